@@ -1,0 +1,1 @@
+"""The configs that come with rtctl, so that a wheel carries them."""

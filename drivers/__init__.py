@@ -1,0 +1,1 @@
+"""Boards, converters, sensors and amplifiers: what stands between a number in the loop and a quantity in the plant."""

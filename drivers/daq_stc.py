@@ -1,0 +1,48 @@
+"""The two 24-bit up/down counters of the AT-MIO-16DE-10's timing chip, the DAQ-STC.
+
+A counter counts edges at its source, up or down as its DIO line says: line 6 for counter 0, line 7 for counter 1.
+It starts at half its size, so that neither direction wraps soon; the reader on the loop side is right through wraps
+all the same, as long as a tick brings fewer than 2^23 counts.
+
+Source: thesis 7.1.1 and appendix D; National Instruments, DAQ-STC Technical Reference Manual.
+"""
+
+from rtctl.idiom import state, tick
+
+SIZE = 1 << 24
+INITIAL_COUNT = SIZE // 2  # 8388608
+DIO_LINE = (6, 7)  # direction of counter 0 and 1: high counts up
+
+COUNTER_STATE = state(n=int)  # counts since the initial count, unwrapped
+READER_STATE = state(n=int, previous=int, position=int)
+
+
+@tick
+def counter_step(s, pulses, up):
+    """Count `pulses` (not negative) up or down as the DIO line says (`up` 1 or 0); returns codes, 0 to 2^24 - 1."""
+    s.n += pulses if up != 0 else -pulses
+    return (INITIAL_COUNT + s.n) & (SIZE - 1)
+
+
+@tick
+def counter_reset(s):
+    """Load the initial count again (ND_RESET, ND_INITIAL_COUNT, ND_PROGRAM)."""
+    s.n = 0
+
+
+@tick
+def counter_position(s, codes):
+    """Signed continuous counts since the initial count, from codes that wrap."""
+    previous = s.previous if s.n != 0 else INITIAL_COUNT
+    s.position += ((codes - previous + INITIAL_COUNT) & (SIZE - 1)) - INITIAL_COUNT
+    s.previous = codes
+    s.n += 1
+    return s.position
+
+
+@tick
+def position_reset(s):
+    """Start again at position 0, as after a reset of the counter."""
+    s.n = 0
+    s.previous = 0
+    s.position = 0

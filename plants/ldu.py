@@ -1,0 +1,151 @@
+"""The Linear Drive Unit: a motor shaft rolls on a transmission wheel, whose capstan rolls along a steel strip.
+
+    K_m1 I = K_m2 th_m' + J_m th_m'' + b_s (th_m' - N th_t') + k_s (th_m - N th_t)                       (F.1-F.3, F.8)
+    N [b_s (th_m' - N th_t') + k_s (th_m - N th_t)] = J_t th_t'' + b_c (th_t' - th_c') + k_c (th_t - th_c)         (F.4)
+    b_c (th_t' - th_c') + k_c (th_t - th_c) = (J_c + M R_c^2) th_c'' + (B_c + R_c^2 B_m) th_c'
+                                              + b_c (th_c' - th_e') + k_c (th_c - th_e) + R_c F_c     (F.5, F.6, F.9)
+    b_c (th_c' - th_e') + k_c (th_c - th_e) = J_e th_e''                                                         (F.7)
+
+The carriage stands at x = R_c th_c. F_c is the dry friction of the carriage, which the thesis finds (12.6) but
+does not write into its equations.
+
+Source: thesis 12.1 and appendix F. Erratum: `b_m` in row 4 of A is b_s; the ninth column of A does not exist.
+The listed k_s, k_c give 239, 919, 951 and 3261 Hz; figure 12.2 shows 114, 254, 286 and 2100 Hz, hence two sets.
+Damping, B_c, B_m, K_m2 are not given; they are chosen for 1 to 5 percent modal damping.
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants import linear
+
+MOTOR, WHEEL, CAPSTAN, ENCODER = range(4)
+NODES = {"motor": MOTOR, "wheel": WHEEL, "capstan": CAPSTAN, "encoder": ENCODER}
+NQ, NU, NX = 4, 1, 10  # four rotations and their speeds, two states of the amplifier
+
+
+class LduParameters(Settings):
+    """Appendix F, as the set says where not given."""
+
+    R_s: float = quantity(1.5e-3, unit="m", gt=0, help="radius of the motor shaft")
+    R_t: float = quantity(3.0e-2, unit="m", gt=0, help="radius of the transmission wheel")
+    R_c: float = quantity(3.0e-3, unit="m", gt=0, help="radius of the capstan")
+    k_s: float = quantity(4.2, unit="Nm/rad", gt=0, help="stiffness of the motor shaft")
+    k_c: float = quantity(7.6, unit="Nm/rad", gt=0, help="stiffness of each half of the capstan")
+    b_s: float = quantity(1.91e-5, unit="Nms/rad", ge=0, help="damping of the motor shaft")
+    b_c: float = quantity(8.13e-4, unit="Nms/rad", ge=0, help="damping of each half of the capstan")
+    J_m: float = quantity(1e-6, unit="kg*m^2", gt=0, help="inertia of the motor")
+    J_t: float = quantity(1e-5, unit="kg*m^2", gt=0, help="inertia of the transmission wheel")
+    J_c: float = quantity(1e-7, unit="kg*m^2", gt=0, help="inertia of the capstan")
+    J_e: float = quantity(3e-6, unit="kg*m^2", gt=0, help="inertia of the encoder")
+    M: float = quantity(1.25, unit="kg", gt=0, help="mass of the carriage")
+    K_m1: float = quantity(21e-3, unit="Nm/A", gt=0, help="motor constant")
+    K_m2: float = quantity(5e-8, unit="Nms/rad", ge=0, help="speed/torque gradient of the motor")
+    B_c: float = quantity(1e-6, unit="Nms/rad", ge=0, help="viscous friction of the capstan's bearing")
+    B_m: float = quantity(0.5, unit="N*s/m", ge=0, help="viscous friction of the carriage")
+    F_c: float = quantity(5.0, unit="N", ge=0, help="dry friction of the carriage")
+
+
+SETS = {
+    "figure_12_2": {},
+    "appendix_f": {"k_s": 10.0, "k_c": 100.0, "M": 5.0, "b_s": 2.9e-5, "b_c": 2.9e-3},
+}
+
+
+class LduSettings(Settings):
+    kind: Literal["ldu"] = "ldu"
+    set: Literal["figure_12_2", "appendix_f"] = "figure_12_2"
+    parameters: LduParameters = LduParameters()
+
+
+class LduParams(NamedTuple):
+    h: float
+    N: float
+    R_c: float
+    k_s: float
+    k_c: float
+    b_s: float
+    b_c: float
+    J_m: float
+    J_t: float
+    J_c: float
+    J_e: float
+    M: float
+    K_m1: float
+    K_m2: float
+    B_c: float
+    B_m: float
+    F_c: float
+    drive: np.ndarray  # (2,) of the amplifier: natural frequency rad/s, damping
+
+
+LDU_STATE = state(m=linear.machine_state(NQ, NX, NU))
+
+
+def parameters(settings: LduSettings) -> LduParameters:
+    """The named set with what the settings say otherwise."""
+    return LduParameters(**{**SETS[settings.set], **settings.parameters.model_dump(exclude_unset=True)})
+
+
+def build(settings: LduSettings, h: float, drive: tuple[float, float]) -> LduParams:
+    """Params for substeps of `h` s; `drive` is the natural frequency (rad/s) and damping of the amplifier."""
+    p = parameters(settings)
+    values = {name: getattr(p, name) for name in LduParams._fields if hasattr(p, name)}
+    return LduParams(h=h, N=p.R_t / p.R_s, drive=np.array(drive, float), **values)
+
+
+@tick
+def assemble(p, A, G):
+    """Fill A (10, 10) and G = [amperes asked for | node torques] (10, 5)."""
+    for i in range(NX):
+        for j in range(NX):
+            A[i, j] = 0.0
+        for j in range(NU + NQ):
+            G[i, j] = 0.0
+    J_load = p.J_c + p.M * p.R_c**2
+    for i in range(NQ):
+        A[i, NQ + i] = 1.0
+    for d in range(2):  # stiffness fills the columns of the positions, damping those of the speeds
+        c = d * NQ
+        s = p.b_s if d == 1 else p.k_s
+        k = p.b_c if d == 1 else p.k_c
+        A[NQ + MOTOR, c + MOTOR] -= s / p.J_m
+        A[NQ + MOTOR, c + WHEEL] += p.N * s / p.J_m
+        A[NQ + WHEEL, c + MOTOR] += p.N * s / p.J_t
+        A[NQ + WHEEL, c + WHEEL] -= (k + p.N**2 * s) / p.J_t
+        A[NQ + WHEEL, c + CAPSTAN] += k / p.J_t
+        A[NQ + CAPSTAN, c + WHEEL] += k / J_load
+        A[NQ + CAPSTAN, c + CAPSTAN] -= 2.0 * k / J_load
+        A[NQ + CAPSTAN, c + ENCODER] += k / J_load
+        A[NQ + ENCODER, c + CAPSTAN] += k / p.J_e
+        A[NQ + ENCODER, c + ENCODER] -= k / p.J_e
+    A[NQ + MOTOR, NQ + MOTOR] -= p.K_m2 / p.J_m
+    A[NQ + CAPSTAN, NQ + CAPSTAN] -= (p.B_c + p.R_c**2 * p.B_m) / J_load
+    inertia = (p.J_m, p.J_t, J_load, p.J_e)
+    for i in range(NQ):
+        G[NQ + i, NU + i] = 1.0 / inertia[i]
+    a = 2 * NQ  # current and its scaled derivative: I' = w x, x' = w (I_wanted - I) - 2 zeta w x
+    w, zeta = p.drive[0], p.drive[1]
+    A[a, a + 1] = w
+    A[a + 1, a] = -w
+    A[a + 1, a + 1] = -2.0 * zeta * w
+    G[a + 1, 0] = w
+    A[NQ + MOTOR, a] = p.K_m1 / p.J_m
+
+
+@tick
+def start(p, s):
+    """Matrices and dry friction; positions and speeds stay as they are (all zero at first)."""
+    s.m.h = p.h
+    s.m.dry_base[CAPSTAN] = p.R_c * p.F_c
+    assemble(p, s.m.A, s.m.G)
+    linear.discretise_into(s.m.A, s.m.G, s.m.h, s.m.Phi_T, s.m.Gamma_T, s.m.work)
+
+
+def state_space(p: LduParams) -> tuple[np.ndarray, np.ndarray]:
+    """A (10, 10) and B (10, 1), amperes in, without dry friction, for design and tests."""
+    A, G = np.zeros((NX, NX)), np.zeros((NX, NU + NQ))
+    assemble(p, A, G)
+    return A, G[:, :NU]

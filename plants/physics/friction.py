@@ -1,0 +1,150 @@
+"""Friction: what resists motion at a node, dry (up to a limit, opposing) or viscous (in proportion to speed).
+
+Dry terms add to the limit of the node's dry friction and the solver finds the force, so that a node that sticks
+stands still. Viscous terms add a force.
+
+Source: Armstrong-Helouvry, Dupont & Canudas de Wit, A survey of models, analysis tools and compensation methods for
+the control of machines with friction, Automatica 30 (1994); thesis (8.3).
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.physics.term import Term
+
+SHAFTS = {
+    "ivu": ("motor1", "motor2", "reel1", "reel2", "capstan"),
+    "ldu": ("motor", "wheel", "capstan", "carriage"),
+    "axis": ("carriage",),
+}
+
+
+class CoulombSettings(Settings):
+    term: Literal["friction.coulomb"] = "friction.coulomb"
+    node: str
+    F_C: float = quantity(unit="", ge=-1e4, le=1e4, help="dry friction on top of the base model's, Nm or N by node")
+
+
+class CoulombParams(NamedTuple):
+    F_C: float
+
+
+def build_coulomb(settings: CoulombSettings, h: float) -> CoulombParams:
+    """Nothing to discretise."""
+    return CoulombParams(settings.F_C)
+
+
+@tick
+def coulomb(p):
+    """Addition to the limit of dry friction, Nm or N."""
+    return p.F_C
+
+
+class ViscousSettings(Settings):
+    term: Literal["friction.viscous"] = "friction.viscous"
+    node: str
+    B: float = quantity(unit="", ge=0, le=1e5, help="viscous friction, Nms/rad or Ns/m by node")
+
+
+class ViscousParams(NamedTuple):
+    B: float
+
+
+def build_viscous(settings: ViscousSettings, h: float) -> ViscousParams:
+    """Nothing to discretise."""
+    return ViscousParams(settings.B)
+
+
+@tick
+def viscous(p, v):
+    """Force on the node at speed `v`, Nm or N."""
+    return -p.B * v
+
+
+class StribeckSettings(Settings):
+    """F_s is the friction at standstill; it falls to the base model's within a few v_s of speed (8.3)."""
+
+    term: Literal["friction.stribeck"] = "friction.stribeck"
+    node: str
+    F_s: float = quantity(unit="", ge=0, le=1e4, help="dry friction at standstill, Nm or N by node")
+    v_s: float = quantity(unit="", gt=0, le=1e3, help="Stribeck speed, rad/s or m/s by node")
+    form: Literal["gaussian", "exponential", "tustin"] = "gaussian"
+
+
+class StribeckParams(NamedTuple):
+    F_s: float
+    v_s: float
+    form: int
+
+
+FORMS = ("gaussian", "exponential", "tustin")
+
+
+def build_stribeck(settings: StribeckSettings, h: float) -> StribeckParams:
+    """Nothing to discretise."""
+    return StribeckParams(settings.F_s, settings.v_s, FORMS.index(settings.form))
+
+
+@tick
+def stribeck(p, F_C, v):
+    """Addition to the limit of dry friction at speed `v` over a base of `F_C`, Nm or N.
+
+    gaussian exp(-(v/v_s)^2) as in (8.3); exponential exp(-|v|/v_s), Bo & Pavelescu 1982; tustin 1/(1+(v/v_s)^2),
+    Hess & Soom 1990.
+    """
+    z = abs(v) / p.v_s
+    if p.form == 0:
+        fall = math.exp(-z * z)
+    elif p.form == 1:
+        fall = math.exp(-z)
+    else:
+        fall = 1.0 / (1.0 + z * z)
+    return (p.F_s - F_C) * fall
+
+
+COULOMB = Term(
+    name="friction.coulomb",
+    words="dry friction: it takes a fixed force to move, whatever the speed",
+    equation="|F| <= F_C at rest, F = -F_C sign(v) in motion",
+    source="Coulomb 1785; Armstrong-Helouvry 1994",
+    settings=CoulombSettings,
+    build=build_coulomb,
+    act="{m}.dry[{i}] += {r} * friction.coulomb({p})",
+    nodes=SHAFTS,
+    look_alikes={
+        "friction.stribeck": "constant speeds from crawl to full: only Stribeck falls at the start",
+        "friction.load": "the same motion at three tensions: only load friction grows",
+        "drive.deadband": "push slowly both ways at standstill under a spring: the dead band shows in u, not in force",
+    },
+    typical={"F_C": (0.05, 0.2)},
+)
+VISCOUS = Term(
+    name="friction.viscous",
+    words="viscous friction: a brake that grows in proportion to speed, as of grease or eddy currents",
+    equation="F = -B v",
+    source="Armstrong-Helouvry 1994",
+    settings=ViscousSettings,
+    build=build_viscous,
+    act="{m}.f[{i}] += {r} * friction.viscous({p}, {r} * {m}.vm[{i}])",
+    nodes=SHAFTS,
+    look_alikes={
+        "friction.coulomb": "constant speeds over a decade: only viscous friction grows with speed",
+        "drive.supply_sag": "load the other motor at constant speed: sag changes the gain, grease does not",
+    },
+)
+STRIBECK = Term(
+    name="friction.stribeck",
+    words="sticking: it takes more to start moving than to keep moving",
+    equation="F = (F_C + (F_s - F_C) exp(-(v/v_s)^2)) sign(v)",
+    source="thesis (8.3); Bo & Pavelescu 1982; Hess & Soom 1990",
+    settings=StribeckSettings,
+    build=build_stribeck,
+    act="{m}.dry[{i}] += {r} * friction.stribeck({p}, {m}.dry_base[{i}] / {r}, {r} * {m}.vm[{i}])",
+    nodes=SHAFTS,
+    look_alikes={
+        "friction.presliding": "reverse within microns: a spring with hysteresis is presliding",
+        "friction.coulomb": "constant speeds from crawl to full: Coulomb stays flat",
+    },
+    typical={"F_s": (1.1, 2.0), "v_s": (0.1, 5.0)},
+)

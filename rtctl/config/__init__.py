@@ -1,0 +1,1 @@
+"""YAML to settings: loading, units, error messages for people, JSON Schema."""

@@ -1,0 +1,1 @@
+"""The Python side of a running controller: supervisor, command protocol, telemetry, recorder."""

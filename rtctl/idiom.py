@@ -1,0 +1,88 @@
+"""The one idiom that everything in the tick shares: settings, params, state, build, step.
+
+    class PdSettings(Settings)       what a person writes in YAML, in the unit of their choice
+    class PdParams(NamedTuple)       what the tick needs: coefficients for this dt
+    PD_STATE = state(e=float)        what it remembers from tick to tick
+    def build(settings, dt)          the only road from the first to the second
+    @tick def step(p, s, ...)        one expression of the law or the physics, compiled
+
+In the running tick `p` and `s` are records inside shared memory; in a test they may as well be the
+named tuple itself and `np.zeros(1, PD_STATE)[0]`: compiled code reads `p.gain` from either.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic.fields import FieldInfo
+
+from rtctl.config.units import to_si
+
+
+def tick(function: Callable[..., Any]) -> Any:
+    """Compile a step. Not cached by itself: the generated module that calls it is, under a name made of all sources.
+
+    IEEE arithmetic in program order (no fastmath, no contraction), so that the same step gives the same bits in
+    whatever module it is compiled; division by zero gives inf instead of raising, since nobody could catch it.
+    """
+    return njit(nogil=True, error_model="numpy", fastmath=False)(function)
+
+
+class Settings(BaseModel):
+    """What a person writes in YAML. SI units or a string with a unit; an unknown key is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False, allow_inf_nan=False)
+
+
+def quantity(default: Any = ..., *, unit: str, help: str, **bounds: Any) -> Any:
+    """A setting with its unit and one line of help, both shown by `rtctl schema`.
+
+    A number is taken as SI; a string may carry any unit of the same dimension ("160 ms", "2.4 mNm").
+    """
+    field = Field(default, description=help, json_schema_extra={"unit": unit}, **bounds)
+    assert isinstance(field, FieldInfo)
+    field.metadata.append(BeforeValidator(lambda value: to_si(value, unit)))  # last: it runs first
+    return field
+
+
+def state(**fields: Any) -> np.dtype:
+    """A state record: `state(e=float, n=int, x=(float, 4), pd=PD_STATE)`. float is f8, int is i8."""
+    return np.dtype([_field(name, kind) for name, kind in fields.items()], align=True)
+
+
+def _field(name: str, kind: Any) -> tuple:
+    if isinstance(kind, tuple):
+        return (name, _scalar(kind[0]), kind[1] if isinstance(kind[1], tuple) else (kind[1],))
+    return (name, _scalar(kind))
+
+
+def _scalar(kind: Any) -> Any:
+    return {float: np.float64, int: np.int64}.get(kind, kind)
+
+
+def record_dtype(params: Any) -> np.dtype:
+    """The record that holds a params tuple in shared memory, nested tuples and arrays included."""
+    fields: list[tuple] = []
+    for name in params._fields:
+        value = getattr(params, name)
+        if hasattr(value, "_fields"):
+            fields.append((name, record_dtype(value)))
+        elif isinstance(value, np.ndarray):
+            fields.append((name, value.dtype, value.shape))
+        elif isinstance(value, (bool, int, np.integer)):
+            fields.append((name, np.int64))
+        else:
+            fields.append((name, np.float64))
+    return np.dtype(fields, align=True)
+
+
+def fill_record(record: Any, params: Any) -> None:
+    """Copy a params tuple into its record, field by field."""
+    for name in params._fields:
+        value = getattr(params, name)
+        if hasattr(value, "_fields"):
+            fill_record(record[name], value)
+        else:
+            record[name] = value

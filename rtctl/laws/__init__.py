@@ -1,0 +1,1 @@
+"""Control laws. One file a law, each in the idiom of rtctl.idiom; nothing here knows of boards, plants or clocks."""

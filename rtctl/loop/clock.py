@@ -1,0 +1,53 @@
+"""The monotonic clock, read and slept on from compiled code. Nanoseconds since boot, as 64-bit integers."""
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+CLOCK_MONOTONIC = 1
+TIMER_ABSTIME = 1
+SECOND = 1_000_000_000
+
+_I32, _I64 = ir.IntType(32), ir.IntType(64)
+_TIMESPEC = ir.LiteralStructType([_I64, _I64])
+_POINTER = _TIMESPEC.as_pointer()
+
+
+@intrinsic
+def now(typing_context):  # type: ignore[no-untyped-def]
+    """Time in ns: clock_gettime(CLOCK_MONOTONIC), a vDSO call without a system call."""
+
+    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(_I32, [_I32, _POINTER]), "clock_gettime"
+        )
+        spec = cgutils.alloca_once(builder, _TIMESPEC)
+        builder.call(function, [ir.Constant(_I32, CLOCK_MONOTONIC), spec])
+        seconds = builder.load(cgutils.gep_inbounds(builder, spec, 0, 0))
+        return builder.add(
+            builder.mul(seconds, ir.Constant(_I64, SECOND)), builder.load(cgutils.gep_inbounds(builder, spec, 0, 1))
+        )
+
+    return types.int64(), codegen
+
+
+@intrinsic
+def sleep_until(typing_context, wake):  # type: ignore[no-untyped-def]
+    """Sleep until `wake` in ns: clock_nanosleep(TIMER_ABSTIME), so that no drift adds up. Returns 0, or EINTR."""
+
+    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(_I32, [_I32, _I32, _POINTER, _POINTER]), "clock_nanosleep"
+        )
+        spec = cgutils.alloca_once(builder, _TIMESPEC)
+        second = ir.Constant(_I64, SECOND)
+        builder.store(builder.sdiv(args[0], second), cgutils.gep_inbounds(builder, spec, 0, 0))
+        builder.store(builder.srem(args[0], second), cgutils.gep_inbounds(builder, spec, 0, 1))
+        result = builder.call(
+            function,
+            [ir.Constant(_I32, CLOCK_MONOTONIC), ir.Constant(_I32, TIMER_ABSTIME), spec, ir.Constant(_POINTER, None)],
+        )
+        return builder.sext(result, _I64)
+
+    return types.int64(types.int64), codegen

@@ -1,0 +1,81 @@
+"""Memory shared between supervisor, loop and plant: one file of named numpy records, and the fence between writers.
+
+A segment lives in /dev/shm and outlives whoever made it, so that the last seconds before a crash can be read back.
+"""
+
+import mmap
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+ALIGN = 64  # one cache line: two writers never share one
+
+
+@intrinsic
+def fence(typing_context):  # type: ignore[no-untyped-def]
+    """A full memory fence: what is written before it is seen before what is written after it."""
+
+    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        builder.fence("seq_cst")
+        return ir.Constant(ir.IntType(64), 0)
+
+    return types.int64(), codegen
+
+
+class Segment:
+    """Named arrays of records in one shared file.
+
+    `Segment.create(path, {"status": (STATUS, 1), ...})` makes it, zeroed; `Segment.open(path, same layout)` maps it in
+    another process. Raises FileNotFoundError where there is none, ValueError where its size does not fit the layout.
+    """
+
+    def __init__(self, path: Path, layout: dict[str, tuple[np.dtype, int]], buffer: mmap.mmap):
+        self.path = path
+        self._buffer = buffer
+        self._arrays: dict[str, np.ndarray] = {}
+        offset = 0
+        for name, (dtype, count) in layout.items():
+            self._arrays[name] = np.frombuffer(buffer, dtype, count, offset)
+            offset = _aligned(offset + dtype.itemsize * count)
+
+    @classmethod
+    def create(cls, path: Path, layout: dict[str, tuple[np.dtype, int]]) -> "Segment":
+        size = _size(layout)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.unlink(missing_ok=True)
+        fd = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600)
+        try:
+            os.ftruncate(fd, size)
+            return cls(path, layout, mmap.mmap(fd, size))
+        finally:
+            os.close(fd)
+
+    @classmethod
+    def open(cls, path: Path, layout: dict[str, tuple[np.dtype, int]]) -> "Segment":
+        fd = os.open(path, os.O_RDWR)
+        try:
+            size = os.fstat(fd).st_size
+            if size != _size(layout):
+                raise ValueError(f"{path}: {size} bytes, but this config needs {_size(layout)}; it is of another version")
+            return cls(path, layout, mmap.mmap(fd, size))
+        finally:
+            os.close(fd)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._arrays[name]
+
+    def unlink(self) -> None:
+        self.path.unlink(missing_ok=True)
+
+
+def _aligned(offset: int) -> int:
+    return (offset + ALIGN - 1) // ALIGN * ALIGN
+
+
+def _size(layout: dict[str, tuple[np.dtype, int]]) -> int:
+    return sum(_aligned(dtype.itemsize * count) for dtype, count in layout.values())

@@ -1,0 +1,51 @@
+"""The ring of trace rows from the loop to the supervisor: one writer, one reader, nobody waits.
+
+The writer overwrites the oldest rows, so that the newest seconds survive a reader that died; the reader counts what
+it did not get. Rows are numbered from 0, so rows written = rows read + rows lost, exactly.
+"""
+
+import numpy as np
+
+from rtctl.idiom import state, tick
+from rtctl.loop.memory import Segment, fence
+
+RING = state(
+    head=int,  # rows written; the loop writes it
+    tail=int,  # rows the reader has taken or given up; the supervisor writes it
+)
+
+
+@tick
+def put(ring, rows, row):
+    """Append the record `row[0]`; allocates nothing."""
+    rows[ring.head % rows.shape[0]] = row[0]
+    fence()  # the row is whole before the head says that it is there
+    ring.head += 1
+
+
+class Reader:
+    """The supervisor's end. `take()` returns a copy of the rows that are new; `lost` counts those overwritten."""
+
+    def __init__(self, segment: Segment):
+        self._ring = segment["ring"][0]
+        self._rows = segment["rows"]
+        self.lost = 0
+        self.gaps: list[tuple[int, int]] = []  # (first row lost, how many) since the last take
+
+    def take(self, most: int | None = None) -> np.ndarray:
+        """New rows, oldest first, at most `most` of them; what was lost before them is in `gaps`."""
+        capacity = len(self._rows)
+        head, tail = int(self._ring["head"]), int(self._ring["tail"])
+        self.gaps = []
+        first = max(tail, head - capacity)
+        last = head if most is None else min(head, first + most)
+        rows = self._rows[np.arange(first, last) % capacity]
+        torn = int(self._ring["head"]) - capacity + 1  # rows below may have been overwritten while they were copied
+        if torn > first:
+            skip = min(torn, last) - first
+            rows, first = rows[skip:], first + skip
+        if first > tail:
+            self.gaps.append((tail, first - tail))
+            self.lost += first - tail
+        self._ring["tail"] = last
+        return rows

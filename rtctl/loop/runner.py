@@ -1,0 +1,182 @@
+"""The loops. The generator copies them into the generated module, beneath the `tick` and the plant that it wrote.
+
+What stands here is the loop as it runs; only `tick`, `start`, `advance`, `sample` and `link` are the generated module's.
+"""
+
+from typing import Any
+
+from rtctl.loop import clock, histogram, mailbox, ring
+
+tick: Any = None  # the generated tick: tick(p, s, t, c, rx, tx, y, k, fresh, late)
+start: Any = None  # the generated plant: start(p, s), advance(p, s, tx), sample(p, s, rx)
+advance: Any = None
+sample: Any = None
+link: Any = None  # rtctl.loop.zmq_link or shm_link
+
+
+def run_real(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_staged, out, inp, period, spin, late_ns, ahead, most):
+    """Wake, tick, sleep, on the wall clock, until told to stop or `most` ticks are done."""
+    st = status[0]
+    wake = clock.now() + period
+    st.first_ns = wake
+    before = wake
+    for k in range(most):
+        if st.stop != 0:
+            break
+        clock.sleep_until(wake - spin)
+        woke = clock.now()
+        while woke < wake:  # short spin, and sleeps cut short by a signal
+            woke = clock.now()
+        lateness = woke - wake
+        skipped = lateness // period  # a late tick is counted and never made up for
+        late = 1 if lateness > late_ns else 0
+        if ahead != 0:
+            send(st, out, tx, woke)
+        mailbox.take(box, staged, p, c)
+        fresh = link.receive_newest(inp, rx, rx_staged)
+        if fresh > 0:
+            st.link_frames += fresh
+            histogram.add(st.age, woke - rx[0].t_ns)
+            histogram.add(st.round_trip, clock.now() - rx[0].outputs_t_ns)
+        y[0].tick = k
+        y[0].t = (woke - st.first_ns) * 1e-9
+        y[0].period = (woke - before) * 1e-9
+        y[0].lateness = lateness * 1e-9
+        was = st.state
+        tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], k, fresh, late)
+        if ahead == 0 or (s[0].safety.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
+            send(st, out, tx, clock.now())
+        ring.put(ring_[0], rows, y)
+        account(st, s[0].safety, k, rx[0].lost_counts)
+        st.missed += skipped
+        st.late += late
+        before = woke
+        wake += (skipped + 1) * period
+        done = clock.now()
+        histogram.add(st.lateness, lateness)
+        histogram.add(st.ticks, done - woke)
+        if done > wake:
+            st.overruns += 1
+        if st.supervisor_lost != 0:
+            break
+    tx[0].ao_codes[:] = 0
+    tx[0].dio_lines = 0
+    tx[0].state = 0
+    for _ in range(3):  # a lost frame must not leave the outputs on
+        send(st, out, tx, clock.now())
+        clock.sleep_until(clock.now() + period)
+    st.ended = 1
+
+
+def run_lockstep(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_staged, held, out, inp, period, ahead, first, most):
+    """Loop and plant take turns on a virtual clock: wait for a sample, tick, send what acts until the next."""
+    st = status[0]
+    for k in range(first, first + most):
+        if st.stop != 0 or st.supervisor_lost != 0:
+            break
+        if link.receive(inp, rx, rx_staged) == 0:
+            st.failed = 1
+            break
+        st.link_frames += 1
+        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, period, ahead, k)
+        send(st, out, held, clock.now())
+
+
+def run_fused(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, pp, ps, period, ahead, first, most):
+    """Loop and plant in one process on a virtual clock, as fast as they go; to the bit as in lockstep."""
+    st = status[0]
+    if first == 0:
+        start(pp[0], ps[0])
+        sample(pp[0], ps[0], rx[0])
+    for k in range(first, first + most):
+        if st.stop != 0 or st.supervisor_lost != 0:
+            break
+        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, period, ahead, k)
+        advance(pp[0], ps[0], held[0])
+        sample(pp[0], ps[0], rx[0])
+
+
+def virtual(st, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, period, ahead, k):
+    """One tick on the virtual clock; `held` then has the outputs that act until the next."""
+    mailbox.take(box, staged, p, c)
+    if ahead != 0:
+        held[0] = tx[0]
+    y[0].tick = k
+    y[0].t = k * (period * 1e-9)
+    y[0].period = period * 1e-9
+    y[0].lateness = 0.0
+    was = st.state
+    tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], k, 1, 0)
+    if ahead == 0 or (s[0].safety.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
+        held[0] = tx[0]
+    ring.put(ring_[0], rows, y)
+    account(st, s[0].safety, k, rx[0].lost_counts)
+
+
+def send(st, out, frame, now):
+    """Send the outputs with a number and the time on them."""
+    frame[0].seq += 1
+    frame[0].t_ns = now
+    if not link.send(out, frame):
+        st.link_dropped += 1
+
+
+def account(st, safety, k, lost_counts):
+    """What the supervisor sees at once, without reading the ring."""
+    st.tick = k + 1
+    st.state = safety.state
+    st.trip = safety.trip
+    st.trip_tick = safety.trip_tick
+    st.lost_counts = lost_counts
+    st.ready = 1
+
+
+def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind):
+    """The emulated machine on its own clock: newest outputs in, one period on, sample out."""
+    st = status[0]
+    start(p[0], s[0])
+    sample(p[0], s[0], rx[0])
+    wake = clock.now() + period
+    while st.stop == 0:
+        clock.sleep_until(wake)
+        woke = clock.now()
+        if link.receive_newest(inp, tx, tx_staged) > 0:
+            st.frames += 1
+        periods = 1 + (woke - wake) // period  # a machine does not stop because its emulator was late
+        if periods > 1:
+            st.catch_ups += 1
+        if periods > most_behind:
+            st.skipped += periods - most_behind
+            wake += (periods - most_behind) * period
+            periods = most_behind
+        for _ in range(periods):
+            advance(p[0], s[0], tx[0])
+        sample(p[0], s[0], rx[0])
+        answer(st, rx, tx, out, clock.now())
+        wake += periods * period
+        histogram.add(st.ticks, clock.now() - woke)
+
+
+def plant_lockstep(status, p, s, tx, tx_staged, rx, out, inp):
+    """The emulated machine on the loop's virtual clock: sample out, outputs in, one period on."""
+    st = status[0]
+    start(p[0], s[0])
+    while st.stop == 0:
+        sample(p[0], s[0], rx[0])
+        answer(st, rx, tx, out, clock.now())
+        while link.receive(inp, tx, tx_staged) == 0:
+            if st.stop != 0:
+                return
+        st.frames += 1
+        advance(p[0], s[0], tx[0])
+
+
+def answer(st, rx, tx, out, now):
+    """Send a sample with its number, its time, and which outputs it has seen."""
+    rx[0].seq += 1
+    rx[0].t_ns = now
+    rx[0].outputs_seq = tx[0].seq
+    rx[0].outputs_t_ns = tx[0].t_ns
+    link.send(out, rx)
+    st.tick += 1
+    st.ready = 1

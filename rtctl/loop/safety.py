@@ -1,0 +1,199 @@
+"""The safety machine: idle, armed, running, tripped, and what trips it.
+
+    idle     outputs at zero
+    armed    outputs on, the machine is brought to its starting point and holds it
+    running  follows the reference
+    tripped  outputs are taken to zero from the very tick of the trip; only `reset` leads back to idle
+
+A trip latches its first cause. Every limit that is 0 (or infinite) is switched off.
+
+Source: the state machine of IEC 61800-7 drives, reduced to what a bench needs.
+"""
+
+from typing import NamedTuple
+
+from pydantic import Field
+
+from rtctl.idiom import Settings, quantity, state, tick
+
+IDLE, ARMED, RUNNING, TRIPPED = range(4)
+STATES = ("idle", "armed", "running", "tripped")
+
+NONE, LINK, FROZEN, FOLLOWING, TENSION, CURRENT, NOT_A_NUMBER, MISSED, COMMANDER, START_UP, SUPERVISOR = range(11)
+TRIPS = {
+    NONE: ("none", "no trip"),
+    LINK: ("link_lost", "the plant or board has sent nothing for too long: is it running, is the cable in?"),
+    FROZEN: ("encoder_frozen", "the drive pulls and the encoder does not move: blocked machine or dead encoder"),
+    FOLLOWING: ("following_error", "the machine is too far from its reference"),
+    TENSION: ("tension", "the estimated tape tension is out of range: torn, folded or jammed tape"),
+    CURRENT: ("current_time", "the drive has been asked for more than its continuous current for too long"),
+    NOT_A_NUMBER: ("not_a_number", "a signal or the law's output is not a number"),
+    MISSED: ("missed_ticks", "too many ticks in a row came late: the machine cannot hold this rate"),
+    COMMANDER: ("commander_lost", "nobody has talked to the command socket for too long, and the config requires it"),
+    START_UP: ("start_up", "the start-up routine did not find the reel radii"),
+    SUPERVISOR: ("supervisor_lost", "the supervisor has died"),
+}
+
+
+class SafetySettings(Settings):
+    link_timeout: float = quantity(0.05, unit="s", gt=0, help="longest time without a frame from plant or board")
+    frozen_time: float = quantity(0.2, unit="s", ge=0, help="longest effort without a count; 0 switches it off")
+    frozen_effort: float = quantity(1.0, unit="V", gt=0, help="command above which something should move")
+    following_error: float = quantity(0.0, unit="", ge=0, help="largest error, rad or m; 0 switches it off")
+    tension_min: float = quantity(-1e9, unit="N", help="lowest estimated tension while running")
+    tension_max: float = quantity(1e9, unit="N", help="highest estimated tension while running")
+    tension_time: float = quantity(0.05, unit="s", ge=0, help="how long the tension may be out of range")
+    current: float = quantity(1.0, unit="A", gt=0, help="continuous current of a drive")
+    current_time: float = quantity(2.0, unit="s", ge=0, help="how long it may be exceeded; 0 switches it off")
+    missed_ticks: int = Field(default=10, ge=0, description="late ticks in a row that trip; 0 switches it off")
+    require_commander: bool = Field(default=False, description="trip where nobody talks to the command socket")
+    commander_timeout: float = quantity(1.0, unit="s", gt=0, help="how long the command socket may be silent")
+    ramp: float = quantity(0.0, unit="s", ge=0, help="time in which a trip takes the outputs to zero; 0 is at once")
+
+
+class SafetyParams(NamedTuple):
+    link: int  # ticks
+    frozen: int
+    frozen_effort: float
+    following: float
+    tension_min: float
+    tension_max: float
+    tension: int
+    current: float
+    current_time: int
+    missed: int
+    fade: float  # share of the output that a trip takes away each tick
+
+
+SAFETY_STATE = state(
+    state=int,
+    trip=int,
+    trip_tick=int,
+    arm=int,  # requests seen
+    disarm=int,
+    reset=int,
+    armed_for=int,  # ticks in `armed`
+    silent=int,  # ticks without a frame
+    still=int,
+    over=int,
+    slack=int,
+    late=int,
+    counts=int,
+    hold=(float, 2),  # outputs of the last tick before the trip, V
+    gate=float,  # share of them that is still written: 1, falling to 0 after a trip
+    on=int,  # 1 in the tick in which the outputs come on
+)
+
+
+def build(settings: SafetySettings, dt: float) -> SafetyParams:
+    """Limits in ticks of `dt` s. Raises ValueError where the tension range is empty."""
+    if settings.tension_min >= settings.tension_max:
+        raise ValueError(f"tension_min {settings.tension_min:g} N is not below tension_max {settings.tension_max:g} N")
+    return SafetyParams(
+        link=max(round(settings.link_timeout / dt), 1),
+        frozen=round(settings.frozen_time / dt),
+        frozen_effort=settings.frozen_effort,
+        following=settings.following_error,
+        tension_min=settings.tension_min,
+        tension_max=settings.tension_max,
+        tension=round(settings.tension_time / dt),
+        current=settings.current,
+        current_time=round(settings.current_time / dt),
+        missed=settings.missed_ticks,
+        fade=1.0 if settings.ramp <= dt else dt / settings.ramp,
+    )
+
+
+@tick
+def trip(s, cause, k):
+    """Latch a cause, unless one is latched already or nothing is on."""
+    if s.state == ARMED or s.state == RUNNING:
+        s.state = TRIPPED
+        s.trip = cause
+        s.trip_tick = k
+
+
+@tick
+def command(s, c):
+    """Take requests: arm leads from idle to armed, disarm to idle, reset from tripped to idle. Sets s.on."""
+    s.on = 0
+    if c.reset != s.reset:
+        s.reset = c.reset
+        if s.state == TRIPPED:
+            s.state = IDLE
+            s.trip = NONE
+    if c.disarm != s.disarm:
+        s.disarm = c.disarm
+        if s.state != TRIPPED:
+            s.state = IDLE
+    if c.arm != s.arm:
+        s.arm = c.arm
+        if s.state == IDLE:
+            s.state = ARMED
+            s.on = 1
+            s.armed_for = 0
+            s.gate = 1.0
+            s.silent = 0
+            s.still = 0
+            s.over = 0
+            s.slack = 0
+            s.late = 0
+    if s.state == ARMED:
+        s.armed_for += 1
+
+
+@tick
+def check_timing(p, s, c, fresh, late, k):
+    """Link, lateness and commander, at the start of tick `k`: `fresh` frames came, `late` is 1 where it woke late."""
+    s.silent = 0 if fresh > 0 else s.silent + 1
+    s.late = s.late + 1 if late != 0 else 0
+    if s.silent > p.link:
+        trip(s, LINK, k)
+    if p.missed > 0 and s.late >= p.missed:
+        trip(s, MISSED, k)
+    if c.commander_lost != 0:
+        trip(s, COMMANDER, k)
+
+
+@tick
+def check_motion(p, s, error, counts, effort, amperes, k):
+    """Following error (rad or m), encoder against `effort` (V), current (A), anything not a number."""
+    total = error + effort + amperes
+    if total != total or abs(total) > 1e300:
+        trip(s, NOT_A_NUMBER, k)
+    if p.following > 0.0 and abs(error) > p.following:
+        trip(s, FOLLOWING, k)
+    s.still = s.still + 1 if counts == s.counts and abs(effort) > p.frozen_effort else 0
+    s.counts = counts
+    if p.frozen > 0 and s.still > p.frozen:
+        trip(s, FROZEN, k)
+    s.over = s.over + 1 if amperes > p.current else 0
+    if p.current_time > 0 and s.over > p.current_time:
+        trip(s, CURRENT, k)
+
+
+@tick
+def check_tension(p, s, T1, T2, k):
+    """Estimated tensions in N, while running."""
+    out = min(T1, T2) < p.tension_min or max(T1, T2) > p.tension_max
+    s.slack = s.slack + 1 if out and s.state == RUNNING else 0
+    if s.slack > p.tension:
+        trip(s, TENSION, k)
+
+
+@tick
+def gate(p, s, u, channel):
+    """The voltage that may be written: `u` while on, what is left of the last one after a trip, else 0."""
+    if s.state == ARMED or s.state == RUNNING:
+        s.hold[channel] = u if u == u else 0.0
+        return s.hold[channel]
+    if s.state == TRIPPED:
+        return s.hold[channel] * s.gate
+    return 0.0
+
+
+@tick
+def fade(p, s):
+    """After a trip, one tick's share less of the outputs. Call once a tick, before `gate`."""
+    if s.state == TRIPPED:
+        s.gate = max(s.gate - p.fade, 0.0)

@@ -1,0 +1,77 @@
+"""The link over shared memory: one slot each way and a futex to wait on. Same machine only; five microseconds.
+
+A slot is a sequence lock: odd while it is written. Whoever reads takes the newest whole frame or none.
+
+Source: futex(2).
+"""
+
+import numpy as np
+from numba import types
+
+from rtctl.idiom import tick
+from rtctl.loop import frames
+from rtctl.loop.memory import fence
+
+SYS_FUTEX = 202  # x86-64
+WAIT, WAKE = 0, 1
+TIMEOUT_NS = 5_000_000_000
+
+syscall = types.ExternalFunction(
+    "syscall", types.int64(types.int64, types.intp, types.int64, types.int64, types.intp, types.intp, types.int64)
+)
+
+
+def slot_dtype(frame: np.dtype) -> np.dtype:
+    """Record of one direction: written by its sender but for `seen`, which its receiver writes."""
+    return np.dtype(
+        [("count", np.int32), ("pad", np.int32), ("seen", np.int64), ("wait", np.int64, (2,)), ("frame", frame)],
+        align=True,
+    )
+
+
+OUTPUTS_SLOT, INPUTS_SLOT = slot_dtype(frames.OUTPUTS), slot_dtype(frames.INPUTS)
+
+
+@tick
+def send(slot, frame):
+    """Write the frame into the slot and wake who waits for it."""
+    slot[0].count += 1
+    fence()
+    slot[0].frame = frame[0]
+    fence()
+    slot[0].count += 1
+    syscall(SYS_FUTEX, slot.ctypes.data, WAKE, 1, 0, 0, 0)  # `count` is the first field of the record
+    return True
+
+
+@tick
+def receive_newest(slot, frame, staged):
+    """The newest frame, if there is one not yet seen; returns 1 or 0, and never waits."""
+    count = slot[0].count
+    if count == slot[0].seen or count % 2 == 1:
+        return 0
+    fence()
+    staged[0] = slot[0].frame
+    fence()
+    if slot[0].count != count or not frames.valid(staged[0]):
+        return 0
+    frame[0] = staged[0]
+    slot[0].seen = count
+    return 1
+
+
+@tick
+def receive(slot, frame, staged):
+    """Wait for a new frame, at most five seconds; returns 1, or 0 where none came."""
+    for _ in range(1000):
+        if receive_newest(slot, frame, staged) == 1:
+            return 1
+        count = slot[0].count
+        slot[0].wait[0] = TIMEOUT_NS // 1_000_000_000
+        slot[0].wait[1] = 0
+        if count == slot[0].seen and syscall(SYS_FUTEX, slot.ctypes.data, WAIT, count, slot.wait.ctypes.data, 0, 0) < 0:
+            if receive_newest(slot, frame, staged) == 1:
+                return 1
+            if slot[0].count == count:
+                return 0
+    return 0

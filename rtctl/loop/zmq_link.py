@@ -1,0 +1,69 @@
+"""The link over ZeroMQ, called from compiled code: one DEALER socket at each end, whole frames, newest wins.
+
+The sockets are made and secured in Python (pyzmq); the tick gets their handles. Sending never blocks: a plant that is
+gone costs frames, not time. The libzmq is the one inside the pyzmq wheel, made known to the compiler by `load()`.
+
+Source: zmq_send(3), zmq_recv(3); thread safety: the handle stays with the thread that runs the loop.
+"""
+
+import glob
+from pathlib import Path
+
+import llvmlite.binding
+import zmq
+from numba import types
+
+from rtctl.idiom import tick
+from rtctl.loop import frames
+
+DONTWAIT = 1
+MOST = 64  # frames drained in one tick: a peer that floods us cannot hold the tick
+
+zmq_send = types.ExternalFunction("zmq_send", types.int32(types.intp, types.intp, types.uintp, types.int32))
+zmq_recv = types.ExternalFunction("zmq_recv", types.int32(types.intp, types.intp, types.uintp, types.int32))
+
+
+def load() -> None:
+    """Make libzmq's functions known to compiled code. Raises OSError where the wheel holds no libzmq."""
+    root = Path(zmq.__file__).parent
+    for pattern in (root.parent / "pyzmq.libs" / "libzmq*", root / "libzmq*", root / ".dylibs" / "libzmq*"):
+        for found in glob.glob(str(pattern)):
+            llvmlite.binding.load_library_permanently(found)
+            return
+    import ctypes.util
+
+    name = ctypes.util.find_library("zmq")
+    if name is None:
+        raise OSError("libzmq was found neither inside pyzmq nor on the system; use link: {kind: shm}")
+    llvmlite.binding.load_library_permanently(name)
+
+
+@tick
+def send(link, frame):
+    """Send the record array `frame` (1,) without waiting; returns whether it was taken."""
+    return zmq_send(link, frame.ctypes.data, frame.itemsize, DONTWAIT) == frame.itemsize
+
+
+@tick
+def receive_newest(link, frame, staged):
+    """Drain the socket; the newest valid frame is in `frame`. Returns how many valid ones came."""
+    fresh = 0
+    for _ in range(MOST):
+        if zmq_recv(link, staged.ctypes.data, staged.itemsize, DONTWAIT) < 0:
+            break
+        if frames.valid(staged[0]):
+            frame[0] = staged[0]
+            fresh += 1
+    return fresh
+
+
+@tick
+def receive(link, frame, staged):
+    """Wait for the next valid frame, as long as the socket's timeout; returns 1, or 0 where none came."""
+    for _ in range(MOST):
+        if zmq_recv(link, staged.ctypes.data, staged.itemsize, 0) < 0:
+            return 0
+        if frames.valid(staged[0]):
+            frame[0] = staged[0]
+            return 1
+    return 0

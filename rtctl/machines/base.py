@@ -1,0 +1,140 @@
+"""What every machine's config shares, and the block diagram from which its tick is generated."""
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from rtctl.idiom import Settings, quantity
+from rtctl.loop.safety import SafetySettings
+
+
+class Column(NamedTuple):
+    """One signal of the trace."""
+
+    name: str
+    unit: str
+    help: str
+
+
+class Block(NamedTuple):
+    """One block of the diagram: its name in `p` and `s`, its params (None for none) and its state (None for none)."""
+
+    name: str
+    params: Any
+    state: np.dtype | None
+
+
+class Diagram(NamedTuple):
+    """A machine's tick: what it uses, what it holds, what it traces, and its lines in order, each stage with a name."""
+
+    uses: tuple[str, ...]  # modules, e.g. "rtctl.laws.pd"
+    blocks: tuple[Block, ...]
+    columns: tuple[Column, ...]
+    stages: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+class PlantDiagram(NamedTuple):
+    """An emulated machine: lines that start it, that advance it by one period, and that sample its sensors."""
+
+    uses: tuple[str, ...]
+    blocks: tuple[Block, ...]
+    truth: tuple[Column, ...]  # what the emulator tells beside the sensors, in the order of the frame's truth
+    start: tuple[str, ...]
+    advance: tuple[tuple[str, tuple[str, ...]], ...]
+    sample: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+class LinkSettings(Settings):
+    kind: Literal["zmq", "shm"] = Field(default="zmq", description="ZeroMQ (also across machines) or shared memory")
+    endpoint: str | None = Field(
+        default=None, description="where the plant listens, e.g. tcp://bench2:5570; a local socket if absent"
+    )
+    plant: Literal["spawn", "external"] = Field(
+        default="spawn", description="spawn: start the emulator with the loop; external: somebody else runs `rtctl plant`"
+    )
+    timeout: float = quantity(5.0, unit="s", gt=0, help="how long to wait for the plant at the start and in lockstep")
+    keys: str | None = Field(default=None, description="name of the CURVE keys, needed for anything but this machine")
+
+
+class LoopSettings(Settings):
+    rate: float = quantity(unit="Hz", gt=0.1, le=50e3, help="ticks a second")
+    mode: Literal["real", "lockstep", "fused"] = Field(
+        default="real", description="real: wall clock; lockstep: virtual time, two processes; fused: virtual, in one"
+    )
+    write: Literal["next_tick", "same_tick"] = Field(
+        default="next_tick",
+        description="next_tick: outputs leave at the start of the next tick, one period after they were due but always "
+        "by the same time; same_tick: they leave as soon as they are computed",
+    )
+    realtime: Literal["required", "preferred", "off"] = Field(
+        default="preferred", description="required: refuse to start without SCHED_FIFO and locked memory"
+    )
+    priority: int = Field(default=80, ge=1, le=99, description="SCHED_FIFO priority of the loop's thread")
+    cpu: int | None = Field(default=None, ge=0, description="CPU of the loop; the last one if absent")
+    spin: float = quantity(0.0, unit="s", ge=0, le=1e-3, help="end of each sleep that is spent polling the clock")
+    late: float = Field(default=0.5, gt=0, le=1, description="share of a period beyond which a tick counts as late")
+    seed: int = Field(default=1, ge=0, description="seed of dither and noise in the emulated board")
+
+
+class RecordSettings(Settings):
+    seconds: float = quantity(20.0, unit="s", gt=0, help="length of the ring between loop and supervisor")
+    batch: float = quantity(0.1, unit="s", gt=0, le=10, help="longest time until a row is on disk")
+    truth: bool = Field(default=True, description="record what the emulator knows beside what sensors say")
+    trace: list[str] = Field(default=[], description="state fields to record besides, e.g. position.d")
+
+
+class CommandSettings(Settings):
+    endpoint: str | None = Field(default=None, description="command socket; a local socket if absent")
+    telemetry: str | None = Field(default=None, description="telemetry socket; a local socket if absent")
+    telemetry_period: float = quantity(0.02, unit="s", ge=0.01, le=1, help="time between telemetry messages")
+    telemetry_rate: float = quantity(1000.0, unit="Hz", gt=0, help="most rows a second in the telemetry")
+    keys: str | None = Field(default=None, description="name of the CURVE keys, needed for anything but this machine")
+
+
+class MachineSettings(Settings):
+    """Keys that every machine's config has."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$", description="name of this machine; one daemon a name")
+    loop: LoopSettings
+    link: LinkSettings = LinkSettings()
+    safety: SafetySettings = SafetySettings()
+    record: RecordSettings = RecordSettings()
+    commands: CommandSettings = CommandSettings()
+
+
+COMMON_COLUMNS = (
+    Column("tick", "", "number of the tick"),
+    Column("t", "s", "controller clock at the tick"),
+    Column("period", "s", "measured time since the tick before"),
+    Column("lateness", "s", "how late the tick woke"),
+    Column("state", "", "0 idle, 1 armed, 2 running, 3 tripped"),
+    Column("trip", "", "cause of the trip, 0 for none"),
+    Column("link_age", "ticks", "ticks since plant or board last sent a frame"),
+)
+STATE_LINES = (
+    "safety.command(s.safety, c)",
+    "safety.check_timing(p.safety, s.safety, c, fresh, late, k)",
+)
+TRACE_LINES = (
+    "y.state = s.safety.state",
+    "y.trip = s.safety.trip",
+    "y.link_age = s.safety.silent",
+)
+
+
+def physics_lines(terms: list[Any], kind: str, nodes: dict[str, tuple[int, str]], dt: float) -> tuple[Any, Any, Any]:
+    """Modules, blocks and lines of the plant's terms. `nodes` gives index and the factor to the node's own unit."""
+    from rtctl.plants.physics import TERMS
+
+    uses: list[str] = []
+    blocks: list[Block] = []
+    lines: list[str] = []
+    for number, settings in enumerate(terms):
+        term = TERMS[settings.term]
+        index, factor = nodes[settings.node]
+        name = f"term{number}"
+        blocks.append(Block(name, term.build(settings, dt), term.state))
+        uses.append(term.build.__module__)
+        lines.append(term.act.format(p=f"p.{name}", s=f"s.{name}", m="s.plant.m", i=index, r=factor))
+    return tuple(dict.fromkeys(uses)), tuple(blocks), tuple(lines)

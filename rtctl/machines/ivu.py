@@ -1,0 +1,517 @@
+"""The Image Verification Unit at 500 Hz: a board, two drivers, a capstan encoder, two reel sensors, one PD loop.
+
+Block diagram of the tick, thesis figure 5.1:
+
+    reference -> shaper -> error -> PD -> + friction + excitation -> allocation to two motors (+ tension) -> limits
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from rtctl.drivers import at_mio_16de, daq_stc, l292, ls7084, optical_sensor
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.laws import (
+    allocation,
+    bumpless,
+    excitation,
+    friction_feedforward,
+    gain_schedule,
+    limit,
+    pd,
+    reel_radius,
+    reference,
+    shaper,
+    tension,
+    tension_estimate,
+    velocity,
+)
+from rtctl.laws.allocation import AllocationSettings
+from rtctl.drivers.at_mio_16de import AnalogInputSettings, AnalogOutputSettings
+from rtctl.laws.bumpless import BumplessSettings
+from rtctl.laws.excitation import ExcitationSettings, NoneSettings
+from rtctl.laws.friction_feedforward import FrictionFeedforwardSettings
+from rtctl.laws.gain_schedule import GainScheduleSettings
+from rtctl.drivers.l292 import L292Settings
+from rtctl.laws.limit import LimitSettings
+from rtctl.drivers.ls7084 import Ls7084Settings
+from rtctl.drivers.optical_sensor import OpticalSensorSettings
+from rtctl.laws.pd import PdSettings
+from rtctl.laws.reel_radius import ReelRadiusSettings
+from rtctl.laws.reference import ReferenceSettings
+from rtctl.laws.shaper import ShaperSettings
+from rtctl.laws.tension import TensionSettings
+from rtctl.laws.tension_estimate import TensionEstimateSettings
+from rtctl.laws.velocity import VelocitySettings
+from rtctl.loop import safety
+from rtctl.machines.base import (
+    COMMON_COLUMNS,
+    STATE_LINES,
+    TRACE_LINES,
+    Block,
+    Column,
+    Diagram,
+    MachineSettings,
+    PlantDiagram,
+    physics_lines,
+)
+from rtctl.machines.physics import PhysicsTerm, check_nodes
+from rtctl.plants import ivu as plant_ivu
+
+
+class BoardSettings(Settings):
+    """AT-MIO-16DE-10: outputs 0 and 1 to the drivers, counter 0 on the capstan, two inputs on the reel sensors."""
+
+    output1: AnalogOutputSettings = AnalogOutputSettings(channel=0)
+    output2: AnalogOutputSettings = AnalogOutputSettings(channel=1)
+    reel1: AnalogInputSettings = AnalogInputSettings(channel=0, polarity="unipolar", gain=1)
+    reel2: AnalogInputSettings = AnalogInputSettings(channel=1, polarity="unipolar", gain=1)
+    dither: bool = Field(default=False, description="0.5 LSB rms of noise on every analog input")
+
+
+class SensorSettings(Settings):
+    capstan: Ls7084Settings = Ls7084Settings(lines=2500)
+    reel1: OpticalSensorSettings = OpticalSensorSettings()
+    reel2: OpticalSensorSettings = OpticalSensorSettings()
+
+
+class RadiusSettings(Settings):
+    """Reel radii that the laws use: given, or measured when the machine is armed (5.2, 6.2)."""
+
+    source: Literal["given", "measured"] = Field(default="given", description="given: R1 and R2 below; measured: at arming")
+    R1: float = quantity(0.038, unit="m", gt=0.005, le=0.2, help="radius of reel 1")
+    R2: float = quantity(0.022, unit="m", gt=0.005, le=0.2, help="radius of reel 2")
+    d_tape: float = quantity(0.5e-3, unit="m", ge=0, help="thickness of the tape, by which the radii follow it")
+    measure: ReelRadiusSettings = ReelRadiusSettings()
+
+
+class FrictionSettings(Settings):
+    """Friction compensation: of the motor that winds, always; of the one that pays out, while it turns."""
+
+    motor1: FrictionFeedforwardSettings = FrictionFeedforwardSettings(
+        tau_C=2.4e-3
+    )
+    motor2: FrictionFeedforwardSettings = FrictionFeedforwardSettings(
+        tau_C=2.4e-3
+    )
+    speed: float = quantity(0.3, unit="rad/s", gt=0, help="reference speed at which the paying motor is fully compensated")
+
+
+class IvuLawSettings(Settings):
+    shaper: ShaperSettings = ShaperSettings()
+    position: PdSettings
+    gain_schedule: GainScheduleSettings = GainScheduleSettings()
+    friction: FrictionSettings = FrictionSettings()
+    tension: TensionSettings = TensionSettings()
+    allocation: AllocationSettings = AllocationSettings()
+    limit: LimitSettings = LimitSettings()
+    bumpless: BumplessSettings = BumplessSettings()
+    velocity: VelocitySettings = VelocitySettings(filter=30.0)
+    tension_estimate: TensionEstimateSettings = TensionEstimateSettings()
+
+
+class IvuPlantSettings(plant_ivu.IvuSettings):
+    rate: float | None = quantity(None, unit="Hz", gt=0, help="rate of the emulator in real mode; 2 kHz if absent")
+    substep: float = quantity(5e-4, unit="s", gt=0, le=2e-3, help="longest integration step")
+    follow_tape: bool = Field(default=True, description="radii and inertias follow the tape (4.3-4.8)")
+    driver: L292Settings = L292Settings()
+    physics: list[PhysicsTerm] = Field(default=[], description="terms of physics beyond the equations")
+
+    @model_validator(mode="after")
+    def _nodes(self) -> "IvuPlantSettings":
+        check_nodes(self.physics, "ivu")
+        return self
+
+
+class IvuConfig(MachineSettings):
+    machine: Literal["ivu"] = "ivu"
+    board: BoardSettings = BoardSettings()
+    sensors: SensorSettings = SensorSettings()
+    radius: RadiusSettings = RadiusSettings()
+    law: IvuLawSettings
+    reference: ReferenceSettings = ReferenceSettings()
+    excitation: ExcitationSettings = NoneSettings()
+    plant: IvuPlantSettings = IvuPlantSettings()
+    R_c: float = quantity(0.0125, unit="m", gt=0, help="radius of the capstan, for millimetres")
+
+
+PLANT_RATE = 2000.0  # Hz, of the free-running emulator: a sample is at most half a millisecond old
+UNIT = "rad"
+
+
+def radius(config: IvuConfig) -> float:
+    """Radius that turns metres of tape into radians of the capstan."""
+    return config.R_c
+
+
+def metres_per_unit(config: IvuConfig) -> float:
+    """Tape moved per radian of capstan."""
+    return config.R_c
+
+
+class IvuParams(NamedTuple):
+    measure: int
+    R1: float
+    R2: float
+    grow: float  # d_tape R_c / pi: R^2 grows by this per rad of capstan
+    trail_speed: float
+    settle: int  # ticks from arming to running
+
+
+IVU_STATE = state(
+    R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float, k_run=int, gains=int, play=int, prepared=int, u_fb=float
+)
+
+
+@tick
+def switch_on(p, s, phi):
+    """The tick in which outputs come on: every law starts from where the machine stands."""
+    reference.hold(0, s.reference, phi)
+    shaper.reset(p.shaper, s.shaper, phi)
+    pd.reset(p.position, s.position)
+    velocity.reset(p.velocity, s.velocity)
+    velocity.reset(p.velocity, s.acceleration)
+    velocity.reset(p.velocity, s.reference_speed)
+    friction_feedforward.reset(p.friction1, s.friction1)
+    friction_feedforward.reset(p.friction2, s.friction2)
+    tension.reset(p.tension, s.tension)
+    bumpless.reset(p.bumpless, s.bumpless)
+    reel_radius.reset(p.reel_radius, s.reel_radius)
+    limit.reset(p.limit, s.limit1, 0.0)
+    limit.reset(p.limit, s.limit2, 0.0)
+    s.machine.prepared = 0
+    if s.machine.R1 == 0.0 or p.machine.measure == 0:
+        _set_radii(s.machine, p.machine.R1, p.machine.R2, phi)
+
+
+@tick
+def _set_radii(m, R1, R2, phi):
+    m.R1_0, m.R2_0, m.phi_0 = R1, R2, phi
+
+
+@tick
+def prepare(p, s, phi, n1_counts, n2_counts, k):
+    """While armed: measure the radii if asked to, tighten the tape, then run from where the capstan stands."""
+    if p.machine.measure != 0 and s.machine.prepared == 0:
+        if reel_radius.step(p.reel_radius, s.reel_radius, phi, n1_counts, n2_counts) == 0:
+            reference.hold(0, s.reference, phi)
+            shaper.reset(p.shaper, s.shaper, phi)
+            return
+        if s.reel_radius.failed != 0:
+            safety.trip(s.safety, safety.START_UP, k)
+            return
+        _set_radii(s.machine, s.reel_radius.R1, s.reel_radius.R2, phi)
+        reference.hold(0, s.reference, phi)
+        shaper.reset(p.shaper, s.shaper, phi)
+        s.safety.armed_for = 0
+    s.machine.prepared = 1
+    if s.safety.armed_for > p.machine.settle:
+        s.safety.state = safety.RUNNING
+        s.machine.k_run = k
+
+
+@tick
+def follow_radii(p, m, phi):
+    """Radii now: the area of paper on a reel grows with the tape that it wound, R^2 = R_0^2 + d_tape x / pi."""
+    m.R1 = np.sqrt(max(m.R1_0 * m.R1_0 + p.grow * (phi - m.phi_0), 1e-6))
+    m.R2 = np.sqrt(max(m.R2_0 * m.R2_0 - p.grow * (phi - m.phi_0), 1e-6))
+
+
+@tick
+def play(t, s, c, k):
+    """Start the table when it is asked for, once the machine runs."""
+    if s.safety.state == safety.RUNNING and c.play != s.machine.play:
+        reference.start(t.reference, s.reference, k)
+        s.machine.play = c.play
+
+
+COLUMNS = (
+    *COMMON_COLUMNS,
+    Column("target", "rad", "reference before shaping"),
+    Column("ref", "rad", "position reference"),
+    Column("w", "V", "excitation added to the controller's output"),
+    Column("u1", "V", "written to driver 1, after limits and 12-bit rounding"),
+    Column("u2", "V", "written to driver 2, after limits and 12-bit rounding"),
+    Column("capstan_counts", "counts", "capstan encoder, up/down, quadrature x4, 0 at the start"),
+    Column("reel1_counts", "counts", "optical sensor of reel 1, up in either direction"),
+    Column("reel2_counts", "counts", "optical sensor of reel 2, up in either direction"),
+    Column("capstan", "rad", "capstan angle"),
+    Column("capstan_error", "rad", "ref - capstan"),
+    Column("capstan_speed", "rad/s", "filtered difference of the capstan angle"),
+    Column("u_c", "V", "command to the capstan, before allocation"),
+    Column("R1", "m", "radius of reel 1 that the laws use"),
+    Column("R2", "m", "radius of reel 2 that the laws use"),
+    Column("gain_factor", "", "factor of the gain schedule"),
+    Column("tension1_estimate", "N", "tension at reel 1 from command and motion"),
+    Column("tension2_estimate", "N", "tension at reel 2 from command and motion"),
+)
+
+STAGES = (
+    (
+        "read",
+        (
+            "y.capstan_counts = daq_stc.counter_position(s.capstan, rx.counter_codes[0])",
+            "y.capstan = ls7084.radians(p.capstan, y.capstan_counts)",
+            "y.reel1_counts = optical_sensor.count("
+            "p.reel1, s.reel1, at_mio_16de.codes_to_input_volts(p.input1, rx.ai_codes[0]))",
+            "y.reel2_counts = optical_sensor.count("
+            "p.reel2, s.reel2, at_mio_16de.codes_to_input_volts(p.input2, rx.ai_codes[1]))",
+        ),
+    ),
+    (
+        "state",
+        (
+            *STATE_LINES,
+            "if s.safety.on != 0:",
+            "    machine.switch_on(p, s, y.capstan)",
+            "if s.safety.state == safety.ARMED:",
+            "    machine.prepare(p, s, y.capstan, y.reel1_counts, y.reel2_counts, k)",
+        ),
+    ),
+    (
+        "estimate",
+        (
+            "machine.follow_radii(p.machine, s.machine, y.capstan)",
+            "y.R1 = s.machine.R1",
+            "y.R2 = s.machine.R2",
+            "y.capstan_speed = velocity.step(p.velocity, s.velocity, y.capstan)",
+            "acceleration = velocity.step(p.velocity, s.acceleration, y.capstan_speed)",
+            "tension_estimate.step("
+            "p.tension_estimate, s.tension_estimate, y.u1, y.u2, y.capstan_speed, acceleration, y.R1, y.R2)",
+            "y.tension1_estimate = s.tension_estimate.T1",
+            "y.tension2_estimate = s.tension_estimate.T2",
+        ),
+    ),
+    (
+        "reference",
+        (
+            "machine.play(t, s, c, k)",
+            "y.target = reference.step(t.reference, s.reference, c.setpoint, k)",
+            "y.ref = shaper.step(p.shaper, s.shaper, y.target)",
+            "speed = velocity.step(p.reference_speed, s.reference_speed, y.ref)",
+            "running = s.safety.state == safety.RUNNING",
+            "y.w = excitation.step(t.excitation, k - s.machine.k_run) if running else 0.0",
+        ),
+    ),
+    (
+        "law",
+        (
+            "y.capstan_error = y.ref - y.capstan",
+            "u_pd = pd.step(p.position, s.position, y.capstan_error)",
+            "y.gain_factor = gain_schedule.step(p.gain_schedule, s.gain_schedule, y.R1, y.R2, u_pd)",
+            "changed = c.gains != s.machine.gains",
+            "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, y.gain_factor * u_pd, changed, s.machine.u_fb)",
+            "s.machine.gains = c.gains",
+            "winding = friction_feedforward.step(p.friction1, s.friction1, y.ref)",
+            "paying = friction_feedforward.step(p.friction2, s.friction2, y.ref)",
+            "y.u_c = s.machine.u_fb + y.w + (winding if s.friction1.direction > 0.0 else paying)",
+            "tension.step(p.tension, s.tension, y.R1, y.R2)",
+            "trail = min(max(speed / p.machine.trail_speed, -1.0), 1.0)",
+            "T1 = s.tension.V1 + min(trail, 0.0) * p.friction1.volts",
+            "T2 = s.tension.V2 - max(trail, 0.0) * p.friction2.volts",
+            "allocation.step(p.allocation, s.allocation, y.u_c, T1, T2)",
+            "measuring = p.machine.measure != 0 and s.safety.state == safety.ARMED and s.machine.prepared == 0",
+            "u1 = limit.step(p.limit, s.limit1, s.reel_radius.u1 if measuring else s.allocation.u1)",
+            "u2 = limit.step(p.limit, s.limit2, s.reel_radius.u2 if measuring else s.allocation.u2)",
+        ),
+    ),
+    (
+        "safety",
+        (
+            "amperes = max(abs(u1), abs(u2)) * p.drive.amp_per_volt",
+            "safety.check_motion(p.safety, s.safety, y.capstan_error, y.capstan_counts, y.u_c, amperes, k)",
+            "safety.check_tension(p.safety, s.safety, y.tension1_estimate, y.tension2_estimate, k)",
+            "safety.fade(p.safety, s.safety)",
+        ),
+    ),
+    (
+        "write",
+        (
+            "tx.ao_codes[0] = at_mio_16de.volts_to_codes(p.output1, safety.gate(p.safety, s.safety, u1, 0))",
+            "tx.ao_codes[1] = at_mio_16de.volts_to_codes(p.output2, safety.gate(p.safety, s.safety, u2, 1))",
+            "y.u1 = at_mio_16de.codes_to_volts(p.output1, tx.ao_codes[0])",
+            "y.u2 = at_mio_16de.codes_to_volts(p.output2, tx.ao_codes[1])",
+            *TRACE_LINES,
+        ),
+    ),
+)
+
+
+class DriveParams(NamedTuple):
+    amp_per_volt: float
+
+
+def diagram(config: IvuConfig, dt: float) -> Diagram:
+    """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
+    law, radius = config.law, config.radius
+    at_mio_16de.check_inputs([config.board.reel1, config.board.reel2])
+    blocks = (
+        Block("machine", _machine_params(config, dt), IVU_STATE),
+        Block("safety", safety.build(config.safety, dt), safety.SAFETY_STATE),
+        Block("capstan", ls7084.build(config.sensors.capstan, dt), daq_stc.READER_STATE),
+        Block("input1", at_mio_16de.build_input(config.board.reel1, dt, False, 0, 0), None),
+        Block("input2", at_mio_16de.build_input(config.board.reel2, dt, False, 1, 0), None),
+        Block("reel1", optical_sensor.build(config.sensors.reel1, dt), optical_sensor.OPTICAL_SENSOR_STATE),
+        Block("reel2", optical_sensor.build(config.sensors.reel2, dt), optical_sensor.OPTICAL_SENSOR_STATE),
+        Block("reference", None, reference.REFERENCE_STATE),
+        Block("shaper", shaper.build(law.shaper, dt), shaper.SHAPER_STATE),
+        Block("reference_speed", velocity.build(VelocitySettings(), dt), velocity.VELOCITY_STATE),
+        Block("velocity", velocity.build(law.velocity, dt), velocity.VELOCITY_STATE),
+        Block("acceleration", None, velocity.VELOCITY_STATE),
+        Block(
+            "tension_estimate",
+            tension_estimate.build(law.tension_estimate, dt),
+            tension_estimate.TENSION_ESTIMATE_STATE,
+        ),
+        Block("position", pd.build(law.position, dt), pd.PD_STATE),
+        Block("gain_schedule", gain_schedule.build(law.gain_schedule, dt), gain_schedule.GAIN_SCHEDULE_STATE),
+        Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
+        Block("friction1", friction_feedforward.build(law.friction.motor1, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE),
+        Block("friction2", friction_feedforward.build(law.friction.motor2, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE),
+        Block("tension", tension.build(law.tension, dt), tension.TENSION_STATE),
+        Block("allocation", allocation.build(law.allocation, dt), allocation.ALLOCATION_STATE),
+        Block("reel_radius", reel_radius.build(radius.measure, dt), reel_radius.REEL_RADIUS_STATE),
+        Block("limit", limit.build(law.limit, dt), None),
+        Block("limit1", None, limit.LIMIT_STATE),
+        Block("limit2", None, limit.LIMIT_STATE),
+        Block("drive", DriveParams(law.tension.amp_per_volt), None),
+        Block("output1", at_mio_16de.build_output(config.board.output1, dt), None),
+        Block("output2", at_mio_16de.build_output(config.board.output2, dt), None),
+    )  # fmt: skip
+    return Diagram(USES, blocks, COLUMNS, STAGES)
+
+
+USES = (
+    "rtctl.drivers.at_mio_16de",
+    "rtctl.drivers.daq_stc",
+    "rtctl.drivers.ls7084",
+    "rtctl.drivers.optical_sensor",
+    "rtctl.laws.allocation",
+    "rtctl.laws.bumpless",
+    "rtctl.laws.excitation",
+    "rtctl.laws.friction_feedforward",
+    "rtctl.laws.gain_schedule",
+    "rtctl.laws.limit",
+    "rtctl.laws.pd",
+    "rtctl.laws.reference",
+    "rtctl.laws.shaper",
+    "rtctl.laws.tension",
+    "rtctl.laws.tension_estimate",
+    "rtctl.laws.velocity",
+    "rtctl.loop.safety",
+)
+
+
+def _machine_params(config: IvuConfig, dt: float) -> IvuParams:
+    r = config.radius
+    return IvuParams(
+        measure=int(r.source == "measured"),
+        R1=r.R1,
+        R2=r.R2,
+        grow=r.d_tape * config.R_c / np.pi,
+        trail_speed=config.law.friction.speed,
+        settle=round(config.law.tension.ramp / dt) + round(0.1 / dt),
+    )
+
+
+TRUTH = (
+    Column("truth_tension1", "N", "tape tension at reel 1 in the emulator"),
+    Column("truth_tension2", "N", "tape tension at reel 2 in the emulator"),
+    Column("truth_capstan", "rad", "capstan angle in the emulator"),
+    Column("truth_motor1", "rad", "angle of motor 1 in the emulator"),
+    Column("truth_motor2", "rad", "angle of motor 2 in the emulator"),
+    Column("truth_R1", "m", "radius of reel 1 in the emulator"),
+    Column("truth_R2", "m", "radius of reel 2 in the emulator"),
+)
+
+
+def substeps(config: IvuConfig, period: float) -> int:
+    """Integration steps of the emulator in `period` s."""
+    return max(1, int(np.ceil(period / config.plant.substep - 1e-9)))
+
+
+def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
+    """Blocks and lines of the emulated machine, advanced by `period` s a call."""
+    h = period / substeps(config, period)
+    driver = (*l292.second_order(config.plant.driver), config.plant.driver.R_F * config.plant.driver.C_F)
+    nodes = {name: (index, "1.0") for name, index in plant_ivu.NODES.items()}
+    uses, terms, lines = physics_lines(config.plant.physics, "ivu", nodes, h)
+    follow = ("ivu.follow_tape(p.plant, s.plant)",) if config.plant.follow_tape else ()
+    blocks = (
+        Block("plant", plant_ivu.build(config.plant, h, [driver, driver]), plant_ivu.IVU_STATE),
+        Block("driver", l292.build(config.plant.driver, h), None),
+        Block("output1", at_mio_16de.build_output(config.board.output1, h), at_mio_16de.ANALOG_OUTPUT_STATE),
+        Block("output2", at_mio_16de.build_output(config.board.output2, h), at_mio_16de.ANALOG_OUTPUT_STATE),
+        Block("capstan", ls7084.build(config.sensors.capstan, h), ls7084.LS7084_STATE),
+        Block("counter0", None, daq_stc.COUNTER_STATE),
+        Block("reel1", optical_sensor.build(config.sensors.reel1, h), None),
+        Block("reel2", optical_sensor.build(config.sensors.reel2, h), None),
+        Block("input1", at_mio_16de.build_input(config.board.reel1, h, config.board.dither, 0, seed), at_mio_16de.ANALOG_INPUT_STATE),
+        Block("input2", at_mio_16de.build_input(config.board.reel2, h, config.board.dither, 1, seed), at_mio_16de.ANALOG_INPUT_STATE),
+        *terms,
+    )  # fmt: skip
+    advance = (
+        (
+            "drivers",
+            (
+                "u1 = at_mio_16de.output_step(p.output1, s.output1, tx.ao_codes[0], p.plant.h)",
+                "u2 = at_mio_16de.output_step(p.output2, s.output2, tx.ao_codes[1], p.plant.h)",
+                "s.plant.m.u[0] = l292.limit(p.driver, u1)",
+                "s.plant.m.u[1] = l292.limit(p.driver, u2)",
+            ),
+        ),
+        ("physics", ("linear.midpoint(s.plant.m)", *follow, *lines, "linear.advance(s.plant.m)")),
+        (
+            "encoder",
+            (
+                "pulses = ls7084.step(p.capstan, s.capstan, s.plant.m.x[ivu.CAPSTAN], p.plant.h)",
+                "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
+            ),
+        ),
+    )
+    sample = (
+        (
+            "scan",
+            (
+                "rx.counter_codes[0] = daq_stc.counter_step(s.counter0, 0, 1)",
+                "theta1 = s.plant.m.x[ivu.REEL1] + s.plant.m.x[ivu.NQ + ivu.REEL1] * p.input1.scan_delay",
+                "theta2 = s.plant.m.x[ivu.REEL2] + s.plant.m.x[ivu.NQ + ivu.REEL2] * p.input2.scan_delay",
+                "rx.ai_codes[0] = at_mio_16de.input_step(p.input1, s.input1, optical_sensor.volts(p.reel1, theta1))",
+                "rx.ai_codes[1] = at_mio_16de.input_step(p.input2, s.input2, optical_sensor.volts(p.reel2, theta2))",
+                "rx.lost_counts = s.capstan.lost",
+            ),
+        ),
+        (
+            "truth",
+            (
+                "ivu.tensions(p.plant, s.plant)",
+                "rx.truth[0] = s.plant.T1",
+                "rx.truth[1] = s.plant.T2",
+                "rx.truth[2] = s.plant.m.x[ivu.CAPSTAN]",
+                "rx.truth[3] = s.plant.m.x[ivu.MOTOR1]",
+                "rx.truth[4] = s.plant.m.x[ivu.MOTOR2]",
+                "rx.truth[5] = s.plant.R1",
+                "rx.truth[6] = s.plant.R2",
+            ),
+        ),
+    )
+    return PlantDiagram(
+        uses=(
+            "rtctl.drivers.at_mio_16de",
+            "rtctl.drivers.daq_stc",
+            "rtctl.drivers.l292",
+            "rtctl.drivers.ls7084",
+            "rtctl.drivers.optical_sensor",
+            "rtctl.plants.ivu",
+            "rtctl.plants.linear",
+            *uses,
+        ),
+        blocks=blocks,
+        truth=TRUTH,
+        start=("ivu.start(p.plant, s.plant)",),
+        advance=advance,
+        sample=sample,
+    )
+
+

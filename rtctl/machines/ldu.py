@@ -1,0 +1,409 @@
+"""The Linear Drive Unit at 10 kHz: a board, an amplifier with a direction bit, a rotary encoder, a linear scale.
+
+Block diagram of the tick, thesis figures 12.7 and 12.10:
+
+    reference -> shaper -> error -> law (PI with velocity feedback, PD, or any sections) -> + friction -> limit
+"""
+
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from rtctl.drivers import at_mio_16de, daq_stc, ldu_amplifier, linear_scale, ls7084
+from rtctl.drivers.at_mio_16de import AnalogOutputSettings
+from rtctl.drivers.ldu_amplifier import LduAmplifierSettings
+from rtctl.drivers.linear_scale import LinearScaleSettings
+from rtctl.drivers.ls7084 import Ls7084Settings
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.laws import (
+    bumpless,
+    excitation,
+    friction_feedforward,
+    limit,
+    pd,
+    pi_velocity,
+    reference,
+    sections,
+    shaper,
+    velocity,
+)
+from rtctl.laws.bumpless import BumplessSettings
+from rtctl.laws.excitation import ExcitationSettings, NoneSettings
+from rtctl.laws.limit import LimitSettings
+from rtctl.laws.pd import PdMetreSettings
+from rtctl.laws.pi_velocity import PiVelocitySettings
+from rtctl.laws.reference import MetreReferenceSettings
+from rtctl.laws.sections import SectionsSettings
+from rtctl.laws.shaper import ShaperSettings
+from rtctl.laws.velocity import VelocitySettings
+from rtctl.loop import safety
+from rtctl.machines.base import (
+    COMMON_COLUMNS,
+    STATE_LINES,
+    TRACE_LINES,
+    Block,
+    Column,
+    Diagram,
+    MachineSettings,
+    PlantDiagram,
+    physics_lines,
+)
+from rtctl.machines.physics import PhysicsTerm, check_nodes
+from rtctl.plants import ldu as plant_ldu
+
+UNIT = "m"
+PLANT_RATE = 10_000.0  # Hz, of the free-running emulator
+
+
+class LduBoardSettings(Settings):
+    """AT-MIO-16DE-10: one output to the amplifier, a digital line for its direction, both counters."""
+
+    output: AnalogOutputSettings = AnalogOutputSettings(channel=0)
+    direction_line: int = Field(default=0, ge=0, le=5, description="digital line of the direction bit; 6 and 7 count")
+
+
+class LduSensorSettings(Settings):
+    encoder: Ls7084Settings = Ls7084Settings(lines=5000)
+    scale: LinearScaleSettings = LinearScaleSettings()
+    feedback: Literal["encoder", "scale"] = Field(default="encoder", description="what the loop closes on (11.3)")
+    R_c: float = quantity(3.0e-3, unit="m", gt=0, help="capstan radius that turns encoder angle into position (11.2)")
+
+
+class PiLawSettings(PiVelocitySettings):
+    """The present controller: PI on position, velocity feedback (figure 12.7)."""
+
+    kind: Literal["pi_velocity"] = "pi_velocity"
+
+
+class PdLawSettings(PdMetreSettings):
+    kind: Literal["pd"] = "pd"
+
+
+class SectionsLawSettings(SectionsSettings):
+    """Lead-lag, notches, low-pass: up to four sections (figure 12.9)."""
+
+    kind: Literal["sections"] = "sections"
+
+
+PositionSettings = Annotated[PiLawSettings | PdLawSettings | SectionsLawSettings, Field(discriminator="kind")]
+
+
+class FrictionSettings(Settings):
+    F_c: float = quantity(0.0, unit="N", ge=0, help="dry friction of the carriage to compensate (12.6)")
+    newton_per_volt: float = quantity(14.0, unit="N/V", gt=0, help="force at the carriage per volt: N K_m 0.1 / R_c")
+
+
+class LduLawSettings(Settings):
+    shaper: ShaperSettings = ShaperSettings()
+    position: PositionSettings
+    friction: FrictionSettings = FrictionSettings()
+    limit: LimitSettings = LimitSettings(high=3.0)
+    bumpless: BumplessSettings = BumplessSettings()
+    velocity: VelocitySettings = VelocitySettings(filter=200.0)
+
+
+class LduPlantSettings(plant_ldu.LduSettings):
+    rate: float | None = quantity(None, unit="Hz", gt=0, help="rate of the emulator in real mode; the loop's if absent")
+    substep: float = quantity(5e-5, unit="s", gt=0, le=2e-4, help="longest integration step")
+    amplifier: LduAmplifierSettings = LduAmplifierSettings(kind="linear")
+    bandwidth: float = quantity(2000.0, unit="Hz", gt=0, help="of the amplifier's current loop (12.2)")
+    damping: float = quantity(0.7071, unit="", gt=0, help="of the amplifier's current loop")
+    physics: list[PhysicsTerm] = Field(default=[], description="terms of physics beyond the equations")
+
+    @model_validator(mode="after")
+    def _nodes(self) -> "LduPlantSettings":
+        check_nodes(self.physics, "ldu")
+        return self
+
+
+class LduConfig(MachineSettings):
+    machine: Literal["ldu"] = "ldu"
+    board: LduBoardSettings = LduBoardSettings()
+    sensors: LduSensorSettings = LduSensorSettings()
+    amplifier: LduAmplifierSettings = LduAmplifierSettings(kind="linear")
+    law: LduLawSettings
+    reference: MetreReferenceSettings = MetreReferenceSettings()
+    excitation: ExcitationSettings = NoneSettings()
+    plant: LduPlantSettings = LduPlantSettings()
+
+
+def metres_per_unit(config: LduConfig) -> float:
+    """The loop works in metres."""
+    return 1.0
+
+
+def radius(config: LduConfig) -> float:
+    """Radius that turns metres into radians of the capstan."""
+    return config.sensors.R_c
+
+
+class LduParams(NamedTuple):
+    R_c: float
+    line: int  # bit of the direction line
+    settle: int
+    amp_per_volt: float
+
+
+LDU_STATE = state(k_run=int, gains=int, play=int, u_fb=float)
+
+
+@tick
+def switch_on(p, s, x):
+    """The tick in which outputs come on: every law starts from where the carriage stands."""
+    reference.hold(0, s.reference, x)
+    shaper.reset(p.shaper, s.shaper, x)
+    velocity.reset(p.velocity, s.velocity)
+    friction_feedforward.reset(p.friction, s.friction)
+    bumpless.reset(p.bumpless, s.bumpless)
+    limit.reset(p.limit, s.limit, 0.0)
+    s.machine.u_fb = 0.0
+
+
+COLUMNS = (
+    *COMMON_COLUMNS,
+    Column("target", "m", "reference before shaping"),
+    Column("ref", "m", "position reference"),
+    Column("w", "V", "excitation added to the controller's output"),
+    Column("u", "V", "written, signed by the direction bit, after limit and 12-bit rounding"),
+    Column("encoder_counts", "counts", "rotary encoder, quadrature x4"),
+    Column("scale_counts", "counts", "linear scale on the carriage"),
+    Column("position", "m", "R_c times the encoder angle, or the scale, as `feedback` says"),
+    Column("scale", "m", "position by the linear scale"),
+    Column("position_error", "m", "ref - position"),
+    Column("speed", "m/s", "filtered difference of the position"),
+    Column("u_c", "V", "command before the limit"),
+)
+
+LAW_LINES = {
+    "pi_velocity": ("pi_velocity.step(p.position, s.position, y.position_error, y.speed)", "pi_velocity.reset(p.position, s.position)"),
+    "pd": ("pd.step(p.position, s.position, y.position_error)", "pd.reset(p.position, s.position)"),
+    "sections": ("sections.step(p.position, s.position, y.position_error)", "sections.reset(p.position, s.position, 0.0)"),
+}  # fmt: skip
+LAWS = {
+    "pi_velocity": (pi_velocity.build, pi_velocity.PI_VELOCITY_STATE),
+    "pd": (pd.build, pd.PD_STATE),
+    "sections": (sections.build, sections.SECTIONS_STATE),
+}
+
+
+def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Lines of the tick for the law and the feedback of this config."""
+    step, reset = LAW_LINES[config.law.position.kind]
+    position = "y.scale" if config.sensors.feedback == "scale" else "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
+    track = (
+        ("pi_velocity.track(p.position, s.position, u_c, u)",) if config.law.position.kind == "pi_velocity" else ()
+    )
+    return (
+        (
+            "read",
+            (
+                "y.encoder_counts = daq_stc.counter_position(s.encoder, rx.counter_codes[0])",
+                "y.scale_counts = daq_stc.counter_position(s.scale, rx.counter_codes[1])",
+                "y.scale = linear_scale.metres(p.scale, y.scale_counts)",
+                f"y.position = {position}",
+            ),
+        ),
+        (
+            "state",
+            (
+                *STATE_LINES,
+                "if s.safety.on != 0:",
+                "    machine.switch_on(p, s, y.position)",
+                f"    {reset}",
+                "machine.prepare(p, s, c, k)",
+            ),
+        ),
+        (
+            "reference",
+            (
+                "machine.play(t, s, c, k)",
+                "y.target = reference.step(t.reference, s.reference, c.setpoint, k)",
+                "y.ref = shaper.step(p.shaper, s.shaper, y.target)",
+                "y.w = excitation.step(t.excitation, k - s.machine.k_run) if s.safety.state == safety.RUNNING else 0.0",
+            ),
+        ),
+        (
+            "law",
+            (
+                "y.position_error = y.ref - y.position",
+                "y.speed = velocity.step(p.velocity, s.velocity, y.position)",
+                f"u_fb = {step}",
+                "changed = c.gains != s.machine.gains",
+                "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",
+                "s.machine.gains = c.gains",
+                "u_c = s.machine.u_fb + friction_feedforward.step(p.friction, s.friction, y.ref) + y.w",
+                "u = limit.step(p.limit, s.limit, u_c)",
+                *track,
+                "y.u_c = u_c",
+            ),
+        ),
+        (
+            "safety",
+            (
+                "amperes = abs(u) * p.machine.amp_per_volt",
+                "safety.check_motion(p.safety, s.safety, y.position_error, y.encoder_counts, u, amperes, k)",
+                "safety.fade(p.safety, s.safety)",
+            ),
+        ),
+        (
+            "write",
+            (
+                "u = safety.gate(p.safety, s.safety, u, 0)",
+                "forward = ldu_amplifier.direction(p.amplifier, u)",
+                "tx.ao_codes[0] = at_mio_16de.volts_to_codes(p.output, ldu_amplifier.encode(p.amplifier, u))",
+                "tx.dio_lines = forward << p.machine.line",
+                "y.u = (1.0 if forward != 0 else -1.0) * at_mio_16de.codes_to_volts(p.output, tx.ao_codes[0])",
+                *TRACE_LINES,
+            ),
+        ),
+    )
+
+
+@tick
+def prepare(p, s, c, k):
+    """Armed leads to running once the law has held the carriage for a moment."""
+    if s.safety.state == safety.ARMED and s.safety.armed_for > p.machine.settle:
+        s.safety.state = safety.RUNNING
+        s.machine.k_run = k
+
+
+@tick
+def play(t, s, c, k):
+    """Start the table when it is asked for, once the machine runs."""
+    if s.safety.state == safety.RUNNING and c.play != s.machine.play:
+        reference.start(t.reference, s.reference, k)
+        s.machine.play = c.play
+
+
+def diagram(config: LduConfig, dt: float) -> Diagram:
+    """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
+    law = config.law
+    build, law_state = LAWS[law.position.kind]
+    output = at_mio_16de.build_output(config.board.output, dt)
+    volts = law.friction.F_c / law.friction.newton_per_volt
+    blocks = (
+        Block("machine", LduParams(config.sensors.R_c, config.board.direction_line, round(0.05 / dt), 0.1), LDU_STATE),
+        Block("safety", safety.build(config.safety, dt), safety.SAFETY_STATE),
+        Block("encoder", ls7084.build(config.sensors.encoder, dt), daq_stc.READER_STATE),
+        Block("scale", linear_scale.build(config.sensors.scale, dt), daq_stc.READER_STATE),
+        Block("reference", None, reference.REFERENCE_STATE),
+        Block("shaper", shaper.build(law.shaper, dt), shaper.SHAPER_STATE),
+        Block("velocity", velocity.build(law.velocity, dt), velocity.VELOCITY_STATE),
+        Block("position", build(law.position, dt), law_state),  # type: ignore[arg-type]
+        Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
+        Block(
+            "friction",
+            friction_feedforward.FrictionFeedforwardParams(volts),
+            friction_feedforward.FRICTION_FEEDFORWARD_STATE,
+        ),
+        Block("limit", limit.build(law.limit, dt), limit.LIMIT_STATE),
+        Block("amplifier", ldu_amplifier.build(config.amplifier, dt, output.volts_per_code), None),
+        Block("output", output, None),
+    )
+    return Diagram((*USES, f"rtctl.laws.{law.position.kind}"), blocks, COLUMNS, stages(config))
+
+
+USES = (
+    "rtctl.drivers.at_mio_16de",
+    "rtctl.drivers.daq_stc",
+    "rtctl.drivers.ldu_amplifier",
+    "rtctl.drivers.linear_scale",
+    "rtctl.drivers.ls7084",
+    "rtctl.laws.bumpless",
+    "rtctl.laws.excitation",
+    "rtctl.laws.friction_feedforward",
+    "rtctl.laws.limit",
+    "rtctl.laws.reference",
+    "rtctl.laws.shaper",
+    "rtctl.laws.velocity",
+    "rtctl.loop.safety",
+)
+TRUTH = (
+    Column("truth_x", "m", "carriage position in the emulator"),
+    Column("truth_speed", "m/s", "carriage speed in the emulator"),
+    Column("truth_current", "A", "motor current in the emulator"),
+)
+
+
+def substeps(config: LduConfig, period: float) -> int:
+    """Integration steps of the emulator in `period` s."""
+    return max(1, int(np.ceil(period / config.plant.substep - 1e-9)))
+
+
+def plant_diagram(config: LduConfig, period: float, seed: int) -> PlantDiagram:
+    """Blocks and lines of the emulated machine, advanced by `period` s a call."""
+    h = period / substeps(config, period)
+    nodes = {name: (index, "1.0") for name, index in plant_ldu.NODES.items()}
+    nodes["carriage"] = (plant_ldu.CAPSTAN, "p.plant.R_c")
+    uses, terms, lines = physics_lines(config.plant.physics, "ldu", nodes, h)
+    output = at_mio_16de.build_output(config.board.output, h)
+    blocks = (
+        Block(
+            "plant",
+            plant_ldu.build(config.plant, h, (2 * np.pi * config.plant.bandwidth, config.plant.damping)),
+            plant_ldu.LDU_STATE,
+        ),
+        Block("amplifier", ldu_amplifier.build(config.plant.amplifier, h, output.volts_per_code), None),
+        Block("output", output, at_mio_16de.ANALOG_OUTPUT_STATE),
+        Block("encoder", ls7084.build(config.sensors.encoder, h), ls7084.LS7084_STATE),
+        Block("counter0", None, daq_stc.COUNTER_STATE),
+        Block("scale", linear_scale.build(config.sensors.scale, h), linear_scale.LINEAR_SCALE_STATE),
+        Block("counter1", None, daq_stc.COUNTER_STATE),
+        *terms,
+    )
+    line = config.board.direction_line
+    advance = (
+        (
+            "amplifier",
+            (
+                "volts = at_mio_16de.output_step(p.output, s.output, tx.ao_codes[0], p.plant.h)",
+                f"s.plant.m.u[0] = ldu_amplifier.current(p.amplifier, volts, (tx.dio_lines >> {line}) & 1)",
+            ),
+        ),
+        ("physics", ("linear.midpoint(s.plant.m)", *lines, "linear.advance(s.plant.m)")),
+        (
+            "encoder and scale",
+            (
+                "pulses = ls7084.step(p.encoder, s.encoder, s.plant.m.x[ldu.ENCODER], p.plant.h)",
+                "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
+                "pulses = linear_scale.step(p.scale, s.scale, p.plant.R_c * s.plant.m.x[ldu.CAPSTAN])",
+                "daq_stc.counter_step(s.counter1, abs(pulses), pulses > 0)",
+            ),
+        ),
+    )
+    sample = (
+        (
+            "scan",
+            (
+                "rx.counter_codes[0] = daq_stc.counter_step(s.counter0, 0, 1)",
+                "rx.counter_codes[1] = daq_stc.counter_step(s.counter1, 0, 1)",
+                "rx.lost_counts = s.encoder.lost",
+            ),
+        ),
+        (
+            "truth",
+            (
+                "rx.truth[0] = p.plant.R_c * s.plant.m.x[ldu.CAPSTAN]",
+                "rx.truth[1] = p.plant.R_c * s.plant.m.x[ldu.NQ + ldu.CAPSTAN]",
+                "rx.truth[2] = s.plant.m.x[2 * ldu.NQ]",
+            ),
+        ),
+    )
+    return PlantDiagram(
+        uses=(
+            "rtctl.drivers.at_mio_16de",
+            "rtctl.drivers.daq_stc",
+            "rtctl.drivers.ldu_amplifier",
+            "rtctl.drivers.linear_scale",
+            "rtctl.drivers.ls7084",
+            "rtctl.plants.ldu",
+            "rtctl.plants.linear",
+            *uses,
+        ),
+        blocks=blocks,
+        truth=TRUTH,
+        start=("ldu.start(p.plant, s.plant)",),
+        advance=advance,
+        sample=sample,
+    )

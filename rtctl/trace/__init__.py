@@ -1,0 +1,1 @@
+"""Bundles (recording.parquet and case.json), their repair, metrics and pictures."""

@@ -1,0 +1,101 @@
+import msgpack
+import numpy as np
+import pytest
+import zmq
+from hypothesis import given
+from hypothesis import strategies as st
+from rtctl.config.errors import UserError
+from rtctl.daemon.telemetry import MESSAGES_WAITING, Telemetry, thin
+
+ROWS = np.array([[0.0, 1.0, 2.0], [0.1, 3.0, np.nan]])
+
+
+@pytest.fixture
+def made(context, endpoint):
+    telemetry = Telemetry(endpoint, "ivu", ["v", "u"], context, max_rows_per_message=10)
+    yield telemetry
+    telemetry.close()
+
+
+def subscriber(context, telemetry, publish, hwm=1000):
+    """A SUB socket that has seen its first message: the subscription has arrived at the publisher."""
+    socket = context.socket(zmq.SUB)
+    socket.linger, socket.rcvhwm = 0, hwm
+    socket.subscribe("ivu")
+    socket.connect(telemetry.endpoint)
+    for _ in range(500):
+        publish()
+        if socket.poll(20):
+            while socket.poll(50):
+                socket.recv_multipart()
+            return socket
+    raise AssertionError("the subscription never arrived")
+
+
+def test_sends_topic_and_rows_as_plotjuggler_reads_them(context, made):
+    socket = subscriber(context, made, lambda: made.publish(ROWS))
+    assert made.publish(ROWS) == 2
+    topic, payload = socket.recv_multipart()
+    rows = msgpack.unpackb(payload)
+    assert topic == b"ivu"
+    assert rows[0] == {"timestamp": 0.0, "v": 1.0, "u": 2.0}
+    assert list(rows[1]) == ["timestamp", "v", "u"]
+    assert np.isnan(rows[1]["u"])
+
+
+def test_without_batch_each_row_is_a_message(context, endpoint):
+    telemetry = Telemetry(endpoint, "ivu", ["v", "u"], context, batch=False)
+    socket = subscriber(context, telemetry, lambda: telemetry.publish(ROWS))
+    telemetry.publish(ROWS)
+    messages = [msgpack.unpackb(socket.recv_multipart()[1]) for _ in range(2)]
+    assert [message["timestamp"] for message in messages] == [0.0, 0.1]
+
+
+def test_counts_what_it_leaves_out(made):
+    many = np.zeros((25, 3))
+    assert made.publish(many) == 9
+    assert (made.sent, made.thinned) == (9, 16)
+    assert made.publish(np.zeros((0, 3))) == 0
+
+
+@given(st.integers(0, 500), st.integers(1, 60))
+def test_thinning_keeps_the_newest_and_even_gaps(n, most):
+    kept = thin(np.arange(n), most)
+    assert len(kept) <= most
+    assert n == 0 or kept[-1] == n - 1
+    assert len(set(np.diff(kept))) <= 1
+    if n <= most:
+        assert len(kept) == n
+    else:
+        assert len(kept) > most // 2
+
+
+def test_a_slow_subscriber_loses_messages_and_blocks_nobody(context, made):
+    socket = subscriber(context, made, lambda: made.publish(ROWS), hwm=1)
+    wide = np.zeros((10, 3))
+    for number in range(50 * MESSAGES_WAITING):
+        wide[:, 0] = number
+        made.publish(wide)
+    received = 0
+    while socket.poll(100):
+        socket.recv_multipart()
+        received += 1
+    assert 1 <= received < 50 * MESSAGES_WAITING
+
+
+@pytest.mark.parametrize("shape", [(3,), (2, 2), (2, 4)])
+def test_rows_of_another_shape(made, shape):
+    with pytest.raises(ValueError, match="3 names: timestamp, v, u"):
+        made.publish(np.zeros(shape))
+
+
+def test_names_are_unique(context, endpoint):
+    with pytest.raises(ValueError, match="twice"):
+        Telemetry(endpoint, "ivu", ["v", "timestamp"], context)
+    with pytest.raises(ValueError, match="at least 1"):
+        Telemetry(endpoint, "ivu", ["v"], context, max_rows_per_message=0)
+
+
+def test_two_on_one_endpoint(context, made, endpoint):
+    with pytest.raises(UserError, match="in use by another daemon"):
+        Telemetry(endpoint, "ivu", ["v"], context)

@@ -1,0 +1,38 @@
+import numpy as np
+import pytest
+
+from rtctl.laws import velocity
+
+DT = 0.002
+
+
+def run(p, s, x):
+    return np.array([velocity.step(p, s, float(xk)) for xk in x])
+
+
+def test_follows_a_ramp_in_the_end(zero):
+    p = velocity.build(velocity.VelocitySettings(filter=20.0), DT)
+    v = run(p, zero(velocity.VELOCITY_STATE), 5.0 + 3.0 * np.arange(300) * DT)
+    assert v[0] == 0.0
+    assert v[-1] == pytest.approx(3.0, rel=1e-6)
+    assert np.all(np.diff(v) >= -1e-9)
+
+
+def test_without_a_filter_it_is_the_difference(zero):
+    p = velocity.build(velocity.VelocitySettings(), DT)
+    assert run(p, zero(velocity.VELOCITY_STATE), [1.0, 1.0, 1.01, 1.0]) == pytest.approx([0, 0, 5.0, -5.0])
+
+
+def test_one_count_moves_it_by_a_share_of_the_difference(zero):
+    p = velocity.build(velocity.VelocitySettings(filter=10.0), DT)
+    count = 2 * np.pi / 10_000
+    v = run(p, zero(velocity.VELOCITY_STATE), np.where(np.arange(50) < 10, 0.0, count))
+    assert v.max() == pytest.approx(p.a * count / DT)
+
+
+def test_reset_forgets_the_position(zero):
+    p = velocity.build(velocity.VelocitySettings(filter=10.0), DT)
+    s = zero(velocity.VELOCITY_STATE)
+    run(p, s, [0.0, 1.0])
+    velocity.reset(p, s)
+    assert velocity.step(p, s, 7.0) == 0.0
