@@ -9,6 +9,7 @@ from rtctl.idiom import tick
 
 MAGIC = 0x4C544352  # "RCTL"
 VERSION = 1
+HELLO = -1  # sequence number of the frame with which a loop wakes a plant that waits for it
 AO_CHANNELS, COUNTERS, AI_CHANNELS, TRUTHS = 2, 2, 16, 8
 
 OUTPUTS = np.dtype(
@@ -40,5 +41,5 @@ INPUTS = np.dtype(
 
 @tick
 def valid(frame):
-    """Whether a frame is ours and of this version."""
-    return frame.magic == MAGIC and frame.version == VERSION
+    """Whether a frame is ours, of this version, and more than a hello."""
+    return frame.magic == MAGIC and frame.version == VERSION and frame.seq >= 0

@@ -1,0 +1,70 @@
+"""`rtctl run CONFIG`: run a machine, show how it does, and report on its steps."""
+
+import signal
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rtctl.cli import common
+from rtctl.cli.common import JsonOption, SetOption
+
+app = typer.Typer()
+
+
+@app.command()
+def run(
+    config: Annotated[str, typer.Argument(help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis.")],
+    mode: Annotated[str | None, typer.Option(help="real, lockstep or fused; as in the config if not given.")] = None,
+    link: Annotated[str | None, typer.Option(help="zmq or shm; as in the config if not given.")] = None,
+    duration: Annotated[str | None, typer.Option("--for", metavar="T", help="How long, e.g. 12s; until Ctrl-C if not given.")] = None,
+    reference: Annotated[str | None, typer.Option(help="File with the reference to play.")] = None,
+    set_: SetOption = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the recorded bundle; runs/NAME-DATE-TIME if not given.")] = None,
+    arm: Annotated[bool, typer.Option(help="Arm at once and play the reference.")] = True,
+    plot: Annotated[bool, typer.Option(help="Draw the run into the bundle.")] = True,
+    json: JsonOption = False,
+) -> None:
+    """Run a machine under control, on a bench or against its emulated twin.
+
+    Examples:
+
+      rtctl run ivu --for 12s --reference steps
+
+      rtctl run ldu.yaml --mode fused --for 3s --json
+
+      rtctl run ivu.yaml --set law.position.gain=20 --set radius.source=measured
+    """
+    from rtctl.daemon.session import Session
+
+    settings = common.load_config(config, set_)
+    settings = common.with_loop(common.with_reference(settings, reference), mode, link)
+    length = common.seconds(duration, "--for")
+    folder = out if out is not None else common.default_folder(settings.name)
+    console = _console(json)
+    previous = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        session = Session(settings, folder, length, arm=arm, say=console.say)
+        with console.live(session):
+            result = session.run(console.update)
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+    if plot:
+        result["plot"] = session.draw()
+    if json:
+        common.print_json(result)
+    else:
+        console.report(result)
+    if result["tripped"]:
+        sys.exit(1)
+
+
+def _interrupt(*_: Any) -> None:
+    raise KeyboardInterrupt
+
+
+def _console(json: bool) -> Any:
+    from rtctl.cli.console import RunConsole
+
+    return RunConsole(quiet=json)

@@ -1,0 +1,96 @@
+"""What the loop's and the plant's process have in common: their orders, their reports, and a watch on their parent.
+
+Orders are one JSON object on the command line. Reports are JSON lines on standard output. Standard input is a pipe
+from the supervisor that carries nothing: its end means that the supervisor is gone.
+"""
+
+import json
+import os
+import select
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import zmq
+
+from rtctl import machines
+from rtctl.daemon import keys, server
+from rtctl.loop import generate, zmq_link
+from rtctl.loop.memory import Segment
+from rtctl.loop.records import layout
+from rtctl.machines import Machine
+
+LINK_WAITING = 8  # frames a link may hold: newest wins, older ones are of no use
+
+
+def orders(argv: list[str]) -> dict[str, Any]:
+    """The orders of this process, from its command line."""
+    return json.loads(argv[1])
+
+
+def report(event: str, **values: Any) -> None:
+    """Tell the supervisor, one line at a time. A supervisor that is gone is not an error here."""
+    try:
+        print(json.dumps({"event": event, **values}), flush=True)
+    except OSError:
+        pass
+
+
+def machine_from(order: dict[str, Any]) -> Machine:
+    """The machine of an order, which carries its config in full."""
+    config = order["config"]
+    return machines.build(machines.CONFIGS[config["machine"]].model_validate(config))
+
+
+def segment_from(order: dict[str, Any], made: generate.Generated) -> Segment:
+    """Map the shared memory that the supervisor made."""
+    return Segment.open(Path(order["segment"]), layout(made.params, made.tables, made.row, order["rows"]))
+
+
+def watch_parent(on_lost: Callable[[], None], on_stop: Callable[[], None], interrupt: bool = False) -> None:
+    """Call `on_lost` when the supervisor's pipe ends and `on_stop` on SIGTERM, even while compiled code runs.
+
+    Compiled code never returns to the interpreter, so a Python signal handler would wait for ever; the wake-up file
+    descriptor is written by the C handler at once and read here, in a thread of its own.
+    """
+    read_end, write_end = os.pipe()
+    os.set_blocking(write_end, False)
+    # Ctrl-C goes to the whole group: a child leaves it to the supervisor, a process of its own (`interrupt`) stops
+    signal.signal(signal.SIGINT, (lambda *_: None) if interrupt else signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda *_: None)
+    signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
+
+    def watch() -> None:
+        while True:
+            ready, _, _ = select.select([read_end] if interrupt else [sys.stdin.fileno(), read_end], [], [])
+            if read_end in ready and os.read(read_end, 64):
+                on_stop()
+            if not interrupt and sys.stdin.fileno() in ready and not os.read(sys.stdin.fileno(), 4096):
+                on_lost()
+                return
+
+    threading.Thread(target=watch, name="watch", daemon=True).start()
+
+
+def link_socket(context: zmq.Context, endpoint: str, bind: bool, timeout: float, key_name: str | None) -> zmq.Socket:
+    """One end of the link: the plant binds, the loop connects. Secured by CURVE where it leaves this machine."""
+    zmq_link.load()
+    socket = context.socket(zmq.DEALER)
+    socket.set(zmq.LINGER, 100)
+    socket.set(zmq.SNDHWM, LINK_WAITING)
+    socket.set(zmq.RCVHWM, LINK_WAITING)
+    socket.set(zmq.RCVTIMEO, int(timeout * 1000))
+    socket.set(zmq.MAXMSGSIZE, 4096)
+    if bind:
+        server.bind(socket, endpoint, keys.server_curve() if key_name else None)
+        return socket
+    if key_name:
+        curve = keys.client_curve(key_name)
+        keys.apply_client(socket, curve.keys, curve.server)
+    elif keys.require_curve(endpoint):
+        raise keys.refuse_open(endpoint)
+    socket.connect(endpoint)
+    return socket

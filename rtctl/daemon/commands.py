@@ -1,0 +1,157 @@
+"""What the command socket can ask of a running machine. Everything is checked and built here, outside the tick."""
+
+import time
+from typing import TYPE_CHECKING, Any
+
+from rtctl import machines
+from rtctl.config.errors import UserError, nearest
+from rtctl.config.load import get_path, set_path
+from rtctl.config.units import convert
+from rtctl.daemon.protocol import Args
+from rtctl.idiom import fill_record
+from rtctl.loop import generate
+
+if TYPE_CHECKING:
+    from rtctl.daemon.supervisor import Supervisor
+
+SWITCHED = ("loop", "link", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation")
+
+
+class Commands:
+    """Handles one op at a time; `handle` answers at once, with the tick at the latest at which it takes effect."""
+
+    def __init__(self, supervisor: "Supervisor"):
+        self._of = supervisor
+        self._last_heard = time.monotonic()
+        self._commander_lost = 0
+
+    def handle(self, op: str, args: Args) -> dict[str, Any]:
+        """Carry out `op`. Raises UserError where the request makes no sense now."""
+        self._last_heard = time.monotonic()
+        return getattr(self, f"_{op}")(**args.model_dump(exclude_none=True))
+
+    def watch_commander(self) -> None:
+        """Tell the loop when nobody has talked to the command socket for too long, where the config requires it."""
+        safety = self._of.config.safety
+        lost = int(safety.require_commander and time.monotonic() - self._last_heard > safety.commander_timeout)
+        if lost != self._commander_lost:
+            self._commander_lost = lost
+            self._post(commander_lost=lost)
+
+    def _post(self, **fields: Any) -> dict[str, Any]:
+        def write(_: Any, command: Any) -> None:
+            for name, value in fields.items():
+                command[name] = value
+
+        self._of.mailbox.post(write)
+        return {"tick": int(self._of.status["tick"])}
+
+    def _count(self, name: str) -> dict[str, Any]:
+        command = self._of.segment["mailbox"][0]["command"]
+        return self._post(**{name: int(command[name]) + 1})
+
+    def _ping(self) -> dict[str, Any]:
+        return {"name": self._of.config.name}
+
+    def _status(self) -> dict[str, Any]:
+        row = self._of.last_row
+        signals = {} if row is None else {n: float(row[n]) for n in row.dtype.names}
+        return {**self._of.snapshot(), "signals": signals}
+
+    def _signals(self) -> dict[str, Any]:
+        return {"signals": [{"name": c.name, "unit": c.unit, "help": c.help} for c in self._of.made.columns]}
+
+    def _arm(self) -> dict[str, Any]:
+        if int(self._of.status["state"]) == 3:
+            raise UserError("the machine has tripped; look at `rtctl status`, then `rtctl reset` and arm again")
+        return self._count("arm")
+
+    def _disarm(self) -> dict[str, Any]:
+        return self._count("disarm")
+
+    def _reset(self) -> dict[str, Any]:
+        return self._count("reset")
+
+    def _stop(self) -> dict[str, Any]:
+        self._of.status["stop"] = 1
+        return {"tick": int(self._of.status["tick"])}
+
+    def play(self) -> dict[str, Any]:
+        """Play the reference table from its start, as soon as the machine runs."""
+        return self._count("play")
+
+    def _setpoint(self, value: float, name: str | None = None, unit: str | None = None, ramp: float | None = None,
+                  ramp_unit: str | None = None) -> dict[str, Any]:  # fmt: skip
+        if name not in (None, "position"):
+            raise UserError(f"this machine has no setpoint '{name}'; it has 'position'")
+        if int(self._of.status["state"]) not in (1, 2):
+            raise UserError("outputs are off; `rtctl arm` first")
+        target = self._in_own_unit(value, unit)
+        rate = 0.0 if ramp is None else abs(self._in_own_unit(ramp, ramp_unit.removesuffix("/s") if ramp_unit else unit))
+        seq = int(self._of.segment["mailbox"][0]["command"]["setpoint"]["seq"]) + 1
+
+        def write(_: Any, command: Any) -> None:
+            command["setpoint"]["target"] = target
+            command["setpoint"]["rate"] = rate
+            command["setpoint"]["seq"] = seq
+
+        self._of.mailbox.post(write)
+        return {"tick": int(self._of.status["tick"]), "target": target, "unit": self._of.machine.unit, "rate": rate}
+
+    def _in_own_unit(self, value: float, unit: str | None) -> float:
+        """A length or an angle in the unit of this machine's reference."""
+        machine = self._of.machine
+        if unit is None or unit == machine.unit:
+            return value
+        for kind in ("m", "rad"):
+            try:
+                si = convert(value, unit, kind)
+            except ValueError:
+                continue
+            if kind == machine.unit:
+                return si
+            return si / machine.radius if machine.unit == "rad" else si * machine.radius
+        raise UserError(f"'{unit}' is neither a length nor an angle; use e.g. mm or rad")
+
+    def _get(self, path: str) -> dict[str, Any]:
+        value = get_path(self._of.config, path)
+        return {"path": path, "value": value.model_dump(mode="json") if hasattr(value, "model_dump") else value}
+
+    def _set(self, path: str, value: Any) -> dict[str, Any]:
+        if path.split(".")[0] in SWITCHED:
+            raise UserError(f"{path} cannot change while the machine runs; stop it and start it with --set {path}=...")
+        config = set_path(self._of.config, path, value)
+        try:
+            machine = machines.build(config)
+        except ValueError as error:
+            raise UserError(f"{path}: {error}") from error
+        if generate.source(machine, self._of.link) != generate.source(self._of.machine, self._of.link):
+            raise UserError(f"{path} changes the structure of the tick; stop the machine and start it with --set {path}=...")
+        gains = int(self._of.segment["mailbox"][0]["command"]["gains"]) + 1
+
+        def write(params: Any, command: Any) -> None:
+            for block in machine.diagram.blocks:
+                if block.params is not None:
+                    fill_record(params[block.name], block.params)
+            command["gains"] = gains
+
+        self._of.mailbox.post(write)
+        self._of.config, self._of.machine = config, machine
+        self._of.note_change(path, value)
+        return {"path": path, "value": value, "tick": int(self._of.status["tick"])}
+
+    def _capture(self, seconds: float, pre: float = 0.0, trigger: str | None = None, out: str | None = None) -> dict[str, Any]:
+        return self._of.captures.start(seconds, pre, trigger, out, self._of.config.name)
+
+    def _capture_status(self, id: str) -> dict[str, Any]:
+        return self._of.captures.status(id)
+
+    def _capture_stop(self, id: str) -> dict[str, Any]:
+        return self._of.captures.end(id)
+
+
+def known(name: str, names: list[str], what: str) -> None:
+    """Raise UserError where `name` is none of `names`, with the nearest."""
+    if name not in names:
+        near = nearest(name, names)
+        raise UserError(f"no {what} '{name}'" + (f"; did you mean '{near}'?" if near else f"; there is {', '.join(names)}"))

@@ -1,0 +1,159 @@
+"""The loop's process: `python -m rtctl.daemon.loop_process ORDERS`, started by the supervisor.
+
+Python runs before and after the compiled loop and, on virtual time, between its stretches; never during them.
+"""
+
+import os
+import sys
+import time
+from typing import Any
+
+import numpy as np
+import zmq
+
+from rtctl.config.errors import UserError
+from rtctl.daemon import child
+from rtctl.loop import frames, generate, mailbox
+from rtctl.loop.memory import Segment
+from rtctl.loop.realtime import RealTime
+from rtctl.machines import Machine
+
+STRETCH = 20_000  # ticks of virtual time between two looks at the ring's reader
+FOREVER = 2**62
+SECOND = 1_000_000_000
+
+
+class Loop:
+    """All arrays that the compiled loop works on, and the three ways to run it."""
+
+    def __init__(self, machine: Machine, made: generate.Generated, segment: Segment, out: Any, inp: Any):
+        self.machine, self.made, self.segment = machine, made, segment
+        self.out, self.inp = out, inp
+        frame = generate.new_frames()
+        self.tx, self.rx, self.rx_staged, self.held = frame["tx"], frame["rx"], frame["rx_staged"], frame["tx_held"]
+        self.p, self.s = np.zeros(1, made.params), np.zeros(1, made.state)
+        self.c, self.y = np.zeros(1, mailbox.COMMAND), np.zeros(1, made.row)
+        self.staged = np.zeros(1, mailbox.mailbox_dtype(made.params))
+        self.pp, self.ps = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
+        generate.fill(self.p[0], machine.diagram.blocks)
+        generate.fill(self.pp[0], machine.plant_diagram.blocks)
+        self.status = segment["status"]
+        self.shared = (self.status, segment["mailbox"], segment["tables"], segment["ring"], segment["rows"])
+        self.own = (self.p, self.s, self.c, self.staged, self.y, self.tx, self.rx)
+        self.period = round(SECOND / machine.rate)
+        self.ahead = int(machine.config.loop.write == "next_tick")
+
+    def real(self, ticks: int) -> None:
+        """On the wall clock, to the end."""
+        loop = self.machine.config.loop
+        late = int(loop.late * self.period)
+        self.made.module.run_real(
+            *self.shared, *self.own, self.rx_staged, self.out, self.inp, self.period, int(loop.spin * SECOND), late,
+            self.ahead, ticks,
+        )  # fmt: skip
+
+    def lockstep(self, first: int, most: int) -> None:
+        """A stretch of virtual time, in turns with the plant's process."""
+        self.made.module.run_lockstep(
+            *self.shared, *self.own, self.rx_staged, self.held, self.out, self.inp, self.period, self.ahead, first, most
+        )
+
+    def fused(self, first: int, most: int) -> None:
+        """A stretch of virtual time with the plant inside."""
+        self.made.module.run_fused(
+            *self.shared, *self.own, self.held, self.pp, self.ps, self.period, self.ahead, first, most
+        )
+
+    def virtual(self, ticks: int) -> None:
+        """Stretches of virtual time, never further than the ring's reader can follow: nothing is lost."""
+        stretch = self.lockstep if self.machine.config.loop.mode == "lockstep" else self.fused
+        status, ring = self.status[0], self.segment["ring"][0]
+        room = len(self.segment["rows"])
+        done = 0
+        while done < ticks and not status["stop"] and not status["supervisor_lost"] and not status["failed"]:
+            free = room - int(ring["head"] - ring["tail"])
+            most = min(ticks - done, STRETCH, free)
+            if most <= 0:
+                time.sleep(0.0005)  # the reader is behind; virtual time waits for it
+                continue
+            stretch(done, most)
+            done = int(status["tick"])
+        status["ended"] = 1
+
+
+def main(argv: list[str]) -> int:
+    """Run the loop as ordered; reports `ready`, `lacks`, `error` and `ended`."""
+    order = child.orders(argv)
+    machine = child.machine_from(order)
+    loop = machine.config.loop
+    made = generate.generate(machine, order["link"])
+    segment = child.segment_from(order, made)
+    status = segment["status"]
+    status["pid"] = os.getpid()
+
+    def lost() -> None:
+        status["supervisor_lost"] = 1
+
+    def stop() -> None:
+        status["stop"] = 1
+
+    child.watch_parent(lost, stop)
+    context = zmq.Context()
+    socket = None
+    out: Any = segment["outputs"]
+    inp: Any = segment["inputs"]
+    if order["link"] == "zmq" and loop.mode != "fused":
+        link = machine.config.link
+        socket = child.link_socket(context, order["endpoint"], False, link.timeout, link.keys)
+        out = inp = socket.underlying
+    run = Loop(machine, made, segment, out, inp)
+    ticks = order["ticks"] or FOREVER
+    if loop.mode == "fused":
+        run.virtual(ticks)
+    else:
+        _wait_for_plant(socket, run, machine.config.link.timeout, order["endpoint"], loop.mode)
+        if loop.mode == "lockstep":
+            run.virtual(ticks)
+        else:
+            realtime = RealTime(loop.priority, loop.cpu) if loop.realtime != "off" else None
+            if realtime is not None and realtime.lacks:
+                child.report("lacks", lacks=[str(lack) for lack in realtime.lacks])
+                if loop.realtime == "required":
+                    raise UserError("loop.realtime is 'required' and this machine does not allow it: "
+                                    + "; ".join(map(str, realtime.lacks)))  # fmt: skip
+            run.real(ticks)
+    if status[0]["failed"]:
+        raise UserError(f"the plant at {order['endpoint']} stopped answering at tick {status[0]['tick']}")
+    child.report("ended", tick=int(status[0]["tick"]))
+    if socket is not None:
+        socket.close()
+    context.term()
+    return 0
+
+
+def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoint: str, mode: str) -> None:
+    """Say hello until the plant answers. Raises UserError where it does not."""
+    deadline = time.monotonic() + timeout
+    hello = generate.new_frames()["tx"]
+    hello["seq"] = frames.HELLO
+    while time.monotonic() < deadline:
+        if socket is None:
+            if int(run.inp[0]["count"]) > 0:
+                return
+            time.sleep(0.001)
+            continue
+        try:
+            socket.send(hello.tobytes(), zmq.DONTWAIT)
+        except zmq.Again:
+            pass
+        if socket.poll(200, zmq.POLLIN):
+            return
+    raise UserError(f"no plant answers at {endpoint} within {timeout:g} s; start one with `rtctl plant`, or set link.plant: spawn")
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv))
+    except UserError as error:
+        child.report("error", message=str(error), code=2)
+        sys.exit(2)

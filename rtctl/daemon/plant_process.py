@@ -1,0 +1,99 @@
+"""The emulated machine's process: `python -m rtctl.daemon.plant_process ORDERS`, or `rtctl plant CONFIG` by itself."""
+
+import os
+import sys
+from typing import Any
+
+import numpy as np
+import zmq
+
+from rtctl.config.errors import UserError
+from rtctl.daemon import child
+from rtctl.loop import frames, generate
+from rtctl.loop.records import PLANT_STATUS
+from rtctl.machines import Machine
+
+SECOND = 1_000_000_000
+MOST_BEHIND = 200  # periods that the emulator makes up for before it lets time slip
+
+
+def run(machine: Machine, made: generate.Generated, status: Any, out: Any, inp: Any) -> None:
+    """Emulate until status.stop is set, on the wall clock or in turns with the loop."""
+    frame = generate.new_frames()
+    p, s = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
+    generate.fill(p[0], machine.plant_diagram.blocks)
+    if machine.config.loop.mode == "lockstep":
+        made.module.plant_lockstep(status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp)
+    else:
+        period = round(machine.plant_period * SECOND)
+        made.module.plant_real(
+            status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp, period, MOST_BEHIND
+        )
+    status["ended"] = 1
+
+
+def serve(machine: Machine, endpoint: str, status: Any, announce: Any) -> None:
+    """Listen at a ZeroMQ endpoint and emulate; `announce()` is called when it listens."""
+    made = generate.generate(machine, "zmq")
+    context = zmq.Context()
+    link = machine.config.link
+    socket = child.link_socket(context, endpoint, True, 1.0, link.keys)
+    announce()
+    if machine.config.loop.mode == "lockstep":
+        hello = np.zeros(1, frames.OUTPUTS)
+        while not status[0]["stop"]:  # the loop says hello; until then there is nobody to take the first sample
+            if socket.poll(200, zmq.POLLIN):
+                data = socket.recv()
+                if len(data) == frames.OUTPUTS.itemsize:
+                    hello[:] = np.frombuffer(data, frames.OUTPUTS)
+                    if hello[0]["magic"] == frames.MAGIC and hello[0]["seq"] == frames.HELLO:
+                        break
+    run(machine, made, status, socket.underlying, socket.underlying)
+    socket.close()
+    context.term()
+
+
+def main(argv: list[str]) -> int:
+    """Emulate as ordered by the supervisor."""
+    order = child.orders(argv)
+    machine = child.machine_from(order)
+    made = generate.generate(machine, order["link"])
+    segment = child.segment_from(order, made)
+    status = segment["plant_status"]
+    status["pid"] = os.getpid()
+
+    def stop() -> None:
+        status["stop"] = 1
+
+    child.watch_parent(stop, stop)
+    if order.get("cpu") is not None:
+        try:
+            os.sched_setaffinity(0, {order["cpu"]})
+        except OSError:
+            pass  # the emulator runs anywhere; only its samples come a little later
+    if order["link"] == "zmq":
+        serve(machine, order["endpoint"], status, lambda: child.report("listening"))
+    else:
+        child.report("listening")
+        run(machine, made, status, segment["inputs"], segment["outputs"])
+    child.report("ended")
+    return 0
+
+
+def alone(machine: Machine, endpoint: str, announce: Any) -> None:
+    """As `rtctl plant`: emulate until interrupted."""
+    status = np.zeros(1, PLANT_STATUS)
+
+    def stop() -> None:
+        status["stop"] = 1
+
+    child.watch_parent(lambda: None, stop, interrupt=True)
+    serve(machine, endpoint, status, announce)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv))
+    except UserError as error:
+        child.report("error", message=str(error), code=2)
+        sys.exit(2)

@@ -1,0 +1,82 @@
+"""A run from start to end: supervise, arm, play the reference, record, and tell what came of it."""
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rtctl.config.errors import UserError
+from rtctl.daemon.supervisor import Supervisor
+
+
+class Session:
+    """One `rtctl run`. `length` in s ends it; None leaves that to `stop`, Ctrl-C or a trip."""
+
+    def __init__(
+        self, config: Any, out: Path | None, length: float | None, arm: bool = True, say: Callable[[str], None] = lambda _: None
+    ):
+        ticks = 0 if length is None else max(1, round(length * config.loop.rate))
+        if config.loop.mode == "fused" and not ticks:
+            raise UserError("a fused run has no wall clock to follow: say how long with --for")
+        self.config, self.arm, self.say = config, arm, say
+        self.supervisor = Supervisor(config, out, ticks, say)
+        self.bundle: Path | None = None
+        self.steps: list[dict[str, Any]] = []
+
+    def run(self, update: Callable[[Supervisor], None] = lambda _: None) -> dict[str, Any]:
+        """Run to the end; `update` is called at every turn. Returns what `rtctl run --json` prints."""
+        supervisor = self.supervisor
+        interrupted = False
+        supervisor.armed_at_start = self.arm
+        with supervisor:
+            try:
+                for _ in supervisor.run():
+                    update(supervisor)
+            except KeyboardInterrupt:
+                interrupted = True
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+            supervisor.stop()
+            result = supervisor.snapshot()
+            try:
+                self.bundle = supervisor.finish()
+            except OSError as error:
+                where = supervisor.out
+                raise UserError(
+                    f"{where}: the disk did not take the recording ({error.strerror}); make room, then "
+                    f"`rtctl trace repair {where}`"
+                ) from error
+        self.steps = self._metrics()
+        return {
+            **result,
+            "steps": self.steps,
+            "tripped": result["trip"]["code"] if result["trip"] else None,
+            "interrupted": interrupted,
+            "bundle": str(self.bundle) if self.bundle else None,
+        }
+
+    def _metrics(self) -> list[dict[str, Any]]:
+        if self.bundle is None:
+            return []
+        from rtctl.trace.bundle import load_bundle
+        from rtctl.trace.metrics import step_metrics
+
+        trace = load_bundle(self.bundle).columns
+        machine = self.supervisor.machine
+        running = trace["state"] == 2
+        if running.sum() < 2:
+            return []
+        y = trace["capstan" if machine.kind == "ivu" else "x" if machine.kind == "axis" else "position"]
+        rad = 1.0 if machine.unit == "rad" else 1.0 / machine.radius
+        mm = 1000.0 * machine.metres_per_unit
+        return step_metrics(trace["t"][running], trace["target"][running], y[running], mm, rad)
+
+    def draw(self) -> str | None:
+        """Draw the run beside its bundle; returns the picture's path."""
+        if self.bundle is None:
+            return None
+        from rtctl.trace.bundle import load_bundle
+        from rtctl.trace.plot import plot_run
+
+        path = self.bundle / "run.png"
+        plot_run(load_bundle(self.bundle), self.steps, path)
+        return str(path)

@@ -1,0 +1,308 @@
+"""The supervisor: starts loop and plant, and does for them everything that is not real-time.
+
+    loop -> ring -> supervisor -> recorder, captures, telemetry, status
+    command socket -> supervisor -> mailbox -> loop
+
+Its own loop takes a turn every few milliseconds. It never holds up the loop: what it is too late for is counted.
+"""
+
+import contextlib
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import structlog
+import zmq
+
+from rtctl import machines
+from rtctl.config.errors import UserError
+from rtctl.daemon import keys
+from rtctl.daemon.captures import Captures
+from rtctl.daemon.case import describe
+from rtctl.daemon.children import ChildProcess
+from rtctl.daemon.commands import Commands
+from rtctl.daemon.lock import MachineLock
+from rtctl.daemon.server import CommandServer, default_endpoint, runtime_dir
+from rtctl.daemon.telemetry import Telemetry
+from rtctl.loop import generate, safety
+from rtctl.loop.histogram import percentiles
+from rtctl.loop.mailbox import Mailbox
+from rtctl.loop.memory import Segment
+from rtctl.loop.records import layout
+from rtctl.loop.ring import Reader
+from rtctl.trace.recorder import Recorder
+
+log = structlog.get_logger()
+TURN = 0.01  # s between two turns of the supervisor on the wall clock
+START_TIMEOUT = 180.0  # s; a cold cache compiles for some ten seconds
+SHM = Path("/dev/shm")
+
+
+class Supervisor:
+    """A running machine. Use as a context: leaving it stops the loop with its outputs at zero.
+
+    `out` is the folder of the run's bundle; None records nothing but captures. `ticks` ends the run, 0 never.
+    `say` gets one-line messages for the person who started it.
+    """
+
+    def __init__(self, config: Any, out: Path | None, ticks: int = 0, say: Callable[[str], None] = lambda _: None):
+        self.config, self.out, self.ticks, self.say = config, out, ticks, say
+        try:
+            self.machine = machines.build(config)
+        except ValueError as error:
+            raise UserError(f"{config.name}: {error}") from error
+        self.link = "shm" if config.loop.mode == "fused" else config.link.kind
+        self.made = generate.generate(self.machine, self.link)
+        self.lacks: list[str] = []
+        self.armed_at_start = False
+        self.changes: list[dict[str, Any]] = []
+        self._ended = False
+        self._stack = contextlib.ExitStack()
+        self._last_telemetry = 0.0
+        self._rows_after: list[np.ndarray] = []
+
+    def __enter__(self) -> "Supervisor":
+        with contextlib.ExitStack() as stack:
+            self._open(stack)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.stop()
+        self._stack.close()
+
+    def _open(self, stack: contextlib.ExitStack) -> None:
+        config, made = self.config, self.made
+        stack.enter_context(MachineLock(runtime_dir() / f"{config.name}.lock", config.name))
+        rows = max(int(config.record.seconds * self.machine.rate), 1000)
+        self.segment = Segment.create(
+            SHM / f"rtctl-{os.getuid()}-{config.name}", layout(made.params, made.tables, made.row, rows)
+        )
+        self.status = self.segment["status"][0]
+        self.mailbox = Mailbox(self.segment)
+        self.reader = Reader(self.segment)
+        generate.fill(self.segment["mailbox"][0]["params"], self.machine.diagram.blocks)
+        generate.fill_tables(self.segment["tables"][0], (self.machine.reference, self.machine.excitation))
+        if self.armed_at_start:
+            self.mailbox.post(_arm_and_play)  # there before the first tick, so that a virtual run repeats to the bit
+        context = zmq.Context()
+        stack.callback(context.destroy, linger=100)
+        self.commands = Commands(self)
+        curve = keys.server_curve() if config.commands.keys else None
+        self.server = CommandServer(
+            config.commands.endpoint or default_endpoint(config.name, "command"), self.commands, context, curve
+        )
+        stack.callback(self.server.close)
+        self._signals = [c.name for c in made.columns if c.name not in ("t",)]
+        per_message = max(1, int(config.commands.telemetry_rate * config.commands.telemetry_period))
+        self.telemetry = Telemetry(
+            config.commands.telemetry or default_endpoint(config.name, "telemetry"),
+            config.name,
+            self._signals,
+            context,
+            max_rows_per_message=per_message,
+            curve=curve,
+        )
+        stack.callback(self.telemetry.close)
+        self.case = describe(self.machine, made)
+        self.captures = Captures(self.machine.rate, made.columns, made.row, self.case)
+        stack.callback(self.captures.close)
+        self.recorder: Recorder | None = None
+        if self.out is not None:
+            try:
+                self.recorder = Recorder(self.out, made.columns, made.row, self.case)
+            except OSError as error:
+                raise UserError(f"{self.out}: cannot record here: {error.strerror}") from error
+        self._start_children(stack, rows)
+
+    def _start_children(self, stack: contextlib.ExitStack, rows: int) -> None:
+        config, link = self.config, self.config.link
+        endpoint = link.endpoint or f"ipc://{runtime_dir() / f'{config.name}.plant'}"
+        cpus = sorted(os.sched_getaffinity(0))
+        others = [c for c in cpus if c != (config.loop.cpu if config.loop.cpu is not None else cpus[-1])]
+        order = {
+            "config": config.model_dump(mode="json", exclude_unset=True),
+            "segment": str(self.segment.path),
+            "rows": rows,
+            "link": self.link,
+            "endpoint": endpoint,
+            "ticks": self.ticks,
+            "cpu": others[0] if others else None,
+        }
+        entry = {"real": "run_real", "lockstep": "run_lockstep", "fused": "run_fused"}[config.loop.mode]
+        if not generate.is_warm(self.made.path, entry):
+            self.say("compiling the tick, once for this config structure; half a minute or so ...")
+        self.children: list[ChildProcess] = []
+        self.plant: ChildProcess | None = None
+        stack.callback(self._stop_children)
+        if config.loop.mode != "fused" and link.plant == "spawn":
+            self.plant = ChildProcess("plant", order)
+            self.children.append(self.plant)
+            self._wait(self.plant, lambda: self.listening, "the plant")
+        self.loop = ChildProcess("loop", order)
+        self.children.append(self.loop)
+        self._wait(self.loop, lambda: bool(self.status["ready"]) or bool(self.status["ended"]), "the loop")
+
+    listening = False
+
+    def _wait(self, child: ChildProcess, done: Callable[[], bool], who: str) -> None:
+        deadline = time.monotonic() + START_TIMEOUT
+        while not done():
+            self._hear()
+            if not child.running() and not done():
+                self._hear()
+                raise RuntimeError(f"{who} ended while it started:\n{child.last_words()}")
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"{who} did not start within {START_TIMEOUT:g} s")
+            time.sleep(0.002)
+
+    def _hear(self) -> None:
+        """Reports of the children: what they lack, errors as exceptions, ends."""
+        for child in self.children:
+            for report in child.reports():
+                if report["event"] == "error":
+                    raise UserError(report["message"])
+                if report["event"] == "lacks":
+                    self.lacks = report["lacks"]
+                    self.say("not fully real-time here: " + " | ".join(self.lacks))
+                if report["event"] == "listening":
+                    self.listening = True
+
+    # one turn
+
+    def turn(self) -> bool:
+        """Drain, record, publish, answer. Returns False once the loop has ended and all of it is taken in."""
+        ended = bool(self.status["ended"]) or not self.loop.running()
+        self._drain()
+        self.server.process()
+        self.commands.watch_commander()
+        if not self._ended:
+            self._hear()
+        if ended and not self._ended:
+            self._ended = True
+            self._drain()
+            if self.loop.process.poll() not in (None, 0) and not self.status["ended"]:
+                raise RuntimeError(f"the loop's process died:\n{self.loop.last_words()}")
+        if self.plant is not None and not self._ended and not self.plant.running() and not self._plant_died:
+            self._plant_died = True
+            log.warning("plant ended", last_words=self.plant.last_words())
+        return not self._ended
+
+    _plant_died = False
+
+    def _drain(self) -> None:
+        while True:
+            rows = self.reader.take(65536)
+            for first, count in self.reader.gaps:
+                if self.recorder is not None:
+                    self.recorder.note_lost(first, count)
+                self.captures.note_lost(first, count)
+                log.warning("rows lost between loop and supervisor", first=first, count=count)
+            if not len(rows):
+                return
+            self.last_row = rows[-1]
+            self.captures.feed(rows)
+            if self.recorder is not None:
+                self.recorder.put(rows)
+            self._publish(rows)
+
+    last_row: Any = None
+
+    def _publish(self, rows: np.ndarray) -> None:
+        self._rows_after.append(rows[-2000:])
+        now = time.monotonic()
+        if now - self._last_telemetry >= self.config.commands.telemetry_period:
+            self._last_telemetry = now
+            kept = np.concatenate(self._rows_after)[-2000:]
+            self._rows_after = []
+            self.telemetry.publish(np.column_stack([kept["t"], *[kept[name] for name in self._signals]]))
+
+    def run(self) -> Iterator[None]:
+        """Turns until the run ends; yields after each, so that the caller can show a status line."""
+        virtual = self.config.loop.mode != "real"
+        poller = zmq.Poller()
+        poller.register(self.server.socket, zmq.POLLIN)
+        while self.turn():
+            yield
+            poller.poll(1 if virtual else TURN * 1000)
+
+    # what others ask
+
+    def snapshot(self) -> dict[str, Any]:
+        """State, counts and times of now, as `rtctl status` and the run's JSON give them."""
+        s = self.status
+        trip = safety.TRIPS[int(s["trip"])]
+        return {
+            "name": self.config.name,
+            "machine": self.machine.kind,
+            "mode": self.config.loop.mode,
+            "link": self.link if self.config.loop.mode != "fused" else "none",
+            "pid": os.getpid(),
+            "state": safety.STATES[int(s["state"])],
+            "trip": None if not s["trip"] else {"code": trip[0], "why": trip[1], "tick": int(s["trip_tick"])},
+            "ticks": int(s["tick"]),
+            "rate_hz": self.machine.rate,
+            "measured_rate_hz": self._measured_rate(),
+            "missed": int(s["missed"]),
+            "late": int(s["late"]),
+            "overruns": int(s["overruns"]),
+            "lateness_us": percentiles(s["lateness"]),
+            "tick_us": percentiles(s["ticks"]),
+            "link_latency_us": percentiles(s["round_trip"]),
+            "sample_age_us": percentiles(s["age"]),
+            "frames": {"received": int(s["link_frames"]), "not_sent": int(s["link_dropped"])},
+            "lost_counts": int(s["lost_counts"]),
+            "rows": {"lost_in_ring": self.reader.lost, **self._recorded()},
+            "refused_commands": dict(self.server.refused),
+            "lacks": self.lacks,
+        }
+
+    def note_change(self, path: str, value: Any) -> None:
+        """Remember a setting that was changed while running, for the bundle."""
+        self.changes.append({"tick": int(self.status["tick"]), "path": path, "value": value})
+
+    def _recorded(self) -> dict[str, Any]:
+        if self.recorder is None:
+            return {}
+        stats = self.recorder.stats()
+        return {"recorded": stats.rows_written, "queued": stats.rows_queued, "lost": stats.rows_lost, "error": stats.error}
+
+    def _measured_rate(self) -> float | None:
+        if self.last_row is None or self.last_row["t"] <= 0:
+            return None
+        return round(float(self.last_row["tick"] / self.last_row["t"]), 3)
+
+    def stop(self) -> None:
+        """End the loop with its outputs at zero and take in what it still wrote."""
+        if hasattr(self, "status"):
+            self.status["stop"] = 1
+        deadline = time.monotonic() + 5.0
+        while hasattr(self, "loop") and not self._ended and time.monotonic() < deadline:
+            try:
+                if not self.turn():
+                    break
+            except (RuntimeError, UserError) as error:
+                log.error("while stopping", error=str(error))
+                break
+            time.sleep(0.002)
+
+    def finish(self) -> Path | None:
+        """Close the recording; returns the bundle's folder. Raises OSError where the disk does not take it."""
+        if self.recorder is None:
+            return None
+        return self.recorder.finish({"run": self.snapshot(), "changes": self.changes})
+
+    def _stop_children(self) -> None:
+        self.segment["plant_status"][0]["stop"] = 1
+        self.status["stop"] = 1
+        for child in reversed(self.children):
+            child.stop()
+        self.segment.unlink()
+
+
+def _arm_and_play(_: Any, command: Any) -> None:
+    command["arm"] += 1
+    command["play"] += 1

@@ -1,0 +1,167 @@
+"""A bundle: a folder with `recording.parquet` (one row per tick) and `case.json` (what the owner believes).
+
+While a recording runs, the folder holds `recording.arrows` instead; `finish` makes the one from the other. At every
+moment in between the folder holds all the data in a form that `rtctl.trace.repair` understands.
+"""
+
+import json
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from rtctl.config.errors import UserError, nearest
+from rtctl.trace.columns import columns_of
+
+ARROWS = "recording.arrows"
+PARQUET = "recording.parquet"
+CASE = "case.json"
+FORMAT = 1
+ROW_GROUP = 65_536  # rows; what a conversion holds in memory
+
+
+class Bundle(NamedTuple):
+    columns: dict[str, np.ndarray]
+    case: dict[str, Any]
+    folder: Path
+    units: dict[str, str]  # of the columns that name theirs
+
+
+def load_bundle(folder: Path | str) -> Bundle:
+    """Read a finished bundle. Raises UserError that names the file and says what would be right."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise UserError(f"{folder} is not a folder; a bundle is a folder with {PARQUET} and {CASE}")
+    path = folder / PARQUET
+    if not path.is_file():
+        if (folder / ARROWS).exists():
+            raise UserError(f"{folder} holds a recording that was not finished; run: rtctl repair {folder}")
+        raise UserError(f"{path} is missing; a bundle holds {PARQUET} and {CASE}")
+    case = load_case(folder)
+    try:
+        table = pq.read_table(path)
+    except (pa.ArrowException, OSError) as error:
+        raise UserError(f"{path} cannot be read as Parquet: {_first_line(error)}") from None
+    columns = {name: _numbers(path, name, table.column(name)) for name in table.column_names}
+    if "t" not in columns:
+        hint = nearest("t", columns) or nearest("time", columns)
+        raise UserError(f"{path} has no column 't' (s, clock at the tick)" + (f"; is it '{hint}'?" if hint else ""))
+    if not len(columns["t"]):
+        raise UserError(f"{path} holds no rows")
+    if not np.isfinite(columns["t"]).all():
+        raise UserError(f"{path}: column 't' is not finite in row {int(np.argmin(np.isfinite(columns['t'])))}")
+    return Bundle(columns, case, folder, {c.name: c.unit for c in columns_of(table.schema) if c.unit})
+
+
+def load_case(folder: Path) -> dict[str, Any]:
+    """Read case.json. Raises UserError where it is missing, is not JSON or is of a later format."""
+    path = folder / CASE
+    try:
+        case = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise UserError(f"{path} is missing; it says what the owner believes of the machine") from None
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path} is not text in UTF-8: byte {error.start}") from None
+    except json.JSONDecodeError as error:
+        raise UserError(f"{path}, line {error.lineno}: not JSON, {error.msg}") from None
+    except RecursionError:
+        raise UserError(f"{path} is nested too deeply to be a case") from None
+    if not isinstance(case, dict):
+        raise UserError(f"{path} holds a {type(case).__name__}; it should hold one object {{...}}")
+    if case.get("format", FORMAT) != FORMAT:
+        raise UserError(f"{path}: format is {case['format']!r}; this program reads format {FORMAT}")
+    return case
+
+
+def save_case(folder: Path, case: dict[str, Any]) -> Path:
+    """Write case.json: the old one or the new one is there at any moment, never half of either."""
+    path = Path(folder) / CASE
+    text = as_json(case, indent=1) + "\n"
+    part = path.with_name(CASE + ".tmp")
+    with part.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    return replace(part, path)
+
+
+def as_json(case: dict[str, Any], indent: int | None = None) -> str:
+    """The case as text; numpy's numbers and arrays and paths are welcome. Raises ValueError at nan and inf."""
+    return json.dumps(case, indent=indent, default=_plain, allow_nan=False)
+
+
+def write_parquet(folder: Path, batches: Iterable[pa.RecordBatch], schema: pa.Schema, expect: int | None = None) -> int:
+    """Write recording.parquet in flat memory, verify it and put it in place; returns its rows.
+
+    Raises OSError where the disk does not take it, or does not give back as many rows as it was given (or `expect`).
+    """
+    part = folder / (PARQUET + ".tmp")
+    rows = 0
+    try:
+        with pq.ParquetWriter(part, schema, compression="zstd") as writer:
+            for table in _groups(batches, schema):
+                writer.write_table(table, row_group_size=ROW_GROUP)
+                rows += table.num_rows
+        with part.open("rb") as file:
+            os.fsync(file.fileno())
+        found = pq.read_metadata(part).num_rows
+        wanted = rows if expect is None else expect
+        if found != wanted:
+            raise OSError(f"{folder / PARQUET} would hold {found} rows where {wanted} were recorded")
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+    replace(part, folder / PARQUET)
+    return rows
+
+
+def _groups(batches: Iterable[pa.RecordBatch], schema: pa.Schema) -> Iterable[pa.Table]:
+    waiting: list[pa.RecordBatch] = []
+    rows = 0
+    for batch in batches:
+        waiting.append(batch)
+        rows += batch.num_rows
+        if rows >= ROW_GROUP:
+            yield pa.Table.from_batches(waiting, schema)
+            waiting, rows = [], 0
+    if waiting:
+        yield pa.Table.from_batches(waiting, schema)
+
+
+def replace(part: Path, path: Path) -> Path:
+    """Rename and make the rename last."""
+    part.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+    return path
+
+
+def _numbers(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
+    kind = column.type
+    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)):
+        raise UserError(f"{path}: column '{name}' holds {kind}; it should hold numbers")
+    if column.null_count:
+        raise UserError(f"{path}: column '{name}' has {column.null_count} empty cells; every row needs a number")
+    return column.to_numpy()
+
+
+def _plain(value: Any) -> Any:
+    """numpy's numbers and arrays, and paths, as JSON knows them."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"case.json cannot hold a {type(value).__name__}")
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

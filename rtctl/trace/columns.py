@@ -1,0 +1,52 @@
+"""What a recorded column is called, in what unit, and what it means; kept in the file itself."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+
+class Column(NamedTuple):
+    name: str
+    unit: str
+    help: str
+
+
+def schema(columns: Sequence[Column], dtype: np.dtype, metadata: Mapping[str, str] | None = None) -> pa.Schema:
+    """The schema of a recording: one field for each of `columns`, typed as in `dtype`, unit and help in its metadata.
+
+    Fields of `dtype` that are not among `columns` are not recorded. Raises ValueError where a column is not in `dtype`,
+    is there twice, or is not a scalar.
+    """
+    names = [column.name for column in columns]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(f"columns named twice: {', '.join(twice)}")
+    fields = [_field(column, dtype) for column in columns]
+    return pa.schema(fields, metadata=dict(metadata or {}))
+
+
+def _field(column: Column, dtype: np.dtype) -> pa.Field:
+    if column.name not in (dtype.names or ()):
+        raise ValueError(f"column '{column.name}' is not in the row; it has {', '.join(dtype.names or ())}")
+    kind = dtype[column.name]
+    if kind.shape or kind.names:
+        raise ValueError(f"column '{column.name}' is not a scalar but {kind}")
+    return pa.field(
+        column.name, pa.from_numpy_dtype(kind), nullable=False, metadata={"unit": column.unit, "help": column.help}
+    )
+
+
+def record_batch(rows: np.ndarray, schema: pa.Schema) -> pa.RecordBatch:
+    """The rows (structured array) as columns. Copies."""
+    return pa.record_batch([pa.array(np.ascontiguousarray(rows[name])) for name in schema.names], schema=schema)
+
+
+def columns_of(schema: pa.Schema) -> list[Column]:
+    """The way back: unit and help are empty where a file from elsewhere does not name them."""
+    return [Column(field.name, _text(field, b"unit"), _text(field, b"help")) for field in schema]
+
+
+def _text(field: pa.Field, key: bytes) -> str:
+    return (field.metadata or {}).get(key, b"").decode()

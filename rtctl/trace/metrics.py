@@ -1,0 +1,92 @@
+"""What a step response is judged by: final error, overshoot, settling time."""
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+LEAST_HOLD = 10  # samples; a reference that rests for less is still on its way
+
+
+def step_metrics(
+    t: np.ndarray,
+    ref: np.ndarray,
+    y: np.ndarray,
+    scale_mm: float,
+    rad_per_unit: float | None = 1.0,
+    settle_band: float = 0.02,
+    settle_floor: float = 0.0,
+) -> list[dict[str, float | None]]:
+    """One dict for each step of the reference `ref` (a jump or a ramp), judged by the measured `y` until the next one.
+
+    `t` in s; `ref` and `y` in the machine's unit, of which one is `scale_mm` mm and `rad_per_unit` rad: `scales` has
+    both for a case. The keys:
+
+    - `t`: s, when the reference arrives at its new value; `size`: in the machine's unit, with its sign
+    - `final_error_rad`, `final_error_mm`: mean of ref - y over the last tenth of the hold; rad is None without a scale
+    - `overshoot_pct`: how far y went beyond the new value, in % of the step; never negative
+    - `settling_s`: from `t` until y stays within `settle_band` of the step, or `settle_floor` (machine's unit; a few
+      counts of the sensor) where that is more; None if it does not before the next step
+
+    Raises ValueError where the lengths differ.
+    """
+    t, ref, y = (np.asarray(v, dtype=float) for v in (t, ref, y))
+    if not t.shape == ref.shape == y.shape or t.ndim != 1:
+        raise ValueError(f"t, ref and y should be equally long: they are {t.shape}, {ref.shape} and {y.shape}")
+    resolution = 1e-9 * float(np.ptp(ref)) if len(ref) else 0.0
+    steps: list[dict[str, float | None]] = []
+    for (_, before), (start, end) in pairwise(_holds(ref, resolution)):
+        size = float(ref[start] - ref[before - 1])
+        if abs(size) <= resolution:
+            continue  # there and back without a rest in between
+        hold = slice(start, end)
+        final = _final_error(t[hold], ref[hold] - y[hold])
+        steps.append(
+            {
+                "t": float(t[start]),
+                "size": size,
+                "final_error_rad": None if rad_per_unit is None else final * rad_per_unit,
+                "final_error_mm": final * scale_mm,
+                "overshoot_pct": max(0.0, float(np.max((y[hold] - ref[hold]) / size)) * 100),
+                "settling_s": _settling(t[hold], ref[hold] - y[hold], max(settle_band * abs(size), settle_floor)),
+            }
+        )
+    return steps
+
+
+def scales(case: Mapping[str, Any]) -> tuple[float, float | None]:
+    """mm and rad in one unit of position: rad of the capstan on an ivu, m on an ldu or another linear axis.
+
+    rad is None where a linear axis has no capstan radius R_c. Raises ValueError where an ivu has none.
+    """
+    radius = case.get("parameters", {}).get("R_c")
+    if case.get("plant") == "ivu":
+        if not radius:
+            raise ValueError("parameters.R_c is missing: without the capstan's radius (m) rad are not mm")
+        return 1000.0 * radius, 1.0
+    return 1000.0, 1.0 / radius if radius else None
+
+
+def _holds(ref: np.ndarray, resolution: float) -> list[tuple[int, int]]:
+    """The stretches [start, end) in which the reference rests."""
+    if not len(ref):
+        return []
+    moves = np.flatnonzero(np.abs(np.diff(ref)) > resolution) + 1  # first sample at a new value
+    starts, ends = np.concatenate(([0], moves)), np.concatenate((moves, [len(ref)]))
+    long = ends - starts >= LEAST_HOLD
+    long[0] = True  # a step may come right at the start
+    return list(zip(starts[long].tolist(), ends[long].tolist(), strict=True))
+
+
+def _final_error(t: np.ndarray, error: np.ndarray) -> float:
+    return float(error[t >= t[-1] - 0.1 * (t[-1] - t[0])].mean())
+
+
+def _settling(t: np.ndarray, error: np.ndarray, band: float) -> float | None:
+    outside = np.flatnonzero(~(np.abs(error) <= band))
+    if not len(outside):
+        return 0.0
+    if outside[-1] == len(t) - 1:
+        return None
+    return float(t[outside[-1] + 1] - t[0])

@@ -1,0 +1,187 @@
+"""A picture of a run: position and reference, error, outputs, tension, one above the other over the same time."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from rtctl.trace.bundle import Bundle
+
+BUCKETS = 1500  # about the pixels of a panel's width
+
+
+class Trace(NamedTuple):
+    column: str
+    label: str
+    color: str
+    style: str = "-"
+
+
+class Panel(NamedTuple):
+    title: str
+    unit: str | None  # None: that of the position
+    traces: tuple[Trace, ...]
+
+
+INK, BLUE, ORANGE, GREEN, RED, GREY = "#222222", "#0b62a8", "#d9730d", "#2e8b57", "#b3262e", "#8a8f98"
+PANELS = (
+    Panel(
+        "Position",
+        None,
+        (
+            Trace("truth_x", "true", GREEN),
+            Trace("capstan", "capstan", BLUE),
+            Trace("position", "measured", BLUE),
+            Trace("x", "measured", BLUE),
+            Trace("ref", "reference", INK, "--"),
+        ),
+    ),
+    Panel("Error", None, (Trace("error", "reference - measured", RED),)),
+    Panel("Output", "V", (Trace("u", "u", BLUE), Trace("u1", "u1", BLUE), Trace("u2", "u2", ORANGE))),
+    Panel(
+        "Tension",
+        "N",
+        (
+            Trace("truth_tension1", "tape 1, true", "#8fc1ea"),
+            Trace("truth_tension2", "tape 2, true", "#f4bd8a"),
+            Trace("tension1_estimate", "tape 1, estimate", BLUE),
+            Trace("tension2_estimate", "tape 2, estimate", ORANGE),
+        ),
+    ),
+    Panel(
+        "Counters",
+        "counts",
+        (
+            Trace("capstan_counts", "capstan", BLUE),
+            Trace("encoder_counts", "encoder", BLUE),
+            Trace("scale_counts", "scale", ORANGE),
+            Trace("reel1_counts", "reel 1", GREEN),
+            Trace("reel2_counts", "reel 2", GREY),
+        ),
+    ),
+)
+SPARE = "Counters"  # drawn only where there is no position beside the reference
+METRES = ("position", "x", "truth_x", "encoder_counts")  # a machine with one of these is linear
+NAMES = {"ivu": "Image verification unit", "ldu": "Linear drive unit", "axis": "Axis"}
+
+
+def plot_run(
+    run: Bundle | Mapping[str, np.ndarray],
+    metrics: Sequence[Mapping[str, Any]],
+    path: Path | str,
+    title: str | None = None,
+) -> Path:
+    """Draw a bundle, or columns by name with `t` in s, into a PNG at `path`; what of the known names is there is drawn.
+
+    `metrics` as from `step_metrics` (may be empty). The title is the case's machine and date where none is given.
+    Raises ValueError where there is no `t`, or nothing to draw.
+    """
+    bundle = run if isinstance(run, Bundle) else None
+    columns = bundle.columns if bundle else dict(run)  # type: ignore[arg-type]
+    if not len(columns.get("t", ())):
+        raise ValueError("nothing to draw: there is no column 't', or it is empty")
+    panels = _panels(columns, bundle.units if bundle else {})
+    if not panels:
+        raise ValueError(f"nothing to draw: none of the columns {', '.join(columns)} is known")
+    heights = [1.5 if panel.title == "Position" else 1.0 for panel in panels]
+    figure = Figure(figsize=(11, 1.2 + 1.6 * sum(heights)), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    every = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    for axes, panel in zip(every, panels, strict=True):
+        _draw(axes, panel, columns)
+        for step in metrics:
+            axes.axvline(step["t"], color=GREY, linewidth=0.8, linestyle=":", zorder=0)
+    every[-1].set_xlabel("time [s]")
+    every[-1].set_xlim(float(columns["t"][0]), float(columns["t"][-1]) or 1.0)
+    figure.align_ylabels(list(every))
+    figure.suptitle(title or _title(bundle.case if bundle else {}), x=0.01, ha="left", fontsize=14, fontweight="bold")
+    if metrics:
+        every[0].set_title(summary(metrics), loc="left", fontsize=10, color="#444444")
+    figure.savefig(path)
+    return Path(path)
+
+
+def summary(metrics: Sequence[Mapping[str, Any]]) -> str:
+    """The steps of a run in one line."""
+    worst = max(metrics, key=lambda step: abs(step["final_error_mm"]))["final_error_mm"]
+    over = max(step["overshoot_pct"] for step in metrics)
+    times = [step["settling_s"] for step in metrics]
+    settled = [s for s in times if s is not None]
+    parts = [
+        "1 step" if len(metrics) == 1 else f"{len(metrics)} steps",
+        f"largest final error {worst:.3g} mm",
+        f"largest overshoot {over:.3g} %",
+        f"slowest settling {max(settled):.3g} s" if settled else "",
+        f"{times.count(None)} did not settle" if None in times else "",
+    ]
+    return "   |   ".join(part for part in parts if part)
+
+
+def envelope(t: np.ndarray, y: np.ndarray, buckets: int = BUCKETS) -> tuple[np.ndarray, np.ndarray]:
+    """At most about `2 * buckets` points that cover the same ink as the whole: least and greatest of every bucket.
+
+    nan are left out where a bucket has anything else. Short signals come back as they are.
+    """
+    if len(t) <= 2 * buckets:
+        return t, y
+    edges = np.linspace(0, len(t), buckets + 1).astype(int)
+    starts = edges[:-1]
+    values = np.empty(2 * buckets)
+    values[0::2] = np.fmin.reduceat(y, starts)
+    values[1::2] = np.fmax.reduceat(y, starts)
+    times = np.empty(2 * buckets)
+    times[0::2] = t[starts]
+    times[1::2] = t[edges[1:] - 1]
+    return times, values
+
+
+def _panels(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> list[Panel]:
+    """The panels that have something to show, with only the traces that are there and their unit."""
+    linear = any(name in columns for name in METRES)
+    found = []
+    for panel in PANELS:
+        traces = tuple(trace for trace in panel.traces if trace.column in columns)
+        if traces:
+            named = next((units[trace.column] for trace in traces if trace.column in units), None)
+            found.append(Panel(panel.title, named or panel.unit or ("m" if linear else "rad"), traces))
+    position = next((panel for panel in found if panel.title == "Position"), None)
+    measured = position is not None and any(trace.column != "ref" for trace in position.traces)
+    return [panel for panel in found if not (panel.title == SPARE and measured)]
+
+
+def _draw(axes: Axes, panel: Panel, columns: Mapping[str, np.ndarray]) -> None:
+    t = np.asarray(columns["t"], dtype=float)
+    drawn = [(trace, *envelope(t, np.asarray(columns[trace.column], dtype=float))) for trace in panel.traces]
+    factor, unit = _prefixed(panel.unit or "", max(_largest(y) for _, _, y in drawn))
+    for trace, x, y in drawn:
+        axes.plot(x, y * factor, trace.style, color=trace.color, linewidth=1.2, label=trace.label)
+    axes.set_ylabel(f"{panel.title.lower()} [{unit}]")
+    axes.grid(True, color="#e3e5e8", linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.margins(y=0.08)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, fontsize=9, borderaxespad=0.0)
+
+
+def _largest(y: np.ndarray) -> float:
+    finite = np.abs(y[np.isfinite(y)])
+    return float(finite.max()) if len(finite) else 0.0
+
+
+def _prefixed(unit: str, largest: float) -> tuple[float, str]:
+    """The factor and the unit that bring the largest value to 1 or more: 2e-4 m is 200 um."""
+    if unit not in ("m", "rad", "N", "V") or not largest:
+        return 1.0, unit
+    thousands = min(3, max(0, math.ceil(-math.log10(largest) / 3)))
+    return 1000.0**thousands, ("", "m", "µ", "n")[thousands] + unit
+
+
+def _title(case: Mapping[str, Any]) -> str:
+    machine = case.get("machine") or NAMES.get(str(case.get("plant")), case.get("plant")) or "Run"
+    date = str(case.get("recorded_at", "")).replace("T", " ").removesuffix("+00:00")
+    return f"{machine}, {date} UTC" if date else str(machine)
