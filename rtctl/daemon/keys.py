@@ -104,7 +104,8 @@ def require_curve(endpoint: str) -> bool:
     """True where others could reach the endpoint: all but ipc, inproc and tcp on a loopback address."""
     if endpoint.startswith(("ipc://", "inproc://")):
         return False
-    host = endpoint.removeprefix("tcp://").rpartition(":")[0].strip("[]")
+    address = endpoint.removeprefix("tcp://")
+    host = (address.rpartition(":")[0] or address).strip("[]")
     try:
         return host != "localhost" and not ipaddress.ip_address(host).is_loopback
     except ValueError:  # a name, an interface or a wildcard: not known to be loopback
@@ -112,6 +113,9 @@ def require_curve(endpoint: str) -> bool:
 
 
 def refuse_open(endpoint: str) -> UserError:
+    """The error for an endpoint that needs keys and has none."""
+    if not endpoint.startswith("tcp://"):
+        return UserError(f"'{endpoint}' is no endpoint; expected ipc:///PATH or tcp://ADDRESS:PORT")
     return UserError(
         f"{endpoint} can be reached from other machines and needs keys: run `rtctl keys new` (and see docs/protocol.md),"
         " or use ipc:// or tcp://127.0.0.1"
@@ -135,13 +139,15 @@ def apply_client(socket: zmq.Socket, keys: Keys, server: bytes) -> None:
 class Doorman:
     """Answers libzmq, for each new connection of a context, whether the client's key is known.
 
-    It ends when its context does, which is why nobody has to stop it.
+    It ends when its context does, so nobody has to stop it. Its socket belongs to a shadow of the context, else
+    `context.destroy()` would close it under the thread that waits on it, which libzmq answers with an abort.
     """
 
     def __init__(self, context: zmq.Context):
         self._known: dict[str, frozenset[bytes]] = {}
         self._numbers = itertools.count()
-        self._socket = context.socket(zmq.REP)
+        self._context = context
+        self._socket = zmq.Context.shadow(context.underlying).socket(zmq.REP)
         self._socket.linger = 0
         self._socket.bind("inproc://zeromq.zap.01")
         threading.Thread(target=self._serve, name="rtctl-doorman", daemon=True).start()
@@ -157,7 +163,7 @@ class Doorman:
             while True:
                 self._socket.send_multipart(self._answer(self._socket.recv_multipart()))
         except zmq.ZMQError:  # the context ended
-            _doormen.pop(self._socket.context, None)
+            _doormen.pop(self._context, None)
             self._socket.close()
 
     def _answer(self, frames: list[bytes]) -> list[bytes]:

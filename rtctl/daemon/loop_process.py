@@ -13,7 +13,7 @@ import zmq
 
 from rtctl.config.errors import UserError
 from rtctl.daemon import child
-from rtctl.loop import frames, generate, mailbox
+from rtctl.loop import frames, generate, mailbox, zmq_link
 from rtctl.loop.memory import Segment
 from rtctl.loop.realtime import RealTime
 from rtctl.machines import Machine
@@ -43,30 +43,39 @@ class Loop:
         self.period = round(SECOND / machine.rate)
         self.ahead = int(machine.config.loop.write == "next_tick")
 
-    def real(self, ticks: int) -> None:
-        """On the wall clock, to the end."""
-        loop = self.machine.config.loop
-        late = int(loop.late * self.period)
-        self.made.module.run_real(
-            *self.shared, *self.own, self.rx_staged, self.out, self.inp, self.period, int(loop.spin * SECOND), late,
-            self.ahead, ticks,
+    def entry(self) -> tuple[Any, tuple[Any, ...]]:
+        """The compiled function of this mode and its arguments, but for the last two of a virtual one."""
+        loop, module = self.machine.config.loop, self.made.module
+        if loop.mode == "real":
+            late = int(loop.late * self.period)
+            return module.run_real, (
+                *self.shared, *self.own, self.rx_staged, self.out, self.inp, self.period, int(loop.spin * SECOND), late,
+                self.ahead, 0,
+            )  # fmt: skip
+        if loop.mode == "lockstep":
+            return module.run_lockstep, (
+                *self.shared, *self.own, self.rx_staged, self.held, self.out, self.inp, self.period, self.ahead, 0, 0
+            )  # fmt: skip
+        return module.run_fused, (
+            *self.shared, *self.own, self.held, self.pp, self.ps, self.period, self.ahead, 0, 0
         )  # fmt: skip
 
-    def lockstep(self, first: int, most: int) -> None:
-        """A stretch of virtual time, in turns with the plant's process."""
-        self.made.module.run_lockstep(
-            *self.shared, *self.own, self.rx_staged, self.held, self.out, self.inp, self.period, self.ahead, first, most
-        )
+    def warm(self) -> None:
+        """Compile, before anything waits for us."""
+        generate.warm(*self.entry())
 
-    def fused(self, first: int, most: int) -> None:
-        """A stretch of virtual time with the plant inside."""
-        self.made.module.run_fused(
-            *self.shared, *self.own, self.held, self.pp, self.ps, self.period, self.ahead, first, most
-        )
+    def real(self, ticks: int) -> None:
+        """On the wall clock, to the end."""
+        run, arguments = self.entry()
+        run(*arguments[:-1], ticks)
+
+    def stretch(self, first: int, most: int) -> None:
+        """A stretch of virtual time, with the plant inside or in turns with its process."""
+        run, arguments = self.entry()
+        run(*arguments[:-2], first, most)
 
     def virtual(self, ticks: int) -> None:
         """Stretches of virtual time, never further than the ring's reader can follow: nothing is lost."""
-        stretch = self.lockstep if self.machine.config.loop.mode == "lockstep" else self.fused
         status, ring = self.status[0], self.segment["ring"][0]
         room = len(self.segment["rows"])
         done = 0
@@ -76,7 +85,7 @@ class Loop:
             if most <= 0:
                 time.sleep(0.0005)  # the reader is behind; virtual time waits for it
                 continue
-            stretch(done, most)
+            self.stretch(done, most)
             done = int(status["tick"])
         status["ended"] = 1
 
@@ -98,15 +107,17 @@ def main(argv: list[str]) -> int:
         status["stop"] = 1
 
     child.watch_parent(lost, stop)
+    over_zmq = order["link"] == "zmq" and loop.mode != "fused"
+    run = Loop(machine, made, segment, *((0, 0) if over_zmq else (segment["outputs"], segment["inputs"])))
+    if over_zmq:
+        zmq_link.load()
+    run.warm()  # before the link is up: samples that wait while we compile would be old
     context = zmq.Context()
     socket = None
-    out: Any = segment["outputs"]
-    inp: Any = segment["inputs"]
-    if order["link"] == "zmq" and loop.mode != "fused":
+    if over_zmq:
         link = machine.config.link
         socket = child.link_socket(context, order["endpoint"], False, link.timeout, link.keys)
-        out = inp = socket.underlying
-    run = Loop(machine, made, segment, out, inp)
+        run.out = run.inp = socket.underlying
     ticks = order["ticks"] or FOREVER
     if loop.mode == "fused":
         run.virtual(ticks)
@@ -147,6 +158,11 @@ def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoi
         except zmq.Again:
             pass
         if socket.poll(200, zmq.POLLIN):
+            if mode == "real":  # what waited for us is old by now
+                while socket.poll(0):
+                    socket.recv()
+                if not socket.poll(200):
+                    continue
             return
     raise UserError(f"no plant answers at {endpoint} within {timeout:g} s; start one with `rtctl plant`, or set link.plant: spawn")
 

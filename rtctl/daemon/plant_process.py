@@ -17,19 +17,26 @@ SECOND = 1_000_000_000
 MOST_BEHIND = 200  # periods that the emulator makes up for before it lets time slip
 
 
-def run(machine: Machine, made: generate.Generated, status: Any, out: Any, inp: Any) -> None:
-    """Emulate until status.stop is set, on the wall clock or in turns with the loop."""
-    frame = generate.new_frames()
-    p, s = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
-    generate.fill(p[0], machine.plant_diagram.blocks)
-    if machine.config.loop.mode == "lockstep":
-        made.module.plant_lockstep(status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp)
-    else:
-        period = round(machine.plant_period * SECOND)
-        made.module.plant_real(
-            status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp, period, MOST_BEHIND
-        )
-    status["ended"] = 1
+class Plant:
+    """All arrays that the compiled emulator works on."""
+
+    def __init__(self, machine: Machine, made: generate.Generated, status: Any, out: Any, inp: Any):
+        frame = generate.new_frames()
+        p, s = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
+        generate.fill(p[0], machine.plant_diagram.blocks)
+        self.status = status
+        arguments = (status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp)
+        if machine.config.loop.mode == "lockstep":
+            self._entry, self._arguments = made.module.plant_lockstep, arguments
+        else:
+            period = round(machine.plant_period * SECOND)
+            self._entry, self._arguments = made.module.plant_real, (*arguments, period, MOST_BEHIND)
+        generate.warm(self._entry, self._arguments)
+
+    def run(self) -> None:
+        """Emulate until status.stop is set, on the wall clock or in turns with the loop."""
+        self._entry(*self._arguments)
+        self.status["ended"] = 1
 
 
 def serve(machine: Machine, endpoint: str, status: Any, announce: Any) -> None:
@@ -38,19 +45,25 @@ def serve(machine: Machine, endpoint: str, status: Any, announce: Any) -> None:
     context = zmq.Context()
     link = machine.config.link
     socket = child.link_socket(context, endpoint, True, 1.0, link.keys)
+    plant = Plant(machine, made, status, socket.underlying, socket.underlying)
     announce()
     if machine.config.loop.mode == "lockstep":
-        hello = np.zeros(1, frames.OUTPUTS)
-        while not status[0]["stop"]:  # the loop says hello; until then there is nobody to take the first sample
-            if socket.poll(200, zmq.POLLIN):
-                data = socket.recv()
-                if len(data) == frames.OUTPUTS.itemsize:
-                    hello[:] = np.frombuffer(data, frames.OUTPUTS)
-                    if hello[0]["magic"] == frames.MAGIC and hello[0]["seq"] == frames.HELLO:
-                        break
-    run(machine, made, status, socket.underlying, socket.underlying)
+        _wait_for_hello(socket, status)
+    plant.run()
     socket.close()
     context.term()
+
+
+def _wait_for_hello(socket: zmq.Socket, status: Any) -> None:
+    """Until the loop says hello there is nobody to take the first sample."""
+    while not status[0]["stop"]:
+        if not socket.poll(200, zmq.POLLIN):
+            continue
+        data = socket.recv()
+        if len(data) == frames.OUTPUTS.itemsize:
+            hello = np.frombuffer(data, frames.OUTPUTS)[0]
+            if hello["magic"] == frames.MAGIC and hello["seq"] == frames.HELLO:
+                return
 
 
 def main(argv: list[str]) -> int:
@@ -74,8 +87,9 @@ def main(argv: list[str]) -> int:
     if order["link"] == "zmq":
         serve(machine, order["endpoint"], status, lambda: child.report("listening"))
     else:
+        plant = Plant(machine, made, status, segment["inputs"], segment["outputs"])
         child.report("listening")
-        run(machine, made, status, segment["inputs"], segment["outputs"])
+        plant.run()
     child.report("ended")
     return 0
 

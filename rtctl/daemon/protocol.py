@@ -273,7 +273,9 @@ def _unpack(data: bytes, **limits: int) -> dict[str, Any]:
     try:
         message = msgpack.unpackb(data, ext_hook=_no_ext, object_pairs_hook=_unique, strict_map_key=True, **limits)
     except (ValueError, TypeError, OverflowError, RecursionError, msgpack.UnpackException) as error:
-        raise ProtocolError("malformed", f"not a msgpack map within the limits: {str(error) or 'nested too deep'}") from None
+        raise ProtocolError(
+            "malformed", f"not a msgpack map within the limits: {str(error) or 'nested too deep'}"
+        ) from None
     if not isinstance(message, dict):
         raise ProtocolError("malformed", "the message is not a msgpack map")
     return message

@@ -251,6 +251,7 @@ class Supervisor:
             "overruns": int(s["overruns"]),
             "lateness_us": percentiles(s["lateness"]),
             "tick_us": percentiles(s["ticks"]),
+            "exchange_us": percentiles(s["exchange"]),
             "link_latency_us": percentiles(s["round_trip"]),
             "sample_age_us": percentiles(s["age"]),
             "frames": {"received": int(s["link_frames"]), "not_sent": int(s["link_dropped"])},

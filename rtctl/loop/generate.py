@@ -187,6 +187,11 @@ def load(path: Path) -> ModuleType:
     return module
 
 
+def warm(entry: Any, arguments: tuple[Any, ...]) -> None:
+    """Compile an entry point for these arguments, or load it from the cache, without running it."""
+    entry.compile(tuple(numba.typeof(a) for a in arguments))
+
+
 def generate(machine: Machine, link: str) -> Generated:
     """Write and load the tick of a machine for a link, `zmq` or `shm`."""
     path = write(machine, link)

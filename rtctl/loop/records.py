@@ -26,7 +26,8 @@ STATUS = state(
     lost_counts=int,  # by the emulated quadrature converters
     failed=int,  # 1 where the plant stopped answering in lockstep
     lateness=HISTOGRAM,
-    ticks=HISTOGRAM,
+    ticks=HISTOGRAM,  # driver, law, safety and ring
+    exchange=HISTOGRAM,  # the link: sending and receiving
     age=HISTOGRAM,  # of the newest sample, when the tick reads it
     round_trip=HISTOGRAM,
     # written by the supervisor

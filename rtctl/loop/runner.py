@@ -32,29 +32,33 @@ def run_real(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_st
         late = 1 if lateness > late_ns else 0
         if ahead != 0:
             send(st, out, tx, woke)
-        mailbox.take(box, staged, p, c)
         fresh = link.receive_newest(inp, rx, rx_staged)
-        if fresh > 0:
-            st.link_frames += fresh
-            histogram.add(st.age, woke - rx[0].t_ns)
-            histogram.add(st.round_trip, clock.now() - rx[0].outputs_t_ns)
+        begun = clock.now()
+        mailbox.take(box, staged, p, c)
         y[0].tick = k
         y[0].t = (woke - st.first_ns) * 1e-9
         y[0].period = (woke - before) * 1e-9
         y[0].lateness = lateness * 1e-9
         was = st.state
         tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], k, fresh, late)
-        if ahead == 0 or (s[0].safety.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
-            send(st, out, tx, clock.now())
         ring.put(ring_[0], rows, y)
         account(st, s[0].safety, k, rx[0].lost_counts)
+        ticked = clock.now()
+        if ahead == 0 or (st.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
+            send(st, out, tx, ticked)
+        done = clock.now()
+        if fresh > 0:
+            st.link_frames += fresh
+            histogram.add(st.age, woke - rx[0].t_ns)
+            if rx[0].outputs_seq > 0:
+                histogram.add(st.round_trip, begun - rx[0].outputs_t_ns)
+        histogram.add(st.lateness, lateness)
+        histogram.add(st.ticks, ticked - begun)
+        histogram.add(st.exchange, begun - woke + done - ticked)
         st.missed += skipped
         st.late += late
         before = woke
         wake += (skipped + 1) * period
-        done = clock.now()
-        histogram.add(st.lateness, lateness)
-        histogram.add(st.ticks, done - woke)
         if done > wake:
             st.overruns += 1
         if st.supervisor_lost != 0:

@@ -47,10 +47,10 @@ PANELS = (
         "Tension",
         "N",
         (
-            Trace("truth_tension1", "tape 1, true", "#8fc1ea"),
-            Trace("truth_tension2", "tape 2, true", "#f4bd8a"),
-            Trace("tension1_estimate", "tape 1, estimate", BLUE),
-            Trace("tension2_estimate", "tape 2, estimate", ORANGE),
+            Trace("tension1_estimate", "tape 1, estimate", "#8fc1ea"),  # noisy: pale, and below the truth
+            Trace("tension2_estimate", "tape 2, estimate", "#f4bd8a"),
+            Trace("truth_tension1", "tape 1, true", BLUE),
+            Trace("truth_tension2", "tape 2, true", ORANGE),
         ),
     ),
     Panel(
@@ -97,7 +97,8 @@ def plot_run(
         for step in metrics:
             axes.axvline(step["t"], color=GREY, linewidth=0.8, linestyle=":", zorder=0)
     every[-1].set_xlabel("time [s]")
-    every[-1].set_xlim(float(columns["t"][0]), float(columns["t"][-1]) or 1.0)
+    if columns["t"][-1] > columns["t"][0]:
+        every[-1].set_xlim(float(columns["t"][0]), float(columns["t"][-1]))
     figure.align_ylabels(list(every))
     figure.suptitle(title or _title(bundle.case if bundle else {}), x=0.01, ha="left", fontsize=14, fontweight="bold")
     if metrics:
@@ -130,13 +131,11 @@ def envelope(t: np.ndarray, y: np.ndarray, buckets: int = BUCKETS) -> tuple[np.n
     if len(t) <= 2 * buckets:
         return t, y
     edges = np.linspace(0, len(t), buckets + 1).astype(int)
-    starts = edges[:-1]
-    values = np.empty(2 * buckets)
-    values[0::2] = np.fmin.reduceat(y, starts)
-    values[1::2] = np.fmax.reduceat(y, starts)
-    times = np.empty(2 * buckets)
-    times[0::2] = t[starts]
-    times[1::2] = t[edges[1:] - 1]
+    first, last = edges[:-1], edges[1:] - 1
+    least, greatest = np.fmin.reduceat(y, first), np.fmax.reduceat(y, first)
+    falls = y[last] < y[first]  # greatest first, or a falling line would be drawn as a zigzag
+    values = np.column_stack((np.where(falls, greatest, least), np.where(falls, least, greatest))).ravel()
+    times = np.column_stack((t[first], t[last])).ravel()
     return times, values
 
 
@@ -174,10 +173,10 @@ def _largest(y: np.ndarray) -> float:
 
 
 def _prefixed(unit: str, largest: float) -> tuple[float, str]:
-    """The factor and the unit that bring the largest value to 1 or more: 2e-4 m is 200 um."""
+    """The factor and the unit that bring the largest value to a half or more: 2e-4 m is 200 um."""
     if unit not in ("m", "rad", "N", "V") or not largest:
         return 1.0, unit
-    thousands = min(3, max(0, math.ceil(-math.log10(largest) / 3)))
+    thousands = min(3, max(0, math.ceil(-math.log10(2 * largest) / 3)))
     return 1000.0**thousands, ("", "m", "µ", "n")[thousands] + unit
 
 

@@ -35,13 +35,16 @@ def test_returns_results_and_raises_refusals(serving, client, endpoint):
 
 
 def test_no_daemon(context, endpoint):
-    with Client(endpoint, timeout=0.05, context=context) as client, pytest.raises(UserError, match="start one with `rtctl run`"):
+    with (
+        Client(endpoint, timeout=0.05, context=context) as client,
+        pytest.raises(UserError, match="start one with `rtctl run`"),
+    ):
         client.call("ping")
 
 
 def test_works_after_a_restart(serving, client, endpoint):
     for _ in range(2):
-        with serving(endpoint):
+        with zmq.Context() as daemon, serving(endpoint, context=daemon):
             assert client.call("ping")["pid"]
 
 

@@ -53,7 +53,7 @@ def test_a_secret_that_others_can_read_is_refused(keys):
         load_keys("alice", keys)
 
 
-@pytest.mark.parametrize("text", ["", "public-key = 'short'", "public-key = \"" + "~" * 40 + '"'])
+@pytest.mark.parametrize("text", ["", "public-key = 'short'", 'public-key = "' + "~" * 40 + '"'])
 def test_damaged_keys(keys, text):
     path = keys / "alice.key_secret"
     path.write_text(text)
@@ -101,7 +101,10 @@ def test_a_known_client_is_let_in_and_others_are_not(serving, keys, far):
     with serving(TCP, curve=curve) as server:
         with Client(server.endpoint, 10.0, alice, far) as client:
             assert client.call("ping")["pid"] == os.getpid()
-        with Client(server.endpoint, 0.3, mallory, far) as client, pytest.raises(UserError, match="does not know our key"):
+        with (
+            Client(server.endpoint, 0.3, mallory, far) as client,
+            pytest.raises(UserError, match="does not know our key"),
+        ):
             client.call("ping")
         with Client(server.endpoint, 0.3, None, far) as client, pytest.raises(UserError, match="no daemon answers"):
             client.call("ping")

@@ -6,7 +6,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rtctl.daemon import protocol
-from rtctl.daemon.protocol import ProtocolError, decode_reply, decode_request, encode_error, encode_request, encode_result
+from rtctl.daemon.protocol import (
+    ProtocolError,
+    decode_reply,
+    decode_request,
+    encode_error,
+    encode_request,
+    encode_result,
+)
 
 GOOD = {"v": 1, "id": 1, "op": "setpoint", "args": {"value": 1.0}}
 ANYTHING = st.recursive(

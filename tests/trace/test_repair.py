@@ -1,0 +1,216 @@
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from trace_rows import CASE, COLUMNS, ROW, is_truth, make
+
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.trace import repair as repair_module
+from rtctl.trace.bundle import load_bundle, save_case
+from rtctl.trace.recorder import Recorder
+from rtctl.trace.repair import repair
+from rtctl.trace.stream import StreamWriter
+
+SIZES = [1, 40, 7, 300, 2]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """The bytes of a whole stream, where its schema ends, and where each batch ends."""
+    path = tmp_path_factory.mktemp("whole") / "recording.arrows"
+    writer = StreamWriter(path, COLUMNS, ROW, {"case": json.dumps(CASE)})
+    head, ends = writer.bytes, []
+    for size in SIZES:
+        writer.write(make(writer.rows, size))
+        ends.append(writer.bytes)
+    writer.close()
+    return path.read_bytes(), head, ends
+
+
+def killed(folder: Path, stream: bytes, case: bytes | None = json.dumps(CASE).encode()) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "recording.arrows").write_bytes(stream)
+    if case is not None:
+        (folder / "case.json").write_bytes(case)
+    return folder
+
+
+def check_cut(folder: Path, recording, cut: int) -> None:
+    stream, head, ends = recording
+    killed(folder, stream[:cut])
+    if cut < head:
+        with pytest.raises(NoAnswer, match="ends before its list of columns"):
+            repair(folder)
+        assert (folder / "recording.arrows").stat().st_size == cut
+        return
+    report = repair(folder)
+    rows = sum(size for size, end in zip(SIZES, ends, strict=True) if end <= cut)
+    assert (report.rows, report.changed) == (rows, True)
+    whole = max((end for end in [head, *ends, len(stream)] if end <= cut), default=0)
+    assert report.discarded_bytes == cut - whole
+    case = json.loads((folder / "case.json").read_text())
+    assert case["repaired"] is True and case["rows"] == rows and case["discarded_bytes"] == cut - whole
+    if rows:
+        assert is_truth(load_bundle(folder).columns, range(rows))
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert sorted(before) == ["case.json", "recording.parquet"]
+    again = repair(folder)
+    assert again == report._replace(changed=False) and "nothing to repair" in str(again)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_cut_at_or_beside_any_boundary_gives_all_whole_batches(tmp_path, recording):
+    stream, head, ends = recording
+    near = {end + by for end in [0, head, *ends, len(stream)] for by in (-9, -8, -1, 0, 1, 3, 4, 7, 8, 9)}
+    for cut in sorted(c for c in near if 0 <= c <= len(stream)):
+        check_cut(tmp_path / str(cut), recording, cut)
+
+
+@settings(deadline=None, max_examples=40)
+@given(share=st.floats(0, 1))
+def test_a_cut_anywhere_gives_a_prefix(tmp_path_factory, recording, share):
+    check_cut(tmp_path_factory.mktemp("cut"), recording, round(share * len(recording[0])))
+
+
+def test_zeros_after_the_last_batch_are_no_rows(tmp_path, recording):
+    stream, _, ends = recording
+    folder = killed(tmp_path / "run", stream[: ends[2]] + bytes(4096))
+    assert repair(folder)[1:3] == (sum(SIZES[:3]), 4096)
+    assert is_truth(load_bundle(folder).columns, range(sum(SIZES[:3])))
+
+
+@pytest.mark.parametrize("case", [None, b"", b'{"format": 1, "pla', b"[]"])
+def test_a_lost_case_comes_out_of_the_recording(tmp_path, recording, case):
+    folder = killed(tmp_path / "run", recording[0], case)
+    report = repair(folder)
+    assert "made again from the copy inside the recording" in str(report)
+    found = load_bundle(folder)
+    assert {k: found.case[k] for k in CASE} == CASE and found.case["repaired"] is True
+    if case:
+        assert (folder / "case.json.broken").read_bytes() == case
+    assert repair(folder).changed is False
+
+
+def test_a_case_lost_after_the_end_is_made_again(tmp_path, recording):
+    folder = killed(tmp_path / "run", recording[0])
+    repair(folder)
+    (folder / "case.json").unlink()
+    report = repair(folder)
+    assert report.changed and load_bundle(folder).case["plant"] == "ivu"
+
+
+def test_a_recording_without_any_case_says_what_to_fill_in(tmp_path):
+    writer = StreamWriter(tmp_path / "recording.arrows", COLUMNS, ROW)
+    writer.write(make(0, 10))
+    writer.close()
+    assert "fill in plant" in str(repair(tmp_path))
+    assert load_bundle(tmp_path).case["rows"] == 10
+
+
+def test_missing_ticks_are_told_as_losses(tmp_path):
+    writer = StreamWriter(tmp_path / "recording.arrows", COLUMNS, ROW)
+    rows = make(0, 100)
+    writer.write(np.concatenate([rows[5:20], rows[23:30]]))
+    writer.write(rows[40:])
+    writer.close()
+    save_case(tmp_path, CASE)
+    repair(tmp_path)
+    assert load_bundle(tmp_path).case["losses"] == {"rows": 13, "gaps": [[20, 3], [30, 10]]}
+
+
+def test_a_recording_that_was_all_but_finished_keeps_its_case(tmp_path, recording):
+    run = Recorder(tmp_path / "run", COLUMNS, ROW, CASE)
+    run.put(make(0, sum(SIZES)))
+    folder = run.finish()
+    before = (folder / "case.json").read_bytes()
+    (folder / "recording.arrows").write_bytes(recording[0])  # killed just before its removal
+    (folder / "recording.parquet.tmp").touch()
+    assert repair(folder).rows == sum(SIZES)
+    assert (folder / "case.json").read_bytes() == before and load_bundle(folder).case["complete"] is True
+    assert sorted(p.name for p in folder.iterdir()) == ["case.json", "recording.parquet"]
+
+
+def test_a_damaged_stream_never_replaces_a_longer_parquet(tmp_path, recording):
+    folder = killed(tmp_path / "run", recording[0])
+    repair(folder)
+    for cut in (0, recording[2][1]):
+        killed(folder, recording[0][:cut])
+        assert repair(folder).rows == sum(SIZES)
+        assert is_truth(load_bundle(folder).columns, range(sum(SIZES)))
+
+
+@pytest.mark.parametrize("step", ["write_parquet", "save_case"])
+def test_a_repair_that_is_killed_can_be_done_again(tmp_path, recording, monkeypatch, step):
+    folder = killed(tmp_path / "run", recording[0][:-20])
+    real = getattr(repair_module, step)
+
+    def stop_after(*arguments, **named):
+        real(*arguments, **named)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(repair_module, step, stop_after)
+        with pytest.raises(KeyboardInterrupt):
+            repair(folder)
+    assert repair(folder).rows == sum(SIZES[:-1])
+    assert load_bundle(folder).case["repaired"] is True
+    assert is_truth(load_bundle(folder).columns, range(sum(SIZES[:-1])))
+
+
+def test_no_room_for_the_result_leaves_everything(tmp_path, recording, small_disk):
+    folder = killed(tmp_path / "run", recording[0])
+    with small_disk(1000), pytest.raises(OSError):
+        repair(folder)
+    assert (folder / "recording.arrows").read_bytes() == recording[0]
+    assert repair(folder).rows == sum(SIZES)
+
+
+def test_refuses_what_is_no_recording_or_still_runs(tmp_path):
+    with pytest.raises(UserError, match="nothing to repair"):
+        repair(tmp_path)
+    run = Recorder(tmp_path, COLUMNS, ROW, CASE)
+    run.put(make(0, 10))
+    with pytest.raises(UserError, match="in use"):
+        repair(tmp_path)
+    assert is_truth(load_bundle(run.finish()).columns, range(10))
+
+
+RECORD_FOR_EVER = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from trace_rows import CASE, COLUMNS, ROW, make
+from rtctl.trace.recorder import Recorder
+run, tick = Recorder(Path(sys.argv[1]), COLUMNS, ROW, CASE, max_queued_bytes=100_000), 0
+while True:
+    run.put(make(tick, 200))
+    tick += 200
+"""
+
+
+@pytest.mark.parametrize("size", [20_011, 1_000_003])
+def test_a_killed_recorder_is_repaired_to_what_it_had_written(tmp_path, size):
+    folder, path = tmp_path / "run", tmp_path / "run" / "recording.arrows"
+    process = subprocess.Popen([sys.executable, "-c", RECORD_FOR_EVER, folder, Path(__file__).parent])
+    try:
+        while process.poll() is None and not (path.exists() and path.stat().st_size >= size):
+            os.sched_yield()
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == -9
+    shutil.copytree(folder, tmp_path / "copy")
+    report = repair(folder)
+    found = load_bundle(folder)
+    lost = {t for first, count in found.case["losses"]["gaps"] for t in range(first, first + count)}
+    last = int(found.columns["tick"][-1])
+    assert is_truth(found.columns, sorted(set(range(last + 1)) - lost))
+    assert len(found.columns["t"]) == report.rows == last + 1 - len(lost)
+    assert repair(tmp_path / "copy").rows == report.rows
