@@ -1,7 +1,7 @@
 """CURVE keys: who may command a daemon over the network, and how a client knows that it speaks to the right one.
 
-A pair NAME is two files in one folder: NAME.key, public, and NAME.key_secret, for the owner's eyes only. The daemon uses
-the pair `server` and lets in the clients whose public files lie in the folder `authorized` next to it.
+A pair NAME is two files in one folder: NAME.key, public, and NAME.key_secret, for the owner's eyes only. The daemon
+uses the pair `server` and lets in the clients whose public files lie in the folder `authorized` next to it.
 
 Source: RFC 26/CurveZMQ and RFC 27/ZAP of rfc.zeromq.org.
 """
@@ -117,8 +117,8 @@ def refuse_open(endpoint: str) -> UserError:
     if not endpoint.startswith("tcp://"):
         return UserError(f"'{endpoint}' is no endpoint; expected ipc:///PATH or tcp://ADDRESS:PORT")
     return UserError(
-        f"{endpoint} can be reached from other machines and needs keys: run `rtctl keys new` (and see docs/protocol.md),"
-        " or use ipc:// or tcp://127.0.0.1"
+        f"{endpoint} can be reached from other machines and needs keys: run `rtctl keys new`"
+        " (and see docs/protocol.md), or use ipc:// or tcp://127.0.0.1"
     )
 
 
@@ -147,7 +147,8 @@ class Doorman:
         self._known: dict[str, frozenset[bytes]] = {}
         self._numbers = itertools.count()
         self._context = context
-        self._socket = zmq.Context.shadow(context.underlying).socket(zmq.REP)
+        shadow: zmq.Context = zmq.Context.shadow(context.underlying)
+        self._socket = shadow.socket(zmq.REP)
         self._socket.linger = 0
         self._socket.bind("inproc://zeromq.zap.01")
         threading.Thread(target=self._serve, name="rtctl-doorman", daemon=True).start()

@@ -219,8 +219,8 @@ def _check_path(path: Path) -> None:
     length = len(os.fsencode(path))
     if length > MAX_SOCKET_PATH:
         raise UserError(
-            f"the socket path {path} is {length} bytes long, and {MAX_SOCKET_PATH} is the most that a unix socket takes;"
-            " set XDG_RUNTIME_DIR to a shorter folder, or name a shorter endpoint"
+            f"the socket path {path} is {length} bytes long, and {MAX_SOCKET_PATH} is the most that a unix socket"
+            " takes; set XDG_RUNTIME_DIR to a shorter folder, or name a shorter endpoint"
         )
     if not path.is_absolute():
         raise UserError(f"ipc://{path} is not an absolute path; write e.g. ipc:///run/rtctl/ivu.command")

@@ -1,7 +1,7 @@
 """Signals as they happen, for whoever cares to look: a PUB socket that PlotJuggler reads.
 
 A message is two parts, the topic and a msgpack list of rows: `[{"timestamp": t, name: value, ...}, ...]`. The daemon
-publishes every 10 to 20 ms what the loop has left since. It never waits for a subscriber: one that is slow loses messages.
+publishes every 10 to 20 ms what the loop has left since. It never waits: a subscriber that is slow loses messages.
 
 Source: PlotJuggler's ZeroMQ subscriber takes topic and payload as two parts (its pull request 951), its MessagePack
 parser a list of rows since February 2026 (1285); before that, one row a message. No third part with the time: a

@@ -39,7 +39,7 @@ def load_bundle(folder: Path | str) -> Bundle:
     path = folder / PARQUET
     if not path.is_file():
         if (folder / ARROWS).exists():
-            raise UserError(f"{folder} holds a recording that was not finished; run: rtctl repair {folder}")
+            raise UserError(f"{folder} holds a recording that was not finished; run: rtctl trace repair {folder}")
         raise UserError(f"{path} is missing; a bundle holds {PARQUET} and {CASE}")
     case = load_case(folder)
     try:
@@ -84,10 +84,14 @@ def save_case(folder: Path, case: dict[str, Any]) -> Path:
     path = Path(folder) / CASE
     text = as_json(case, indent=1) + "\n"
     part = path.with_name(CASE + ".tmp")
-    with part.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
     return replace(part, path)
 
 

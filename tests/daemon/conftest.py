@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import zmq
+
 from rtctl.config.errors import UserError
 from rtctl.daemon.server import CommandServer
 

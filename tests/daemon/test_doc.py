@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from rtctl.daemon import protocol
 from rtctl.daemon.server import default_endpoint
 from rtctl.daemon.telemetry import Telemetry

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 import zmq
+
 from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client
 from rtctl.daemon.keys import ClientCurve, client_curve, load_keys, load_public, new_keys, require_curve, server_curve
@@ -65,7 +66,7 @@ def test_missing_keys_say_how_to_make_them(tmp_path):
     with pytest.raises(UserError, match="rtctl keys new bob"):
         load_keys("bob", tmp_path)
     new_keys("server", tmp_path)
-    with pytest.raises(UserError, match="copy the public NAME.key"):
+    with pytest.raises(UserError, match=r"copy the public NAME\.key"):
         server_curve(tmp_path)
     with pytest.raises(UserError, match="no name for keys"):
         new_keys("../bob", tmp_path)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+
 from rtctl.daemon import protocol
 from rtctl.daemon.protocol import (
     ProtocolError,
@@ -16,11 +17,10 @@ from rtctl.daemon.protocol import (
 )
 
 GOOD = {"v": 1, "id": 1, "op": "setpoint", "args": {"value": 1.0}}
+INTEGERS = st.integers(-(2**63), 2**64 - 1)  # what msgpack holds
 ANYTHING = st.recursive(
-    st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats() | st.text() | st.binary(),
-    lambda inner: (
-        st.lists(inner, max_size=4) | st.dictionaries(st.text() | st.binary() | st.integers(), inner, max_size=4)
-    ),
+    st.none() | st.booleans() | INTEGERS | st.floats() | st.text() | st.binary(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text() | st.binary() | INTEGERS, inner, max_size=4),
     max_leaves=20,
 )
 

@@ -8,6 +8,7 @@ import pytest
 import zmq
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
 from rtctl.config.errors import UserError
 from rtctl.daemon import protocol, server
 from rtctl.daemon.protocol import decode_reply, encode_request
@@ -160,9 +161,9 @@ def test_tcp_in_use_names_the_daemon_or_says_another_program(serving, context, e
         assert re.fullmatch(r"tcp://127\.0\.0\.1:\d+", first.endpoint)
         with pytest.raises(UserError, match=rf"another daemon \(pid {os.getpid()}\)"):
             CommandServer(first.endpoint, echo, context)
-    with sockets.create_server(("127.0.0.1", 0)) as other:
-        with pytest.raises(UserError, match="in use by another program"):
-            CommandServer(f"tcp://127.0.0.1:{other.getsockname()[1]}", echo, context)
+    other = sockets.create_server(("127.0.0.1", 0))
+    with other, pytest.raises(UserError, match="in use by another program"):
+        CommandServer(f"tcp://127.0.0.1:{other.getsockname()[1]}", echo, context)
 
 
 @pytest.mark.parametrize(
@@ -221,7 +222,7 @@ def test_a_temporary_folder_that_others_may_use_is_refused(no_xdg, trap):
         mine.symlink_to(no_xdg / "theirs")
     else:
         mine.touch()
-    with pytest.raises(UserError, match="not a private folder|cannot make"):
+    with pytest.raises(UserError, match=r"not a private folder|cannot make"):
         runtime_dir()
 
 

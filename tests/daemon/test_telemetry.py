@@ -4,6 +4,7 @@ import pytest
 import zmq
 from hypothesis import given
 from hypothesis import strategies as st
+
 from rtctl.config.errors import UserError
 from rtctl.daemon.telemetry import MESSAGES_WAITING, Telemetry, thin
 

@@ -85,6 +85,7 @@ def test_a_case_that_cannot_be_written_leaves_the_old_one(folder, small_disk):
     with pytest.raises(TypeError, match="cannot hold a set"):
         save_case(folder, {"x": {1}})
     assert load_bundle(folder).case == CASE
+    assert sorted(p.name for p in folder.iterdir()) == ["case.json", "recording.parquet"]
 
 
 def test_a_case_may_hold_numpy(tmp_path):
@@ -136,7 +137,7 @@ def test_a_spoiled_bundle_is_told_in_words(folder, spoil, words):
 
 def test_an_unfinished_recording_is_sent_to_repair(tmp_path):
     (tmp_path / "recording.arrows").touch()
-    with pytest.raises(UserError, match="run: rtctl repair"):
+    with pytest.raises(UserError, match="run: rtctl trace repair"):
         load_bundle(tmp_path)
     with pytest.raises(UserError, match="is not a folder"):
         load_bundle(tmp_path / "nowhere")
