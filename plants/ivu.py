@@ -60,7 +60,7 @@ class IvuParameters(Settings):
     d_tape: float = quantity(0.5e-3, unit="m", ge=0, help="thickness of the tape; 0 keeps the radii as they are")
     tau_F1: float = quantity(2.4e-3, unit="Nm", ge=0, help="dry friction of motor 1")
     tau_F2: float = quantity(2.6e-3, unit="Nm", ge=0, help="dry friction of motor 2 (slightly higher, 8.1)")
-    tau_Fc: float = quantity(2e-4, unit="Nm", ge=0, help="dry friction of the capstan's bearing; not in the thesis")
+    tau_Fc: float = quantity(1e-4, unit="Nm", ge=0, help="dry friction of the capstan's bearing; not in the thesis")
 
 
 SETS = {

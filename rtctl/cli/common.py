@@ -1,24 +1,65 @@
 """Options and conversions that commands share."""
 
+import math
 import re
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from rtctl.config.errors import UserError, nearest
-from rtctl.config.units import convert
 
+ConfigArgument = Annotated[
+    str, typer.Argument(metavar="CONFIG", help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis.")
+]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change one key of the config, e.g. law.position.gain=20. Repeatable."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change one key, e.g. law.position.gain=20. Repeatable."),
+]
+ModeOption = Annotated[
+    str | None, typer.Option("--mode", metavar="MODE", help="real, lockstep or fused; as in the config if absent.")
+]
+LinkOption = Annotated[
+    str | None, typer.Option("--link", metavar="LINK", help="zmq or shm; as in the config if absent.")
+]
+ReferenceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--reference",
+        metavar="FILE",
+        help="Reference to play: a file, or one that comes with rtctl: steps.",
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 NameOption = Annotated[
-    str | None, typer.Option("--name", "-n", help="Name of the machine (its config's `name`); needed where several run.")
+    str | None,
+    typer.Option(
+        "--name",
+        "-n",
+        metavar="NAME",
+        help="The machine's `name` or its endpoint, where several run.",
+    ),
 ]
 
-DURATION = re.compile(r"\s*([-+0-9.eE]+)\s*([a-z]*)\s*")
+SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
+DURATION = re.compile(r"\s*(\+?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*([a-z]*)\s*")
+QUANTITY = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z%][A-Za-z%/]*)?\s*")
+NEGATIVE = re.compile(r"-[0-9.]")
+
+
+class SignedCommand(TyperCommand):
+    """A command whose arguments may be negative numbers, which would otherwise be taken for options."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if "--" not in args:
+            first = next((i for i, word in enumerate(args) if NEGATIVE.match(word)), None)
+            if first is not None:  # -5mm and the words of its unit go behind the options
+                end = first + 1
+                while end < len(args) and not args[end].startswith("-"):
+                    end += 1
+                args = [*args[:first], *args[end:], "--", *args[first:end]]
+        return super().parse_args(ctx, args)
 
 
 def load_config(path: str, overrides: list[str] | None) -> Any:
@@ -27,7 +68,8 @@ def load_config(path: str, overrides: list[str] | None) -> Any:
     from rtctl.config.load import load_settings
     from rtctl.config.yaml_file import find, load_yaml
 
-    document = load_yaml(find(path))
+    file = find(path)
+    document = load_yaml(file)
     kind = document.data.get("machine") if isinstance(document.data, dict) else None
     if kind not in machines.CONFIGS:
         near = nearest(str(kind), machines.CONFIGS) if kind else None
@@ -38,7 +80,7 @@ def load_config(path: str, overrides: list[str] | None) -> Any:
             f"{where}: machine: " + (f"'{kind}' is not one of {known}" if kind else f"missing; it is one of {known}")
             + (f"; did you mean '{near}'?" if near else "")
         )  # fmt: skip
-    return load_settings(path, machines.CONFIGS[kind], overrides or [])
+    return load_settings(file, machines.CONFIGS[kind], overrides or [])
 
 
 def with_reference(config: Any, path: str | None) -> Any:
@@ -46,10 +88,20 @@ def with_reference(config: Any, path: str | None) -> Any:
     if path is None:
         return config
     from rtctl.config.load import load_settings
+    from rtctl.config.yaml_file import find
 
+    try:
+        file = find(path)
+    except UserError:
+        try:
+            file = find(f"references/{path}")
+        except UserError:
+            file = None
+        if file is None:
+            raise
     model = type(config).model_fields["reference"].annotation
     assert model is not None
-    return config.model_copy(update={"reference": load_settings(path, model, [])})
+    return config.model_copy(update={"reference": load_settings(file, model, [])})
 
 
 def with_loop(config: Any, mode: str | None, link: str | None) -> Any:
@@ -66,53 +118,105 @@ def with_loop(config: Any, mode: str | None, link: str | None) -> Any:
     return config.model_copy(update=update) if update else config
 
 
+def machine_of(config: Any) -> Any:
+    """The machine of a config, not compiled. Raises UserError where its settings contradict each other."""
+    from rtctl import machines
+
+    try:
+        return machines.build(config)
+    except ValueError as error:
+        raise UserError(f"{config.name}: {error}") from error
+
+
 def seconds(text: str | None, option: str) -> float | None:
     """A duration such as 12s, 200ms or 1.5h; a bare number is seconds."""
     if text is None:
         return None
     match = DURATION.fullmatch(text)
     try:
-        if match is None:
+        if match is None or match[2] not in SECONDS:
             raise ValueError
-        value = convert(float(match[1]), match[2] or "s", "s")
+        value = float(match[1]) * SECONDS[match[2]]
     except ValueError:
         raise UserError(f"{option} {text}: not a duration; write e.g. 12s, 200ms or 1h") from None
-    if value <= 0:
-        raise UserError(f"{option} {text}: must be more than nothing")
+    if value <= 0 or not math.isfinite(value):
+        raise UserError(f"{option} {text}: must be more than nothing, and have an end")
     return value
 
 
-def quantity_of(text: str, option: str) -> tuple[float, str | None]:
+def quantity_of(text: str, option: str, example: str = "20mm/s") -> tuple[float, str | None]:
     """A number with its unit, written together or apart: 20mm/s, 1.5 rad."""
-    match = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*([A-Za-z/]*)\s*", text)
-    if match is None:
-        raise UserError(f"{option} {text}: not a number with a unit; write e.g. 20mm/s")
-    return float(match[1]), match[2] or None
+    match = QUANTITY.fullmatch(text)
+    try:
+        if match is None:
+            raise ValueError
+        return float(match[1]), match[2]
+    except ValueError:
+        raise UserError(f"{option} {text}: not a number with a unit; write e.g. {example}") from None
 
 
 def client(name: str | None) -> Any:
-    """A client of the machine that runs; the only one, or the one named."""
+    """A client of the machine that runs: the only one, or the one named."""
+    from rtctl.daemon import keys
     from rtctl.daemon.client import Client
-    from rtctl.daemon.server import find_endpoint, runtime_dir
+    from rtctl.daemon.server import find_endpoint
 
+    if name is not None and "://" in name:
+        return Client(name, curve=keys.client_curve() if keys.require_curve(name) else None)
+    names = running()
     if name is None:
-        folder = runtime_dir()
-        running = sorted(p.name.removesuffix(".command") for p in folder.glob("*.command"))
-        if not running:
+        if not names:
             raise UserError("no machine runs here; start one with `rtctl run CONFIG`")
-        if len(running) > 1:
-            raise UserError(f"several machines run: {', '.join(running)}; say which with --name")
-        name = running[0]
-    elif "://" in name:
-        return Client(name)
+        if len(names) > 1:
+            raise UserError(f"several machines run: {', '.join(names)}; say which with --name")
+        name = names[0]
+    elif name not in names:
+        near = nearest(name, names)
+        there = f"there is {', '.join(names)}" if names else "start it with `rtctl run`"
+        raise UserError(f"no machine '{name}' runs here; " + (f"did you mean '{near}'?" if near else there))
     return Client(find_endpoint(name, "command"))
 
 
+def running() -> list[str]:
+    """Names of the machines whose command socket somebody listens on."""
+    from rtctl.daemon.server import SYSTEM_DIR, runtime_dir
+
+    files = [path for folder in {runtime_dir(), SYSTEM_DIR} if folder.is_dir() for path in folder.glob("*.command")]
+    return sorted({path.name.removesuffix(".command") for path in files if listens(f"ipc://{path}")})
+
+
+def listens(endpoint: str) -> bool:
+    """Whether somebody listens at an ipc or tcp endpoint, be it as busy as it may."""
+    import socket
+
+    family: Any = socket.AF_UNIX
+    address: Any = endpoint.removeprefix("ipc://")
+    if endpoint.startswith("tcp://"):
+        host, _, port = endpoint.removeprefix("tcp://").rpartition(":")
+        host = host.strip("[]")
+        family, address = (socket.AF_INET6 if ":" in host else socket.AF_INET), (host, int(port))
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.settimeout(1.0)
+        try:
+            probe.connect(address)
+        except OSError:
+            return False
+        return True
+
+
 def print_json(value: Any) -> None:
-    """One JSON object on standard output."""
+    """One JSON object on standard output. What was not measured (NaN) becomes null, which JSON can hold."""
     import json
 
-    typer.echo(json.dumps(value))
+    typer.echo(json.dumps(_finite(value)))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def default_folder(name: str) -> Path:

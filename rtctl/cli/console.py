@@ -14,7 +14,11 @@ from rtctl.loop import safety
 from rtctl.loop.histogram import percentiles
 
 REFRESH = 0.1  # s
-POSITION = {"ivu": ("capstan", "capstan_error", "rad"), "ldu": ("position", "position_error", "m"), "axis": ("x", "position_error", "m")}
+POSITION = {
+    "ivu": ("capstan", "capstan_error", "rad"),
+    "ldu": ("position", "position_error", "m"),
+    "axis": ("x", "position_error", "m"),
+}
 COLOUR = {"idle": "dim", "armed": "yellow", "running": "green", "tripped": "bold red"}
 
 

@@ -4,10 +4,15 @@ import importlib
 import os
 import sys
 import traceback
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from rtctl.config.errors import NoAnswer, UserError, nearest
+
+# Name of each command, in the order of `rtctl --help`, and its module here. Modules import nothing heavy.
 COMMANDS = {
     "run": "run",
     "build": "build",
@@ -28,55 +33,86 @@ COMMANDS = {
     "trace": "trace",
     "keys": "keys",
 }
+USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]  # typer's own, which it does not export
 
 
 class LazyGroup(TyperGroup):
     """Loads a command's module when that command is asked for."""
 
-    def list_commands(self, ctx):  # type: ignore[no-untyped-def]
+    def list_commands(self, ctx: Any) -> list[str]:
         return list(COMMANDS)
 
-    def get_command(self, ctx, name):  # type: ignore[no-untyped-def]
-        if name not in COMMANDS:
-            from rtctl.config.errors import UserError, nearest
-
-            near = nearest(name, COMMANDS)
-            raise UserError(f"no command '{name}'" + (f"; did you mean '{near}'?" if near else "; see rtctl --help"))
-        module = importlib.import_module(f"rtctl.cli.{COMMANDS[name]}")
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name not in COMMANDS:
+            if ctx.resilient_parsing:  # the shell completes what is not yet a command
+                return None
+            near = nearest(cmd_name, COMMANDS)
+            raise UserError(
+                f"no command '{cmd_name}'" + (f"; did you mean '{near}'?" if near else "; see rtctl --help")
+            )
+        module = importlib.import_module(f"rtctl.cli.{COMMANDS[cmd_name]}")
         command = typer.main.get_command(module.app)
-        return command.commands[name] if hasattr(command, "commands") and name in command.commands else command
+        command = getattr(command, "commands", {}).get(cmd_name, command)
+        command.name = cmd_name
+        return command
 
 
-app = typer.Typer(
-    cls=LazyGroup, no_args_is_help=True, add_completion=True, help="Real-time controller daemon for motion hardware."
-)
+app = typer.Typer(cls=LazyGroup, add_completion=True, help="Real-time controller daemon for motion hardware.")
 
 
-@app.callback()
-def _root() -> None:
-    pass
+def _version(wanted: bool) -> None:
+    if wanted:
+        from rtctl import __version__
+
+        typer.echo(f"rtctl {__version__}")
+        raise typer.Exit
 
 
-def main() -> None:
-    """Entry point. Exit code 2 for the user's mistake, 3 for data that carry no answer, 1 for ours, 130 for Ctrl-C."""
-    from rtctl.config.errors import NoAnswer, UserError
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        context.get_help()
+        raise typer.Exit(2)
 
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; `arguments` are those of the command line if not given. Returns the exit code.
+
+    2 for the user's mistake, 3 for data that carry no answer, 1 for a run that tripped and for ours, 130 for Ctrl-C.
+    """
     try:
-        app()
+        return app(arguments, prog_name="rtctl", standalone_mode=False) or 0
     except (UserError, NoAnswer) as error:
-        print(f"rtctl: {error}", file=sys.stderr)
-        sys.exit(error.exit_code)
+        return _fail(str(error), error.exit_code)
+    except USAGE_ERROR as error:
+        return _fail(_usage(error), 2) if str(error) else 2  # empty: typer has shown the help instead
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        sys.exit(1)
-    except KeyboardInterrupt:
-        sys.exit(130)
+        return 1
+    except (KeyboardInterrupt, typer.Abort):
+        return 130
     except Exception as error:
         if os.environ.get("RTCTL_TRACEBACK"):
             traceback.print_exc()
-        print(f"rtctl: internal error: {error!r}; RTCTL_TRACEBACK=1 shows where", file=sys.stderr)
-        sys.exit(1)
+        return _fail(f"internal error: {error!r}; RTCTL_TRACEBACK=1 shows where", 1)
+
+
+def _usage(error: Any) -> str:
+    """A mistake on the command line, in one line that says where the right words are."""
+    message = " ".join(error.format_message().split()).rstrip(".")
+    context = getattr(error, "ctx", None)
+    return f"{message[:1].lower()}{message[1:]}; see {context.command_path if context else 'rtctl'} --help"
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"rtctl: {message}", file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

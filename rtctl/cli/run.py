@@ -1,27 +1,33 @@
 """`rtctl run CONFIG`: run a machine, show how it does, and report on its steps."""
 
 import signal
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from rtctl.cli import common
-from rtctl.cli.common import JsonOption, SetOption
+from rtctl.cli.common import ConfigArgument, JsonOption, LinkOption, ModeOption, ReferenceOption, SetOption
 
-app = typer.Typer()
+app = typer.Typer(add_completion=False)
 
 
 @app.command()
 def run(
-    config: Annotated[str, typer.Argument(help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis.")],
-    mode: Annotated[str | None, typer.Option(help="real, lockstep or fused; as in the config if not given.")] = None,
-    link: Annotated[str | None, typer.Option(help="zmq or shm; as in the config if not given.")] = None,
-    duration: Annotated[str | None, typer.Option("--for", metavar="T", help="How long, e.g. 12s; until Ctrl-C if not given.")] = None,
-    reference: Annotated[str | None, typer.Option(help="File with the reference to play.")] = None,
+    config: ConfigArgument,
+    mode: ModeOption = None,
+    link: LinkOption = None,
+    duration: Annotated[
+        str | None, typer.Option("--for", metavar="T", help="How long, e.g. 12s; until Ctrl-C if not given.")
+    ] = None,
+    reference: ReferenceOption = None,
     set_: SetOption = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for the recorded bundle; runs/NAME-DATE-TIME if not given.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Folder for the recorded bundle; runs/NAME-DATE-TIME if not given."
+        ),
+    ] = None,
     arm: Annotated[bool, typer.Option(help="Arm at once and play the reference.")] = True,
     plot: Annotated[bool, typer.Option(help="Draw the run into the bundle.")] = True,
     json: JsonOption = False,
@@ -57,7 +63,7 @@ def run(
     else:
         console.report(result)
     if result["tripped"]:
-        sys.exit(1)
+        raise typer.Exit(1)
 
 
 def _interrupt(*_: Any) -> None:

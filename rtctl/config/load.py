@@ -1,5 +1,6 @@
 """Loading a config: YAML, overrides, validation, each mistake in one line that says where and what would be right."""
 
+import copy
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -7,39 +8,89 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
+from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError
+from rtctl.config.fields import Shape, fill, put, unknown, written
+from rtctl.config.yaml_file import Document, find, load_yaml, parse, scalar_tag
 from rtctl.idiom import Settings
 
 
 def load_settings(path: str | Path, model: type[Settings], overrides: Sequence[str] = ()) -> Any:
-    try:
-        data = yaml.safe_load(Path(path).read_text())
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}") from error
-    for item in overrides:
-        key, _, value = item.partition("=")
-        node = data
-        parts = key.split(".")
-        for part in parts[:-1]:
-            node = node[int(part)] if isinstance(node, list) else node.setdefault(part, {})
-        node[parts[-1]] = yaml.safe_load(value)
+    """Settings of a file, with `key.path=value` overrides. Raises UserError with one line for each mistake."""
+    document = load_yaml(find(path))
+    data = copy.deepcopy(document.data)
+    if data is None:
+        data = {}  # an empty file lacks its keys, as {} does
+    said: dict[tuple, str] = {}
+    for text in overrides:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise UserError(f"--set {text}: write key=value, e.g. loop.rate=500")
+        given = parse(value, f"--set {text}").data
+        said.update(dict.fromkeys(put(data, Shape(model, model=model), key, given, f"--set {text}"), text))
+    data = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise UserError(str(error)) from error
+        raise UserError(sentences(error, model, data, lambda at: _where(document, said, at))) from error
 
 
 def get_path(settings: Any, path: str) -> Any:
-    for part in path.split("."):
-        settings = settings[int(part)] if isinstance(settings, (list, tuple)) else getattr(settings, part)
-    return settings
+    """The setting at a dotted path such as law.position.gain or reference.steps.0.at. Raises UserError."""
+    node = settings
+    for i, part in enumerate(path.split(".")):
+        here = ".".join(path.split(".")[:i])
+        if isinstance(node, (list, tuple)):
+            if not (part.isascii() and part.isdigit() and len(part) < 7 and int(part) < len(node)):
+                raise UserError(f"{path}: '{part[:40]}' is not an index of {here}, which has {len(node)} items")
+            node = node[int(part)]
+        elif not hasattr(type(node), "model_fields"):
+            raise UserError(f"{path}: {here} is a value and has no key '{part[:40]}'")
+        elif part not in type(node).model_fields:
+            raise UserError(f"{path}: unknown key '{part[:40]}'; {unknown(part, type(node).model_fields)}")
+        else:
+            node = getattr(node, part)
+    return node
 
 
 def set_path(settings: Any, path: str, value: Any) -> Any:
-    data = settings.model_dump(exclude_unset=True)
-    node = data
-    parts = path.split(".")
-    for part in parts[:-1]:
-        node = node[int(part)] if isinstance(node, list) else node.setdefault(part, {})
-    node[parts[-1]] = value
-    return type(settings).model_validate(data)
+    """New settings with `value`, SI or text with a unit, at a dotted path. Raises UserError where it does not fit."""
+    model = type(settings)
+    data = written(settings)
+    put(data, Shape(model, model=model), path, copy.deepcopy(value))
+    data = fill(Shape(model, model=model), data)
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise UserError(sentences(error, model, data)) from error
+
+
+def to_yaml(settings: Any, full: bool = False) -> str:
+    """YAML that loads to equal settings, in SI: what was written, or with `full` every key."""
+    data = settings.model_dump() if full else written(settings)
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)
+
+
+def _where(document: Document, said: dict[tuple, str], path: tuple) -> str:
+    """File and line of a path, or the override that made it."""
+    for end in range(len(path), 0, -1):
+        if path[:end] in said:
+            return f"--set {said[path[:end]]}"
+        if path[:end] in document.lines:
+            return f"{document.path}:{document.lines[path[:end]]}"
+    return document.path
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes what either YAML 1.1 or 1.2 would not read as text."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
+    style = '"' if scalar_tag(text) != "str" else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _text)

@@ -7,6 +7,7 @@ from typing import Any
 
 from rtctl.config.errors import UserError
 from rtctl.daemon.supervisor import Supervisor
+from rtctl.machines import MODULES
 
 
 class Session:
@@ -68,7 +69,14 @@ class Session:
         y = trace["capstan" if machine.kind == "ivu" else "x" if machine.kind == "axis" else "position"]
         rad = 1.0 if machine.unit == "rad" else 1.0 / machine.radius
         mm = 1000.0 * machine.metres_per_unit
-        return step_metrics(trace["t"][running], trace["target"][running], y[running], mm, rad)
+        return step_metrics(
+            trace["t"][running],
+            trace["target"][running],
+            y[running],
+            mm,
+            rad,
+            settle_floor=MODULES[machine.kind].SETTLE_FLOOR,
+        )
 
     def draw(self) -> str | None:
         """Draw the run beside its bundle; returns the picture's path."""

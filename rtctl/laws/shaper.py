@@ -22,22 +22,27 @@ class ShaperSettings(Settings):
 
 class ShaperParams(NamedTuple):
     a: float
+    w: float  # rad/s, 0 where nothing is shaped
 
 
-SHAPER_STATE = state(x1=float, x2=float, ref=float)
+SHAPER_STATE = state(x1=float, x2=float, ref=float, speed=float, acceleration=float)  # of the shaped reference
 
 
 def build(settings: ShaperSettings, dt: float) -> ShaperParams:
     """Coefficient for a tick of `dt` s."""
-    return ShaperParams(1.0 if settings.bandwidth is None else 1.0 - exp(-settings.bandwidth * dt))
+    if settings.bandwidth is None:
+        return ShaperParams(1.0, 0.0)
+    return ShaperParams(1.0 - exp(-settings.bandwidth * dt), settings.bandwidth)
 
 
 @tick
 def step(p, s, target):
-    """Shaped reference for `target`, same unit."""
+    """Shaped reference for `target`, same unit. Its speed and acceleration are left in the state (0 if not shaped)."""
     s.x1 += p.a * (target - s.x1)
     s.x2 += p.a * (s.x1 - s.x2)
     s.ref += p.a * (s.x2 - s.ref)
+    s.speed = p.w * (s.x2 - s.ref)
+    s.acceleration = p.w * (p.w * (s.x1 - s.x2) - s.speed)
     return s.ref
 
 
@@ -47,3 +52,5 @@ def reset(p, s, position):
     s.x1 = position
     s.x2 = position
     s.ref = position
+    s.speed = 0.0
+    s.acceleration = 0.0

@@ -38,6 +38,7 @@ from rtctl.plants import axis as plant_axis
 __all__ = ["play", "prepare"]  # called by the generated tick as machine.play and machine.prepare
 
 UNIT = "m"
+SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
 PLANT_RATE = 1000.0
 
 

@@ -18,6 +18,7 @@ from rtctl.laws import (
     excitation,
     friction_feedforward,
     gain_schedule,
+    inertia_feedforward,
     limit,
     pd,
     reel_radius,
@@ -34,6 +35,7 @@ from rtctl.laws.excitation import ExcitationSettings, NoneSettings
 from rtctl.laws.friction_feedforward import FrictionFeedforwardSettings
 from rtctl.laws.gain_schedule import GainScheduleSettings
 from rtctl.drivers.l292 import L292Settings
+from rtctl.laws.inertia_feedforward import InertiaFeedforwardSettings
 from rtctl.laws.limit import LimitSettings
 from rtctl.drivers.ls7084 import Ls7084Settings
 from rtctl.drivers.optical_sensor import OpticalSensorSettings
@@ -96,6 +98,9 @@ class FrictionSettings(Settings):
         tau_C=2.4e-3
     )
     speed: float = quantity(0.3, unit="rad/s", gt=0, help="reference speed at which the paying motor is fully compensated")
+    hand_over: float = quantity(
+        0.6, unit="", ge=0, le=1, help="share of the paying motor's friction that the winding one takes at standstill"
+    )
 
 
 class IvuLawSettings(Settings):
@@ -103,6 +108,7 @@ class IvuLawSettings(Settings):
     position: PdSettings
     gain_schedule: GainScheduleSettings = GainScheduleSettings()
     friction: FrictionSettings = FrictionSettings()
+    inertia: InertiaFeedforwardSettings = InertiaFeedforwardSettings()
     tension: TensionSettings = TensionSettings()
     allocation: AllocationSettings = AllocationSettings()
     limit: LimitSettings = LimitSettings()
@@ -138,6 +144,7 @@ class IvuConfig(MachineSettings):
 
 PLANT_RATE = 2000.0  # Hz, of the free-running emulator: a sample is at most half a millisecond old
 UNIT = "rad"
+SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
 
 
 def radius(config: IvuConfig) -> float:
@@ -156,6 +163,7 @@ class IvuParams(NamedTuple):
     R2: float
     grow: float  # d_tape R_c / pi: R^2 grows by this per rad of capstan
     trail_speed: float
+    hand_over: float
     settle: int  # ticks from arming to running
 
 
@@ -303,13 +311,17 @@ STAGES = (
             "changed = c.gains != s.machine.gains",
             "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, y.gain_factor * u_pd, changed, s.machine.u_fb)",
             "s.machine.gains = c.gains",
-            "winding = friction_feedforward.step(p.friction1, s.friction1, y.ref)",
-            "paying = friction_feedforward.step(p.friction2, s.friction2, y.ref)",
-            "y.u_c = s.machine.u_fb + y.w + (winding if s.friction1.direction > 0.0 else paying)",
+            "u_f1 = friction_feedforward.step(p.friction1, s.friction1, y.ref)",
+            "u_f2 = friction_feedforward.step(p.friction2, s.friction2, y.ref)",
+            "trail = min(abs(speed) / p.machine.trail_speed, 1.0)",
+            "rest = p.machine.hand_over * (1.0 - trail)  # what the paying motor does not compensate, the winding one does",
+            "forward = s.friction1.direction > 0.0",
+            "friction = u_f1 + rest * u_f2 * y.R1 / y.R2 if forward else u_f2 + rest * u_f1 * y.R2 / y.R1",
+            "y.u_c = s.machine.u_fb + y.w + friction",
             "tension.step(p.tension, s.tension, y.R1, y.R2)",
-            "trail = min(max(speed / p.machine.trail_speed, -1.0), 1.0)",
-            "T1 = s.tension.V1 + min(trail, 0.0) * p.friction1.volts",
-            "T2 = s.tension.V2 - max(trail, 0.0) * p.friction2.volts",
+            "inertia_feedforward.step(p.inertia, s.inertia, s.shaper.acceleration, y.R1, y.R2)",
+            "T1 = s.tension.V1 + s.inertia.u1 + (0.0 if forward else trail * u_f1)",
+            "T2 = s.tension.V2 + s.inertia.u2 - (trail * u_f2 if forward else 0.0)",
             "allocation.step(p.allocation, s.allocation, y.u_c, T1, T2)",
             "measuring = p.machine.measure != 0 and s.safety.state == safety.ARMED and s.machine.prepared == 0",
             "u1 = limit.step(p.limit, s.limit1, s.reel_radius.u1 if measuring else s.allocation.u1)",
@@ -369,6 +381,7 @@ def diagram(config: IvuConfig, dt: float) -> Diagram:
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
         Block("friction1", friction_feedforward.build(law.friction.motor1, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE),
         Block("friction2", friction_feedforward.build(law.friction.motor2, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE),
+        Block("inertia", inertia_feedforward.build(law.inertia, dt), inertia_feedforward.INERTIA_FEEDFORWARD_STATE),
         Block("tension", tension.build(law.tension, dt), tension.TENSION_STATE),
         Block("allocation", allocation.build(law.allocation, dt), allocation.ALLOCATION_STATE),
         Block("reel_radius", reel_radius.build(radius.measure, dt), reel_radius.REEL_RADIUS_STATE),
@@ -392,6 +405,7 @@ USES = (
     "rtctl.laws.excitation",
     "rtctl.laws.friction_feedforward",
     "rtctl.laws.gain_schedule",
+    "rtctl.laws.inertia_feedforward",
     "rtctl.laws.limit",
     "rtctl.laws.pd",
     "rtctl.laws.reference",
@@ -411,6 +425,7 @@ def _machine_params(config: IvuConfig, dt: float) -> IvuParams:
         R2=r.R2,
         grow=r.d_tape * config.R_c / np.pi,
         trail_speed=config.law.friction.speed,
+        hand_over=config.law.friction.hand_over,
         settle=round(config.law.tension.ramp / dt) + round(0.1 / dt),
     )
 

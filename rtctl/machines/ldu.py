@@ -53,6 +53,7 @@ from rtctl.machines.physics import PhysicsTerm, check_nodes
 from rtctl.plants import ldu as plant_ldu
 
 UNIT = "m"
+SETTLE_FLOOR = 4e-6  # in that unit: 4 um are "more than allowed" (11.1); smaller steps need not settle closer
 PLANT_RATE = 10_000.0  # Hz, of the free-running emulator
 
 

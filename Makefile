@@ -1,0 +1,45 @@
+# make run    the reel unit under control, against its emulated twin, with a picture at the end
+# make test   the whole test suite
+# make check  lint, format and types
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: run test check format bench clean
+
+run: $(VENV)/installed
+	$(BIN)/rtctl run configs/ivu.yaml --reference configs/references/steps.yaml --for 12s
+
+test: $(VENV)/installed-dev
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+check: $(VENV)/installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	@# drivers/ and plants/ become rtctl.drivers and rtctl.plants on installation; mypy is shown the same tree by links
+	@rm -rf build/types && mkdir -p build/types/rtctl && ln -s $(CURDIR)/rtctl/* build/types/rtctl/ \
+	  && ln -s $(CURDIR)/drivers $(CURDIR)/plants $(CURDIR)/configs build/types/rtctl/
+	cd build/types && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p rtctl
+
+format: $(VENV)/installed-dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(VENV)/installed-dev
+	$(BIN)/python benchmarks/fused_speed.py
+	$(BIN)/python benchmarks/lateness.py
+
+clean:
+	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+$(VENV)/installed-dev: pyproject.toml $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	touch $@

@@ -1,0 +1,67 @@
+"""`rtctl check CONFIG`: whether a config is right, without compiling or moving anything."""
+
+from typing import Any
+
+import typer
+
+from rtctl.cli import common
+from rtctl.cli.common import ConfigArgument, LinkOption, ModeOption, ReferenceOption, SetOption
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def check(
+    config: ConfigArgument,
+    reference: ReferenceOption = None,
+    mode: ModeOption = None,
+    link: LinkOption = None,
+    set_: SetOption = None,
+) -> None:
+    """Check a config and say what it would run. Exit code 2 with every mistake, where it is wrong.
+
+    Examples:
+
+      rtctl check ivu.yaml
+
+      rtctl check ldu --reference print_steps --set loop.rate='5 kHz'
+    """
+    settings = common.with_loop(common.load_config(config, set_), mode, link)
+    machine = common.machine_of(common.with_reference(settings, reference))
+    typer.echo("ok")
+    for name, value in _summary(machine):
+        typer.echo(f"  {name:10}{value}")
+
+
+def _summary(machine: Any) -> list[tuple[str, str]]:
+    """What a run of this machine would be."""
+    from rtctl.daemon.server import default_endpoint, runtime_dir
+
+    config = machine.config
+    loop, link, commands = config.loop, config.link, config.commands
+    law = getattr(config.law.position, "kind", "pd")
+    if loop.mode == "fused":
+        plant = "emulated, in the loop's own process"
+    else:
+        endpoint = link.endpoint or f"ipc://{runtime_dir() / f'{config.name}.plant'}"
+        where = f"over {link.kind}" if link.kind == "shm" else f"at {endpoint}"
+        plant = f"{'emulated' if link.plant == 'spawn' else 'external'}, {where}"
+    terms = [f"{term.term} at {term.node}" for term in config.plant.physics]
+    return [
+        ("machine", f"{config.name} ({machine.kind})"),
+        ("rate", f"{machine.rate:g} Hz, {loop.mode}, writes at the {loop.write.replace('_', ' ')}"),
+        ("law", f"{law}, {len(machine.diagram.blocks)} blocks, {len(machine.diagram.columns)} signals"),
+        ("reference", _reference(machine)),
+        ("plant", plant + (f", with {', '.join(terms)}" if terms else "")),
+        ("command", commands.endpoint or default_endpoint(config.name, "command")),
+        ("telemetry", commands.telemetry or default_endpoint(config.name, "telemetry")),
+    ]
+
+
+def _reference(machine: Any) -> str:
+    table = machine.reference
+    if table.n < 2:
+        return "holds still until a setpoint comes"
+    return f"{table.n} knots over {table.t[table.n - 1]:g} s, in {machine.unit}" + (
+        ", repeated" if table.period else ""
+    )

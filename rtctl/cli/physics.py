@@ -1,0 +1,77 @@
+"""`rtctl physics`: the terms of physics that a plant's `physics:` list can hold."""
+
+import textwrap
+from typing import Annotated, Any
+
+import typer
+
+app = typer.Typer(add_completion=False)
+WIDTH = 100
+
+
+@app.command()
+def physics(
+    term: Annotated[
+        str | None, typer.Argument(metavar="[TERM]", help="Explain this one, e.g. friction.stribeck.")
+    ] = None,
+) -> None:
+    """List the terms of physics, or explain one: equation, parameters, where it can stand, what it is mistaken for.
+
+    Examples:
+
+      rtctl physics
+
+      rtctl physics friction.stribeck
+    """
+    from rtctl.config.errors import UserError, nearest
+    from rtctl.plants.physics import TERMS
+
+    if term is None:
+        width = max(map(len, TERMS)) + 2
+        for name, entry in TERMS.items():
+            typer.echo(f"{name:{width}}{entry.words}")
+        return
+    if term not in TERMS:
+        near = nearest(term, TERMS) or next((name for name in TERMS if name.rpartition(".")[2] == term), None)
+        raise UserError(f"no term '{term}'; " + (f"did you mean '{near}'?" if near else "`rtctl physics` lists them"))
+    typer.echo("\n".join(explain(TERMS[term])))
+
+
+def explain(term: Any) -> list[str]:
+    """Lines about one term."""
+    lines = [
+        term.name,
+        f"  {term.words}",
+        "",
+        f"  equation  {term.equation}",
+        f"  source    {term.source}",
+        "",
+        "  parameters",
+    ]
+    for name, field in term.settings.model_fields.items():
+        if name not in ("term", "node"):
+            lines += _item(name, _parameter(field, term.typical.get(name)))
+    lines += ["", "  nodes"]
+    for plant, nodes in term.nodes.items():
+        lines += _item(plant, ", ".join(nodes))
+    if term.look_alikes:
+        lines += ["", "  mistaken for, and the experiment that tells them apart"]
+        for rival, experiment in term.look_alikes.items():
+            lines += _item(rival, experiment)
+    return lines
+
+
+def _parameter(field: Any, typical: tuple[float, float] | None) -> str:
+    """Help, unit, default and the range met in practice of one parameter."""
+    from typing import get_args
+
+    unit = (field.json_schema_extra or {}).get("unit", "")
+    words = field.description or " | ".join(map(str, get_args(field.annotation)))
+    default = "" if field.is_required() else f"; {field.default:g} {unit}".rstrip() + " if not given" if isinstance(
+        field.default, float) else f"; {field.default} if not given"  # fmt: skip
+    met = f"; {typical[0]:g} to {typical[1]:g} times the base model's is typical" if typical else ""
+    return words + (f" [{unit}]" if unit else "") + default + met
+
+
+def _item(name: str, text: str) -> list[str]:
+    return textwrap.wrap(f"{name:20} {text}", WIDTH, initial_indent="    ", subsequent_indent=" " * 25)

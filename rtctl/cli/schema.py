@@ -1,0 +1,34 @@
+"""`rtctl schema`: what may stand in a config, for editors and for people."""
+
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def schema(
+    machine: Annotated[str, typer.Argument(metavar="MACHINE", help="ivu, ldu or axis.")],
+) -> None:
+    """Print the JSON Schema of a machine's config: every key with its unit, bounds and meaning.
+
+    Examples:
+
+      rtctl schema ivu > ivu.schema.json
+
+      rtctl schema ldu | jq '.["$defs"].PiVelocitySettings.properties'
+    """
+    import json
+
+    from rtctl import machines
+    from rtctl.config.errors import UserError, nearest
+    from rtctl.config.schema import json_schema
+
+    if machine not in machines.CONFIGS:
+        near = nearest(machine, machines.CONFIGS)
+        raise UserError(
+            f"no machine '{machine}'; "
+            + (f"did you mean '{near}'?" if near else f"it is {', '.join(machines.CONFIGS)}")
+        )
+    typer.echo(json.dumps(json_schema(machines.CONFIGS[machine]), indent=2))

@@ -1,0 +1,121 @@
+"""`rtctl status`: what a running machine does."""
+
+import time
+from typing import Annotated, Any
+
+import typer
+
+from rtctl.cli import common
+from rtctl.cli.common import JsonOption, NameOption
+
+app = typer.Typer(add_completion=False)
+REFRESH = 0.25  # s
+SIGNALS = (
+    "capstan",
+    "position",
+    "x",
+    "ref",
+    "capstan_error",
+    "position_error",
+    "tension1_estimate",
+    "tension2_estimate",
+)
+COLOUR = {"idle": "dim", "armed": "yellow", "running": "green", "tripped": "bold red"}
+
+
+@app.command()
+def status(
+    json: JsonOption = False,
+    watch: Annotated[bool, typer.Option("--watch", "-w", help="Keep showing it until Ctrl-C.")] = False,
+    name: NameOption = None,
+) -> None:
+    """Show state, timing, link and signals of a running machine.
+
+    Examples:
+
+      rtctl status
+
+      rtctl status --watch --name ivu
+
+      rtctl status --json | jq .state
+    """
+    with common.client(name) as client:
+        found = client.call("status")
+        if watch:
+            _watch(client, found, json)
+        elif json:
+            common.print_json(found)
+        else:
+            from rich.console import Console
+
+            units = {s["name"]: s["unit"] for s in client.call("signals")["signals"]}
+            Console().print(table(found, units))
+
+
+def _watch(client: Any, found: dict[str, Any], json: bool) -> None:
+    """Show again and again, in place or as JSON lines; ends with Ctrl-C or the daemon."""
+    from rich.console import Console
+    from rich.live import Live
+
+    from rtctl.config.errors import UserError
+
+    units = {s["name"]: s["unit"] for s in client.call("signals")["signals"]}
+    try:
+        if json:
+            while True:
+                common.print_json(found)
+                time.sleep(REFRESH)
+                found = client.call("status")
+        with Live(table(found, units), console=Console(), auto_refresh=False) as live:
+            while True:
+                time.sleep(REFRESH)
+                found = client.call("status")
+                live.update(table(found, units), refresh=True)
+    except KeyboardInterrupt:
+        return
+    except UserError:
+        if common.listens(client.endpoint):
+            raise
+        typer.echo(f"{found['name']} has ended", err=True)
+
+
+def table(found: dict[str, Any], units: dict[str, str]) -> Any:
+    """A status reply as a table; `units` of the signals by name."""
+    from rich.table import Table
+    from rich.text import Text
+
+    out = Table(box=None, show_header=False, pad_edge=False)
+    out.add_column(style="dim")
+    out.add_column()
+    late, tick, rows = found["lateness_us"], found["tick_us"], found["rows"]
+    out.add_row("machine", Text(f"{found['name']} ({found['machine']}, pid {found['pid']})", "bold"))
+    out.add_row("state", Text(found["state"], COLOUR.get(found["state"], "")))
+    if found["trip"]:
+        trip = found["trip"]
+        out.add_row("trip", Text(f"{trip['code']} at tick {trip['tick']}: {trip['why']}", "bold red"))
+    measured = f", {found['measured_rate_hz']:g} Hz measured" if found["measured_rate_hz"] else ""
+    out.add_row("ticks", f"{found['ticks']} at {found['rate_hz']:g} Hz{measured}, {found['mode']}")
+    out.add_row("missed", f"{found['missed']} missed, {found['late']} late, {found['overruns']} overruns")
+    if found["mode"] == "real":
+        out.add_row("lateness", _times(late))
+    out.add_row("tick time", _times(tick))
+    frames = found["frames"]
+    out.add_row("link", f"{found['link']}, {frames['received']} frames, {frames['not_sent']} not sent")
+    if found["mode"] == "real":
+        out.add_row("latency", _times(found["link_latency_us"]))
+    recorded = f"{rows['recorded']} recorded, {rows['lost']} lost" if "recorded" in rows else "not recorded"
+    out.add_row(
+        "rows",
+        f"{recorded}, {rows['lost_in_ring']} lost in the ring" + (f", {rows['error']}" if rows.get("error") else ""),
+    )
+    for signal in SIGNALS:
+        if signal in found["signals"]:
+            out.add_row(signal, f"{found['signals'][signal]:+.5g} {units.get(signal, '')}")
+    for lack in found["lacks"]:
+        out.add_row("lacks", Text(lack, "yellow"))
+    return out
+
+
+def _times(percentiles: dict[str, float]) -> str:
+    """Percentiles in us."""
+    return "p50 {p50:.0f}, p99 {p99:.0f}, p99.9 {p999:.0f}, max {max:.0f} us".format(**percentiles)

@@ -1,0 +1,100 @@
+"""What tests of a running machine share: small configs, a folder for sockets, and a machine inside the test process."""
+
+import itertools
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from rtctl import machines
+from rtctl.config.load import set_path
+from rtctl.daemon.loop_process import Loop
+from rtctl.loop import generate
+from rtctl.loop.mailbox import Mailbox
+from rtctl.loop.memory import Segment
+from rtctl.loop.records import layout
+from rtctl.loop.ring import Reader
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+number = itertools.count(1)
+
+
+@pytest.fixture(scope="session")
+def runtime() -> Iterator[Path]:
+    """A folder of our own for sockets and locks, with a short path: a socket's has 107 bytes at most."""
+    folder = Path(tempfile.mkdtemp(prefix="rt-", dir="/tmp"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        yield folder
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def config() -> Callable[..., Any]:
+    """`config("ivu", mode="fused", link="shm", set={"safety.current": 0.5})`: settings under a name of their own."""
+
+    def make(kind: str = "ivu", mode: str = "fused", link: str = "shm", set: dict[str, Any] | None = None) -> Any:
+        data = yaml.safe_load((CONFIGS / f"{kind}.yaml").read_text())
+        data["name"] = f"t{os.getpid()}-{next(number)}"
+        settings = machines.CONFIGS[kind].model_validate(data)
+        for path, value in {"loop.mode": mode, "link.kind": link, **(set or {})}.items():
+            settings = set_path(settings, path, value)
+        return settings
+
+    return make
+
+
+class Bench:
+    """A machine inside the test process: ask, run some seconds of virtual time, look at the rows."""
+
+    def __init__(self, config: Any, folder: Path, rows: int = 20_000):
+        self.machine = machines.build(config)
+        self.made = generate.generate(self.machine, "shm")
+        self.segment = Segment.create(
+            folder / f"segment-{config.name}", layout(self.made.params, self.made.tables, self.made.row, rows)
+        )
+        self.take_over(config)
+        generate.fill_tables(self.segment["tables"][0], (self.machine.reference, self.machine.excitation))
+        self.status = self.segment["status"][0]
+        self.mailbox, self.reader = Mailbox(self.segment), Reader(self.segment)
+        self.loop = Loop(self.machine, self.made, self.segment, self.segment["outputs"], self.segment["inputs"])
+        self.ticks = 0
+
+    def take_over(self, config: Any) -> None:
+        """Put the parameters of a config into the mailbox; they are taken with the next request."""
+        generate.fill(self.segment["mailbox"][0]["params"], machines.build(config).diagram.blocks)
+
+    def ask(self, *requests: str, **fields: int) -> "Bench":
+        """Count up each of the requests (arm, play, reset, disarm, gains) and set fields of the command."""
+
+        def write(_: Any, command: Any) -> None:
+            for name in requests:
+                command[name] += 1
+            for name, value in fields.items():
+                command[name] = value
+
+        self.mailbox.post(write)
+        return self
+
+    def run(self, seconds: float) -> np.ndarray:
+        """The rows of the next `seconds`."""
+        ticks = round(seconds * self.machine.rate)
+        self.loop.stretch(self.ticks, ticks)
+        self.ticks += ticks
+        return self.reader.take()
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Callable[..., Bench]:
+    """`bench(config)` is a Bench for it."""
+
+    def make(config: Any, rows: int = 20_000) -> Bench:
+        return Bench(config, tmp_path, rows)
+
+    return make

@@ -1,0 +1,43 @@
+import time
+
+import pytest
+
+from rtctl.idiom import tick
+from rtctl.loop import clock
+
+
+@tick
+def read():
+    return clock.now()
+
+
+@tick
+def sleep(ns):
+    """How much later than asked for it woke, in ns, and the result of the call."""
+    wake = clock.now() + ns
+    result = clock.sleep_until(wake)
+    return clock.now() - wake, result
+
+
+def test_is_the_clock_of_python() -> None:
+    read()
+    before = time.monotonic_ns()
+    now = read()
+    assert before <= now <= time.monotonic_ns()
+
+
+def test_never_runs_backwards() -> None:
+    times = [read() for _ in range(1000)]
+    assert times == sorted(times)
+
+
+@pytest.mark.parametrize("ns", [1, 100_000, 2_000_000])
+def test_never_wakes_early(ns: int) -> None:
+    for _ in range(20):
+        late, result = sleep(ns)
+        assert result == 0 and late >= 0
+
+
+def test_a_time_that_has_passed_does_not_wait() -> None:
+    late, result = sleep(-3600 * clock.SECOND)
+    assert result == 0 and 3600 * clock.SECOND <= late < 3700 * clock.SECOND

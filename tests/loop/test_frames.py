@@ -1,0 +1,28 @@
+import numpy as np
+import pytest
+
+from rtctl.loop import frames, generate
+
+
+@pytest.mark.parametrize("dtype", [frames.OUTPUTS, frames.INPUTS])
+def test_records_have_no_holes_and_are_little_endian(dtype: np.dtype) -> None:
+    assert dtype.itemsize == sum(dtype[name].itemsize for name in dtype.names)
+    assert all(dtype[name].base.str[0] in "<|" for name in dtype.names)
+
+
+@pytest.mark.parametrize("name", ["tx", "rx"])
+@pytest.mark.parametrize(
+    ("field", "value", "valid"),
+    [
+        ("seq", 0, True),
+        ("seq", 2**62, True),
+        ("seq", frames.HELLO, False),
+        ("magic", 0x52544354, False),
+        ("version", frames.VERSION + 1, False),
+        ("version", 0, False),
+    ],
+)
+def test_only_our_own_frames_are_valid(name: str, field: str, value: int, valid: bool) -> None:
+    frame = generate.new_frames()[name]
+    frame[field] = value
+    assert frames.valid(frame[0]) == valid

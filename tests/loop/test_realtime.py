@@ -1,0 +1,85 @@
+import ctypes
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from rtctl.loop import realtime
+from rtctl.loop.realtime import RealTime
+
+
+class Kernel:
+    """Stands in for the kernel; refuses what is named in `refuses`."""
+
+    def __init__(self, patch: pytest.MonkeyPatch):
+        self.refuses: set[str] = set()
+        self.cpus = {0, 1, 2}
+        self.asked: dict[str, Any] = {}
+        patch.setattr(os, "sched_setscheduler", lambda pid, policy, param: self._ask("fifo", (policy, param.sched_priority)))
+        patch.setattr(os, "sched_setaffinity", lambda pid, cpus: self._ask("pin", cpus))
+        patch.setattr(os, "sched_getaffinity", lambda pid: self.cpus)
+        patch.setattr(ctypes, "CDLL", lambda *_, **__: self)
+        patch.setattr(realtime.gc, "freeze", lambda: None)
+        opened, written = os.open, os.write
+        patch.setattr(os, "open", lambda path, *a, **k: self._latency() if "latency" in str(path) else opened(path, *a, **k))
+        patch.setattr(os, "write", lambda fd, data: self._ask("zero", data) if fd == -7 else written(fd, data))
+        closed = os.close
+        patch.setattr(os, "close", lambda fd: self._ask("closed", fd) if fd == -7 else closed(fd))
+
+    def _latency(self) -> int:
+        self._ask("latency", True)
+        return -7
+
+    def mlockall(self, flags: int) -> int:
+        self.asked["lock"] = flags
+        return -1 if "lock" in self.refuses else 0
+
+    def _ask(self, what: str, value: Any) -> None:
+        if what in self.refuses:
+            raise PermissionError(1, "Operation not permitted")
+        self.asked[what] = value
+
+
+@pytest.fixture
+def kernel(monkeypatch: pytest.MonkeyPatch) -> Iterator[Kernel]:
+    with monkeypatch.context() as patch:
+        yield Kernel(patch)
+
+
+def test_asks_for_everything(kernel: Kernel) -> None:
+    made = RealTime(80, None)
+    assert made.lacks == []
+    assert kernel.asked["fifo"] == (os.SCHED_FIFO, 80)
+    assert kernel.asked["lock"] == 3 and kernel.asked["pin"] == {2}
+    assert kernel.asked["zero"] == bytes(4) and "closed" not in kernel.asked
+    made.close()
+    made.close()
+    assert kernel.asked["closed"] == -7
+
+
+@pytest.mark.parametrize(
+    ("refused", "what", "remedy"),
+    [
+        ("fifo", "no SCHED_FIFO", "LimitRTPRIO"),
+        ("lock", "memory is not locked", "LimitMEMLOCK"),
+        ("pin", "not on CPU 2", "allowed are 0, 1, 2: set loop.cpu to one of them"),
+        ("latency", "no access to /dev/cpu_dma_latency", "write access"),
+    ],
+)
+def test_names_what_was_refused_and_what_helps(kernel: Kernel, refused: str, what: str, remedy: str) -> None:
+    kernel.refuses = {refused}
+    (lack,) = RealTime(80, None).lacks
+    assert lack.what == what and remedy in lack.remedy and str(lack).startswith(f"{what}: ")
+
+
+def test_names_all_that_was_refused(kernel: Kernel) -> None:
+    kernel.refuses = {"fifo", "lock", "pin", "latency"}
+    assert len(RealTime(80, 1).lacks) == 4
+
+
+def test_one_cpu_is_a_lack_unless_it_was_chosen(kernel: Kernel) -> None:
+    kernel.cpus = {0}
+    (lack,) = RealTime(80, None).lacks
+    assert lack.what == "one CPU only"
+    assert RealTime(80, 0).lacks == [] and kernel.asked["pin"] == {0}

@@ -1,0 +1,232 @@
+"""Propagation of a linear machine with dry friction: against scipy, against closed forms, and for what must never be."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from rtctl.idiom import tick
+from rtctl.plants import linear
+
+GAIN, LIMIT = 0.01, 2.0  # speed per unit force over a substep, friction
+STILL = 1e-18  # speed: rounding of the force that holds
+speeds = st.floats(-1.0, 1.0).map(lambda v: 0.0 if abs(v) < 1e-9 else v)
+
+
+def machine(A: np.ndarray, G: np.ndarray, h: float, nq: int, dry: list[float]) -> Any:
+    """A machine's record, ready to advance."""
+    s = np.zeros(1, linear.machine_state(nq, len(A), G.shape[1] - nq)).view(np.recarray)[0]
+    s.h, s.A, s.G = h, A, G
+    linear.discretise_into(s.A, s.G, h, s.Phi_T, s.Gamma_T, s.work)
+    s.dry_base[:] = dry
+    return s
+
+
+def mass(h: float, M: float = 1.0, dry: float = 0.0, k: float = 0.0, d: float = 0.0) -> Any:
+    """One mass, pushed by input 0; its only node force is friction."""
+    A = np.array([[0.0, 1.0], [-k / M, -d / M]])
+    return machine(A, np.array([[0.0, 0.0], [1.0 / M, 1.0 / M]]), h, 1, [dry])
+
+
+@tick
+def run(m, n):
+    """`n` substeps."""
+    for _ in range(n):
+        linear.midpoint(m)
+        linear.advance(m)
+
+
+def van_loan(A: np.ndarray, G: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+    n = len(A) + G.shape[1]
+    M = np.zeros((n, n))
+    M[: len(A)] = np.hstack([A, G])
+    P = expm(M * h)
+    return P[: len(A), : len(A)], P[: len(A), len(A) :]
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.floats(1.0, 5.0), st.floats(-5.0, -2.0))
+def test_discretise_is_the_matrix_exponential_of_stiff_chains(seed, stiffness, step):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 5))
+    K = np.zeros((n, n))
+    for i in range(n - 1):
+        K[i : i + 2, i : i + 2] += 10 ** rng.uniform(0, stiffness) * np.array([[1, -1], [-1, 1]])
+    inverse = np.diag(10 ** rng.uniform(-1, 1, n))
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -1e-3 * inverse @ K]])
+    G = np.vstack([np.zeros((n, n)), inverse])
+    Phi_T, Gamma_T = linear.discretise(A, G, 10**step)
+    Phi, Gamma = van_loan(A, G, 10**step)
+    position = 10.0 ** np.r_[np.zeros(n), np.full(n, 2)]  # speeds are large where positions are small
+    assert np.abs((Phi_T.T - Phi) * position / position[:, None]).max() < 1e-10
+    np.testing.assert_allclose(Gamma_T.T, Gamma, rtol=0, atol=1e-10 * np.abs(Gamma).max())
+
+
+def test_discretise_of_nothing_is_identity_and_of_a_free_mass_is_exact():
+    Phi_T, Gamma_T = linear.discretise(np.zeros((2, 2)), np.zeros((2, 1)), 0.1)
+    assert np.array_equal(Phi_T, np.eye(2)) and not Gamma_T.any()
+    Phi_T, Gamma_T = linear.discretise(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), 0.1)
+    np.testing.assert_allclose(Phi_T.T, [[1, 0.1], [0, 1]], rtol=1e-15)
+    np.testing.assert_allclose(Gamma_T[0], [0.005, 0.1], rtol=1e-14)
+
+
+def test_a_rigid_machine_does_not_creep_in_a_million_steps():
+    """Two masses a factor 1e4 apart on a stiff spring: position stays at rest, speed stays at speed."""
+    k, d, m1, m2 = 1e4, 1e-2, 1.0, 1e-4
+    A = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-k / m1, k / m1, -d / m1, d / m1], [k / m2, -k / m2, d / m2, -d / m2]])
+    G = np.vstack([np.zeros((2, 2)), np.diag([1 / m1, 1 / m2])])
+    m = machine(A, G, 5e-4, 2, [0.0, 0.0])
+    m.x[:2] = 1.0
+    run(m, 1_000_000)
+    np.testing.assert_allclose(m.x[:2], 1.0, rtol=0, atol=1e-6)  # rounding; a count is 6e-4 rad
+    assert np.abs(m.x[2:]).max() < 1e-8
+    m.x[:] = [0.0, 0.0, 1.0, 1.0]
+    run(m, 1_000_000)
+    np.testing.assert_allclose(m.x, [500.0, 500.0, 1.0, 1.0], rtol=1e-6)
+
+
+def test_dry_friction_holds_exactly_still_up_to_its_limit():
+    m = mass(1e-3, dry=2.0)
+    m.u[0] = 2.0
+    run(m, 1000)
+    assert m.x[0] == pytest.approx(0.0, abs=1e-18)
+    assert m.x[1] == 0.0
+    assert m.r[0] == pytest.approx(-2.0)
+    m.u[0] = 2.01
+    run(m, 1000)
+    assert m.x[1] == pytest.approx(0.01)
+    assert m.x[0] == pytest.approx(0.005)
+
+
+@settings(deadline=None)
+@given(st.floats(-0.999, 0.999))
+def test_dry_friction_at_rest_is_what_it_takes(share):
+    push = share * GAIN * LIMIT
+    assert push + GAIN * linear.dry_friction(0.0, push, GAIN, LIMIT) == pytest.approx(0.0, abs=1e-15)
+
+
+@settings(deadline=None)
+@given(speeds.filter(bool), st.floats(0.0, 10.0))
+def test_dry_friction_that_slides_is_its_limit_against_the_motion(v, push):
+    s = math.copysign(1.0, v)
+    assert linear.dry_friction(v, v + s * (push + GAIN * LIMIT), GAIN, LIMIT) == -s * LIMIT
+
+
+@settings(deadline=None, max_examples=500)
+@given(speeds, speeds, st.floats(1e-6, 1.0), st.floats(1e-6, 10.0))
+def test_dry_friction_is_within_its_limit_and_never_feeds_energy(v, v_free, gain, limit):
+    """Over the substep it takes from the free motion: it never makes the mass faster than it would have been."""
+    r = linear.dry_friction(v, v_free, gain, limit)
+    assert abs(r) <= limit * (1 + 1e-9)
+    after = v_free + gain * r
+    assert abs(after) <= max(abs(v), abs(v_free)) + 1e-12
+    if v == 0.0 or v * v_free >= 0.0:  # it kept its direction: its work is negative
+        assert r * (v + after) <= 1e-12 * limit
+
+
+def test_dry_friction_mirrors():
+    rng = np.random.default_rng(1)
+    for v, v_free in rng.uniform(-1, 1, (200, 2)) * 0.05:
+        right = linear.dry_friction(v, v_free, GAIN, LIMIT)
+        assert linear.dry_friction(-v, -v_free, GAIN, LIMIT) == -right
+
+
+def coast(h: float, F: float, v: float, t: float, dry: float) -> np.ndarray:
+    m = mass(h, dry=dry)
+    m.u[0], m.x[1] = F, v
+    run(m, round(t / h))
+    return np.array(m.x)
+
+
+def test_a_turn_within_a_substep_is_second_order():
+    """Thrown against a push greater than the friction: brakes with F + F_c, turns, comes back with F - F_c."""
+    F, v, dry, t = -3.0, 1.0, 1.0, 1.0
+    turn = v / (3.0 + dry)
+    exact = np.array([v * turn / 2 - 0.5 * 2.0 * (t - turn) ** 2, -2.0 * (t - turn)])
+    errors = np.array([[np.abs(coast(h, F, v + shift, t, dry) - _turned(F, v + shift, t, dry)).max()
+                        for shift in np.linspace(0, 0.05, 20)] for h in (1e-2, 5e-3, 2.5e-3, 1.25e-3)]).max(axis=1)  # fmt: skip
+    np.testing.assert_allclose(_turned(F, v, t, dry), exact)
+    assert errors[0] < 2e-4
+    assert np.all(errors[:-1] / errors[1:] > 3.0), errors
+
+
+def _turned(F: float, v: float, t: float, dry: float) -> np.ndarray:
+    turn = v / (dry - F)
+    back = F + dry
+    return np.array([v * turn / 2 + 0.5 * back * (t - turn) ** 2, back * (t - turn)])
+
+
+def test_a_mass_that_friction_stops_stands_where_it_should():
+    for h in (1e-2, 1e-3):
+        x, v = coast(h, 0.0, 1.0, 2.0, 1.0)
+        assert v == 0.0
+        assert x == pytest.approx(0.5, abs=0.51 * h**2 + 1e-9)
+
+
+def test_spring_and_friction_lose_the_same_width_every_half_swing():
+    """Coulomb damping: every half swing is 2 F_c / k shorter than the one before."""
+    k, dry, h = 100.0, 1.0, 1e-4
+    m = mass(h, k=k, dry=dry)
+    m.x[0] = 0.105
+    peaks = []
+    for _ in range(12):
+        run(m, round(math.pi / 10 / h) + 1)
+        peaks.append(abs(m.x[0]))
+    want = np.maximum(0.105 - 0.02 * np.arange(1, 13), 0)
+    np.testing.assert_allclose(peaks[:5], want[:5], atol=1e-5)
+    assert abs(m.x[1]) < STILL and abs(m.x[0]) <= dry / k
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.floats(0.01, 1.0), st.floats(0.01, 1.0))
+def test_coupled_nodes_with_friction_only_lose_energy(x, dry1, dry2):
+    m = pair(dry1, dry2)
+    m.x[:] = [0.01 * x[0], 0.01 * x[1], x[2], x[3]]
+    last = energy(m)
+    for _ in range(50):
+        run(m, 10)
+        now = energy(m)
+        assert now <= last * (1 + 1e-9) + 1e-12
+        last = now
+
+
+def pair(dry1: float, dry2: float, h: float = 5e-4) -> Any:
+    """Two unit masses on a spring of 1 kN/m."""
+    A = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-1e3, 1e3, -1, 1], [1e3, -1e3, 1, -1]], float)
+    G = np.vstack([np.zeros((2, 4)), np.hstack([np.eye(2), np.eye(2)])])
+    return machine(A, G, h, 2, [dry1, dry2])
+
+
+def energy(m: Any) -> float:
+    return 0.5 * float(m.x[2] ** 2 + m.x[3] ** 2 + 1e3 * (m.x[0] - m.x[1]) ** 2)
+
+
+def test_gauss_seidel_holds_both_ends_of_a_pulled_spring():
+    """Pushed with 1.5 N: the first node takes 1 N, and the spring hands the rest to the second."""
+    m = pair(1.0, 1.0)
+    m.u[0] = 1.5
+    run(m, 40_000)
+    assert np.abs(m.x[2:]).max() < STILL
+    assert 0 < m.r[0] * -1 <= 1.0 and 0 <= -m.r[1] <= 1.0
+    assert 1.5 + m.r.sum() == pytest.approx(0.0, abs=1e-6)
+    m.u[0] = 2.5
+    run(m, 40_000)
+    assert m.x[2] == pytest.approx(m.x[3], rel=1e-3)
+    assert m.x[2:].mean() == pytest.approx(0.5 * 0.5 * 20, rel=0.02)  # (2.5 - 2) N on 2 kg for 20 s
+
+
+def test_advance_and_discretise_allocate_nothing(allocations):
+    m = pair(0.1, 0.2)
+    m.u[0] = 1.0
+    assert allocations(run, m, 1000) == allocations(run, m, 1)
+    assert allocations(discretisations, m, 100) == allocations(discretisations, m, 1)
+
+
+@tick
+def discretisations(m, n):
+    for _ in range(n):
+        linear.discretise_into(m.A, m.G, m.h, m.Phi_T, m.Gamma_T, m.work)
