@@ -62,6 +62,5 @@ def _reference(machine: Any) -> str:
     table = machine.reference
     if table.n < 2:
         return "holds still until a setpoint comes"
-    return f"{table.n} knots over {table.t[table.n - 1]:g} s, in {machine.unit}" + (
-        ", repeated" if table.period else ""
-    )
+    repeated = ", repeated" if table.period else ""
+    return f"{table.n} knots over {table.t[table.n - 1]:g} s, in {machine.unit}{repeated}"

@@ -90,18 +90,9 @@ def with_reference(config: Any, path: str | None) -> Any:
     from rtctl.config.load import load_settings
     from rtctl.config.yaml_file import find
 
-    try:
-        file = find(path)
-    except UserError:
-        try:
-            file = find(f"references/{path}")
-        except UserError:
-            file = None
-        if file is None:
-            raise
     model = type(config).model_fields["reference"].annotation
     assert model is not None
-    return config.model_copy(update={"reference": load_settings(file, model, [])})
+    return config.model_copy(update={"reference": load_settings(find(path), model, [])})
 
 
 def with_loop(config: Any, mode: str | None, link: str | None) -> Any:

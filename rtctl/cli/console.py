@@ -66,7 +66,8 @@ class RunConsole:
         late = result["lateness_us"]
         console.print(
             f"[bold]{result['name']}[/bold]  {result['ticks']} ticks at {result['rate_hz']:g} Hz, {result['mode']}"
-            f"{'' if result['mode'] == 'fused' else ' over ' + result['link']}: {result['missed']} missed, {result['late']} late"
+            f"{'' if result['mode'] == 'fused' else ' over ' + result['link']}: "
+            f"{result['missed']} missed, {result['late']} late"
             + (f", lateness p50 {late['p50']:.0f} p99.9 {late['p999']:.0f} us" if result["mode"] == "real" else "")
         )
         if result["steps"]:

@@ -15,9 +15,7 @@ def _keys() -> None:
 
 @app.command()
 def new(
-    name: Annotated[
-        str, typer.Argument(metavar="[NAME]", help="`server` for a daemon, any other name for a client.")
-    ] = "server",
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="`server` for a daemon, else a client.")] = "server",
     directory: Annotated[
         Path | None, typer.Option("--dir", metavar="DIR", help="Folder of the keys; ~/.config/rtctl/keys if not given.")
     ] = None,
@@ -35,10 +33,6 @@ def new(
     public, secret = new_keys(name, directory)
     typer.echo(f"{public} (public)\n{secret} (secret: keep it)")
     if name == "server":
-        typer.echo(
-            f"copy the public key of each client to {public.parent / 'authorized'}, and {public.name} to each client"
-        )
+        typer.echo(f"copy each client's public key to {public.parent / 'authorized'}, and {public.name} to each client")
     else:
-        typer.echo(
-            f"copy {public.name} to the folder `authorized` of the daemon's keys, and its server.key to {public.parent}"
-        )
+        typer.echo(f"copy {public.name} to the daemon's folder `authorized`, and its server.key to {public.parent}")

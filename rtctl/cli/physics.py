@@ -11,9 +11,7 @@ WIDTH = 100
 
 @app.command()
 def physics(
-    term: Annotated[
-        str | None, typer.Argument(metavar="[TERM]", help="Explain this one, e.g. friction.stribeck.")
-    ] = None,
+    term: Annotated[str | None, typer.Argument(metavar="[TERM]", help="Explain this one.")] = None,
 ) -> None:
     """List the terms of physics, or explain one: equation, parameters, where it can stand, what it is mistaken for.
 
@@ -67,10 +65,9 @@ def _parameter(field: Any, typical: tuple[float, float] | None) -> str:
 
     unit = (field.json_schema_extra or {}).get("unit", "")
     words = field.description or " | ".join(map(str, get_args(field.annotation)))
-    default = "" if field.is_required() else f"; {field.default:g} {unit}".rstrip() + " if not given" if isinstance(
-        field.default, float) else f"; {field.default} if not given"  # fmt: skip
     met = f"; {typical[0]:g} to {typical[1]:g} times the base model's is typical" if typical else ""
-    return words + (f" [{unit}]" if unit else "") + default + met
+    default = "" if field.is_required() else f"; {field.default} if absent"
+    return words + (f" [{unit}]" if unit else "") + met + default
 
 
 def _item(name: str, text: str) -> list[str]:

@@ -18,15 +18,13 @@ def run(
     mode: ModeOption = None,
     link: LinkOption = None,
     duration: Annotated[
-        str | None, typer.Option("--for", metavar="T", help="How long, e.g. 12s; until Ctrl-C if not given.")
+        str | None, typer.Option("--for", metavar="T", help="How long, e.g. 12s; until Ctrl-C if absent.")
     ] = None,
     reference: ReferenceOption = None,
     set_: SetOption = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder for the recorded bundle; runs/NAME-DATE-TIME if not given."
-        ),
+        typer.Option("--out", "-o", metavar="DIR", help="Folder of the bundle; runs/NAME-DATE-TIME if absent."),
     ] = None,
     arm: Annotated[bool, typer.Option(help="Arm at once and play the reference.")] = True,
     plot: Annotated[bool, typer.Option(help="Draw the run into the bundle.")] = True,

@@ -1,6 +1,6 @@
 """`rtctl get` and `rtctl set`: one setting of a running machine."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -56,22 +56,11 @@ def set_(
 
       rtctl set safety.tension_min -3
     """
+    from rtctl.config.yaml_file import parse
+
     with common.client(name) as client:
-        result = client.call("set", path=path, value=_scalar(value))
+        result = client.call("set", path=path, value=parse(value, path).data)
     if json:
         common.print_json(result)
     else:
         typer.echo(f"{result['path']} is {result['value']} from tick {result['tick'] + 1} on")
-
-
-def _scalar(text: str) -> Any:
-    """A value as YAML reads it; what only YAML 1.1 takes for a truth value or a date stays text (mode: off)."""
-    import yaml
-
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        return text
-    if isinstance(value, bool):
-        return value if text.lower() in ("true", "false") else text
-    return value if value is None or isinstance(value, (int, float, str, list, dict)) else text

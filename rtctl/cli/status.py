@@ -10,15 +10,9 @@ from rtctl.cli.common import JsonOption, NameOption
 
 app = typer.Typer(add_completion=False)
 REFRESH = 0.25  # s
-SIGNALS = (
-    "capstan",
-    "position",
-    "x",
-    "ref",
-    "capstan_error",
-    "position_error",
-    "tension1_estimate",
-    "tension2_estimate",
+SIGNALS = (  # those that the machine has are shown
+    *("ref", "capstan", "capstan_error", "position", "x", "position_error"),
+    *("tension1_estimate", "tension2_estimate"),
 )
 COLOUR = {"idle": "dim", "armed": "yellow", "running": "green", "tripped": "bold red"}
 
@@ -104,10 +98,8 @@ def table(found: dict[str, Any], units: dict[str, str]) -> Any:
     if found["mode"] == "real":
         out.add_row("latency", _times(found["link_latency_us"]))
     recorded = f"{rows['recorded']} recorded, {rows['lost']} lost" if "recorded" in rows else "not recorded"
-    out.add_row(
-        "rows",
-        f"{recorded}, {rows['lost_in_ring']} lost in the ring" + (f", {rows['error']}" if rows.get("error") else ""),
-    )
+    failed = f", {rows['error']}" if rows.get("error") else ""
+    out.add_row("rows", f"{recorded}, {rows['lost_in_ring']} lost in the ring{failed}")
     for signal in SIGNALS:
         if signal in found["signals"]:
             out.add_row(signal, f"{found['signals'][signal]:+.5g} {units.get(signal, '')}")

@@ -87,7 +87,7 @@ def stop(
     while common.listens(endpoint):
         if time.monotonic() > deadline:
             raise UserError(
-                f"the outputs are off, but the daemon (pid {pid}) has not ended after {wait}; it may still write"
+                f"outputs are off, but the daemon (pid {pid}) has not ended after {wait}; it may still write"
             )
         time.sleep(POLL)
     typer.echo(f"stopped (pid {pid})")

@@ -30,6 +30,8 @@ def sentences(error: ValidationError, model: Any, data: Any, where: Callable[[tu
         at, what = _what(entry, path, place, owner, data)
         name = ".".join(str(part) for part in at)
         prefix = where(path) if where else ""
+        if prefix.startswith(f"--set {name}="):
+            name = ""  # it is there already
         lines.append(": ".join(part for part in (prefix, name, what) if part))
     lines = list(dict.fromkeys(lines))
     more = [f"and {len(lines) - MOST} more"] if len(lines) > MOST else []
@@ -37,7 +39,7 @@ def sentences(error: ValidationError, model: Any, data: Any, where: Callable[[tu
 
 
 def _walk(model: Any, loc: tuple) -> tuple[tuple, Shape, Shape]:
-    """Path in the data for pydantic's location, which has the chosen word of a union in it; its place and the one above."""
+    """Path in the data for pydantic's location, less the chosen words of unions; its place and the one above."""
     place = owner = Shape(model, model=model)
     path: list = []
     for part in loc:
@@ -87,7 +89,8 @@ def _what(entry: Any, path: tuple, place: Shape, owner: Shape, data: Any) -> tup
         return path, f"{value} does not match {context['pattern']}"
     if kind in MAPPINGS:
         known = place.model.model_fields if place.model else ([place.tag] if place.tag else ())
-        return path, f"expected keys such as {', '.join(list(known)[:4])}, not {value}" if known else f"expected keys, not {value}"
+        such = f" such as {', '.join(list(known)[:4])}" if known else ""
+        return path, f"expected keys{such}, not {value}"
     if kind in LISTS:
         return path, f"expected a list, not {value}"
     if kind == "too_long":

@@ -7,6 +7,8 @@ from pydantic.fields import FieldInfo
 
 from rtctl.config.errors import UserError, nearest
 
+DEEPEST = 30  # keys in a dotted path
+
 
 class Shape(NamedTuple):
     """One place in a config. At most one of `model`, `choices` and `item` is there; none of them is a plain value."""
@@ -36,7 +38,8 @@ def shape(annotation: Any, field: FieldInfo | None = None) -> Shape:
         members = [member for member in get_args(annotation) if member is not type(None)]
         optional = len(members) < len(get_args(annotation))
         if field is not None and isinstance(field.discriminator, str):
-            return Shape(annotation, field, None, field.discriminator, _choices(members, field.discriminator), None, optional)
+            tag = field.discriminator
+            return Shape(annotation, field, tag=tag, choices=_choices(members, tag), optional=optional)
         return shape(members[0], field)._replace(optional=optional) if len(members) == 1 else Shape(annotation, field)
     if hasattr(annotation, "model_fields"):
         return Shape(annotation, field, annotation)
@@ -97,6 +100,8 @@ def put(data: Any, place: Shape, path: str, value: Any, said: str = "") -> list[
     said = said or path
     node, at, made = data, place, []
     parts = [part.strip() for part in path.split(".")]
+    if len(parts) > DEEPEST:
+        raise UserError(f"{said[:80]}: no key is that deep")
     walked: tuple = ()
     for i, part in enumerate(parts):
         key: Any = part
@@ -116,9 +121,7 @@ def put(data: Any, place: Shape, path: str, value: Any, said: str = "") -> list[
         walked += (key,)
         if i == len(parts) - 1:
             fresh = value
-        elif isinstance(node, list) and key < len(node):
-            fresh = node[key]
-        elif isinstance(node, dict) and node.get(key) is not None:
+        elif (key < len(node)) if isinstance(node, list) else (node.get(key) is not None):
             fresh = node[key]
         else:
             default = at.field.default if at.field is not None else None

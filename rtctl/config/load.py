@@ -1,6 +1,5 @@
 """Loading a config: YAML, overrides, validation, each mistake in one line that says where and what would be right."""
 
-import copy
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,7 @@ from rtctl.idiom import Settings
 def load_settings(path: str | Path, model: type[Settings], overrides: Sequence[str] = ()) -> Any:
     """Settings of a file, with `key.path=value` overrides. Raises UserError with one line for each mistake."""
     document = load_yaml(find(path))
-    data = copy.deepcopy(document.data)
-    if data is None:
-        data = {}  # an empty file lacks its keys, as {} does
+    data = {} if document.data is None else document.data  # an empty file lacks its keys, as {} does
     said: dict[tuple, str] = {}
     for text in overrides:
         key, equals, value = text.partition("=")
@@ -57,7 +54,7 @@ def set_path(settings: Any, path: str, value: Any) -> Any:
     """New settings with `value`, SI or text with a unit, at a dotted path. Raises UserError where it does not fit."""
     model = type(settings)
     data = written(settings)
-    put(data, Shape(model, model=model), path, copy.deepcopy(value))
+    put(data, Shape(model, model=model), path, value)
     data = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(data)

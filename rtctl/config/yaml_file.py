@@ -22,7 +22,9 @@ CORE = {
     "bool": (re.compile(r"true|True|TRUE|false|False|FALSE"), "tTfF"),
     "int": (re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+"), "-+0123456789"),
     "float": (
-        re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"),
+        re.compile(
+            r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
+        ),
         "-+.0123456789",
     ),
 }
@@ -81,7 +83,9 @@ def parse(text: str, name: str) -> Document:
         raise UserError(f"{name}{f':{mark.line + 1}' if mark else ''}: not YAML: {what}") from error
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
-        raise UserError(f"{name}:{line}: not YAML: the character {error.character!r} does not belong in a text") from error
+        raise UserError(
+            f"{name}:{line}: not YAML: the character {error.character!r} does not belong in a text"
+        ) from error
     except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:
         raise UserError(f"{name}: not YAML: {error}") from error
 
@@ -124,15 +128,15 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: Any, index: Any) -> Any:
         self.count += 1
         self.depth += 1
-        mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+        mark = self.peek_event().start_mark
         _check_size(self.count, self.depth, mark)
-        node = super().compose_node(parent, index)  # type: ignore[no-untyped-call]
+        node = super().compose_node(parent, index)
         self.depth -= 1
         return node
 
 
 _Loader.yaml_implicit_resolvers = {}
-for _kind, (_pattern, _first) in CORE.items():
+for _kind, (_pattern, _first) in CORE.items():  # PyYAML looks a pattern up by the first character
     _Loader.add_implicit_resolver(TAG + _kind, re.compile(f"(?:{_pattern.pattern})\\Z"), list(_first))
 _Loader.yaml_implicit_resolvers[""] = _Loader.yaml_implicit_resolvers.pop("\0")  # a missing value is null
 
@@ -186,7 +190,9 @@ class _Plain:
 
     def _known_tag(self, node: yaml.Node, kind: str) -> None:
         if node.tag != TAG + kind:
-            raise yaml.MarkedYAMLError(problem=f"tags such as {node.tag:.60} mean nothing here", problem_mark=node.start_mark)
+            raise yaml.MarkedYAMLError(
+                problem=f"tags such as {node.tag:.60} mean nothing here", problem_mark=node.start_mark
+            )
 
 
 def _integer(text: str) -> int | float:

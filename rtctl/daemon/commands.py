@@ -76,7 +76,7 @@ class Commands:
         self._of.status["stop"] = 1
         return {"tick": int(self._of.status["tick"])}
 
-    def play(self) -> dict[str, Any]:
+    def _play(self) -> dict[str, Any]:
         """Play the reference table from its start, as soon as the machine runs."""
         return self._count("play")
 

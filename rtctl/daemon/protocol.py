@@ -63,12 +63,14 @@ class NoArgs(Args):
 
 
 class SetpointArgs(Args):
-    """A new setpoint: SI without `unit`; `name` where a machine has several; `ramp` is the time to get there in s."""
+    """A new setpoint: SI without `unit`; `name` where a machine has several. `ramp` is how fast to go there, in `unit`
+    per second or in `ramp_unit`, such as mm/s; at once without it."""
 
     name: Text | None = None
     value: float
     unit: Unit | None = None
-    ramp: Seconds | None = None
+    ramp: Annotated[float, Field(gt=0.0)] | None = None
+    ramp_unit: Unit | None = None
 
 
 class GetArgs(Args):
@@ -109,6 +111,7 @@ OPS: dict[str, type[Args]] = {
     "arm": NoArgs,
     "disarm": NoArgs,
     "reset": NoArgs,
+    "play": NoArgs,
     "stop": NoArgs,
     "capture": CaptureArgs,
     "capture_status": CaptureIdArgs,

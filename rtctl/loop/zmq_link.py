@@ -49,9 +49,10 @@ def receive_newest(link, frame, staged):
     """Drain the socket; the newest valid frame is in `frame`. Returns how many valid ones came."""
     fresh = 0
     for _ in range(MOST):
-        if zmq_recv(link, staged.ctypes.data, staged.itemsize, DONTWAIT) < 0:
+        length = zmq_recv(link, staged.ctypes.data, staged.itemsize, DONTWAIT)
+        if length < 0:
             break
-        if frames.valid(staged[0]):
+        if length == staged.itemsize and frames.valid(staged[0]):
             frame[0] = staged[0]
             fresh += 1
     return fresh
@@ -61,9 +62,10 @@ def receive_newest(link, frame, staged):
 def receive(link, frame, staged):
     """Wait for the next valid frame, as long as the socket's timeout; returns 1, or 0 where none came."""
     for _ in range(MOST):
-        if zmq_recv(link, staged.ctypes.data, staged.itemsize, 0) < 0:
+        length = zmq_recv(link, staged.ctypes.data, staged.itemsize, 0)
+        if length < 0:
             return 0
-        if frames.valid(staged[0]):
+        if length == staged.itemsize and frames.valid(staged[0]):
             frame[0] = staged[0]
             return 1
     return 0

@@ -1,16 +1,13 @@
 """What a recorded column is called, in what unit, and what it means; kept in the file itself."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
 
+from rtctl.machines.base import Column
 
-class Column(NamedTuple):
-    name: str
-    unit: str
-    help: str
+__all__ = ["Column", "columns_of", "record_batch", "schema"]
 
 
 def schema(columns: Sequence[Column], dtype: np.dtype, metadata: Mapping[str, str] | None = None) -> pa.Schema:

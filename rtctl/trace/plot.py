@@ -34,6 +34,7 @@ PANELS = (
         "Position",
         None,
         (
+            Trace("target", "target", GREY, ":"),
             Trace("truth_x", "true", GREEN),
             Trace("capstan", "capstan", BLUE),
             Trace("position", "measured", BLUE),
@@ -41,7 +42,15 @@ PANELS = (
             Trace("ref", "reference", INK, "--"),
         ),
     ),
-    Panel("Error", None, (Trace("error", "reference - measured", RED),)),
+    Panel(
+        "Error",
+        None,
+        (
+            Trace("capstan_error", "reference - measured", RED),
+            Trace("position_error", "reference - measured", RED),
+            Trace("error", "reference - measured", RED),
+        ),
+    ),
     Panel("Output", "V", (Trace("u", "u", BLUE), Trace("u1", "u1", BLUE), Trace("u2", "u2", ORANGE))),
     Panel(
         "Tension",

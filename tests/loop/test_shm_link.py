@@ -67,6 +67,16 @@ def test_a_frame_that_is_being_written_is_left_alone(ends: Ends) -> None:
     assert ends.newest() == 1
 
 
+def test_the_count_may_wrap_around(ends: Ends) -> None:
+    """It is the futex's, so it has 32 bits: thirty hours at 10 kHz."""
+    ends.slot["count"] = ends.slot["seen"] = 2**31 - 6
+    for seq in range(10):
+        ends.send(seq)
+        assert ends.wait() == 1 and ends.got["seq"] == seq
+        assert ends.newest() == 0
+    assert ends.slot["count"] < 0
+
+
 @tick
 def ping(out, inp, tx, rx, staged, rounds):
     """Send and wait for the answer; returns how many answers were right."""

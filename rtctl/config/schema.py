@@ -1,0 +1,131 @@
+"""What may stand in a config: JSON Schema for editors, and rows for the documentation."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from pydantic_core import PydanticUndefined
+
+from rtctl.config.complaints import show
+from rtctl.config.fields import Shape, child, literals, shape
+from rtctl.config.units import NUMBER, example
+from rtctl.idiom import Settings
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+SIGNS = {
+    "gt": ">",
+    "ge": ">=",
+    "lt": "<",
+    "le": "<=",
+    "min_length": "length >=",
+    "max_length": "length <=",
+    "pattern": "like",
+}
+
+
+class Row(NamedTuple):
+    """One setting. A list's items have [] in the path, the members of a choice the chosen word: position[pd].gain."""
+
+    path: str
+    type: str
+    unit: str
+    default: str  # as in YAML; "" where the key must be given
+    bounds: str
+    help: str
+
+
+def json_schema(model: type[Settings]) -> dict[str, Any]:
+    """JSON Schema 2020-12 of a config. A quantity is a number in SI or a text with a unit; `unit` names the SI unit."""
+    schema = _with_units(model.model_json_schema(mode="validation"))
+    return {"$schema": DIALECT, **schema}
+
+
+def settings_table(model: type[Settings]) -> list[Row]:
+    """A row for each setting of a config, in the order of the file, nested ones included."""
+    return list(_rows(Shape(model, model=model), "", {}))
+
+
+def _with_units(node: Any) -> Any:
+    """The schema without pydantic's titles, and with a text beside the number of each quantity."""
+    if isinstance(node, list):
+        return [_with_units(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    result = {
+        key: {name: _with_units(part) for name, part in value.items()}
+        if key in ("properties", "$defs")
+        else value
+        if key in ("default", "const", "enum")
+        else _with_units(value)
+        for key, value in node.items()
+        if key != "title"
+    }
+    return _quantity(result) if isinstance(result.get("unit"), str) else result
+
+
+def _quantity(node: dict[str, Any]) -> dict[str, Any]:
+    about: dict[str, Any] = {key: node[key] for key in ("description", "unit", "default") if key in node}
+    kinds = node.get("anyOf") or [{key: value for key, value in node.items() if key not in about}]
+    text = {"type": "string", "pattern": NUMBER, "examples": [example(node["unit"])]}
+    return {**about, "anyOf": [*kinds, text]}
+
+
+def _rows(place: Shape, path: str, defaults: dict[str, Any]) -> Iterator[Row]:
+    for name, field in place.model.model_fields.items():
+        at = shape(field.annotation, field)
+        here = f"{path}{name}"
+        default = defaults.get(name, field.default)
+        yield Row(here, _type(at), at.unit or "", _default(default), _bounds(field.metadata), field.description or "")
+        yield from _below(at, here, default)
+
+
+def _below(place: Shape, here: str, default: Any = None) -> Iterator[Row]:
+    if place.model is not None:
+        known = (
+            {name: getattr(default, name) for name in type(default).model_fields}
+            if type(default) is place.model
+            else {}
+        )
+        yield from _rows(place, f"{here}.", known)
+    for word, model in place.choices.items():
+        yield from _rows(Shape(model, model=model), f"{here}[{word}].", {})
+    if place.item is not None:
+        item = child(place, 0)
+        assert item is not None
+        yield from _below(item, f"{here}[]")
+
+
+def _type(place: Shape) -> str:
+    """A word or two for the kind of value."""
+    words = literals(place.annotation)
+    if words:
+        return " | ".join(str(word) for word in words)
+    if place.choices:
+        return f"{place.tag}: {' | '.join(place.choices)}"
+    if place.model is not None:
+        return "keys"
+    if place.item is not None:
+        return f"list of {_type(shape(place.item))}"
+    names = {"float": "number", "int": "whole number", "bool": "true | false", "str": "text"}
+    parts = [part.strip() for part in getattr(place.annotation, "__name__", str(place.annotation)).split("|")]
+    return " | ".join(names.get(part, part) for part in parts if part != "None")
+
+
+def _default(value: Any) -> str:
+    if value is PydanticUndefined or hasattr(type(value), "model_fields"):
+        return ""
+    if isinstance(value, str):
+        return value
+    if value == []:
+        return "[]"
+    return "none" if value is None else show(value)
+
+
+def _bounds(metadata: list[Any]) -> str:
+    """Bounds from pydantic's metadata, as a person would write them."""
+    found = []
+    for item in metadata:
+        for name, sign in SIGNS.items():
+            bound = getattr(item, name, None)
+            if bound is not None:
+                found.append(f"{sign} {bound:g}" if isinstance(bound, (int, float)) else f"{sign} {bound}")
+    return ", ".join(found)

@@ -1,0 +1,107 @@
+"""The same machine, law and reference in every mode: on the wall clock, in turns with the plant's process, in one."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rtctl.daemon.session import Session
+from rtctl.trace.bundle import load_bundle
+
+LENGTH = 7.0  # s
+STEPS = {"steps": [{"at": 0.5, "to": 1.0}, {"at": 2.5, "to": 0.0}, {"at": 4.5, "to": -1.0}]}
+SETTLED = [(2.0, 2.5), (4.0, 4.5), (6.0, 6.5)]  # s from the start of the reference: the ends of the steps
+MODES = [("fused", "shm"), ("lockstep", "zmq"), ("lockstep", "shm")]
+
+Run = tuple[dict[str, Any], dict[str, np.ndarray]]
+
+
+@pytest.fixture(scope="module")
+def run(runtime: Path, config: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Run]:
+    """`run("fused", "shm")`: what the run returned, and its trace."""
+
+    def make(mode: str, link: str, length: float = LENGTH, **keys: Any) -> Run:
+        out = tmp_path_factory.mktemp("run") / "bundle"
+        session = Session(config(mode=mode, link=link, set={"reference": STEPS, **keys}), out, length)
+        return session.run(), load_bundle(out).columns
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def runs(run: Callable[..., Run]) -> dict[tuple[str, str], Run]:
+    return {key: run(*key) for key in MODES}
+
+
+def check_steps(trace: dict[str, np.ndarray], error: float) -> None:
+    running = trace["state"] == 2
+    start = trace["t"][running][0]
+    for first, last in SETTLED:
+        t = trace["t"] - start
+        end = (t >= first) & (t < last)
+        assert np.abs(trace["target"] - trace["capstan"])[end].max() <= error
+    assert np.ptp(trace["target"]) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("key", MODES)
+def test_steps_end_within_a_hundredth_of_a_radian(runs: dict[tuple[str, str], Run], key: tuple[str, str]) -> None:
+    result, trace = runs[key]
+    assert result["tripped"] is None and result["lost_counts"] == 0
+    check_steps(trace, 0.010)
+
+
+@pytest.mark.parametrize("key", MODES)
+def test_the_tape_never_goes_slack(runs: dict[tuple[str, str], Run], key: tuple[str, str]) -> None:
+    _, trace = runs[key]
+    running = trace["state"] == 2
+    assert running.mean() > 0.8
+    assert min(trace[name][running].min() for name in ("truth_tension1", "truth_tension2")) >= 0.0
+
+
+@pytest.mark.parametrize("key", MODES)
+def test_every_tick_is_recorded(runs: dict[tuple[str, str], Run], key: tuple[str, str]) -> None:
+    result, trace = runs[key]
+    ticks = round(LENGTH * 500)
+    assert result["ticks"] == ticks and result["rows"]["recorded"] == ticks and result["rows"]["lost_in_ring"] == 0
+    assert (trace["tick"] == np.arange(ticks)).all()
+    assert np.allclose(trace["t"], np.arange(ticks) / 500, atol=1e-12)
+
+
+def differing(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> list[str]:
+    assert list(a) == list(b)
+    return [name for name in a if not np.array_equal(a[name], b[name], equal_nan=True)]
+
+
+@pytest.mark.parametrize("key", MODES[1:])
+def test_turns_between_processes_are_to_the_bit_what_one_process_does(
+    runs: dict[tuple[str, str], Run], key: tuple[str, str]
+) -> None:
+    assert differing(runs[key][1], runs["fused", "shm"][1]) == []
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_does_not(run: Callable[..., Run]) -> None:
+    """With dither on the reel sensors and radii measured through them, so that the noise reaches the law."""
+    noisy = {"board.dither": True, "radius.source": "measured"}
+    first, again, other = (
+        run("fused", "shm", 8.0, **noisy, **{"loop.seed": seed})[1] for seed in (1, 1, 2)
+    )
+    assert differing(first, again) == []
+    assert differing(first, other) != []
+
+
+def test_rows_are_not_lost_where_the_ring_is_shorter_than_the_run(run: Callable[..., Run]) -> None:
+    result, trace = run("fused", "shm", 20.0, **{"record.seconds": 2.0})
+    assert result["rows"]["lost_in_ring"] == 0 and len(trace["tick"]) == 10_000
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("link", ["zmq", "shm"])
+def test_on_the_wall_clock(run: Callable[..., Run], link: str) -> None:
+    result, trace = run("real", link, LENGTH)
+    assert result["tripped"] is None
+    assert result["measured_rate_hz"] == pytest.approx(500, rel=0.01)
+    assert result["missed"] < 0.02 * result["ticks"]
+    check_steps(trace, 0.03)
+    assert result["frames"]["received"] > 0.9 * result["ticks"]
