@@ -25,18 +25,3 @@ def nearest(word: str, choices: Iterable[str]) -> str | None:
     folded = {name.casefold(): name for name in reversed(names)}
     found = difflib.get_close_matches(word.casefold(), folded, n=1)
     return folded[found[0]] if found else None
-
-
-def did_you_mean(word: str, choices: Iterable[str], what: str = "there is") -> str:
-    """The end of a message about an unknown word: '; did you mean ...?', or the choices, or nothing."""
-    names = list(choices)
-    near = nearest(word, names)
-    if near is not None:
-        return f"; did you mean '{near}'?"
-    return f"; {what} {listing(names)}" if names else ""
-
-
-def listing(names: Iterable[object], most: int = 20) -> str:
-    """Names with commas between them, the first `most` of them."""
-    words = [str(name) for name in names]
-    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")

@@ -73,7 +73,7 @@ class Captures:
         return {
             "id": identity,
             "done": False,
-            "triggered": capture.triggered,
+            "triggered": capture.trigger_tick is not None,
             "rows": stats.rows_written + stats.rows_queued,
             "bundle": str(recorder.folder),
         }
@@ -99,7 +99,7 @@ class Captures:
 
     def _finish(self, identity: str) -> None:
         capture, recorder = self._running.pop(identity)
-        entry: dict[str, Any] = {"id": identity, "done": True, "triggered": capture.triggered, "bundle": str(recorder.folder)}
+        entry: dict[str, Any] = {"id": identity, "done": True, "triggered": capture.trigger_tick is not None, "bundle": str(recorder.folder)}
         try:
             recorder.finish()
             entry["rows"] = recorder.stats().rows_written

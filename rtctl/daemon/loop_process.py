@@ -77,7 +77,7 @@ class Loop:
     def virtual(self, ticks: int) -> None:
         """Stretches of virtual time, never further than the ring's reader can follow: nothing is lost."""
         status, ring = self.status[0], self.segment["ring"][0]
-        room = len(self.segment["rows"])
+        room = len(self.segment["rows"]) - 1  # the reader gives up the oldest row of a full ring: it may be torn
         done = 0
         while done < ticks and not status["stop"] and not status["supervisor_lost"] and not status["failed"]:
             free = room - int(ring["head"] - ring["tail"])

@@ -37,7 +37,6 @@ class Session:
                 interrupted = True
                 signal.signal(signal.SIGINT, signal.default_int_handler)
             supervisor.stop()
-            result = supervisor.snapshot()
             try:
                 self.bundle = supervisor.finish()
             except OSError as error:
@@ -46,6 +45,7 @@ class Session:
                     f"{where}: the disk did not take the recording ({error.strerror}); make room, then "
                     f"`rtctl trace repair {where}`"
                 ) from error
+            result = supervisor.snapshot()  # now that all rows are on disk
         self.steps = self._metrics()
         return {
             **result,

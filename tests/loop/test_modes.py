@@ -12,7 +12,7 @@ from rtctl.trace.bundle import load_bundle
 
 LENGTH = 7.0  # s
 STEPS = {"steps": [{"at": 0.5, "to": 1.0}, {"at": 2.5, "to": 0.0}, {"at": 4.5, "to": -1.0}]}
-SETTLED = [(2.0, 2.5), (4.0, 4.5), (6.0, 6.5)]  # s from the start of the reference: the ends of the steps
+SETTLED = [(2.0, 2.4), (4.0, 4.4), (6.0, 6.4)]  # s from the start of the reference: the ends of the steps
 MODES = [("fused", "shm"), ("lockstep", "zmq"), ("lockstep", "shm")]
 
 Run = tuple[dict[str, Any], dict[str, np.ndarray]]

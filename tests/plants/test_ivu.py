@@ -174,7 +174,7 @@ def test_rigid_rotation_keeps_its_eigenvalue():
         rigid = np.zeros(ivu.NX)
         rigid[[0, 1, 2, 3, 4]] = 1 / p.R1, 1 / p.R1, 1 / p.R_c, -1 / p.R2, -1 / p.R2
         error = np.abs(s.m.Phi_T.T @ rigid - rigid).max() / np.abs(rigid).max()
-        assert error * 3600 / p.h < 1e-3
+        assert error * 3600 / p.h < 1e-4
 
 
 @settings(deadline=None, max_examples=25)
@@ -204,7 +204,7 @@ def driven(p: ivu.IvuParams, volts: np.ndarray, dt: float) -> tuple[Any, Any, np
 
 
 def test_tape_that_leaves_one_reel_arrives_at_the_other():
-    """Four turns of the reels and back: paper is neither made nor lost, but for the stretch."""
+    """A turn of the reels: paper is neither made nor lost, but for the stretch."""
     volts = np.full((4000, 2), 0.17)
     volts[:2000, 0] += 1.5
     record, s, out = driven(built(h=1e-3), volts, 1e-3)
@@ -212,11 +212,11 @@ def test_tape_that_leaves_one_reel_arrives_at_the_other():
     x = s.m.x
     l1 = ivu.wound(x[ivu.REEL1], record.R1, grow, record.R_min)
     l2 = ivu.wound(x[ivu.REEL2], record.R2, grow, record.R_min)
-    assert l1 > 0.3
+    assert l1 > 0.2  # m
     stretch = s.T1 / record.c1 + s.T2 / record.c2
     assert l1 + l2 == pytest.approx(stretch, abs=2e-3)
     assert record.R_c * x[ivu.CAPSTAN] == pytest.approx(l1, abs=2e-3)
-    assert s.R1**2 - record.R1**2 == pytest.approx(record.d_tape * l1 / math.pi, rel=1e-6)
+    assert s.R1**2 - record.R1**2 == pytest.approx(record.d_tape * l1 / math.pi, rel=1e-4)  # taken at the middle of the substep
     assert s.J1 == pytest.approx(ivu.reel_inertia(record.J_10, record.rho_h, s.R1, record.R_min))
     assert s.R1 > record.R1 and s.R2 < record.R2
 
@@ -293,6 +293,14 @@ def test_integration_error_is_below_a_tenth_of_a_count(loop):
     whole, half = loop(5e-4), loop(2.5e-4)
     capstan = np.abs(whole - half) if whole.ndim == 1 else np.abs(whole - half)[:, 0]
     assert capstan.max() < 0.1 * COUNT
+
+
+def test_integration_error_against_the_limit_of_short_steps():
+    """What halving does not show: a motor that breaks loose while its current still rises, in a tenth of a millisecond.
+
+    The whole substep is then taken to slide, which costs some 1e-4 rad/s once; it is never a count.
+    """
+    assert np.abs(open_loop(5e-4) - open_loop(5e-4 / 16))[:, 0].max() < 0.5 * COUNT
 
 
 def test_a_substep_allocates_nothing(allocations):

@@ -1,0 +1,264 @@
+import contextlib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import Field, model_validator
+
+from rtctl.config.errors import UserError
+from rtctl.config.load import get_path, load_settings, set_path, to_yaml
+from rtctl.idiom import Settings, quantity
+from rtctl.machines import CONFIGS
+
+CONFIG_FOLDER = Path(__file__).parents[2] / "configs"
+REFERENCES = {"ivu": ["steps", "constant_speed"], "ldu": ["print_steps"], "axis": ["print_steps"]}
+
+
+class Pd(Settings):
+    kind: Literal["pd"] = "pd"
+    gain: float = quantity(unit="V/rad", gt=0, help="gain")
+
+
+class Notch(Settings):
+    kind: Literal["notch"] = "notch"
+    frequency: float = quantity(unit="Hz", gt=0, help="centre")
+
+
+class Limit(Settings):
+    high: float = quantity(10.0, unit="V", gt=0, le=24, help="highest")
+    slew: float | None = quantity(None, unit="V/s", gt=0, help="fastest")
+
+
+class Small(Settings):
+    rate: float = quantity(unit="Hz", gt=0, help="ticks a second")
+    mode: Literal["real", "fused"] = "real"
+    law: Annotated[Pd | Notch, Field(discriminator="kind")] = Pd(gain=1.0)
+    sections: list[Annotated[Pd | Notch, Field(discriminator="kind")]] = Field(default=[])
+    limit: Limit = Limit(high=3.0)
+    count: int = 1
+    on: bool = False
+    name: str = "x"
+    pairs: list[tuple[float, float]] = Field(default=[])
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Small":
+        if self.count > 100:
+            raise ValueError("count is more than the rate can carry")
+        return self
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load(text, *overrides):
+        path = tmp_path / "s.yaml"
+        path.write_text(text)
+        return load_settings(path, Small, overrides)
+
+    return load
+
+
+def complaint(load, text, *overrides):
+    with pytest.raises(UserError) as error:
+        load(text, *overrides)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("kind", CONFIGS)
+def test_machines_load_and_round_trip(kind, tmp_path):
+    config = load_settings(CONFIG_FOLDER / f"{kind}.yaml", CONFIGS[kind])
+    for full in (False, True):
+        path = tmp_path / "again.yaml"
+        path.write_text(to_yaml(config, full))
+        assert load_settings(path, CONFIGS[kind]) == config
+
+
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in REFERENCES.items() for name in names])
+def test_references_load(kind, name):
+    model = CONFIGS[kind].model_fields["reference"].annotation
+    assert load_settings(CONFIG_FOLDER / "references" / f"{name}.yaml", model).steps
+
+
+def test_every_mistake_in_a_machine_is_one_line(tmp_path):
+    text = (CONFIG_FOLDER / "ivu.yaml").read_text()
+    path = tmp_path / "ivu.yaml"
+    path.write_text(text.replace("rate: 500 Hz", "rate: 500 mm").replace("gain: 31", "gian: 31"))
+    with pytest.raises(UserError) as error:
+        load_settings(path, CONFIGS["ivu"])
+    lines = str(error.value).splitlines()
+    number = 1 + text[: text.index("gain: 31")].count("\n")
+    assert lines[0] == f"{path}:6: loop.rate: '500 mm' is not a quantity in Hz"
+    assert f"{path}:{number}: law.position.gian: unknown key; did you mean 'gain'?" in lines
+    assert any("law.position: missing key 'gain'" in line for line in lines)
+    assert len(lines) == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("mode: fused", "s.yaml: missing key 'rate' (ticks a second, in Hz)"),
+        ("", "missing key 'rate'"),
+        ("- 1", "s.yaml: expected keys such as rate, mode, law, sections, not a list of 1"),
+        ("rate: 5\nmdoe: real", "s.yaml:2: mdoe: unknown key; did you mean 'mode'?"),
+        ("rate: 5\nmode: reel", "s.yaml:2: mode: 'reel' is not one of real, fused; did you mean 'real'?"),
+        ("rate: [1]", "rate: expected a number with a unit such as '1.5 Hz', or just a number in Hz, not a list of 1"),
+        ("rate: true", "rate: true is not a number"),
+        ("rate: .inf", "rate: inf is not finite"),
+        ("rate: -5", "rate: -5 Hz is out of bounds: it must be more than 0 Hz"),
+        ("rate: 5\nlimit: {high: 30000 mV}", "limit.high: '30000 mV' is out of bounds: it must be at most 24 V"),
+        ("rate: 5\nlaw: {kind: notsh}", "s.yaml:2: law.kind: 'notsh' is not one of pd, notch; did you mean 'notch'?"),
+        ("rate: 5\nlaw: {gain: 1}", "law: missing key 'kind': pd, notch"),
+        ("rate: 5\nlaw: 3", "law: expected keys such as kind, not 3"),
+        ("rate: 5\ncount: 1.5", "count: expected a whole number, not 1.5"),
+        ("rate: 5\non: 7", "on: expected true or false, not 7"),
+        ("rate: 5\nname: 7", "name: expected text, not 7; put it in quotes"),
+        ("rate: 5\nsections: pd", "sections: expected a list, not 'pd'"),
+        ("rate: 5\npairs:\n- [1]", "s.yaml:3: pairs.0: item 1 is missing"),
+        ("rate: 5\ncount: 500", "s.yaml: count is more than the rate can carry"),
+    ],
+)
+def test_says_what_is_wrong(load, text, message):
+    assert message in complaint(load, text)
+
+
+def test_a_choice_complains_of_its_own_branch_only(load):
+    text = complaint(load, "rate: 5\nsections:\n- {kind: notch, frequency: 3 m}\n- {kind: pd, frequency: 3}")
+    assert "s.yaml:3: sections.0.frequency: '3 m' is not a quantity in Hz" in text
+    assert "s.yaml:4: sections.1.frequency: unknown key" in text
+    assert "s.yaml:4: sections.1: missing key 'gain'" in text
+    assert len(text.splitlines()) == 3
+
+
+def test_stops_at_twenty_mistakes(load):
+    lines = complaint(load, "rate: 5\n" + "".join(f"k{i}: 1\n" for i in range(30))).splitlines()
+    assert len(lines) == 21
+    assert lines[-1] == "and 10 more"
+
+
+def test_overrides_reach_keys_lists_and_defaults(load):
+    got = load("rate: 5", "rate=1 kHz", "limit.slew=5 V/s", "sections.0={kind: pd, gain: 2}", "sections.0.gain=3 V/rad")
+    assert (got.rate, got.limit.slew, got.sections[0].gain) == (1000.0, 5.0, 3.0)
+    assert got.limit.high == 3.0  # the default's, as without the override
+    assert load("rate: 5", "law.gain=4").law == Pd(gain=4.0)
+
+
+def test_part_of_a_group_keeps_the_rest_of_its_default(load):
+    assert load("rate: 5\nlimit: {slew: 2}").limit == Limit(high=3.0, slew=2.0)
+    assert load("rate: 5\nlaw: {kind: notch, frequency: 9}").law == Notch(frequency=9.0)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("rate", "--set rate: write key=value"),
+        ("=5", "--set =5: a key is missing"),
+        ("rate.x=5", "--set rate.x=5: rate is a value and has no key 'x'"),
+        ("sections.1={}", "--set sections.1={}: '1' is not an index of sections, which has 0 items"),
+        ("rate=[1", "--set rate=[1"),
+        ("raet=7", "--set raet=7: unknown key; did you mean 'rate'?"),
+        ("limt.high=7", "--set limt.high=7: limt: unknown key; did you mean 'limit'?"),
+        ("limit.high=3 m", "--set limit.high=3 m: '3 m' is not a quantity in V"),
+        (".".join("a" * 90) + "=1", "no key is that deep"),
+    ],
+)
+def test_a_bad_override_is_named(load, override, message):
+    assert message in complaint(load, "rate: 5", override)
+
+
+def test_yaml_keeps_words_that_look_like_something_else(load, tmp_path):
+    for word in ("off", "1e3", "true", "null", "", "12:30", "0x1F", "~", "a: b"):
+        config = Small(rate=5.0, name=word)
+        assert load(to_yaml(config)) == config
+        assert yaml.safe_load(to_yaml(config))["name"] == word  # nor does a reader of YAML 1.1 get it wrong
+
+
+def test_get_and_set():
+    config = load_settings("ldu", CONFIGS["ldu"])
+    before = get_path(config, "law.position.gain")
+    changed = set_path(config, "law.position.gain", "3 V/mm")
+    assert get_path(changed, "law.position.gain") == 3000.0
+    assert get_path(config, "law.position.gain") == before
+    assert set_path(changed, "law.position.gain", before) == config
+    assert changed.model_fields_set == config.model_fields_set | {"machine"}
+    assert changed.law.model_fields_set == config.law.model_fields_set
+
+
+def test_set_starts_from_the_default_of_what_was_not_written():
+    config = load_settings("ldu", CONFIGS["ldu"])
+    assert get_path(set_path(config, "amplifier.kind", "measured"), "amplifier.kind") == "measured"
+    assert set_path(Small(rate=1.0), "limit.slew", "5 V/s").limit == Limit(high=3.0, slew=5.0)
+    assert set_path(Small(rate=1.0), "law.gain", 2).law == Pd(gain=2.0)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("law.gian", 3, "law.gian: unknown key; did you mean 'gain'?"),
+        ("law.gain", "3 mm", "law.gain: '3 mm' is not a quantity in V/rad"),
+        ("law.gain", -1, "law.gain: -1 V/rad is out of bounds"),
+        ("law.gain.x", 1, "law.gain is a value"),
+        ("sections.-1", {}, "'-1' is not an index"),
+        ("", 1, "a key is missing"),
+        ("law.kind", "notch", "law: missing key 'frequency'"),
+    ],
+)
+def test_set_refuses(path, value, message):
+    with pytest.raises(UserError) as error:
+        set_path(Small(rate=5.0, law=Pd(gain=1.0)), path, value)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("law.gian", "did you mean 'gain'"),
+        ("rate.x", "is a value"),
+        ("sections.0", "not an index"),
+        ("__class__", "unknown key"),
+    ],
+)
+def test_get_refuses(path, message):
+    with pytest.raises(UserError, match=message):
+        get_path(Small(rate=5.0), path)
+
+
+VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.sampled_from(["pd", "5 Hz", "off"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(["kind", "gain", "high", "x"]), inner),
+    max_leaves=6,
+)
+KEYS = [*Small.model_fields, "nope", "0"]
+
+
+@settings(deadline=None)
+@given(st.dictionaries(st.sampled_from(KEYS), VALUES, max_size=5))
+def test_any_structure_is_settings_or_a_user_error(tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "structure.yaml"
+    path.write_text(yaml.safe_dump(data, allow_unicode=False))
+    try:
+        load_settings(path, Small)
+    except UserError as error:
+        assert all("structure.yaml" in line for line in str(error).splitlines())
+
+
+@settings(deadline=None)
+@given(st.text(alphabet="abclawgain.=0123 {}[]:,-*&!'\"", max_size=40), VALUES)
+def test_any_override_path_or_value_is_settings_or_a_user_error(text, value):
+    config = Small(rate=5.0)
+    key = text.partition("=")[0]
+    for attempt in (
+        lambda: load_settings("ivu", CONFIGS["ivu"], [text]),
+        lambda: set_path(config, key, value),
+        lambda: set_path(config, "law", value),
+        lambda: set_path(config, "pairs", value),
+        lambda: get_path(config, text),
+    ):
+        with contextlib.suppress(UserError):
+            attempt()

@@ -1,0 +1,40 @@
+"""The shipped axis, run fused."""
+
+import fused
+import numpy as np
+import pytest
+
+from rtctl.config.errors import UserError
+from rtctl.loop import safety
+
+SETPOINTS = {"reference__steps": [{"at": 0.2, "to": 0.1, "ramp": 0.2}, {"at": 2.0, "to": 0.0, "ramp": 0.2}]}
+
+
+@pytest.fixture(scope="module")
+def run() -> fused.Run:
+    return fused.run(fused.config("axis", **SETPOINTS), 4.0)
+
+
+def test_it_follows_a_ramp_and_stands_where_it_was_told(run):
+    assert run["trip"].max() == 0
+    assert run["state"][-1] == safety.RUNNING
+    for begin, target in ((1.5, 0.1), (3.5, 0.0)):
+        assert run.between(begin, begin + 0.4)["truth_x"] == pytest.approx(target, abs=2e-4)
+    moving = run.between(0.4, 0.6)
+    assert moving["truth_speed"] == pytest.approx(0.2, rel=0.02)
+
+
+def test_the_encoder_counts_micrometres(run):
+    assert np.abs(run["x"] - run["truth_x"]).max() < 1.1e-6
+    assert run["x"] == pytest.approx(run["x_counts"] * 1e-6, abs=1e-12)
+
+
+def test_dry_friction_keeps_an_error_of_less_than_its_volts(run):
+    """Without an integral the axis stops where the position gain no longer beats the friction."""
+    error = run.between(1.8, 1.99)["position_error"]
+    assert np.abs(error).max() <= 20.4 / 35.15 / 39e3 + 2e-6
+
+
+def test_an_unknown_key_is_an_error():
+    with pytest.raises(UserError, match="gian"):
+        fused.config("axis", law__position__gian=1.0)
