@@ -13,7 +13,7 @@ enum { MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 };
     X(reel2_low) X(reel2_high) X(machine_R1) X(machine_R2) X(machine_grow) X(machine_trail_speed) \
     X(machine_hand_over) X(velocity_a) X(velocity_dt) X(reference_speed_a) X(reference_speed_dt) \
     X(tension_estimate_torque_per_volt) X(tension_estimate_J) X(tension_estimate_tau_F) X(tension_estimate_R_c) \
-    X(tension_estimate_v_min) X(shaper_a) X(shaper_w) X(position_gain) X(position_tau_d) X(position_a) \
+    X(tension_estimate_v_min) X(tension_estimate_a) X(shaper_a) X(shaper_w) X(position_gain) X(position_tau_d) X(position_a) \
     X(position_dt) X(bumpless_decay) X(friction1_volts) X(friction2_volts) X(inertia_volts) X(tension_F_t) \
     X(tension_torque_per_volt) X(tension_ramp) X(limit_low) X(limit_high) X(limit_most) X(drive_amp_per_volt) \
     X(output1_volts_per_code) X(output2_volts_per_code) X(safety_frozen_effort) X(safety_following) \
@@ -158,8 +158,10 @@ static void tick(int64_t k)
     double turn1 = p.tension_estimate_J * a * p.tension_estimate_R_c / y->R1;
     double turn2 = p.tension_estimate_J * a * p.tension_estimate_R_c / y->R2;
     double torque = p.tension_estimate_torque_per_volt;
-    y->tension1_estimate = (torque * y->u1 - p.tension_estimate_tau_F * moving - turn1) / y->R1;
-    y->tension2_estimate = (torque * y->u2 + p.tension_estimate_tau_F * moving + turn2) / y->R2;
+    double T1_now = (torque * y->u1 - p.tension_estimate_tau_F * moving - turn1) / y->R1;
+    double T2_now = (torque * y->u2 + p.tension_estimate_tau_F * moving + turn2) / y->R2;
+    y->tension1_estimate += p.tension_estimate_a * (T1_now - y->tension1_estimate);
+    y->tension2_estimate += p.tension_estimate_a * (T2_now - y->tension2_estimate);
 
     /* reference */
     int running = safety->state == RUNNING;

@@ -1,5 +1,6 @@
 """pydantic's validation errors as sentences for people, one line each, with the value as the person wrote it."""
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -22,12 +23,23 @@ NUMBERS = ("float_type", "float_parsing")
 WHOLES = ("int_type", "int_parsing", "int_from_float", "int_parsing_size")
 
 
-def sentences(error: ValidationError, model: Any, data: Any, where: Callable[[tuple], str] | None = None) -> str:
-    """One line for each mistake, at most 20, with `where(path)` in front. `data` is what was validated."""
+def sentences(
+    error: ValidationError,
+    model: Any,
+    data: Any,
+    where: Callable[[tuple], str] | None = None,
+    texts: dict[tuple, str] | None = None,
+) -> str:
+    """One line for each mistake, at most 20, with `where(path)` in front.
+
+    `data` is what was validated, `texts` has its numbers as they were written.
+    """
     lines = []
     for entry in error.errors(include_url=False):
         path, place, owner = _walk(model, entry["loc"])
-        at, what = _what(entry, path, place, owner, data)
+        if entry["type"] == "value_error":
+            path, entry["ctx"]["error"] = _inner(path, str(entry["ctx"]["error"]), data)
+        at, what = _what(entry, path, place, owner, data, texts or {})
         name = ".".join(str(part) for part in at)
         prefix = where(path) if where else ""
         if prefix.startswith(f"--set {name}="):
@@ -53,10 +65,20 @@ def _walk(model: Any, loc: tuple) -> tuple[tuple, Shape, Shape]:
     return tuple(path), place, owner
 
 
-def _what(entry: Any, path: tuple, place: Shape, owner: Shape, data: Any) -> tuple[tuple, str]:
+def _inner(path: tuple, sentence: str, data: Any) -> tuple[tuple, str]:
+    """A check of a group may begin with the key that it is about, as in "physics.0.node: no such node"."""
+    match = re.match(r"(\w+(?:\.\w+){0,9}): (?=.)", sentence[:200], re.ASCII)
+    if match is None:
+        return path, sentence
+    longer = path + tuple(int(part) if part.isdigit() else part for part in match[1].split("."))
+    absent = object()
+    return (path, sentence) if _raw(data, longer, absent) is absent else (longer, sentence[match.end() :])
+
+
+def _what(entry: Any, path: tuple, place: Shape, owner: Shape, data: Any, texts: dict[tuple, str]) -> tuple[tuple, str]:
     """Path to name, and the sentence."""
     kind, context = entry["type"], entry.get("ctx", {})
-    value = show(_raw(data, path, entry["input"]))
+    value = short(texts[path]) if path in texts else show(_raw(data, path, entry["input"]))
     unit = place.unit or ""
     if kind == "extra_forbidden":
         return path, f"unknown key; {unknown(str(path[-1]), owner.model.model_fields if owner.model else ())}"
@@ -110,7 +132,11 @@ def show(value: Any) -> str:
         return "keys with values" if value else "{}"
     if isinstance(value, (list, tuple)):
         return f"a list of {len(value)}"
-    text = repr(value)
+    return short(repr(value))
+
+
+def short(text: str) -> str:
+    """At most 60 characters of it."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

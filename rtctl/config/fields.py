@@ -125,7 +125,9 @@ def put(data: Any, place: Shape, path: str, value: Any, said: str = "") -> list[
             fresh = node[key]
         else:
             default = at.field.default if at.field is not None else None
-            fresh = written(default) if hasattr(type(default), "model_fields") or isinstance(default, list) else {}
+            fresh = (
+                written(default) if hasattr(type(default), "model_fields") or isinstance(default, (list, tuple)) else {}
+            )
         if i == len(parts) - 1 or not (isinstance(node, dict) and node.get(key) is fresh):
             made.append(walked)
         if isinstance(node, list) and key == len(node):

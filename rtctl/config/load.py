@@ -19,17 +19,21 @@ def load_settings(path: str | Path, model: type[Settings], overrides: Sequence[s
     document = load_yaml(find(path))
     data = {} if document.data is None else document.data  # an empty file lacks its keys, as {} does
     said: dict[tuple, str] = {}
+    texts = dict(document.texts)
     for text in overrides:
         key, equals, value = text.partition("=")
         if not equals:
             raise UserError(f"--set {text}: write key=value, e.g. loop.rate=500")
-        given = parse(value, f"--set {text}").data
-        said.update(dict.fromkeys(put(data, Shape(model, model=model), key, given, f"--set {text}"), text))
+        given = parse(value, f"--set {text}")
+        made = put(data, Shape(model, model=model), key, given.data, f"--set {text}")
+        said.update(dict.fromkeys(made, text))
+        texts = {path: word for path, word in texts.items() if path[: len(made[-1])] != made[-1]}
+        texts |= {(*made[-1], *path): word for path, word in given.texts.items()}
     data = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise UserError(sentences(error, model, data, lambda at: _where(document, said, at))) from error
+        raise UserError(sentences(error, model, data, lambda at: _where(document, said, at), texts)) from error
 
 
 def get_path(settings: Any, path: str) -> Any:

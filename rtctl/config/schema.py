@@ -59,6 +59,8 @@ def _with_units(node: Any) -> Any:
         for key, value in node.items()
         if key != "title"
     }
+    if isinstance(result.get("discriminator"), dict):  # its branches have a default, but a file must say which it is
+        result["required"] = [result["discriminator"]["propertyName"]]
     return _quantity(result) if isinstance(result.get("unit"), str) else result
 
 

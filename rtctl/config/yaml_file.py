@@ -37,6 +37,7 @@ class Document(NamedTuple):
     data: Any
     lines: dict[tuple, int] = {}  # noqa: RUF012  never written to
     path: str = ""
+    texts: dict[tuple, str] = {}  # noqa: RUF012  numbers as they were written; never written to
 
     def line(self, path: tuple) -> int | None:
         """Line of a key, or of the nearest key around it; None where there is none."""
@@ -76,7 +77,8 @@ def parse(text: str, name: str) -> Document:
         loader = _Loader(text)
         node = loader.get_single_node()
         lines: dict[tuple, int] = {}
-        return Document(_Plain(lines).data(node, (), 0) if node is not None else None, lines, name)
+        texts: dict[tuple, str] = {}
+        return Document(_Plain(lines, texts).data(node, (), 0) if node is not None else None, lines, name, texts)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         what = ", ".join(str(part) for part in (error.context, error.problem) if part)
@@ -142,10 +144,11 @@ _Loader.yaml_implicit_resolvers[""] = _Loader.yaml_implicit_resolvers.pop("\0") 
 
 
 class _Plain:
-    """Turns nodes into dicts with text as keys, lists and scalars, and notes the line of every key."""
+    """Turns nodes into dicts with text as keys, lists and scalars. Notes lines of keys and texts of numbers."""
 
-    def __init__(self, lines: dict[tuple, int]) -> None:
+    def __init__(self, lines: dict[tuple, int], texts: dict[tuple, str]) -> None:
         self.lines = lines
+        self.texts = texts
         self.count = 0
 
     def data(self, node: yaml.Node, path: tuple, depth: int) -> Any:
@@ -159,7 +162,10 @@ class _Plain:
         if isinstance(node, yaml.SequenceNode):
             self._known_tag(node, "seq")
             return [self.data(item, (*path, i), depth + 1) for i, item in enumerate(node.value)]
-        return self._scalar(node)
+        value = self._scalar(node)
+        if isinstance(value, (int, float)):
+            self.texts[path] = str(node.value)
+        return value
 
     def _mapping(self, node: yaml.MappingNode, path: tuple, depth: int) -> dict[str, Any]:
         result: dict[str, Any] = {}

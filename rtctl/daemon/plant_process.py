@@ -9,6 +9,7 @@ import zmq
 
 from rtctl.config.errors import UserError
 from rtctl.daemon import child
+from rtctl.daemon.server import release
 from rtctl.loop import frames, generate
 from rtctl.loop.records import PLANT_STATUS
 from rtctl.machines import Machine
@@ -50,7 +51,7 @@ def serve(machine: Machine, endpoint: str, status: Any, announce: Any) -> None:
     if machine.config.loop.mode == "lockstep":
         _wait_for_hello(socket, status)
     plant.run()
-    socket.close()
+    release(socket, endpoint)
     context.term()
 
 

@@ -93,7 +93,7 @@ class CommandServer:
         return reply
 
     def close(self) -> None:
-        self.socket.close(linger=0)
+        release(self.socket, self.endpoint)
 
     def _do(self, op: str, args: Args) -> dict[str, Any]:
         if op == "ping":
@@ -163,6 +163,13 @@ def bind(socket: zmq.Socket, endpoint: str, curve: ServerCurve | None = None) ->
     except BaseException:
         socket.close(linger=0)
         raise
+
+
+def release(socket: zmq.Socket, endpoint: str) -> None:
+    """Close a socket that `bind` bound, and take its file away, so that nobody looks for a daemon there."""
+    socket.close(linger=0)
+    if endpoint.startswith("ipc://"):
+        Path(endpoint.removeprefix("ipc://")).unlink(missing_ok=True)
 
 
 def _bind_ipc(socket: zmq.Socket, path: Path) -> None:

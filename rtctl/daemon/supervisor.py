@@ -81,6 +81,8 @@ class Supervisor:
         self.segment = Segment.create(
             SHM / f"rtctl-{os.getuid()}-{config.name}", layout(made.params, made.tables, made.row, rows)
         )
+        stack.callback(self.segment.unlink)
+        stack.callback(self.segment.unlink)  # a crash leaves it, with the last seconds of the trace
         self.status = self.segment["status"][0]
         self.mailbox = Mailbox(self.segment)
         self.reader = Reader(self.segment)
@@ -301,7 +303,6 @@ class Supervisor:
         self.status["stop"] = 1
         for child in reversed(self.children):
             child.stop()
-        self.segment.unlink()
 
 
 def _arm_and_play(_: Any, command: Any) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import zmq
 
 from rtctl.daemon.keys import ServerCurve
-from rtctl.daemon.server import bind
+from rtctl.daemon.server import bind, release
 
 MESSAGES_WAITING = 20  # for each subscriber: a few tenths of a second
 
@@ -74,7 +74,7 @@ class Telemetry:
         return len(kept)
 
     def close(self) -> None:
-        self.socket.close(linger=0)
+        release(self.socket, self.endpoint)
 
     def _send(self, payload: Any) -> None:
         self.socket.send_multipart([self._topic, msgpack.packb(payload)], zmq.NOBLOCK)

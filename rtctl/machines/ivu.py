@@ -186,6 +186,7 @@ def switch_on(p, s, phi):
     tension.reset(p.tension, s.tension)
     bumpless.reset(p.bumpless, s.bumpless)
     reel_radius.reset(p.reel_radius, s.reel_radius)
+    s.reel_radius.T1, s.reel_radius.T2 = 0.0, 0.0  # no tension is in force: the outputs were off
     limit.reset(p.limit, s.limit1, 0.0)
     limit.reset(p.limit, s.limit2, 0.0)
     s.machine.prepared = 0

@@ -42,11 +42,15 @@ class Small(Settings):
     on: bool = False
     name: str = "x"
     pairs: list[tuple[float, float]] = Field(default=[])
+    span: tuple[float, float] = (0.0, 1.0)
 
     @model_validator(mode="after")
     def _fits(self) -> "Small":
         if self.count > 100:
             raise ValueError("count is more than the rate can carry")
+        for i, (at, _) in enumerate(self.pairs):
+            if at > 9:
+                raise ValueError(f"pairs.{i}.0: later than 9 s")
         return self
 
 
@@ -105,7 +109,7 @@ def test_every_mistake_in_a_machine_is_one_line(tmp_path):
         ("rate: 5\nmode: reel", "s.yaml:2: mode: 'reel' is not one of real, fused; did you mean 'real'?"),
         ("rate: [1]", "rate: expected a number with a unit such as '1.5 Hz', or just a number in Hz, not a list of 1"),
         ("rate: true", "rate: true is not a number"),
-        ("rate: .inf", "rate: inf is not finite"),
+        ("rate: .inf", "rate: .inf is not finite"),
         ("rate: -5", "rate: -5 Hz is out of bounds: it must be more than 0 Hz"),
         ("rate: 5\nlimit: {high: 30000 mV}", "limit.high: '30000 mV' is out of bounds: it must be at most 24 V"),
         ("rate: 5\nlaw: {kind: notsh}", "s.yaml:2: law.kind: 'notsh' is not one of pd, notch; did you mean 'notch'?"),
@@ -262,3 +266,26 @@ def test_any_override_path_or_value_is_settings_or_a_user_error(text, value):
     ):
         with contextlib.suppress(UserError):
             attempt()
+
+
+@pytest.mark.parametrize("text", ["-1e6", "0x00", "-1.50"])
+def test_a_number_out_of_bounds_is_shown_as_it_was_written(load, text):
+    assert f"rate: {text} Hz is out of bounds" in complaint(load, f"rate: {text}\n")
+
+
+def test_an_override_is_shown_as_it_was_written_too(load):
+    assert "--set rate=-1e3: -1e3 Hz is out of bounds" in complaint(load, "rate: -2.50\n", "rate=-1e3")
+
+
+def test_a_number_too_large_to_be_one_is_not_called_inf(load):
+    assert "rate: 9999" in complaint(load, "rate: " + "9" * 390 + "\n")
+
+
+def test_a_check_of_a_group_can_point_at_a_key_inside_it(load):
+    text = "rate: 5\npairs:\n  - [1, 2]\n  - [10, 2]\n"
+    assert complaint(load, text).endswith("s.yaml:4: pairs.1.0: later than 9 s")
+    assert "--set pairs.0.0=11: later than 9 s" in complaint(load, text.replace("10,", "3,"), "pairs.0.0=11")
+
+
+def test_an_item_of_a_pair_that_was_not_written_can_be_set(load):
+    assert set_path(load("rate: 5\n"), "span.1", 4.0).span == (0.0, 4.0)

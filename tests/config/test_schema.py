@@ -42,3 +42,10 @@ def test_table_has_a_row_for_each_setting_with_help(kind):
 def test_table_shows_the_default_that_holds_at_its_place():
     rows = {row.path: row for row in settings_table(CONFIGS["ldu"])}
     assert rows["law.limit.high"].default == "3.0"
+
+
+def test_a_choice_must_say_which():
+    schema = json_schema(CONFIGS["ldu"])
+    position = schema["$defs"]["LduLawSettings"]["properties"]["position"]
+    assert position["required"] == ["kind"]
+    assert schema["$defs"]["LduPlantSettings"]["properties"]["physics"]["items"]["required"] == ["term"]

@@ -84,9 +84,7 @@ def test_turns_between_processes_are_to_the_bit_what_one_process_does(
 def test_the_same_seed_gives_the_same_bits_and_another_does_not(run: Callable[..., Run]) -> None:
     """With dither on the reel sensors and radii measured through them, so that the noise reaches the law."""
     noisy = {"board.dither": True, "radius.source": "measured"}
-    first, again, other = (
-        run("fused", "shm", 8.0, **noisy, **{"loop.seed": seed})[1] for seed in (1, 1, 2)
-    )
+    first, again, other = (run("fused", "shm", 8.0, **noisy, **{"loop.seed": seed})[1] for seed in (1, 1, 2))
     assert differing(first, again) == []
     assert differing(first, other) != []
 

@@ -16,13 +16,17 @@ class Kernel:
         self.refuses: set[str] = set()
         self.cpus = {0, 1, 2}
         self.asked: dict[str, Any] = {}
-        patch.setattr(os, "sched_setscheduler", lambda pid, policy, param: self._ask("fifo", (policy, param.sched_priority)))
+        patch.setattr(
+            os, "sched_setscheduler", lambda pid, policy, param: self._ask("fifo", (policy, param.sched_priority))
+        )
         patch.setattr(os, "sched_setaffinity", lambda pid, cpus: self._ask("pin", cpus))
         patch.setattr(os, "sched_getaffinity", lambda pid: self.cpus)
         patch.setattr(ctypes, "CDLL", lambda *_, **__: self)
         patch.setattr(realtime.gc, "freeze", lambda: None)
         opened, written = os.open, os.write
-        patch.setattr(os, "open", lambda path, *a, **k: self._latency() if "latency" in str(path) else opened(path, *a, **k))
+        patch.setattr(
+            os, "open", lambda path, *a, **k: self._latency() if "latency" in str(path) else opened(path, *a, **k)
+        )
         patch.setattr(os, "write", lambda fd, data: self._ask("zero", data) if fd == -7 else written(fd, data))
         closed = os.close
         patch.setattr(os, "close", lambda fd: self._ask("closed", fd) if fd == -7 else closed(fd))

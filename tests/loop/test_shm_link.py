@@ -131,7 +131,13 @@ def read_many(slot, frame, staged, last):
     while before < last:
         if shm_link.receive_newest(slot, frame, staged) == 1:
             f = frame[0]
-            if f.seq < before or f.t_ns != f.seq or f.ao_codes[0] != f.seq or f.ao_codes[1] != f.seq or f.state != f.seq:
+            if (
+                f.seq < before
+                or f.t_ns != f.seq
+                or f.ao_codes[0] != f.seq
+                or f.ao_codes[1] != f.seq
+                or f.state != f.seq
+            ):
                 wrong += 1
             before = f.seq
     return wrong

@@ -90,10 +90,10 @@ def test_encoder_frozen(tripped: Callable[..., Any]) -> None:
 
 
 def test_tension(tripped: Callable[..., Any]) -> None:
-    made, rows, k = tripped(limits(tension_min=-0.5, tension_max=0.5, tension_time=0.01))
+    made, rows, k = tripped(limits(tension_min=-0.2, tension_max=0.2, tension_time=0.01))
     check_off(rows, k, TENSION)
     T = np.array([rows["tension1_estimate"], rows["tension2_estimate"]])
-    out = ((T < -0.5) | (T > 0.5)).any(axis=0) & (np.concatenate([[0], rows["state"][:-1]]) == 2)
+    out = ((T < -0.2) | (T > 0.2)).any(axis=0) & (np.concatenate([[0], rows["state"][:-1]]) == 2)
     assert over_ticks(out, k + 1) == 6
     check_restart(made)
 

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 
-def test_a_slow_reader_holds_virtual_time_and_loses_nothing(config: Callable[..., Any], bench: Callable[..., Any]) -> None:
+def test_a_slow_reader_holds_virtual_time_and_loses_nothing(
+    config: Callable[..., Any], bench: Callable[..., Any]
+) -> None:
     made = bench(config(), rows=1000)
     ticks = 4500
     thread = threading.Thread(target=made.loop.virtual, args=(ticks,))

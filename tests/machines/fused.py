@@ -10,7 +10,7 @@ import numpy as np
 from rtctl import machines
 from rtctl.cli import common
 from rtctl.daemon.loop_process import Loop
-from rtctl.loop import generate
+from rtctl.loop import generate, safety
 from rtctl.loop.records import layout
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -25,10 +25,15 @@ class Run(NamedTuple):
     def __getitem__(self, column: str) -> np.ndarray:
         return np.asarray(self.rows[column])
 
+    @property
+    def start(self) -> float:
+        """Seconds from arming to running, when the reference begins to play."""
+        return float(self.rows["t"][np.argmax(self.rows["state"] == safety.RUNNING)])
+
     def between(self, begin: float, end: float) -> np.ndarray:
-        """Rows of `begin` to `end` s."""
-        t = self.rows["t"]
-        return self.rows[(t >= begin) & (t < end)]
+        """Rows of `begin` to `end` s of the reference."""
+        t = self.rows["t"] - self.start
+        return self.rows[(t > begin - 1e-9) & (t < end - 1e-9)]
 
 
 def config(name: str, reference: str | None = None, **changes: Any) -> Any:
@@ -45,7 +50,8 @@ def run(config: Any, seconds: float) -> Run:
     made = generate.generate(machine, "shm")
     ticks = round(seconds * machine.rate)
     segment: Any = {
-        name: np.zeros(count, dtype) for name, (dtype, count) in layout(made.params, made.tables, made.row, ticks).items()
+        name: np.zeros(count, dtype)
+        for name, (dtype, count) in layout(made.params, made.tables, made.row, ticks).items()
     }
     loop = Loop(machine, made, segment, segment["outputs"], segment["inputs"])
     generate.fill_tables(segment["tables"][0], (machine.reference, machine.excitation))

@@ -20,8 +20,9 @@ def test_it_follows_a_ramp_and_stands_where_it_was_told(run):
     assert run["state"][-1] == safety.RUNNING
     for begin, target in ((1.5, 0.1), (3.5, 0.0)):
         assert run.between(begin, begin + 0.4)["truth_x"] == pytest.approx(target, abs=2e-4)
-    moving = run.between(0.4, 0.6)
-    assert moving["truth_speed"] == pytest.approx(0.2, rel=0.02)
+    speed = run.between(0.5, 0.69)["truth_speed"]
+    assert speed.mean() == pytest.approx(0.2, rel=0.05)
+    assert speed.max() < 0.22
 
 
 def test_the_encoder_counts_micrometres(run):
@@ -31,7 +32,7 @@ def test_the_encoder_counts_micrometres(run):
 
 def test_dry_friction_keeps_an_error_of_less_than_its_volts(run):
     """Without an integral the axis stops where the position gain no longer beats the friction."""
-    error = run.between(1.8, 1.99)["position_error"]
+    error = run.between(1.8, 2.0)["position_error"]
     assert np.abs(error).max() <= 20.4 / 35.15 / 39e3 + 2e-6
 
 

@@ -48,7 +48,12 @@ def test_every_column_has_words(machine):
 
 
 def test_every_truth_is_written(machine):
-    written = {int(i) for i in re.findall(r"rx\.truth\[(\d+)\] =", "\n".join(b for _, body in machine.plant_diagram.sample for b in body))}
+    written = {
+        int(i)
+        for i in re.findall(
+            r"rx\.truth\[(\d+)\] =", "\n".join(b for _, body in machine.plant_diagram.sample for b in body)
+        )
+    }
     assert written == set(range(len(machine.truth)))
 
 
@@ -65,7 +70,10 @@ def test_every_block_is_used_and_every_use_is_a_block(machine, part):
         assert block.params is None or re.search(rf"\bp\.{block.name}\b", text), f"p.{block.name} is never read"
         assert block.state is None or re.search(rf"\bs\.{block.name}\b", text), f"s.{block.name} is never used"
     stages = lines(diagram.stages) if part == "loop" else text
-    held = {b.name for b in diagram.blocks if b.params is not None}, {b.name for b in diagram.blocks if b.state is not None}
+    held = (
+        {b.name for b in diagram.blocks if b.params is not None},
+        {b.name for b in diagram.blocks if b.state is not None},
+    )
     assert set(re.findall(r"\bp\.(\w+)", stages)) <= held[0]
     assert set(re.findall(r"\bs\.(\w+)", stages)) <= held[1]
 
@@ -73,7 +81,10 @@ def test_every_block_is_used_and_every_use_is_a_block(machine, part):
 def test_every_module_is_used_and_every_use_is_a_module(machine):
     for diagram, text in (
         (machine.diagram, lines(machine.diagram.stages)),
-        (machine.plant_diagram, "\n".join(machine.plant_diagram.start) + lines(machine.plant_diagram.advance, machine.plant_diagram.sample)),
+        (
+            machine.plant_diagram,
+            "\n".join(machine.plant_diagram.start) + lines(machine.plant_diagram.advance, machine.plant_diagram.sample),
+        ),
     ):
         called = set(re.findall(r"\b([a-z_]\w*)\.\w+\(", text)) - {"machine", "np"}
         assert called <= {module.rpartition(".")[2] for module in diagram.uses}  # type: ignore[attr-defined]
@@ -85,7 +96,8 @@ def test_the_generated_tick_is_python(machine):
 
 
 @pytest.mark.parametrize(
-    ("name", "node", "near"), [("ivu", "moter1", "motor1"), ("ldu", "carrage", "carriage"), ("axis", "cariage", "carriage")]
+    ("name", "node", "near"),
+    [("ivu", "moter1", "motor1"), ("ldu", "carrage", "carriage"), ("axis", "cariage", "carriage")],
 )
 def test_a_term_at_an_unknown_node_is_refused_with_the_nearest(name, node, near):
     with pytest.raises((UserError, ValidationError), match=f"did you mean '{near}'"):

@@ -40,7 +40,7 @@ def check_steps(run: fused.Run, error: float) -> None:
 
 @pytest.mark.parametrize("mode", ["off", "model"])
 def test_steps_of_a_radian_end_within_a_hundredth(mode):
-    run = fused.shipped("ivu", "steps", 13.0, law__gain_schedule__mode=mode)
+    run = fused.shipped("ivu", "steps", 13.5, law__gain_schedule__mode=mode)
     check_steps(run, 0.010)
     factor = running(run)["gain_factor"]
     assert np.abs(factor - 1.0).max() < (1e-12 if mode == "off" else 1.5)
@@ -49,14 +49,14 @@ def test_steps_of_a_radian_end_within_a_hundredth(mode):
 @pytest.mark.parametrize("mode", ["off", "model"])
 @pytest.mark.parametrize("reference", ["steps", "constant_speed"])
 def test_tape_is_never_slack(mode, reference):
-    run = fused.shipped("ivu", reference, 13.0, law__gain_schedule__mode=mode)
+    run = fused.shipped("ivu", reference, 13.5, law__gain_schedule__mode=mode)
     rows = running(run)
     assert len(rows) > 0.95 * len(run.rows)
     assert tension(rows).min() > 0.0
 
 
 def test_tension_stays_at_constant_speed():
-    run = fused.shipped("ivu", "constant_speed", 13.0)
+    run = fused.shipped("ivu", "constant_speed", 13.5)
     for begin, end in ((2.5, 4.8), (7.5, 9.8)):
         steady = run.between(begin, end)
         assert np.abs(np.diff(steady["ref"]) * 500).min() == pytest.approx(1.5, rel=0.05)
@@ -66,26 +66,26 @@ def test_tension_stays_at_constant_speed():
 @pytest.mark.parametrize("mode", ["off", "model"])
 @pytest.mark.parametrize(("R1", "R2"), [(0.040, 0.040), (0.020, 0.020), (0.040, 0.020), (0.020, 0.040)])
 def test_other_reels_are_stable_too(R1, R2, mode):
-    run = fused.shipped("ivu", "steps", 13.0, law__gain_schedule__mode=mode, **radii(R1, R2))
+    run = fused.shipped("ivu", "steps", 13.5, law__gain_schedule__mode=mode, **radii(R1, R2))
     check_steps(run, 0.015)
     assert tension(running(run)).min() > -SLACK
 
 
-def test_schedule_follows_the_radii():
-    """At 40/40 the process gain is higher than at 20/20 by nobody's guess but the model's."""
+def test_schedule_lowers_the_gain_where_the_margin_is_least():
+    """40/40 has 1.2 dB with a fixed gain, 20/20 has 20.9 dB."""
     full, empty = (
-        running(fused.shipped("ivu", "steps", 13.0, law__gain_schedule__mode="model", **radii(R, R)))["gain_factor"]
+        running(fused.shipped("ivu", "steps", 13.5, law__gain_schedule__mode="model", **radii(R, R)))["gain_factor"]
         for R in (0.04, 0.02)
     )
-    assert np.all(np.isfinite(full)) and np.all(np.isfinite(empty))
-    assert full.mean() > 1.2 * empty.mean()
+    assert 0.3 < full.mean() < 0.7
+    assert full.mean() < empty.mean() < 1.5
 
 
 @pytest.mark.parametrize(("R1", "R2"), [(0.038, 0.022), (0.020, 0.040), (0.030, 0.030), (0.024, 0.024)])
 def test_radii_are_measured_at_arming_and_then_it_runs(R1, R2):
-    """Erratum: 'within 5 %' of 5.2; on edges, on a tape that stretches, it is one percent."""
+    """On a tape that stretches, with motors that stick; the emulator knows the truth."""
     plant = {"plant__parameters__R1": R1, "plant__parameters__R2": R2}
-    run = fused.shipped("ivu", "steps", 24.0, radius__source="measured", **plant)
+    run = fused.shipped("ivu", "steps", 22.0, radius__source="measured", **plant)
     rows = running(run)
     assert run["trip"].max() == 0
     assert len(rows) and rows["t"][0] < 12.0
@@ -93,19 +93,20 @@ def test_radii_are_measured_at_arming_and_then_it_runs(R1, R2):
     assert rows["R2"][0] == pytest.approx(rows["truth_R2"][0], rel=0.05)
     assert tension(run.rows).min() > -SLACK
     assert tension(rows).min() > 0.0
-    assert np.ptp(rows["target"]) > 1.0  # the table was played
-    assert np.abs(rows["capstan_error"][-100:]).max() < 0.010
+    assert np.ptp(rows["target"]) > 0.9  # the table was played
+    end = run.between(6.7, 6.95)
+    assert np.abs(end["capstan_error"]).max() < 0.010
 
 
 def test_radii_follow_the_tape():
-    run = fused.shipped("ivu", "constant_speed", 13.0)
+    run = fused.shipped("ivu", "constant_speed", 13.5)
     for name in ("R1", "R2"):
         np.testing.assert_allclose(run["truth_" + name], run[name], rtol=2e-3)
     assert np.ptp(run["truth_R1"]) > 1e-4
 
 
 def test_encoder_reads_the_capstan():
-    run = fused.shipped("ivu", "steps", 13.0)
+    run = fused.shipped("ivu", "steps", 13.5)
     off = run["truth_capstan"] - run["capstan"]
     assert np.all(off > -1.01 * COUNT) and np.all(off < 2.01 * COUNT)
     np.testing.assert_allclose(run["capstan"], run["capstan_counts"] * COUNT, atol=1e-12)
@@ -126,7 +127,7 @@ def test_frozen_encoder_and_following_error_trip():
 
 TAU = 2.4e-3  # of motor 1, Nm
 NOTHING = {"F_C": 0.0, "B": 0.0, "F_s": TAU, "v_s": 0.3, "form": "gaussian"}
-SIZES = [{"F_C": 0.2 * TAU}, {"B": 2e-4}, {"F_s": 1.5 * TAU}]
+SIZES = [{"F_C": 0.2 * TAU}, {"B": 1e-3}, {"F_s": 1.5 * TAU}]
 
 
 @lru_cache(maxsize=8)
@@ -146,7 +147,7 @@ def with_friction(**sizes: Any) -> np.ndarray:
 
 
 def test_terms_of_size_nothing_change_nothing():
-    assert np.array_equal(with_friction(), fused.shipped("ivu", "steps", 13.0)["capstan_counts"][:3000])
+    assert np.array_equal(with_friction(), fused.shipped("ivu", "steps", 13.5)["capstan_counts"][:3000])
 
 
 @pytest.mark.parametrize("sizes", SIZES, ids=["coulomb", "viscous", "stribeck"])

@@ -133,7 +133,7 @@ def test_process_gain_of_the_simulation_set():
 
 def test_inertia_of_the_reels():
     p = built()
-    assert (p.J_1, p.J_2) == pytest.approx((1.91e-4, 8.3e-6), rel=5e-3)
+    assert pytest.approx((1.91e-4, 8.3e-6), rel=5e-3) == (p.J_1, p.J_2)
     assert built(J_1=5e-4).J_1 == 5e-4
 
 
@@ -147,7 +147,7 @@ def test_end_deflection_under_tension():
     assert (s.m.x[ivu.REEL1], s.m.x[ivu.REEL2]) == pytest.approx((wanted, wanted), rel=1e-3)
     assert abs(s.m.x[ivu.CAPSTAN]) < 1e-9
     ivu.tensions(p, s)
-    assert (s.T1, s.T2) == pytest.approx((0.049 * 0.061 / 0.03,) * 2, rel=1e-3)
+    assert pytest.approx((0.049 * 0.061 / 0.03,) * 2, rel=1e-3) == (s.T1, s.T2)
 
 
 def test_margins_of_the_pd_loop():
@@ -186,7 +186,7 @@ def test_radius_wound_length_and_inertia_agree(q, R1, R2):
     ivu.follow_tape(p, s)
     grow = p.d_tape / (2 * math.pi)
     assert p.R_min == pytest.approx(min(s.R1, s.R2, p.R_min))
-    if s.R1 > p.R_min:
+    if p.R_min < s.R1:
         paper = 2 * math.pi / p.d_tape * grow * (s.R1**2 - R1**2) / (2 * grow)  # area over thickness
         assert ivu.wound(q, R1, grow, p.R_min) == pytest.approx(paper, abs=1e-9)
     assert pytest.approx(ivu.reel_inertia(p.J_10, p.rho_h, s.R1, p.R_min), rel=1e-9) == s.J1
@@ -194,6 +194,38 @@ def test_radius_wound_length_and_inertia_agree(q, R1, R2):
     dq = 1e-5
     slope = (ivu.wound(q + dq, R1, grow, p.R_min) - ivu.wound(q - dq, R1, grow, p.R_min)) / (2 * dq)
     assert slope == pytest.approx(s.R1, rel=1e-6)
+
+
+def exact_accelerations(p: Any, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """(4.9)-(4.17) with the radii that q gives, written out."""
+    grow = p.d_tape / (2 * math.pi)
+    R1, R2 = p.R1 + grow * q[ivu.REEL1], p.R2 + grow * q[ivu.REEL2]
+    J1, J2 = (ivu.reel_inertia(p.J_10, p.rho_h, R, p.R_min) for R in (R1, R2))
+    l1 = (R1**2 - p.R1**2) / (2 * grow)
+    l2 = (R2**2 - p.R2**2) / (2 * grow)
+    F1 = p.c1 * (p.R_c * q[ivu.CAPSTAN] - l1) + p.k1 * (p.R_c * v[ivu.CAPSTAN] - R1 * v[ivu.REEL1])
+    F2 = p.c2 * (-p.R_c * q[ivu.CAPSTAN] - l2) + p.k2 * (-p.R_c * v[ivu.CAPSTAN] - R2 * v[ivu.REEL2])
+    tau1 = p.c_m1 * (q[ivu.MOTOR1] - q[ivu.REEL1]) + p.k_m1 * (v[ivu.MOTOR1] - v[ivu.REEL1])
+    tau2 = p.c_m2 * (q[ivu.MOTOR2] - q[ivu.REEL2]) + p.k_m2 * (v[ivu.MOTOR2] - v[ivu.REEL2])
+    out = np.zeros(5)
+    out[ivu.MOTOR1], out[ivu.MOTOR2] = -tau1 / p.J_m1, -tau2 / p.J_m2
+    out[ivu.REEL1], out[ivu.REEL2] = (F1 * R1 + tau1) / J1, (F2 * R2 + tau2) / J2
+    out[ivu.CAPSTAN] = p.R_c * (F2 - F1) / p.J_c
+    return out
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(-20, 20), st.lists(st.floats(-1, 1), min_size=9, max_size=9))
+def test_linear_model_and_correction_make_the_equations_of_motion(turned, x):
+    """Wherever the tape has gone, between two relinearisations too."""
+    record, s = plant(built(R1=0.03, R2=0.03))
+    q = np.array([turned, turned, 0.03 * turned / 0.0125, -turned, -turned])
+    q[:4] += 0.02 * np.array(x[:4])
+    v = 5.0 * np.array(x[4:])
+    s.m.qm[:], s.m.vm[:] = q, v
+    ivu.follow_tape(record, s)
+    got = s.m.A[5:10, :5] @ q + s.m.A[5:10, 5:10] @ v + s.m.G[5:10, ivu.NU :] @ s.m.f
+    np.testing.assert_allclose(got, exact_accelerations(record, q, v), rtol=1e-9, atol=1e-6)
 
 
 def driven(p: ivu.IvuParams, volts: np.ndarray, dt: float) -> tuple[Any, Any, np.ndarray]:
@@ -207,7 +239,7 @@ def test_tape_that_leaves_one_reel_arrives_at_the_other():
     """A turn of the reels: paper is neither made nor lost, but for the stretch."""
     volts = np.full((4000, 2), 0.17)
     volts[:2000, 0] += 1.5
-    record, s, out = driven(built(h=1e-3), volts, 1e-3)
+    record, s, _ = driven(built(h=1e-3), volts, 1e-3)
     grow = record.d_tape / (2 * math.pi)
     x = s.m.x
     l1 = ivu.wound(x[ivu.REEL1], record.R1, grow, record.R_min)
@@ -216,8 +248,10 @@ def test_tape_that_leaves_one_reel_arrives_at_the_other():
     stretch = s.T1 / record.c1 + s.T2 / record.c2
     assert l1 + l2 == pytest.approx(stretch, abs=2e-3)
     assert record.R_c * x[ivu.CAPSTAN] == pytest.approx(l1, abs=2e-3)
-    assert s.R1**2 - record.R1**2 == pytest.approx(record.d_tape * l1 / math.pi, rel=1e-4)  # taken at the middle of the substep
-    assert s.J1 == pytest.approx(ivu.reel_inertia(record.J_10, record.rho_h, s.R1, record.R_min))
+    assert (
+        pytest.approx(record.d_tape * l1 / math.pi, rel=1e-4) == s.R1**2 - record.R1**2
+    )  # taken at the middle of the substep
+    assert pytest.approx(ivu.reel_inertia(record.J_10, record.rho_h, s.R1, record.R_min)) == s.J1
     assert s.R1 > record.R1 and s.R2 < record.R2
 
 
@@ -226,7 +260,7 @@ def test_an_empty_reel_keeps_its_core():
     volts[:, 0] += 1.5
     record, s, _ = driven(built(h=1e-3, R2=0.0202), volts, 1e-3)
     assert record.R2 + record.d_tape / (2 * math.pi) * s.m.x[ivu.REEL2] < record.R_min  # it has run out
-    assert s.R2 == record.R_min
+    assert record.R_min == s.R2
     assert pytest.approx(record.J_20, rel=1e-6) == s.J2
     assert np.all(np.isfinite(s.m.x))
 

@@ -116,7 +116,14 @@ NOTHING = {"dry": coulomb(0.0), "brake": viscous(0.0), "stick": stribeck(F_s=F_C
 
 
 @settings(deadline=None, max_examples=40)
-@given(st.floats(-1, 1), st.floats(-30, 100), st.floats(0, 500), st.floats(0, 60), st.floats(1e-3, 1), st.sampled_from(FORMS))
+@given(
+    st.floats(-1, 1),
+    st.floats(-30, 100),
+    st.floats(0, 500),
+    st.floats(0, 60),
+    st.floats(1e-3, 1),
+    st.sampled_from(FORMS),
+)
 def test_no_friction_ever_makes_a_free_axis_faster(v, F, B, F_s, v_s, form):
     s = plant()
     s.m.x[1] = s.m.v_before[0] = v

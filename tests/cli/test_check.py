@@ -1,0 +1,66 @@
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def _runtime(runtime):
+    """Names of sockets are printed, so there must be a folder for them."""
+
+
+@pytest.mark.parametrize(
+    ("words", "seen"),
+    [
+        (["ivu"], ["500 Hz, real", "pd,", "holds still", "ivu.command"]),
+        (["ldu", "--mode", "fused"], ["10000 Hz, fused", "pi_velocity,", "loop's own process"]),
+        (["axis", "--link", "shm"], ["1000 Hz", "emulated, over shm"]),
+        (["ivu", "--reference", "steps"], ["knots over 10 s, in rad"]),
+        (["ldu", "--reference", "print_steps"], ["in m"]),
+        (
+            ["ivu", "--set", "link.plant=external", "--set", "link.endpoint=tcp://127.0.0.1:5570"],
+            ["external, at tcp://127"],
+        ),
+        (["ivu", "--set", "name=other", "--set", "loop.rate=1 kHz"], ["other (ivu)", "1000 Hz", "other.telemetry"]),
+    ],
+)
+def test_says_ok_and_what_would_run(rtctl, words, seen):
+    code, out, err = rtctl("check", *words)
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0] == "ok"
+    for text in seen:
+        assert text in out
+
+
+@pytest.mark.parametrize(
+    ("words", "seen"),
+    [
+        (["nix.yaml"], ["nix.yaml", "no such file"]),
+        (["ivu", "--reference", "stesp"], ["stesp", "did you mean 'references/steps'"]),
+        (["ivu", "--set", "law.position.gian=3", "--set", "loop.rate=fast"], ["'gain'", "loop.rate=fast"]),
+        (["ivu", "--set", "loop.rate=500 kg"], ["loop.rate", "Hz"]),
+        (["ivu", "--set", "machine=idu"], ["idu"]),
+        (["ivu", "--mode", "fats"], ["--mode fats", "lockstep"]),
+        (["ivu", "--set", "name"], ["key=value"]),
+    ],
+)
+def test_tells_every_mistake(rtctl, words, seen):
+    code, out, err = rtctl("check", *words)
+    assert (code, out) == (2, "")
+    for text in seen:
+        assert text in err
+
+
+def test_names_file_and_line(rtctl, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("name: mine\nmachine: ivy\n")
+    code, _, err = rtctl("check", file)
+    assert code == 2
+    assert "mine.yaml:2: machine: 'ivy' is not one of ivu, ldu, axis; did you mean 'ivu'?" in err
+    file.write_text("name: mine\n")
+    assert "machine: missing" in rtctl("check", file).err
+
+
+def test_settings_that_contradict_each_other(rtctl, tmp_path):
+    file = tmp_path / "backwards.yaml"
+    file.write_text("steps:\n  - {at: 2 s, to: 1 rad}\n  - {at: 1 s, to: 0 rad}\n")
+    code, out, err = rtctl("check", "ivu", "--reference", file)
+    assert (code, out) == (2, "")
+    assert "step 2 at 1 s comes before" in err
