@@ -52,7 +52,7 @@ def _entries(settings: Any) -> tuple[str, ...]:
     mode = settings.loop.mode
     if mode == "fused":
         return ("run_fused",)
-    return (f"run_{mode}", f"plant_{mode}") if settings.link.plant == "spawn" else (f"run_{mode}",)
+    return (f"run_{mode}", f"plant_{mode}") if settings.link.spawns else (f"run_{mode}",)
 
 
 def _compile(machine: Any, link: str) -> None:

@@ -45,7 +45,7 @@ def _summary(machine: Any) -> list[tuple[str, str]]:
     else:
         endpoint = link.endpoint or f"ipc://{runtime_dir() / f'{config.name}.plant'}"
         where = f"over {link.kind}" if link.kind == "shm" else f"at {endpoint}"
-        plant = f"{'emulated' if link.plant == 'spawn' else 'external'}, {where}"
+        plant = f"{'emulated' if link.spawns else 'external'}, {where}"
     terms = [f"{term.term} at {term.node}" for term in config.plant.physics]
     return [
         ("machine", f"{config.name} ({machine.kind})"),

@@ -164,7 +164,10 @@ def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoi
                 if not socket.poll(200):
                     continue
             return
-    raise UserError(f"no plant answers at {endpoint} within {timeout:g} s; start one with `rtctl plant`, or set link.plant: spawn")
+    raise UserError(
+        f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, or leave "
+        "link.endpoint out to have one started"
+    )
 
 
 if __name__ == "__main__":

@@ -140,7 +140,7 @@ class Supervisor:
         self.children: list[ChildProcess] = []
         self.plant: ChildProcess | None = None
         stack.callback(self._stop_children)
-        if config.loop.mode != "fused" and link.plant == "spawn":
+        if config.loop.mode != "fused" and link.spawns:
             self.plant = ChildProcess("plant", order)
             self.children.append(self.plant)
             self._wait(self.plant, lambda: self.listening, "the plant")

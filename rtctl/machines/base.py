@@ -50,11 +50,18 @@ class LinkSettings(Settings):
     endpoint: str | None = Field(
         default=None, description="where the plant listens, e.g. tcp://bench2:5570; a local socket if absent"
     )
-    plant: Literal["spawn", "external"] = Field(
-        default="spawn", description="spawn: start the emulator with the loop; external: somebody else runs `rtctl plant`"
+    plant: Literal["spawn", "external"] | None = Field(
+        default=None,
+        description="spawn: start the emulator with the loop; external: somebody else runs `rtctl plant`; if absent, "
+        "external where an endpoint is given",
     )
     timeout: float = quantity(5.0, unit="s", gt=0, help="how long to wait for the plant at the start and in lockstep")
     keys: str | None = Field(default=None, description="name of the CURVE keys, needed for anything but this machine")
+
+    @property
+    def spawns(self) -> bool:
+        """Whether the plant is started with the loop."""
+        return self.plant == "spawn" or (self.plant is None and self.endpoint is None)
 
 
 class LoopSettings(Settings):

@@ -322,7 +322,6 @@ def test_children_end_with_their_supervisor_and_the_last_seconds_can_be_read(
         supervisor.send_signal(signal.SIGKILL)
         supervisor.wait()
         wait_for(lambda: all(map(gone, pids)), 5)
-        del segment
         left = Segment.open(path, shape)
         assert left["status"][0]["supervisor_lost"] == 1 and left["status"][0]["ended"] == 1
         ticks = int(left["status"][0]["tick"])
@@ -407,7 +406,10 @@ def test_a_disk_without_room_for_the_bundle_is_told_and_repaired_once_there_is(
     runtime: Path, config: Callable[..., Any], small_disk: Path
 ) -> None:
     out = small_disk / "bundle"
-    with pytest.raises(UserError, match=r"did not take the recording \(No space left .*`rtctl trace repair "):
+    with pytest.raises(
+        UserError,
+        match=r"did not take the recording \(.*No space left on device\); make room, then `rtctl trace repair ",
+    ):
         Session(config(set={"record.seconds": 2.0}), out, 60.0).run()
     subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
     report = repair(out)

@@ -130,5 +130,5 @@ def test_a_cache_that_cannot_be_written_is_told(
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path / "file" / "cache"))
-    with pytest.raises(UserError, match="cannot write the generated tick .*; set RTCTL_CACHE_DIR"):
+    with pytest.raises(UserError, match=r"cannot write the generated tick .*; set RTCTL_CACHE_DIR"):
         generate.write(machines.build(config()), "shm")

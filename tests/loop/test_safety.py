@@ -33,8 +33,9 @@ SETTINGS = SafetySettings(
     tension_time=0.003, current=1.0, current_time=0.006, missed_ticks=7,
 )  # fmt: skip
 P = safety.build(SETTINGS, DT)
-GOOD: dict[str, Any] = {"fresh": 1, "late": 0, "lost": 0, "error": 0.0, "effort": 0.5, "amperes": 0.2, "T1": 1.0, "T2": 1.0,
-                        "moves": True}  # fmt: skip
+GOOD: dict[str, Any] = {
+    "fresh": 1, "late": 0, "lost": 0, "error": 0.0, "effort": 0.5, "amperes": 0.2, "T1": 1.0, "T2": 1.0, "moves": True,
+}  # fmt: skip
 
 
 class Machine:

@@ -107,7 +107,7 @@ def test_current_for_too_long(tripped: Callable[..., Any]) -> None:
 
 
 def test_not_a_number(tripped: Callable[..., Any]) -> None:
-    made, rows, k = tripped({**limits(), "law.position.gain": 1e306})
+    _, rows, k = tripped({**limits(), "law.position.gain": 1e306})
     check_off(rows, k, NOT_A_NUMBER)
     assert np.isfinite(rows["u1"]).all() and np.isfinite(rows["u2"]).all()
 

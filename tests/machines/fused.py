@@ -1,9 +1,10 @@
 """A machine run in fused mode inside the test's own process: no sockets, no children, no clock."""
 
 import json
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from rtctl.loop.records import layout
 CONFIGS = Path(__file__).parents[2] / "configs"
 
 
-class Run(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Run:
     """Rows of a run, and the loop as it stands at its end."""
 
     rows: np.ndarray

@@ -1,5 +1,7 @@
 """The shipped axis, run fused."""
 
+from typing import Any
+
 import fused
 import numpy as np
 import pytest
@@ -7,7 +9,9 @@ import pytest
 from rtctl.config.errors import UserError
 from rtctl.loop import safety
 
-SETPOINTS = {"reference__steps": [{"at": 0.2, "to": 0.1, "ramp": 0.2}, {"at": 2.0, "to": 0.0, "ramp": 0.2}]}
+SETPOINTS: dict[str, Any] = {
+    "reference__steps": [{"at": 0.2, "to": 0.1, "ramp": 0.2}, {"at": 2.0, "to": 0.0, "ramp": 0.2}]
+}
 
 
 @pytest.fixture(scope="module")

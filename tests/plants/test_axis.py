@@ -78,5 +78,5 @@ def test_it_breaks_away_where_the_drive_beats_dry_friction(volts, moves):
 def test_state_space_is_what_the_axis_does_without_dry_friction():
     p = axis.build(axis.AxisSettings(parameters={"k": 100.0}), 1e-3)
     A, B = axis.state_space(p)
-    np.testing.assert_allclose(A, [[0, 1], [-100 / M, -F_V / M]])
-    np.testing.assert_allclose(B, [[0], [35.15 / M]])
+    np.testing.assert_allclose(A, [[0.0, 1.0], [-100 / M, -F_V / M]])
+    np.testing.assert_allclose(B, [[0.0], [35.15 / M]])

@@ -19,7 +19,7 @@ DRIVER = l292.L292Settings()
 DRIVE = (*l292.second_order(DRIVER), DRIVER.R_F * DRIVER.C_F)
 DELAY = 3e-3  # s, of the loop in 8.2
 G, TAU_D = 6.2, 0.16  # A/rad, s
-FREE = {"tau_F1": 0.0, "tau_F2": 0.0, "tau_Fc": 0.0}  # of friction
+FREE: dict[str, Any] = {"tau_F1": 0.0, "tau_F2": 0.0, "tau_Fc": 0.0}  # of friction
 
 
 def built(name: str = "identified", h: float = 5e-4, **parameters: float) -> ivu.IvuParams:
@@ -93,7 +93,7 @@ def process_gain(p: ivu.IvuParams) -> float:
     return float(abs(response(p, np.array([1.0]))[0]) * (2 * np.pi) ** 2)
 
 
-def margins(driver: bool = False, **radii: float) -> tuple[float, float, float]:
+def margins(driver: bool = False, **radii: Any) -> tuple[float, float, float]:
     """Gain margin in dB, phase margin in degrees, crossover in Hz of the PD loop with delay."""
     f = np.geomspace(1.0, 200.0, 4000)
     L = response(built(**radii), f, driver) * G * (1 + 2j * np.pi * f * TAU_D) * np.exp(-2j * np.pi * f * DELAY)

@@ -70,7 +70,7 @@ def test_discretise_of_nothing_is_identity_and_of_a_free_mass_is_exact():
     Phi_T, Gamma_T = linear.discretise(np.zeros((2, 2)), np.zeros((2, 1)), 0.1)
     assert np.array_equal(Phi_T, np.eye(2)) and not Gamma_T.any()
     Phi_T, Gamma_T = linear.discretise(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), 0.1)
-    np.testing.assert_allclose(Phi_T.T, [[1, 0.1], [0, 1]], rtol=1e-15)
+    np.testing.assert_allclose(Phi_T.T, [[1.0, 0.1], [0.0, 1.0]], rtol=1e-15)
     np.testing.assert_allclose(Gamma_T[0], [0.005, 0.1], rtol=1e-14)
 
 
