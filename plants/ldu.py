@@ -11,7 +11,8 @@ does not write into its equations.
 
 Source: thesis 12.1 and appendix F. Erratum: `b_m` in row 4 of A is b_s; the ninth column of A does not exist.
 The listed k_s, k_c give 239, 919, 951 and 3261 Hz; figure 12.2 shows 114, 254, 286 and 2100 Hz, hence two sets.
-Damping, B_c, B_m, K_m2 are not given; they are chosen for 1 to 5 percent modal damping.
+Damping, B_c, B_m, K_m2 are not given; they are chosen for 2 to 10 percent modal damping. F_c is what (12.3) makes of
+the break-away voltages of 12.6.
 """
 
 from typing import Literal, NamedTuple
@@ -45,7 +46,7 @@ class LduParameters(Settings):
     K_m2: float = quantity(5e-8, unit="Nms/rad", ge=0, help="speed/torque gradient of the motor")
     B_c: float = quantity(1e-6, unit="Nms/rad", ge=0, help="viscous friction of the capstan's bearing")
     B_m: float = quantity(0.5, unit="N*s/m", ge=0, help="viscous friction of the carriage")
-    F_c: float = quantity(5.0, unit="N", ge=0, help="dry friction of the carriage")
+    F_c: float = quantity(7.3, unit="N", ge=0, help="dry friction of the carriage: breaks away at 0.88 to 0.93 V (12.6)")
 
 
 SETS = {

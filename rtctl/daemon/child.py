@@ -23,7 +23,9 @@ from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.machines import Machine
 
-LINK_WAITING = 8  # frames a link may hold: newest wins, older ones are of no use
+# Frames a link may hold. ZeroMQ learns what has left its queue only now and then, every 100 frames received at the
+# latest: fewer than twice that, and in lockstep a frame could find a queue full that has long been empty.
+LINK_WAITING = 256
 
 
 def orders(argv: list[str]) -> dict[str, Any]:

@@ -151,10 +151,12 @@ def test_a_second_daemon_of_that_name_is_refused_with_the_pid(live: Callable[...
 def test_a_plant_that_does_not_answer_is_told_within_its_time(
     runtime: Path, config: Callable[..., Any], tmp_path: Path
 ) -> None:
-    keys = {"link.plant": "external", "link.timeout": 0.5}
+    keys = {"link.endpoint": f"ipc://{tmp_path}/nobody", "link.timeout": 0.5}
     settings = config(mode="real", link="zmq", set=keys)
     with (
-        pytest.raises(UserError, match=r"no plant answers at ipc://.* within 0.5 s; start one with `rtctl plant`"),
+        pytest.raises(
+            UserError, match=r"no plant answers at ipc://.* within 0\.5 s \(link\.timeout\); start it with `rtctl plant"
+        ),
         Supervisor(settings, tmp_path / "bundle"),
     ):
         pass

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numba import njit
-from numba.core.runtime import _nrt_python
+from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 
@@ -48,7 +48,7 @@ def test_a_million_ticks(config: Callable[..., Any], bench: Callable[..., Any], 
 
 
 @njit
-def allocate(times):  # type: ignore[no-untyped-def]
+def allocate(times):
     total = 0.0
     for k in range(times):
         total += np.zeros(k + 3)[k]

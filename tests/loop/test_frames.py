@@ -6,8 +6,9 @@ from rtctl.loop import frames, generate
 
 @pytest.mark.parametrize("dtype", [frames.OUTPUTS, frames.INPUTS])
 def test_records_have_no_holes_and_are_little_endian(dtype: np.dtype) -> None:
-    assert dtype.itemsize == sum(dtype[name].itemsize for name in dtype.names)
-    assert all(dtype[name].base.str[0] in "<|" for name in dtype.names)
+    fields = [dtype[name] for name in dtype.names or ()]
+    assert fields and dtype.itemsize == sum(field.itemsize for field in fields)
+    assert all(field.base.str[0] == "<" for field in fields)
 
 
 @pytest.mark.parametrize("name", ["tx", "rx"])

@@ -190,7 +190,7 @@ def test_the_plant_is_gone(
                 assert supervisor.plant is not None
                 os.kill(supervisor.plant.pid, how)
                 gone = int(supervisor.status["tick"])
-        if how == signal.SIGSTOP:
+        if how == signal.SIGSTOP and supervisor.plant is not None:
             os.kill(supervisor.plant.pid, signal.SIGCONT)
         result = supervisor.snapshot()
         supervisor.finish()

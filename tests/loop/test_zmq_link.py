@@ -8,7 +8,8 @@ import pytest
 import zmq
 
 from rtctl.daemon.child import LINK_WAITING, link_socket
-from rtctl.loop import frames, generate, zmq_link
+from rtctl.idiom import tick
+from rtctl.loop import clock, frames, generate, zmq_link
 
 
 class Ends:
@@ -92,6 +93,48 @@ def test_a_message_of_another_length_is_ignored(ends: Ends, length: int) -> None
     ends.loop.send((good.tobytes() * 60)[:length])
     ends.plant.poll(2000)
     assert ends.newest() == 0 and ends.got["seq"] == 1
+
+
+@tick
+def ping(socket, tx, rx, staged, rounds, pause):
+    """Send and take the answer, which has long come when it is looked for; returns the rounds that went well."""
+    for k in range(rounds):
+        tx[0].seq = k
+        if not zmq_link.send(socket, tx):
+            return k
+        until = clock.now() + pause
+        while clock.now() < until:
+            pass
+        if zmq_link.receive(socket, rx, staged) == 0 or rx[0].seq != k:
+            return k
+    return rounds
+
+
+@tick
+def pong(socket, rx, tx, staged, rounds):
+    for k in range(rounds):
+        if zmq_link.receive(socket, rx, staged) == 0:
+            return k
+        tx[0].seq = rx[0].seq
+        if not zmq_link.send(socket, tx):
+            return k
+    return rounds
+
+
+@pytest.mark.parametrize("pause", [0, 70_000])
+def test_no_frame_is_dropped_where_both_take_turns(ends: Ends, pause: int) -> None:
+    """A socket that never has to wait for a frame hears late that its queue is empty; lockstep would stand still."""
+    loop, plant = generate.new_frames(), generate.new_frames()
+    there = (ends.loop.underlying, loop["tx"], loop["rx"], loop["rx_staged"])
+    back = (ends.plant.underlying, plant["tx"], plant["rx"], plant["tx_staged"])
+    ping(*there, 0, 0)
+    pong(*back, 0)  # both compiled
+    found: list[int] = []
+    thread = threading.Thread(target=lambda: found.append(pong(*back, 3000)))
+    thread.start()
+    assert ping(*there, 3000, pause) == 3000
+    thread.join(10)
+    assert found == [3000]
 
 
 def test_sending_never_waits_for_a_peer(tmp_path: Any) -> None:

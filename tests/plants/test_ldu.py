@@ -125,7 +125,7 @@ def test_dry_friction_holds_the_carriage_below_break_away(sign):
     p = built()
     s = plant(p)
     held = moved(s, sign * 0.8 * breakaway(p) * np.minimum(np.arange(10_000) / 4000, 1.0))  # no ringing
-    assert np.abs(held[:, 0]).max() * p.R_c < 1e-3 * COUNT
+    assert np.abs(held[:, 0]).max() * p.R_c < 2e-3 * COUNT
     windup = sign * 0.8 * p.R_c * p.F_c / p.k_c  # of wheel against capstan
     assert s.m.x[ldu.WHEEL] - s.m.x[ldu.CAPSTAN] == pytest.approx(windup, rel=0.05)  # still swinging
     moving = moved(s, np.full(10_000, sign * 1.5 * breakaway(p)))

@@ -129,7 +129,7 @@ def test_dry_friction_that_slides_is_its_limit_against_the_motion(v, push):
 
 @settings(deadline=None, max_examples=500)
 @given(speeds, speeds, st.floats(1e-6, 1.0), st.floats(1e-6, 10.0))
-def test_dry_friction_is_within_its_limit_and_never_feeds_energy(v, v_free, gain, limit):
+def test_dry_friction_is_within_its_limit_and_never_speeds_up(v, v_free, gain, limit):
     """Over the substep it takes from the free motion: it never makes the mass faster than it would have been."""
     r = linear.dry_friction(v, v_free, gain, limit)
     assert abs(r) <= limit * (1 + 1e-9)
@@ -197,14 +197,24 @@ def test_spring_and_friction_lose_the_same_width_every_half_swing():
 @settings(deadline=None, max_examples=20)
 @given(st.lists(st.floats(-1, 1), min_size=4, max_size=4), st.floats(0.01, 1.0), st.floats(0.01, 1.0))
 def test_coupled_nodes_with_friction_only_lose_energy(x, dry1, dry2):
+    """But for what a stop within a substep leaves: the node stops at its end, not at once, h v / 2 too far.
+
+    With v below twice gain times limit that is at most (limit h)^2 / M for each node, second order in h.
+    """
     m = pair(dry1, dry2)
+    allowed = (dry1**2 + dry2**2) * m.h**2
     m.x[:] = [0.01 * x[0], 0.01 * x[1], x[2], x[3]]
     last = energy(m)
     for _ in range(50):
         run(m, 10)
         now = energy(m)
-        assert now <= last * (1 + 1e-9) + 1e-12
+        assert now <= last * (1 + 1e-9) + allowed
         last = now
+    assert last <= energy_at(x) + 2 * allowed
+
+
+def energy_at(x: list[float]) -> float:
+    return 0.5 * (x[2] ** 2 + x[3] ** 2 + 0.1 * (x[0] - x[1]) ** 2)
 
 
 def pair(dry1: float, dry2: float, h: float = 5e-4) -> Any:

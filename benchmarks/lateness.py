@@ -1,0 +1,210 @@
+"""How late our loop wakes, against cyclictest on the same CPU with the same period and priority.
+
+    python benchmarks/lateness.py [--json] [--machine ldu|ivu] [--rate HZ] [--seconds S] [--rounds N]
+
+A round is a window of each, one after the other, so that what the machine does meanwhile falls on all alike:
+
+    ours    rtctl run MACHINE --mode real --link shm: loop on the last CPU, its plant on another
+    load    cyclictest, while the same plant runs on that other CPU
+    bare    cyclictest with nothing beside it
+
+Both sleep with clock_nanosleep(TIMER_ABSTIME) on CLOCK_MONOTONIC and count the time from when they should have woken
+to when they read the clock. The ratio of a round is ours over cyclictest; the result is the median over the rounds.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+CONFIGS = Path(__file__).parents[1] / "configs"
+RATES = {"ivu": 500.0, "ldu": 10_000.0}
+SHARES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
+PRIORITY = 80
+LONGEST_NS = 1_000_000  # buckets of cyclictest, its most; what is later is counted as this late
+
+
+def rtctl_command() -> tuple[str, ...]:
+    """The `rtctl` beside this Python, or the one on the path."""
+    beside = Path(sys.executable).parent / "rtctl"
+    return (str(beside),) if beside.exists() else ("rtctl",)
+
+
+def why_not() -> str | None:
+    """What keeps this machine from measuring, in a sentence; None where nothing does."""
+    if shutil.which("cyclictest") is None:
+        return "cyclictest is not installed here; it comes with rt-tests"
+    if len(os.sched_getaffinity(0)) < 2:
+        return "one CPU only: the plant needs another than the loop's"
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    except OSError:
+        return f"this account may not use SCHED_FIFO at priority {PRIORITY}; run as root or allow rtprio"
+    return None
+
+
+def ours(machine: str, rate: float, link: str, seconds: float, folder: Path) -> dict[str, Any]:
+    """One window of our loop: the JSON of the run."""
+    out = folder / "bundle"
+    shutil.rmtree(out, ignore_errors=True)
+    command = (
+        *rtctl_command(), "run", str(CONFIGS / f"{machine}.yaml"), "--mode", "real", "--link", link,
+        "--for", f"{seconds}s", "--set", f"name=bench-{os.getpid()}", "--set", f"loop.rate={rate}",
+        "--set", f"loop.priority={PRIORITY}", "--set", "safety.missed_ticks=0", "--set", "safety.link_timeout=1",
+        "--json", "--no-plot", "--out", str(out),
+    )  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True)
+    if not done.stdout.strip():
+        raise RuntimeError(f"rtctl run failed:\n{done.stderr}")
+    return json.loads(done.stdout)
+
+
+@contextlib.contextmanager
+def plant(machine: str, rate: float, folder: Path) -> Iterator[None]:
+    """The emulator on its own, where it runs beside our loop: on the first CPU."""
+    command = (
+        *rtctl_command(), "plant", str(CONFIGS / f"{machine}.yaml"), "--endpoint", f"ipc://{folder}/plant",
+        "--mode", "real", "--set", f"name=bench-{os.getpid()}", "--set", f"loop.rate={rate}",
+    )  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})  # at once: its threads come later
+    assert process.stdout is not None and process.stderr is not None
+    try:
+        if not process.stdout.readline():  # it says that it listens, once it is compiled
+            raise RuntimeError(f"rtctl plant ended:\n{process.stderr.read()}")
+        yield
+    finally:
+        process.terminate()
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def cyclictest(rate: float, seconds: float, folder: Path) -> dict[str, float]:
+    """One window of cyclictest: percentiles in us, from a histogram with a bucket per nanosecond."""
+    report = folder / "cyclictest.json"
+    cpu = max(os.sched_getaffinity(0))
+    command = (
+        "cyclictest", "-m", "-p", str(PRIORITY), "-i", str(round(1e6 / rate)), "-a", str(cpu), "-t", "1",
+        "-h", str(LONGEST_NS), "-N", "-q", "-D", str(max(1, round(seconds))), f"--json={report}",
+    )  # fmt: skip
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    thread = json.loads(report.read_text())["thread"]["0"]
+    return {**percentiles(thread["histogram"], int(thread["cycles"])), "max": round(thread["max"] / 1000, 3)}
+
+
+def percentiles(histogram: dict[str, int], cycles: int) -> dict[str, float]:
+    """Percentiles in us, linear within the bucket that holds them; later than all buckets counts as LONGEST_NS."""
+    at = np.array(sorted(int(ns) for ns in histogram))
+    count = np.array([histogram[key] for key in sorted(histogram, key=int)])
+    if cycles > count.sum():
+        at, count = np.append(at, LONGEST_NS), np.append(count, cycles - count.sum())
+    cumulative = np.cumsum(count)
+    out = {}
+    for name, share in SHARES.items():
+        wanted = share * cumulative[-1]
+        i = int(np.searchsorted(cumulative, wanted))
+        before = cumulative[i] - count[i]
+        out[name] = round(float(at[i] + (wanted - before) / count[i]) / 1000, 3)
+    return out
+
+
+def median_of(values: list[dict[str, float]]) -> dict[str, float]:
+    """Median of each percentile over the windows."""
+    return {name: round(statistics.median(v[name] for v in values), 3) for name in values[0]}
+
+
+def ratio(a: list[dict[str, float]], b: list[dict[str, float]]) -> dict[str, float]:
+    """Median over the rounds of ours over theirs."""
+    return {n: round(statistics.median(x[n] / y[n] for x, y in zip(a, b, strict=True)), 3) for n in SHARES}
+
+
+def measure(machine: str, rate: float, seconds: float, rounds: int, folder: Path) -> dict[str, Any]:
+    """All windows and what they say."""
+    ours(machine, rate, "shm", 0.5, folder)  # compile where needed, outside the windows
+    ours(machine, rate, "zmq", 0.5, folder)
+    ours_at, load_at, bare_at, ticks, zmq, runs = [], [], [], [], [], []
+    for number in range(rounds):
+        windows = ["ours", "load", "bare"]
+        for window in windows if number % 2 == 0 else reversed(windows):
+            if window == "ours":
+                runs.append(ours(machine, rate, "shm", seconds, folder))
+                ours_at.append(runs[-1]["lateness_us"])
+                ticks.append(runs[-1]["tick_us"])
+            elif window == "load":
+                with plant(machine, rate, folder):
+                    load_at.append(cyclictest(rate, seconds, folder))
+            else:
+                bare_at.append(cyclictest(rate, seconds, folder))
+        zmq.append(ours(machine, rate, "zmq", seconds, folder))
+    return {
+        "machine": machine,
+        "rate_hz": rate,
+        "ratio_to_cyclictest": ratio(ours_at, load_at),
+        "ratio_to_bare_cyclictest": ratio(ours_at, bare_at),
+        "lateness_us": median_of(ours_at),
+        "cyclictest_us": median_of(load_at),
+        "bare_cyclictest_us": median_of(bare_at),
+        "tick_us": median_of(ticks),
+        "exchange_us": median_of([r["exchange_us"] for r in runs]),
+        "missed": sum(r["missed"] for r in runs),
+        "missed_inside": sum(r["overruns"] for r in runs),
+        "ticks": sum(r["ticks"] for r in runs),
+        "zmq": {
+            "sample_age_us": {n: v for n, v in median_of([r["sample_age_us"] for r in zmq]).items() if n in ("p50", "p99")},
+            "exchange_us": median_of([r["exchange_us"] for r in zmq]),
+            "lateness_us": median_of([r["lateness_us"] for r in zmq]),
+            "missed": sum(r["missed"] for r in zmq),
+            "missed_inside": sum(r["overruns"] for r in zmq),
+            "ticks": sum(r["ticks"] for r in zmq),
+        },
+        "rounds": rounds,
+        "seconds": seconds,
+        "windows": {"ours": ours_at, "load": load_at, "bare": bare_at},
+        "lacks": runs[-1]["lacks"],
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--machine", choices=sorted(RATES), default="ldu")
+    parser.add_argument("--rate", type=float, help="Hz; that of the shipped config if not given")
+    parser.add_argument("--seconds", type=float, default=5.0, help="length of a window, whole seconds for cyclictest")
+    parser.add_argument("--rounds", type=int, default=5)
+    given = parser.parse_args()
+    reason = why_not()
+    if reason is not None:
+        print(json.dumps({"skipped": reason}) if given.json else f"skipped: {reason}")
+        return 3
+    rate = given.rate or RATES[given.machine]
+    with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as folder:
+        result = measure(given.machine, rate, given.seconds, given.rounds, Path(folder))
+    if given.json:
+        print(json.dumps(result))
+        return 0
+    for title, key in (("ours", "lateness_us"), ("cyclictest, plant beside it", "cyclictest_us"), ("cyclictest alone", "bare_cyclictest_us"),
+                       ("ratio, plant beside it", "ratio_to_cyclictest"), ("ratio, alone", "ratio_to_bare_cyclictest"), ("tick", "tick_us")):  # fmt: skip
+        print(f"{title:28s}" + "  ".join(f"{n} {result[key][n]:8.2f}" for n in SHARES))
+    print(f"missed {result['missed']} of {result['ticks']} ticks, {result['missed_inside']} of them by the tick itself")
+    z = result["zmq"]
+    print(f"zmq: sample age p50 {z['sample_age_us']['p50']} p99 {z['sample_age_us']['p99']} us, missed {z['missed']}, "
+          f"{z['missed_inside']} by the tick itself")  # fmt: skip
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,101 @@
+"""Time from `rtctl run` to the first tick on the wall clock.
+
+    python benchmarks/startup.py [--json] [--machine ivu|ldu] [--repeats N] [--cold]
+
+The clock is read before the process is started. The loop writes the time of its first tick into the machine's shared
+segment (`first_ns` of the status), from the same clock, CLOCK_MONOTONIC; this program maps the segment and reads it.
+So the time has all in it: Python's imports, the config, compiled code from the cache, plant and loop as processes of
+their own, and the hello of the link. `--cold` starts once more with an empty RTCTL_CACHE_DIR, so that the tick and the
+plant are compiled first.
+"""
+
+import argparse
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from lateness import CONFIGS, rtctl_command
+
+from rtctl.loop.memory import Segment
+from rtctl.loop.records import STATUS
+
+LIMIT = 300.0  # s
+
+
+def start(machine: str, link: str, folder: Path, cache: Path | None) -> float:
+    """Seconds to the first tick of one run, which is stopped then. Raises RuntimeError where none comes."""
+    name = f"start-{os.getpid()}"
+    segment = Path("/dev/shm") / f"rtctl-{os.getuid()}-{name}"
+    command = (
+        *rtctl_command(), "run", str(CONFIGS / f"{machine}.yaml"), "--mode", "real", "--link", link, "--set",
+        f"name={name}", "--json", "--no-plot", "--out", str(folder / f"bundle-{time.monotonic_ns()}"),
+    )  # fmt: skip
+    environment = {**os.environ, **({"RTCTL_CACHE_DIR": str(cache)} if cache is not None else {})}
+    before = time.monotonic_ns()
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    try:
+        while time.monotonic_ns() - before < LIMIT * 1e9:
+            first = first_tick(segment)
+            if first:
+                return (first - before) * 1e-9
+            if process.poll() is not None:
+                break
+            time.sleep(0.005)
+    finally:
+        process.send_signal(signal.SIGINT)
+        error = process.communicate(timeout=60)[1]
+    raise RuntimeError(f"no tick came:\n{error}")
+
+
+def first_tick(path: Path) -> int:
+    """Clock at the first tick in ns; 0 where it has not come yet."""
+    try:
+        size = path.stat().st_size
+        if size < STATUS.itemsize:
+            return 0
+        status = Segment.open(path, {"status": (STATUS, 1), "rest": (_bytes(size), 1)})["status"][0]
+    except (FileNotFoundError, ValueError):
+        return 0
+    return int(status["first_ns"]) if status["ready"] else 0
+
+
+def _bytes(size: int) -> Any:
+    """Whatever follows the status, so that the layout has the size of the file."""
+    import numpy as np
+
+    return np.dtype((np.void, size - -(-STATUS.itemsize // 64) * 64))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--machine", choices=("ivu", "ldu"), default="ivu")
+    parser.add_argument("--link", choices=("zmq", "shm"), default="zmq")
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--cold", action="store_true", help="once more, with everything to compile")
+    given = parser.parse_args()
+    result: dict[str, Any] = {"machine": given.machine, "link": given.link}
+    with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as folder:
+        start(given.machine, given.link, Path(folder), None)  # compiles where needed
+        warm = [start(given.machine, given.link, Path(folder), None) for _ in range(given.repeats)]
+        result["warm_s"] = round(statistics.median(warm), 3)
+        result["warm_range_s"] = [round(min(warm), 3), round(max(warm), 3)]
+        if given.cold:
+            result["cold_s"] = round(start(given.machine, given.link, Path(folder), Path(folder) / "cache"), 2)
+    if given.json:
+        print(json.dumps(result))
+    else:
+        print(f"{given.machine} over {given.link}: {result['warm_s']:.2f} s from the command to the first tick"
+              + (f", {result['cold_s']:.1f} s with everything to compile" if given.cold else ""))  # fmt: skip
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
