@@ -164,7 +164,9 @@ def measure(machine: str, rate: float, seconds: float, rounds: int, folder: Path
         "missed_inside": sum(r["overruns"] for r in runs),
         "ticks": sum(r["ticks"] for r in runs),
         "zmq": {
-            "sample_age_us": {n: v for n, v in median_of([r["sample_age_us"] for r in zmq]).items() if n in ("p50", "p99")},
+            "sample_age_us": {
+                n: v for n, v in median_of([r["sample_age_us"] for r in zmq]).items() if n in ("p50", "p99")
+            },
             "exchange_us": median_of([r["exchange_us"] for r in zmq]),
             "lateness_us": median_of([r["lateness_us"] for r in zmq]),
             "missed": sum(r["missed"] for r in zmq),

@@ -62,7 +62,9 @@ def _arm_and_play(_: Any, command: Any) -> None:
 class Reference:
     """The C program for the same machine: same parameters, same matrices, same row, its own code."""
 
-    def __init__(self, machine: machines.Machine, row: np.dtype, rows: int, folder: Path, flags: tuple[str, ...] = ("-O2",)):
+    def __init__(
+        self, machine: machines.Machine, row: np.dtype, rows: int, folder: Path, flags: tuple[str, ...] = ("-O2",)
+    ):
         self.machine = machine
         source = HERE / f"reference_{machine.kind}.c"
         library = folder / f"{source.stem}{''.join(flags)}.so"
@@ -79,7 +81,9 @@ class Reference:
             for list_, dtype in (("reals", np.float64), ("wholes", np.int64))
         )
         self._matrices = _matrices(machine)
-        self._tables = tuple(np.ascontiguousarray(a) for a in (machine.reference.t, machine.reference.r, machine.excitation.x))
+        self._tables = tuple(
+            np.ascontiguousarray(a) for a in (machine.reference.t, machine.reference.r, machine.excitation.x)
+        )
         self.reset()
 
     def _names(self, list_: str) -> list[str]:
@@ -92,7 +96,9 @@ class Reference:
         body = text[text.index("struct row {") :].split("}")[0].replace("\n", " ")
         written = [name for part in body.split("{")[1].split(";") for name in part.replace(",", " ").split()[1:]]
         if written != list(row.names or ()):
-            raise ValueError(f"reference_{self.machine.kind}.c: struct row has {written}, the trace {list(row.names or ())}")
+            raise ValueError(
+                f"reference_{self.machine.kind}.c: struct row has {written}, the trace {list(row.names or ())}"
+            )
 
     def reset(self) -> None:
         """Everything at rest again."""

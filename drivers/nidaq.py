@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
+
 from rtctl.drivers import at_mio_16de as mio
 from rtctl.drivers import daq_stc
 

@@ -110,8 +110,19 @@ class IvuParams(NamedTuple):
     drive: np.ndarray  # (2, 4) of each driver: gain A/V, natural frequency rad/s, damping, zero s
 
 
-IVU_STATE = state(m=linear.machine_state(NQ, NX, NU), R1=float, R2=float, J1=float, J2=float, R1_lin=float, R2_lin=float,
-                  J1_lin=float, J2_lin=float, T1=float, T2=float)  # fmt: skip
+IVU_STATE = state(
+    m=linear.machine_state(NQ, NX, NU),
+    R1=float,  # m, now
+    R2=float,
+    J1=float,  # kg m^2, now
+    J2=float,
+    R1_lin=float,  # and when the matrices were last taken
+    R2_lin=float,
+    J1_lin=float,
+    J2_lin=float,
+    T1=float,  # N
+    T2=float,
+)
 
 
 def parameters(settings: IvuSettings) -> IvuParameters:

@@ -46,7 +46,9 @@ class LduParameters(Settings):
     K_m2: float = quantity(5e-8, unit="Nms/rad", ge=0, help="speed/torque gradient of the motor")
     B_c: float = quantity(1e-6, unit="Nms/rad", ge=0, help="viscous friction of the capstan's bearing")
     B_m: float = quantity(0.5, unit="N*s/m", ge=0, help="viscous friction of the carriage")
-    F_c: float = quantity(7.3, unit="N", ge=0, help="dry friction of the carriage: breaks away at 0.88 to 0.93 V (12.6)")
+    F_c: float = quantity(
+        7.3, unit="N", ge=0, help="dry friction of the carriage: breaks away at 0.88 to 0.93 V (12.6)"
+    )
 
 
 SETS = {

@@ -27,5 +27,7 @@ class Term:
     act: str
     nodes: dict[str, tuple[str, ...]]  # plant kind -> nodes where it can stand
     look_alikes: dict[str, str]  # rival name -> the experiment that separates the two
-    typical: dict[str, tuple[float, float]] = field(default_factory=dict)  # parameter -> range; friction in base friction
+    typical: dict[str, tuple[float, float]] = field(
+        default_factory=dict
+    )  # parameter -> range; friction in base friction
     state: np.dtype | None = None

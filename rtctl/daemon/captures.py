@@ -33,7 +33,9 @@ class Captures:
         if pre > PRE_SECONDS:
             raise UserError(f"pre is {pre:g} s; {PRE_SECONDS:g} s before the trigger is the most that is kept")
         names = [c.name for c in self._columns]
-        capture = Capture(seconds, pre, Trigger(trigger, names) if trigger else None, self._rate)
+        if pre >= seconds:
+            raise UserError(f"pre is {pre:g} s of {seconds:g} s; it must leave something after the trigger")
+        capture = Capture(seconds - pre, pre, Trigger(trigger, names) if trigger else None, self._rate)
         self._number += 1
         stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
         folder = Path(out) if out else Path("runs") / f"{name}-capture-{stamp}-{self._number}"
@@ -44,7 +46,7 @@ class Captures:
         identity = str(self._number)
         self._running[identity] = (capture, recorder)
         if self._history:
-            self._take(identity, np.concatenate(self._history)[-int(PRE_SECONDS * self._rate) :])
+            capture.prime(np.concatenate(self._history)[-int(PRE_SECONDS * self._rate) :])
         return self.status(identity)
 
     def feed(self, rows: np.ndarray) -> None:
@@ -99,10 +101,15 @@ class Captures:
 
     def _finish(self, identity: str) -> None:
         capture, recorder = self._running.pop(identity)
-        entry: dict[str, Any] = {"id": identity, "done": True, "triggered": capture.trigger_tick is not None, "bundle": str(recorder.folder)}
+        entry: dict[str, Any] = {
+            "id": identity,
+            "done": True,
+            "triggered": capture.trigger_tick is not None,
+            "bundle": str(recorder.folder),
+        }
         try:
             recorder.finish()
             entry["rows"] = recorder.stats().rows_written
         except OSError as error:
-            entry["error"] = f"{recorder.folder}: {error.strerror}; what is there can be had with `rtctl trace repair`"
+            entry["error"] = f"{recorder.folder}: {error}; what is there can be had with `rtctl trace repair`"
         self._done[identity] = entry

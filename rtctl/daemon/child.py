@@ -4,6 +4,7 @@ Orders are one JSON object on the command line. Reports are JSON lines on standa
 from the supervisor that carries nothing: its end means that the supervisor is gone.
 """
 
+import contextlib
 import json
 import os
 import select
@@ -35,10 +36,8 @@ def orders(argv: list[str]) -> dict[str, Any]:
 
 def report(event: str, **values: Any) -> None:
     """Tell the supervisor, one line at a time. A supervisor that is gone is not an error here."""
-    try:
+    with contextlib.suppress(OSError):
         print(json.dumps({"event": event, **values}), flush=True)
-    except OSError:
-        pass
 
 
 def machine_from(order: dict[str, Any]) -> Machine:

@@ -1,13 +1,12 @@
 """Starting the loop and the plant as processes of their own, and reading what they report."""
 
+import contextlib
 import json
 import os
 import subprocess
 import sys
 from collections import deque
 from typing import Any
-
-from rtctl.config.errors import UserError
 
 
 class ChildProcess:
@@ -60,10 +59,8 @@ class ChildProcess:
     def stop(self, timeout: float = 5.0) -> None:
         """Close its pipe and wait; what does not end by itself is killed."""
         if self.process.stdin is not None and not self.process.stdin.closed:
-            try:
+            with contextlib.suppress(OSError):
                 self.process.stdin.close()
-            except OSError:
-                pass
         try:
             self.process.wait(timeout)
         except subprocess.TimeoutExpired:
@@ -82,10 +79,3 @@ def _read(fd: int) -> bytes | None:
         return os.read(fd, 65536)
     except (BlockingIOError, ValueError):
         return None
-
-
-def raise_for(child: ChildProcess, report: dict[str, Any]) -> None:
-    """Turn an `error` report into the exception that it stands for."""
-    if report["event"] == "error":
-        raise UserError(report["message"])
-    del child

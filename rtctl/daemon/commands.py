@@ -4,12 +4,12 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rtctl import machines
-from rtctl.config.errors import UserError, nearest
+from rtctl.config.errors import UserError
 from rtctl.config.load import get_path, set_path
 from rtctl.config.units import convert
 from rtctl.daemon.protocol import Args
 from rtctl.idiom import fill_record
-from rtctl.loop import generate
+from rtctl.loop import generate, safety
 
 if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
@@ -32,8 +32,8 @@ class Commands:
 
     def watch_commander(self) -> None:
         """Tell the loop when nobody has talked to the command socket for too long, where the config requires it."""
-        safety = self._of.config.safety
-        lost = int(safety.require_commander and time.monotonic() - self._last_heard > safety.commander_timeout)
+        limits = self._of.config.safety
+        lost = int(limits.require_commander and time.monotonic() - self._last_heard > limits.commander_timeout)
         if lost != self._commander_lost:
             self._commander_lost = lost
             self._post(commander_lost=lost)
@@ -50,9 +50,6 @@ class Commands:
         command = self._of.segment["mailbox"][0]["command"]
         return self._post(**{name: int(command[name]) + 1})
 
-    def _ping(self) -> dict[str, Any]:
-        return {"name": self._of.config.name}
-
     def _status(self) -> dict[str, Any]:
         row = self._of.last_row
         signals = {} if row is None else {n: float(row[n]) for n in row.dtype.names}
@@ -62,7 +59,7 @@ class Commands:
         return {"signals": [{"name": c.name, "unit": c.unit, "help": c.help} for c in self._of.made.columns]}
 
     def _arm(self) -> dict[str, Any]:
-        if int(self._of.status["state"]) == 3:
+        if int(self._of.status["state"]) == safety.TRIPPED:
             raise UserError("the machine has tripped; look at `rtctl status`, then `rtctl reset` and arm again")
         return self._count("arm")
 
@@ -78,16 +75,18 @@ class Commands:
 
     def _play(self) -> dict[str, Any]:
         """Play the reference table from its start, as soon as the machine runs."""
+        self._refuse_when_off()
         return self._count("play")
 
     def _setpoint(self, value: float, name: str | None = None, unit: str | None = None, ramp: float | None = None,
                   ramp_unit: str | None = None) -> dict[str, Any]:  # fmt: skip
         if name not in (None, "position"):
             raise UserError(f"this machine has no setpoint '{name}'; it has 'position'")
-        if int(self._of.status["state"]) not in (1, 2):
-            raise UserError("outputs are off; `rtctl arm` first")
+        self._refuse_when_off()
         target = self._in_own_unit(value, unit)
-        rate = 0.0 if ramp is None else abs(self._in_own_unit(ramp, ramp_unit.removesuffix("/s") if ramp_unit else unit))
+        rate = (
+            0.0 if ramp is None else abs(self._in_own_unit(ramp, ramp_unit.removesuffix("/s") if ramp_unit else unit))
+        )
         seq = int(self._of.segment["mailbox"][0]["command"]["setpoint"]["seq"]) + 1
 
         def write(_: Any, command: Any) -> None:
@@ -97,6 +96,10 @@ class Commands:
 
         self._of.mailbox.post(write)
         return {"tick": int(self._of.status["tick"]), "target": target, "unit": self._of.machine.unit, "rate": rate}
+
+    def _refuse_when_off(self) -> None:
+        if int(self._of.status["state"]) not in (safety.ARMED, safety.RUNNING):
+            raise UserError("outputs are off; `rtctl arm` first")
 
     def _in_own_unit(self, value: float, unit: str | None) -> float:
         """A length or an angle in the unit of this machine's reference."""
@@ -126,7 +129,9 @@ class Commands:
         except ValueError as error:
             raise UserError(f"{path}: {error}") from error
         if generate.source(machine, self._of.link) != generate.source(self._of.machine, self._of.link):
-            raise UserError(f"{path} changes the structure of the tick; stop the machine and start it with --set {path}=...")
+            raise UserError(
+                f"{path} changes the structure of the tick; stop the machine and start it with --set {path}=..."
+            )
         gains = int(self._of.segment["mailbox"][0]["command"]["gains"]) + 1
 
         def write(params: Any, command: Any) -> None:
@@ -140,7 +145,9 @@ class Commands:
         self._of.note_change(path, value)
         return {"path": path, "value": value, "tick": int(self._of.status["tick"])}
 
-    def _capture(self, seconds: float, pre: float = 0.0, trigger: str | None = None, out: str | None = None) -> dict[str, Any]:
+    def _capture(
+        self, seconds: float, pre: float = 0.0, trigger: str | None = None, out: str | None = None
+    ) -> dict[str, Any]:
         return self._of.captures.start(seconds, pre, trigger, out, self._of.config.name)
 
     def _capture_status(self, id: str) -> dict[str, Any]:
@@ -148,10 +155,3 @@ class Commands:
 
     def _capture_stop(self, id: str) -> dict[str, Any]:
         return self._of.captures.end(id)
-
-
-def known(name: str, names: list[str], what: str) -> None:
-    """Raise UserError where `name` is none of `names`, with the nearest."""
-    if name not in names:
-        near = nearest(name, names)
-        raise UserError(f"no {what} '{name}'" + (f"; did you mean '{near}'?" if near else f"; there is {', '.join(names)}"))

@@ -3,6 +3,7 @@
 Python runs before and after the compiled loop and, on virtual time, between its stretches; never during them.
 """
 
+import contextlib
 import os
 import sys
 import time
@@ -153,10 +154,8 @@ def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoi
                 return
             time.sleep(0.001)
             continue
-        try:
+        with contextlib.suppress(zmq.Again):
             socket.send(hello.tobytes(), zmq.DONTWAIT)
-        except zmq.Again:
-            pass
         if socket.poll(200, zmq.POLLIN):
             if mode == "real":  # what waited for us is old by now
                 while socket.poll(0):
@@ -165,8 +164,8 @@ def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoi
                     continue
             return
     raise UserError(
-        f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, or leave "
-        "link.endpoint out to have one started"
+        f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, "
+        "or leave link.endpoint out to have one started"
     )
 
 

@@ -1,5 +1,6 @@
 """The emulated machine's process: `python -m rtctl.daemon.plant_process ORDERS`, or `rtctl plant CONFIG` by itself."""
 
+import contextlib
 import os
 import sys
 from typing import Any
@@ -26,12 +27,13 @@ class Plant:
         p, s = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
         generate.fill(p[0], machine.plant_diagram.blocks)
         self.status = status
-        arguments = (status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp)
+        arguments: tuple[Any, ...] = (status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp)
         if machine.config.loop.mode == "lockstep":
-            self._entry, self._arguments = made.module.plant_lockstep, arguments
+            self._entry = made.module.plant_lockstep
         else:
-            period = round(machine.plant_period * SECOND)
-            self._entry, self._arguments = made.module.plant_real, (*arguments, period, MOST_BEHIND)
+            self._entry = made.module.plant_real
+            arguments = (*arguments, round(machine.plant_period * SECOND), MOST_BEHIND)
+        self._arguments = arguments
         generate.warm(self._entry, self._arguments)
 
     def run(self) -> None:
@@ -81,10 +83,8 @@ def main(argv: list[str]) -> int:
 
     child.watch_parent(stop, stop)
     if order.get("cpu") is not None:
-        try:
+        with contextlib.suppress(OSError):  # it runs anywhere; only its samples come a little later
             os.sched_setaffinity(0, {order["cpu"]})
-        except OSError:
-            pass  # the emulator runs anywhere; only its samples come a little later
     if order["link"] == "zmq":
         serve(machine, order["endpoint"], status, lambda: child.report("listening"))
     else:

@@ -14,7 +14,12 @@ class Session:
     """One `rtctl run`. `length` in s ends it; None leaves that to `stop`, Ctrl-C or a trip."""
 
     def __init__(
-        self, config: Any, out: Path | None, length: float | None, arm: bool = True, say: Callable[[str], None] = lambda _: None
+        self,
+        config: Any,
+        out: Path | None,
+        length: float | None,
+        arm: bool = True,
+        say: Callable[[str], None] = lambda _: None,
     ):
         ticks = 0 if length is None else max(1, round(length * config.loop.rate))
         if config.loop.mode == "fused" and not ticks:

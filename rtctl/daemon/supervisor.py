@@ -36,7 +36,7 @@ from rtctl.loop.ring import Reader
 from rtctl.trace.recorder import Recorder
 
 log = structlog.get_logger()
-TURN = 0.01  # s between two turns of the supervisor on the wall clock
+TURN_MS = 10  # between two turns of the supervisor on the wall clock
 START_TIMEOUT = 180.0  # s; a cold cache compiles for some ten seconds
 SHM = Path("/dev/shm")
 
@@ -229,7 +229,7 @@ class Supervisor:
         poller.register(self.server.socket, zmq.POLLIN)
         while self.turn():
             yield
-            poller.poll(1 if virtual else TURN * 1000)
+            poller.poll(1 if virtual else TURN_MS)
 
     # what others ask
 
@@ -271,7 +271,12 @@ class Supervisor:
         if self.recorder is None:
             return {}
         stats = self.recorder.stats()
-        return {"recorded": stats.rows_written, "queued": stats.rows_queued, "lost": stats.rows_lost, "error": stats.error}
+        return {
+            "recorded": stats.rows_written,
+            "queued": stats.rows_queued,
+            "lost": stats.rows_lost,
+            "error": stats.error,
+        }
 
     def _measured_rate(self) -> float | None:
         if self.last_row is None or self.last_row["t"] <= 0:

@@ -3,7 +3,8 @@
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+
+from rtctl.loop.memory import intrinsic
 
 CLOCK_MONOTONIC = 1
 TIMER_ABSTIME = 1
@@ -15,10 +16,10 @@ _POINTER = _TIMESPEC.as_pointer()
 
 
 @intrinsic
-def now(typing_context):  # type: ignore[no-untyped-def]
+def now(typing_context):
     """Time in ns: clock_gettime(CLOCK_MONOTONIC), a vDSO call without a system call."""
 
-    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+    def codegen(context, builder, signature, args):
         function = cgutils.get_or_insert_function(
             builder.module, ir.FunctionType(_I32, [_I32, _POINTER]), "clock_gettime"
         )
@@ -33,10 +34,10 @@ def now(typing_context):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def sleep_until(typing_context, wake):  # type: ignore[no-untyped-def]
+def sleep_until(typing_context, wake):
     """Sleep until `wake` in ns: clock_nanosleep(TIMER_ABSTIME), so that no drift adds up. Returns 0, or EINTR."""
 
-    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+    def codegen(context, builder, signature, args):
         function = cgutils.get_or_insert_function(
             builder.module, ir.FunctionType(_I32, [_I32, _I32, _POINTER, _POINTER]), "clock_nanosleep"
         )

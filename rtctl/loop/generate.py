@@ -76,14 +76,16 @@ def source(machine: Machine, link: str) -> str:
     imports = "\n".join(f"from {m.rpartition('.')[0]} import {m.rpartition('.')[2]}" for m in modules)
     parts = [
         HEADER.format(
-            title=f"The tick of {machine.kind}: {len(loop.stages)} stages at {machine.rate:g} Hz, and its emulated plant.",
+            title=f"The tick of {machine.kind}: {len(loop.stages)} stages, and its emulated plant.",
             version=__version__,
             link=link,
             machine="rtctl.machines",
             machine_name=machine.kind,
             imports=imports,
         ),
-        _function("tick", "p, s, t, c, rx, tx, y, k, fresh, late", "One tick of the loop.", (*loop.stages, *_extras(machine))),
+        _function(
+            "tick", "p, s, t, c, rx, tx, y, k, fresh, late", "One tick of the loop.", (*loop.stages, *_extras(machine))
+        ),
         _function("start", "p, s", "The emulated machine at rest.", (("", plant.start),)),
         _advance(plant.advance, machine.substeps),
         _function("sample", "p, s, rx", "What the board reads now.", plant.sample),
@@ -195,7 +197,11 @@ def warm(entry: Any, arguments: tuple[Any, ...]) -> None:
 def generate(machine: Machine, link: str) -> Generated:
     """Write and load the tick of a machine for a link, `zmq` or `shm`."""
     path = write(machine, link)
-    columns = (*machine.diagram.columns, *machine.truth, *(Column(_traced(n), "", f"state {n}") for n in machine.config.record.trace))
+    columns = (
+        *machine.diagram.columns,
+        *machine.truth,
+        *(Column(_traced(n), "", f"state {n}") for n in machine.config.record.trace),
+    )
     row = np.dtype([(c.name, np.int64 if c.name == "tick" else np.float64) for c in columns], align=True)
     return Generated(
         machine=machine,

@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
+from numba import extending, types
 
+intrinsic: Any = extending.intrinsic  # it drops its first argument, which its annotations do not say
 ALIGN = 64  # one cache line: two writers never share one
 
 
 @intrinsic
-def fence(typing_context):  # type: ignore[no-untyped-def]
+def fence(typing_context):
     """A full memory fence: what is written before it is seen before what is written after it."""
 
-    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+    def codegen(context, builder, signature, args):
         builder.fence("seq_cst")
         return ir.Constant(ir.IntType(64), 0)
 
@@ -61,7 +61,9 @@ class Segment:
         try:
             size = os.fstat(fd).st_size
             if size != _size(layout):
-                raise ValueError(f"{path}: {size} bytes, but this config needs {_size(layout)}; it is of another version")
+                raise ValueError(
+                    f"{path}: {size} bytes, but this config needs {_size(layout)}; it is of another version"
+                )
             return cls(path, layout, mmap.mmap(fd, size))
         finally:
             os.close(fd)

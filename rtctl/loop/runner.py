@@ -1,6 +1,6 @@
 """The loops. The generator copies them into the generated module, beneath the `tick` and the plant that it wrote.
 
-What stands here is the loop as it runs; only `tick`, `start`, `advance`, `sample` and `link` are the generated module's.
+What stands here is the loop as it runs; `tick`, `start`, `advance`, `sample` and `link` are the generated module's.
 """
 
 from typing import Any
@@ -14,7 +14,28 @@ sample: Any = None
 link: Any = None  # rtctl.loop.zmq_link or shm_link
 
 
-def run_real(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_staged, out, inp, period, spin, late_ns, ahead, most):
+def run_real(
+    status,
+    box,
+    tables,
+    ring_,
+    rows,
+    p,
+    s,
+    c,
+    staged,
+    y,
+    tx,
+    rx,
+    rx_staged,
+    out,
+    inp,
+    period,
+    spin,
+    late_ns,
+    ahead,
+    most,
+):
     """Wake, tick, sleep, on the wall clock, until told to stop or `most` ticks are done."""
     st = status[0]
     for _ in range(1000):  # samples that waited for us are old
@@ -75,7 +96,9 @@ def run_real(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_st
     st.ended = 1
 
 
-def run_lockstep(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_staged, held, out, inp, period, ahead, first, most):
+def run_lockstep(
+    status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_staged, held, out, inp, period, ahead, first, most
+):
     """Loop and plant take turns on a virtual clock: wait for a sample, tick, send what acts until the next."""
     st = status[0]
     for k in range(first, first + most):

@@ -5,6 +5,8 @@ A slot is a sequence lock: odd while it is written. Whoever reads takes the newe
 Source: futex(2).
 """
 
+from typing import Any
+
 import numpy as np
 from numba import types
 
@@ -16,7 +18,7 @@ SYS_FUTEX = 202  # x86-64
 WAIT, WAKE = 0, 1
 TIMEOUT_NS = 5_000_000_000
 
-syscall = types.ExternalFunction(
+syscall: Any = types.ExternalFunction(
     "syscall", types.int64(types.int64, types.intp, types.int64, types.int64, types.intp, types.intp, types.int64)
 )
 

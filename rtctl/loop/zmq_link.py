@@ -6,8 +6,8 @@ gone costs frames, not time. The libzmq is the one inside the pyzmq wheel, made 
 Source: zmq_send(3), zmq_recv(3); thread safety: the handle stays with the thread that runs the loop.
 """
 
-import glob
 from pathlib import Path
+from typing import Any
 
 import llvmlite.binding
 import zmq
@@ -19,16 +19,16 @@ from rtctl.loop import frames
 DONTWAIT = 1
 MOST = 64  # frames drained in one tick: a peer that floods us cannot hold the tick
 
-zmq_send = types.ExternalFunction("zmq_send", types.int32(types.intp, types.intp, types.uintp, types.int32))
-zmq_recv = types.ExternalFunction("zmq_recv", types.int32(types.intp, types.intp, types.uintp, types.int32))
+zmq_send: Any = types.ExternalFunction("zmq_send", types.int32(types.intp, types.intp, types.uintp, types.int32))
+zmq_recv: Any = types.ExternalFunction("zmq_recv", types.int32(types.intp, types.intp, types.uintp, types.int32))
 
 
 def load() -> None:
     """Make libzmq's functions known to compiled code. Raises OSError where the wheel holds no libzmq."""
     root = Path(zmq.__file__).parent
-    for pattern in (root.parent / "pyzmq.libs" / "libzmq*", root / "libzmq*", root / ".dylibs" / "libzmq*"):
-        for found in glob.glob(str(pattern)):
-            llvmlite.binding.load_library_permanently(found)
+    for folder in (root.parent / "pyzmq.libs", root, root / ".dylibs"):
+        for found in folder.glob("libzmq*"):
+            llvmlite.binding.load_library_permanently(str(found))
             return
     import ctypes.util
 

@@ -1,6 +1,6 @@
 """One axis: a drive that takes volts, an encoder, and a cascade of position and speed. The plainest bench.
 
-    reference -> shaper -> error -> PD or PI with velocity feedback -> limit
+reference -> shaper -> error -> PD or PI with velocity feedback -> limit
 """
 
 from typing import Literal, NamedTuple
@@ -12,7 +12,7 @@ from rtctl.drivers import at_mio_16de, daq_stc, linear_scale
 from rtctl.drivers.at_mio_16de import AnalogOutputSettings
 from rtctl.drivers.linear_scale import LinearScaleSettings
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.laws import bumpless, excitation, limit, reference, shaper, velocity
+from rtctl.laws import bumpless, limit, reference, shaper, velocity
 from rtctl.laws.bumpless import BumplessSettings
 from rtctl.laws.excitation import ExcitationSettings, NoneSettings
 from rtctl.laws.limit import LimitSettings
@@ -146,7 +146,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
         Block("reference", None, reference.REFERENCE_STATE),
         Block("shaper", shaper.build(law.shaper, dt), shaper.SHAPER_STATE),
         Block("velocity", velocity.build(law.velocity, dt), velocity.VELOCITY_STATE),
-        Block("position", build(law.position, dt), law_state),  # type: ignore[arg-type]
+        Block("position", build(law.position, dt), law_state),
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
         Block("limit", limit.build(law.limit, dt), limit.LIMIT_STATE),
         Block("output", at_mio_16de.build_output(config.output, dt), None),
@@ -259,5 +259,3 @@ def plant_diagram(config: AxisConfig, period: float, seed: int) -> PlantDiagram:
         advance=advance,
         sample=sample,
     )
-
-

@@ -5,17 +5,15 @@ Block diagram of the tick, thesis figure 5.1:
     reference -> shaper -> error -> PD -> + friction + excitation -> allocation to two motors (+ tension) -> limits
 """
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from rtctl.drivers import at_mio_16de, daq_stc, l292, ls7084, optical_sensor
-from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.drivers import at_mio_16de, daq_stc, ls7084, optical_sensor
+from rtctl.idiom import state, tick
 from rtctl.laws import (
     allocation,
     bumpless,
-    excitation,
     friction_feedforward,
     gain_schedule,
     inertia_feedforward,
@@ -28,23 +26,6 @@ from rtctl.laws import (
     tension_estimate,
     velocity,
 )
-from rtctl.laws.allocation import AllocationSettings
-from rtctl.drivers.at_mio_16de import AnalogInputSettings, AnalogOutputSettings
-from rtctl.laws.bumpless import BumplessSettings
-from rtctl.laws.excitation import ExcitationSettings, NoneSettings
-from rtctl.laws.friction_feedforward import FrictionFeedforwardSettings
-from rtctl.laws.gain_schedule import GainScheduleSettings
-from rtctl.drivers.l292 import L292Settings
-from rtctl.laws.inertia_feedforward import InertiaFeedforwardSettings
-from rtctl.laws.limit import LimitSettings
-from rtctl.drivers.ls7084 import Ls7084Settings
-from rtctl.drivers.optical_sensor import OpticalSensorSettings
-from rtctl.laws.pd import PdSettings
-from rtctl.laws.reel_radius import ReelRadiusSettings
-from rtctl.laws.reference import ReferenceSettings
-from rtctl.laws.shaper import ShaperSettings
-from rtctl.laws.tension import TensionSettings
-from rtctl.laws.tension_estimate import TensionEstimateSettings
 from rtctl.laws.velocity import VelocitySettings
 from rtctl.loop import safety
 from rtctl.machines.base import (
@@ -54,93 +35,11 @@ from rtctl.machines.base import (
     Block,
     Column,
     Diagram,
-    MachineSettings,
-    PlantDiagram,
-    physics_lines,
 )
-from rtctl.machines.physics import PhysicsTerm, check_nodes
-from rtctl.plants import ivu as plant_ivu
+from rtctl.machines.ivu_plant import plant_diagram, substeps
+from rtctl.machines.ivu_settings import IvuConfig
 
-
-class BoardSettings(Settings):
-    """AT-MIO-16DE-10: outputs 0 and 1 to the drivers, counter 0 on the capstan, two inputs on the reel sensors."""
-
-    output1: AnalogOutputSettings = AnalogOutputSettings(channel=0)
-    output2: AnalogOutputSettings = AnalogOutputSettings(channel=1)
-    reel1: AnalogInputSettings = AnalogInputSettings(channel=0, polarity="unipolar", gain=1)
-    reel2: AnalogInputSettings = AnalogInputSettings(channel=1, polarity="unipolar", gain=1)
-    dither: bool = Field(default=False, description="0.5 LSB rms of noise on every analog input")
-
-
-class SensorSettings(Settings):
-    capstan: Ls7084Settings = Ls7084Settings(lines=2500)
-    reel1: OpticalSensorSettings = OpticalSensorSettings()
-    reel2: OpticalSensorSettings = OpticalSensorSettings()
-
-
-class RadiusSettings(Settings):
-    """Reel radii that the laws use: given, or measured when the machine is armed (5.2, 6.2)."""
-
-    source: Literal["given", "measured"] = Field(default="given", description="given: R1 and R2 below; measured: at arming")
-    R1: float = quantity(0.038, unit="m", gt=0.005, le=0.2, help="radius of reel 1")
-    R2: float = quantity(0.022, unit="m", gt=0.005, le=0.2, help="radius of reel 2")
-    d_tape: float = quantity(0.5e-3, unit="m", ge=0, help="thickness of the tape, by which the radii follow it")
-    measure: ReelRadiusSettings = ReelRadiusSettings()
-
-
-class FrictionSettings(Settings):
-    """Friction compensation: of the motor that winds, always; of the one that pays out, while it turns."""
-
-    motor1: FrictionFeedforwardSettings = FrictionFeedforwardSettings(
-        tau_C=2.4e-3
-    )
-    motor2: FrictionFeedforwardSettings = FrictionFeedforwardSettings(
-        tau_C=2.4e-3
-    )
-    speed: float = quantity(0.3, unit="rad/s", gt=0, help="reference speed at which the paying motor is fully compensated")
-    hand_over: float = quantity(
-        0.6, unit="", ge=0, le=1, help="share of the paying motor's friction that the winding one takes at standstill"
-    )
-
-
-class IvuLawSettings(Settings):
-    shaper: ShaperSettings = ShaperSettings()
-    position: PdSettings
-    gain_schedule: GainScheduleSettings = GainScheduleSettings()
-    friction: FrictionSettings = FrictionSettings()
-    inertia: InertiaFeedforwardSettings = InertiaFeedforwardSettings()
-    tension: TensionSettings = TensionSettings()
-    allocation: AllocationSettings = AllocationSettings()
-    limit: LimitSettings = LimitSettings()
-    bumpless: BumplessSettings = BumplessSettings()
-    velocity: VelocitySettings = VelocitySettings(filter=30.0)
-    tension_estimate: TensionEstimateSettings = TensionEstimateSettings()
-
-
-class IvuPlantSettings(plant_ivu.IvuSettings):
-    rate: float | None = quantity(None, unit="Hz", gt=0, help="rate of the emulator in real mode; 2 kHz if absent")
-    substep: float = quantity(5e-4, unit="s", gt=0, le=2e-3, help="longest integration step")
-    follow_tape: bool = Field(default=True, description="radii and inertias follow the tape (4.3-4.8)")
-    driver: L292Settings = L292Settings()
-    physics: list[PhysicsTerm] = Field(default=[], description="terms of physics beyond the equations")
-
-    @model_validator(mode="after")
-    def _nodes(self) -> "IvuPlantSettings":
-        check_nodes(self.physics, "ivu")
-        return self
-
-
-class IvuConfig(MachineSettings):
-    machine: Literal["ivu"] = "ivu"
-    board: BoardSettings = BoardSettings()
-    sensors: SensorSettings = SensorSettings()
-    radius: RadiusSettings = RadiusSettings()
-    law: IvuLawSettings
-    reference: ReferenceSettings = ReferenceSettings()
-    excitation: ExcitationSettings = NoneSettings()
-    plant: IvuPlantSettings = IvuPlantSettings()
-    R_c: float = quantity(0.0125, unit="m", gt=0, help="radius of the capstan, for millimetres")
-
+__all__ = ["IvuConfig", "diagram", "plant_diagram", "substeps"]
 
 PLANT_RATE = 2000.0  # Hz, of the free-running emulator: a sample is at most half a millisecond old
 UNIT = "rad"
@@ -229,8 +128,10 @@ def follow_radii(p, m, phi):
 
 @tick
 def play(t, s, c, k):
-    """Start the table when it is asked for, once the machine runs."""
-    if s.safety.state == safety.RUNNING and c.play != s.machine.play:
+    """Start the table when it is asked for, once the machine runs; what was asked for while it was off is forgotten."""
+    if s.safety.state == safety.IDLE or s.safety.state == safety.TRIPPED:
+        s.machine.play = c.play
+    elif s.safety.state == safety.RUNNING and c.play != s.machine.play:
         reference.start(t.reference, s.reference, k)
         s.machine.play = c.play
 
@@ -315,7 +216,7 @@ STAGES = (
             "u_f1 = friction_feedforward.step(p.friction1, s.friction1, y.ref)",
             "u_f2 = friction_feedforward.step(p.friction2, s.friction2, y.ref)",
             "trail = min(abs(speed) / p.machine.trail_speed, 1.0)",
-            "rest = p.machine.hand_over * (1.0 - trail)  # what the paying motor does not compensate, the winding one does",
+            "rest = p.machine.hand_over * (1.0 - trail)  # is for the winding motor to compensate",
             "forward = s.friction1.direction > 0.0",
             "friction = u_f1 + rest * u_f2 * y.R1 / y.R2 if forward else u_f2 + rest * u_f1 * y.R2 / y.R1",
             "y.u_c = s.machine.u_fb + y.w + friction",
@@ -380,8 +281,10 @@ def diagram(config: IvuConfig, dt: float) -> Diagram:
         Block("position", pd.build(law.position, dt), pd.PD_STATE),
         Block("gain_schedule", gain_schedule.build(law.gain_schedule, dt), gain_schedule.GAIN_SCHEDULE_STATE),
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
-        Block("friction1", friction_feedforward.build(law.friction.motor1, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE),
-        Block("friction2", friction_feedforward.build(law.friction.motor2, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE),
+        *(
+            Block(name, friction_feedforward.build(settings, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE)
+            for name, settings in (("friction1", law.friction.motor1), ("friction2", law.friction.motor2))
+        ),
         Block("inertia", inertia_feedforward.build(law.inertia, dt), inertia_feedforward.INERTIA_FEEDFORWARD_STATE),
         Block("tension", tension.build(law.tension, dt), tension.TENSION_STATE),
         Block("allocation", allocation.build(law.allocation, dt), allocation.ALLOCATION_STATE),
@@ -429,105 +332,3 @@ def _machine_params(config: IvuConfig, dt: float) -> IvuParams:
         hand_over=config.law.friction.hand_over,
         settle=round(config.law.tension.ramp / dt) + round(0.1 / dt),
     )
-
-
-TRUTH = (
-    Column("truth_tension1", "N", "tape tension at reel 1 in the emulator"),
-    Column("truth_tension2", "N", "tape tension at reel 2 in the emulator"),
-    Column("truth_capstan", "rad", "capstan angle in the emulator"),
-    Column("truth_motor1", "rad", "angle of motor 1 in the emulator"),
-    Column("truth_motor2", "rad", "angle of motor 2 in the emulator"),
-    Column("truth_R1", "m", "radius of reel 1 in the emulator"),
-    Column("truth_R2", "m", "radius of reel 2 in the emulator"),
-)
-
-
-def substeps(config: IvuConfig, period: float) -> int:
-    """Integration steps of the emulator in `period` s."""
-    return max(1, int(np.ceil(period / config.plant.substep - 1e-9)))
-
-
-def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
-    """Blocks and lines of the emulated machine, advanced by `period` s a call."""
-    h = period / substeps(config, period)
-    driver = (*l292.second_order(config.plant.driver), config.plant.driver.R_F * config.plant.driver.C_F)
-    nodes = {name: (index, "1.0") for name, index in plant_ivu.NODES.items()}
-    uses, terms, lines = physics_lines(config.plant.physics, "ivu", nodes, h)
-    follow = ("ivu.follow_tape(p.plant, s.plant)",) if config.plant.follow_tape else ()
-    blocks = (
-        Block("plant", plant_ivu.build(config.plant, h, [driver, driver]), plant_ivu.IVU_STATE),
-        Block("driver", l292.build(config.plant.driver, h), None),
-        Block("output1", at_mio_16de.build_output(config.board.output1, h), at_mio_16de.ANALOG_OUTPUT_STATE),
-        Block("output2", at_mio_16de.build_output(config.board.output2, h), at_mio_16de.ANALOG_OUTPUT_STATE),
-        Block("capstan", ls7084.build(config.sensors.capstan, h), ls7084.LS7084_STATE),
-        Block("counter0", None, daq_stc.COUNTER_STATE),
-        Block("reel1", optical_sensor.build(config.sensors.reel1, h), None),
-        Block("reel2", optical_sensor.build(config.sensors.reel2, h), None),
-        Block("input1", at_mio_16de.build_input(config.board.reel1, h, config.board.dither, 0, seed), at_mio_16de.ANALOG_INPUT_STATE),
-        Block("input2", at_mio_16de.build_input(config.board.reel2, h, config.board.dither, 1, seed), at_mio_16de.ANALOG_INPUT_STATE),
-        *terms,
-    )  # fmt: skip
-    advance = (
-        (
-            "drivers",
-            (
-                "u1 = at_mio_16de.output_step(p.output1, s.output1, tx.ao_codes[0], p.plant.h)",
-                "u2 = at_mio_16de.output_step(p.output2, s.output2, tx.ao_codes[1], p.plant.h)",
-                "s.plant.m.u[0] = l292.limit(p.driver, u1)",
-                "s.plant.m.u[1] = l292.limit(p.driver, u2)",
-            ),
-        ),
-        ("physics", ("linear.midpoint(s.plant.m)", *follow, *lines, "linear.advance(s.plant.m)")),
-        (
-            "encoder",
-            (
-                "pulses = ls7084.step(p.capstan, s.capstan, s.plant.m.x[ivu.CAPSTAN], p.plant.h)",
-                "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
-            ),
-        ),
-    )
-    sample = (
-        (
-            "scan",
-            (
-                "rx.counter_codes[0] = daq_stc.counter_step(s.counter0, 0, 1)",
-                "theta1 = s.plant.m.x[ivu.REEL1] + s.plant.m.x[ivu.NQ + ivu.REEL1] * p.input1.scan_delay",
-                "theta2 = s.plant.m.x[ivu.REEL2] + s.plant.m.x[ivu.NQ + ivu.REEL2] * p.input2.scan_delay",
-                "rx.ai_codes[0] = at_mio_16de.input_step(p.input1, s.input1, optical_sensor.volts(p.reel1, theta1))",
-                "rx.ai_codes[1] = at_mio_16de.input_step(p.input2, s.input2, optical_sensor.volts(p.reel2, theta2))",
-                "rx.lost_counts = s.capstan.lost",
-            ),
-        ),
-        (
-            "truth",
-            (
-                "ivu.tensions(p.plant, s.plant)",
-                "rx.truth[0] = s.plant.T1",
-                "rx.truth[1] = s.plant.T2",
-                "rx.truth[2] = s.plant.m.x[ivu.CAPSTAN]",
-                "rx.truth[3] = s.plant.m.x[ivu.MOTOR1]",
-                "rx.truth[4] = s.plant.m.x[ivu.MOTOR2]",
-                "rx.truth[5] = s.plant.R1",
-                "rx.truth[6] = s.plant.R2",
-            ),
-        ),
-    )
-    return PlantDiagram(
-        uses=(
-            "rtctl.drivers.at_mio_16de",
-            "rtctl.drivers.daq_stc",
-            "rtctl.drivers.l292",
-            "rtctl.drivers.ls7084",
-            "rtctl.drivers.optical_sensor",
-            "rtctl.plants.ivu",
-            "rtctl.plants.linear",
-            *uses,
-        ),
-        blocks=blocks,
-        truth=TRUTH,
-        start=("ivu.start(p.plant, s.plant)",),
-        advance=advance,
-        sample=sample,
-    )
-
-

@@ -5,9 +5,8 @@ Block diagram of the tick, thesis figures 12.7 and 12.10:
     reference -> shaper -> error -> law (PI with velocity feedback, PD, or any sections) -> + friction -> limit
 """
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from rtctl.drivers import at_mio_16de, daq_stc, ldu_amplifier, linear_scale, ls7084
@@ -18,7 +17,6 @@ from rtctl.drivers.ls7084 import Ls7084Settings
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.laws import (
     bumpless,
-    excitation,
     friction_feedforward,
     limit,
     pd,
@@ -46,11 +44,12 @@ from rtctl.machines.base import (
     Column,
     Diagram,
     MachineSettings,
-    PlantDiagram,
-    physics_lines,
 )
+from rtctl.machines.ldu_plant import plant_diagram, substeps
 from rtctl.machines.physics import PhysicsTerm, check_nodes
 from rtctl.plants import ldu as plant_ldu
+
+__all__ = ["LduConfig", "diagram", "plant_diagram", "substeps"]
 
 UNIT = "m"
 SETTLE_FLOOR = 4e-6  # in that unit: 4 um are "more than allowed" (11.1); smaller steps need not settle closer
@@ -177,11 +176,17 @@ COLUMNS = (
 )
 
 LAW_LINES = {
-    "pi_velocity": ("pi_velocity.step(p.position, s.position, y.position_error, y.speed)", "pi_velocity.reset(p.position, s.position)"),
+    "pi_velocity": (
+        "pi_velocity.step(p.position, s.position, y.position_error, y.speed)",
+        "pi_velocity.reset(p.position, s.position)",
+    ),
     "pd": ("pd.step(p.position, s.position, y.position_error)", "pd.reset(p.position, s.position)"),
-    "sections": ("sections.step(p.position, s.position, y.position_error)", "sections.reset(p.position, s.position, 0.0)"),
-}  # fmt: skip
-LAWS = {
+    "sections": (
+        "sections.step(p.position, s.position, y.position_error)",
+        "sections.reset(p.position, s.position, 0.0)",
+    ),
+}
+LAWS: dict[str, tuple[Any, Any]] = {
     "pi_velocity": (pi_velocity.build, pi_velocity.PI_VELOCITY_STATE),
     "pd": (pd.build, pd.PD_STATE),
     "sections": (sections.build, sections.SECTIONS_STATE),
@@ -191,10 +196,12 @@ LAWS = {
 def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Lines of the tick for the law and the feedback of this config."""
     step, reset = LAW_LINES[config.law.position.kind]
-    position = "y.scale" if config.sensors.feedback == "scale" else "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
-    track = (
-        ("pi_velocity.track(p.position, s.position, u_c, u)",) if config.law.position.kind == "pi_velocity" else ()
+    position = (
+        "y.scale"
+        if config.sensors.feedback == "scale"
+        else "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
     )
+    track = ("pi_velocity.track(p.position, s.position, u_c, u)",) if config.law.position.kind == "pi_velocity" else ()
     return (
         (
             "read",
@@ -271,8 +278,10 @@ def prepare(p, s, c, k):
 
 @tick
 def play(t, s, c, k):
-    """Start the table when it is asked for, once the machine runs."""
-    if s.safety.state == safety.RUNNING and c.play != s.machine.play:
+    """Start the table when it is asked for, once the machine runs; what was asked for while it was off is forgotten."""
+    if s.safety.state == safety.IDLE or s.safety.state == safety.TRIPPED:
+        s.machine.play = c.play
+    elif s.safety.state == safety.RUNNING and c.play != s.machine.play:
         reference.start(t.reference, s.reference, k)
         s.machine.play = c.play
 
@@ -291,7 +300,7 @@ def diagram(config: LduConfig, dt: float) -> Diagram:
         Block("reference", None, reference.REFERENCE_STATE),
         Block("shaper", shaper.build(law.shaper, dt), shaper.SHAPER_STATE),
         Block("velocity", velocity.build(law.velocity, dt), velocity.VELOCITY_STATE),
-        Block("position", build(law.position, dt), law_state),  # type: ignore[arg-type]
+        Block("position", build(law.position, dt), law_state),
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
         Block(
             "friction",
@@ -320,91 +329,3 @@ USES = (
     "rtctl.laws.velocity",
     "rtctl.loop.safety",
 )
-TRUTH = (
-    Column("truth_x", "m", "carriage position in the emulator"),
-    Column("truth_speed", "m/s", "carriage speed in the emulator"),
-    Column("truth_current", "A", "motor current in the emulator"),
-)
-
-
-def substeps(config: LduConfig, period: float) -> int:
-    """Integration steps of the emulator in `period` s."""
-    return max(1, int(np.ceil(period / config.plant.substep - 1e-9)))
-
-
-def plant_diagram(config: LduConfig, period: float, seed: int) -> PlantDiagram:
-    """Blocks and lines of the emulated machine, advanced by `period` s a call."""
-    h = period / substeps(config, period)
-    nodes = {name: (index, "1.0") for name, index in plant_ldu.NODES.items()}
-    nodes["carriage"] = (plant_ldu.CAPSTAN, "p.plant.R_c")
-    uses, terms, lines = physics_lines(config.plant.physics, "ldu", nodes, h)
-    output = at_mio_16de.build_output(config.board.output, h)
-    blocks = (
-        Block(
-            "plant",
-            plant_ldu.build(config.plant, h, (2 * np.pi * config.plant.bandwidth, config.plant.damping)),
-            plant_ldu.LDU_STATE,
-        ),
-        Block("amplifier", ldu_amplifier.build(config.plant.amplifier, h, output.volts_per_code), None),
-        Block("output", output, at_mio_16de.ANALOG_OUTPUT_STATE),
-        Block("encoder", ls7084.build(config.sensors.encoder, h), ls7084.LS7084_STATE),
-        Block("counter0", None, daq_stc.COUNTER_STATE),
-        Block("scale", linear_scale.build(config.sensors.scale, h), linear_scale.LINEAR_SCALE_STATE),
-        Block("counter1", None, daq_stc.COUNTER_STATE),
-        *terms,
-    )
-    line = config.board.direction_line
-    advance = (
-        (
-            "amplifier",
-            (
-                "volts = at_mio_16de.output_step(p.output, s.output, tx.ao_codes[0], p.plant.h)",
-                f"s.plant.m.u[0] = ldu_amplifier.current(p.amplifier, volts, (tx.dio_lines >> {line}) & 1)",
-            ),
-        ),
-        ("physics", ("linear.midpoint(s.plant.m)", *lines, "linear.advance(s.plant.m)")),
-        (
-            "encoder and scale",
-            (
-                "pulses = ls7084.step(p.encoder, s.encoder, s.plant.m.x[ldu.ENCODER], p.plant.h)",
-                "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
-                "pulses = linear_scale.step(p.scale, s.scale, p.plant.R_c * s.plant.m.x[ldu.CAPSTAN])",
-                "daq_stc.counter_step(s.counter1, abs(pulses), pulses > 0)",
-            ),
-        ),
-    )
-    sample = (
-        (
-            "scan",
-            (
-                "rx.counter_codes[0] = daq_stc.counter_step(s.counter0, 0, 1)",
-                "rx.counter_codes[1] = daq_stc.counter_step(s.counter1, 0, 1)",
-                "rx.lost_counts = s.encoder.lost",
-            ),
-        ),
-        (
-            "truth",
-            (
-                "rx.truth[0] = p.plant.R_c * s.plant.m.x[ldu.CAPSTAN]",
-                "rx.truth[1] = p.plant.R_c * s.plant.m.x[ldu.NQ + ldu.CAPSTAN]",
-                "rx.truth[2] = s.plant.m.x[2 * ldu.NQ]",
-            ),
-        ),
-    )
-    return PlantDiagram(
-        uses=(
-            "rtctl.drivers.at_mio_16de",
-            "rtctl.drivers.daq_stc",
-            "rtctl.drivers.ldu_amplifier",
-            "rtctl.drivers.linear_scale",
-            "rtctl.drivers.ls7084",
-            "rtctl.plants.ldu",
-            "rtctl.plants.linear",
-            *uses,
-        ),
-        blocks=blocks,
-        truth=TRUTH,
-        start=("ldu.start(p.plant, s.plant)",),
-        advance=advance,
-        sample=sample,
-    )

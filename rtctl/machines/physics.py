@@ -2,14 +2,17 @@
 
 from functools import reduce
 from operator import or_
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
 from rtctl.config.errors import nearest
 from rtctl.plants.physics import TERMS
 
-PhysicsTerm = Annotated[reduce(or_, [term.settings for term in TERMS.values()]), Field(discriminator="term")]  # type: ignore[valid-type]
+if TYPE_CHECKING:
+    PhysicsTerm = Any
+else:
+    PhysicsTerm = Annotated[reduce(or_, [term.settings for term in TERMS.values()]), Field(discriminator="term")]
 
 
 def check_nodes(terms: list[Any], kind: str) -> None:
@@ -18,5 +21,11 @@ def check_nodes(terms: list[Any], kind: str) -> None:
         allowed = TERMS[settings.term].nodes.get(kind, ())
         if settings.node not in allowed:
             near = nearest(settings.node, allowed)
-            hint = f"did you mean '{near}'?" if near else f"it can stand at {', '.join(allowed) or 'no node of this plant'}"
-            raise ValueError(f"physics.{i}.node: {settings.term} cannot stand at '{settings.node}' of the {kind}; {hint}")
+            hint = (
+                f"did you mean '{near}'?"
+                if near
+                else f"it can stand at {', '.join(allowed) or 'no node of this plant'}"
+            )
+            raise ValueError(
+                f"physics.{i}.node: {settings.term} cannot stand at '{settings.node}' of the {kind}; {hint}"
+            )

@@ -29,6 +29,14 @@ class Capture:
         self.trigger_tick: int | None = None  # None until then
         self.done = False
 
+    def prime(self, rows: np.ndarray) -> None:
+        """Rows from before the capture was asked for: they can precede the trigger, never be it."""
+        if not len(rows):
+            return
+        if self._trigger:
+            self._trigger(rows)
+        self._hold(rows)
+
     def feed(self, rows: np.ndarray) -> tuple[np.ndarray, bool]:
         """Rows to write out of the next batch (and of those held back), and whether the capture is complete."""
         if self.done or not len(rows):

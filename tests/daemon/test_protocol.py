@@ -41,7 +41,9 @@ def nested(depth):
 
 
 def test_what_was_encoded_comes_back_typed():
-    request = decode_request(encode_request("a-1", "setpoint", {"value": 3, "unit": "m/s^2", "ramp": 2.0, "ramp_unit": "mm/s"}))
+    request = decode_request(
+        encode_request("a-1", "setpoint", {"value": 3, "unit": "m/s^2", "ramp": 2.0, "ramp_unit": "mm/s"})
+    )
     assert request.id == "a-1"
     assert request.args == protocol.SetpointArgs(value=3.0, unit="m/s^2", ramp=2.0, ramp_unit="mm/s")
 

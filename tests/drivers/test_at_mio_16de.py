@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
+
 from rtctl.drivers import at_mio_16de as mio
 
 DT = 0.002

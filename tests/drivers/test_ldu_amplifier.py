@@ -3,6 +3,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from rtctl.drivers import at_mio_16de as mio
 from rtctl.drivers import ldu_amplifier as amplifier
 

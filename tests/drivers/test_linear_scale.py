@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from rtctl.drivers import linear_scale
 
 P = linear_scale.build(linear_scale.LinearScaleSettings(), 1e-3)

@@ -1,4 +1,5 @@
 import pytest
+
 from rtctl.drivers import nidaq as ni
 
 

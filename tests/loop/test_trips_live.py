@@ -167,7 +167,7 @@ def test_late_ticks_in_a_row(live: Callable[..., Any]) -> None:
 
 @pytest.mark.realtime
 def test_nobody_commands(live: Callable[..., Any]) -> None:
-    keys = {"safety.require_commander": True, "safety.commander_timeout": 0.3}
+    keys = {"safety.require_commander": True, "safety.commander_timeout": 0.3, "safety.link_timeout": 5.0}
     result, trace = live("real", "shm", 1.5, keys)
     assert result["tripped"] == "commander_lost"
     k = result["trip"]["tick"]
@@ -180,7 +180,7 @@ def test_nobody_commands(live: Callable[..., Any]) -> None:
 def test_the_plant_is_gone(
     runtime: Path, config: Callable[..., Any], tmp_path: Path, link: str, how: signal.Signals
 ) -> None:
-    keys = {"safety.link_timeout": 0.05, "record.batch": 0.05}
+    keys = {"safety.link_timeout": 0.5, "safety.missed_ticks": 0}  # long, so that a busy test machine is no cause
     supervisor = Supervisor(config(mode="real", link=link, set=keys), tmp_path / "bundle", 1000)
     supervisor.armed_at_start = True
     gone = 0
@@ -197,5 +197,5 @@ def test_the_plant_is_gone(
     assert result["trip"] is not None and result["trip"]["code"] == "link_lost"
     trace = load_bundle(tmp_path / "bundle").columns
     k = result["trip"]["tick"]
-    assert trace["link_age"][k] == 26 and gone <= k + 25
+    assert trace["link_age"][k] == 251 and gone <= k - 240
     assert not trace["u1"][k:].any() and not trace["u2"][k:].any() and trace["u1"][k - 1] > 0

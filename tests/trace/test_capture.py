@@ -84,3 +84,24 @@ def test_gives_nothing_after_the_end():
 def test_refuses_times_that_make_no_sense(times):
     with pytest.raises(ValueError, match="a capture needs"):
         Capture(times[0], times[1], None, times[2])
+
+
+def test_history_precedes_the_trigger_and_never_is_it():
+    rows = np.zeros(100, [("tick", "i8"), ("t", "f8"), ("x", "f8")])
+    rows["tick"] = np.arange(100)
+    rows["x"][20:30] = 1.0  # an event before the request
+    rows["x"][70:] = 1.0
+    capture = Capture(0.1, 0.1, Trigger("x > 0.5", ["tick", "t", "x"]), 100.0)
+    capture.prime(rows[:50])
+    taken, done = capture.feed(rows[50:])
+    assert done and capture.trigger_tick == 70
+    assert taken["tick"].tolist() == list(range(60, 80))
+
+
+def test_history_goes_before_a_capture_without_a_trigger():
+    rows = np.zeros(100, [("tick", "i8"), ("t", "f8")])
+    rows["tick"] = np.arange(100)
+    capture = Capture(0.2, 0.1, None, 100.0)
+    capture.prime(rows[:50])
+    taken, done = capture.feed(rows[50:])
+    assert done and taken["tick"].tolist() == list(range(40, 70))
