@@ -116,10 +116,11 @@ def main() -> int:
         print(json.dumps(result))
         return 0
     for kind, r in result.items():
+        same = "same bits" if r["identical"] else f"agrees to {r['agrees_to_all_columns']:.1e}"
         print(
             f"{kind}: {r['x_realtime']:.0f} x real time, {r['ratio_to_c']:.2f} of the time of C "
             f"({r['ratio_range'][0]:.2f} to {r['ratio_range'][1]:.2f}), {r['us_per_tick']:.3f} us a tick "
-            f"of {r['substeps']} substeps; {'same bits' if r['identical'] else 'agrees to %.1e' % r['agrees_to']}"
+            f"of {r['substeps']} substeps; {same}"
         )
     return 0
 

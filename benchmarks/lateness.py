@@ -31,6 +31,14 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 RATES = {"ivu": 500.0, "ldu": 10_000.0}
 SHARES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
 PRIORITY = 80
+TITLES = {
+    "lateness_us": "ours",
+    "cyclictest_us": "cyclictest, plant beside it",
+    "bare_cyclictest_us": "cyclictest alone",
+    "ratio_to_cyclictest": "ratio, plant beside it",
+    "ratio_to_bare_cyclictest": "ratio, alone",
+    "tick_us": "tick",
+}
 LONGEST_NS = 1_000_000  # buckets of cyclictest, its most; what is later is counted as this late
 
 
@@ -198,8 +206,7 @@ def main() -> int:
     if given.json:
         print(json.dumps(result))
         return 0
-    for title, key in (("ours", "lateness_us"), ("cyclictest, plant beside it", "cyclictest_us"), ("cyclictest alone", "bare_cyclictest_us"),
-                       ("ratio, plant beside it", "ratio_to_cyclictest"), ("ratio, alone", "ratio_to_bare_cyclictest"), ("tick", "tick_us")):  # fmt: skip
+    for key, title in TITLES.items():
         print(f"{title:28s}" + "  ".join(f"{n} {result[key][n]:8.2f}" for n in SHARES))
     print(f"missed {result['missed']} of {result['ticks']} ticks, {result['missed_inside']} of them by the tick itself")
     z = result["zmq"]

@@ -8,6 +8,7 @@
 #include <stdatomic.h>
 #include <stdint.h>
 #include <string.h>
+#include <time.h>
 
 #define FIELD_REAL(name) double name;
 #define FIELD_WHOLE(name) int64_t name;
@@ -133,6 +134,30 @@ static double gate(struct safety *s, double u, int channel)
     if (s->state == ARMED || s->state == RUNNING)
         return s->hold[channel] = u == u ? u : 0.0;
     return s->state == TRIPPED ? s->hold[channel] * s->gate : 0.0;
+}
+
+/* ---- times of the tick: every sixteenth is measured, into buckets of 32 to the octave ---- */
+
+struct histogram {
+    int64_t count, max, bucket[32 * 33];
+};
+
+static int64_t now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
+}
+
+static void count_time(struct histogram *h, int64_t ns)
+{
+    int exponent;
+    h->count++;
+    if (ns > h->max)
+        h->max = ns;
+    frexp((double)ns, &exponent);
+    int octave = exponent - 6;
+    h->bucket[ns < 32 ? ns : 32 * octave + (ns >> octave)]++;
 }
 
 /* ---- laws ---- */

@@ -43,6 +43,7 @@ static int64_t n_rows;
 static _Atomic int64_t head;
 static struct mailbox box;
 static struct command command;
+static struct histogram times;
 
 static struct {
     struct safety safety;
@@ -223,7 +224,10 @@ int64_t run(int64_t ticks, int64_t substeps, double dt, int64_t ahead)
         loop.row.t = k * dt;
         loop.row.period = dt;
         loop.row.lateness = 0.0;
+        int64_t begun = k % 16 ? 0 : now();
         tick(k);
+        if (k % 16 == 0)
+            count_time(&times, now() - begun);
         if (!ahead || (loop.safety.state != was && (was == ARMED || was == RUNNING)))
             held = out;
         int64_t n = atomic_load_explicit(&head, memory_order_relaxed);

@@ -13,7 +13,7 @@ from rtctl.daemon.loop_process import Loop
 from rtctl.loop import generate
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.records import layout
-from rtctl.plants import linear
+from rtctl.plants import ivu, ldu, linear
 
 HERE = Path(__file__).parent
 CONFIGS = HERE.parent / "configs"
@@ -138,12 +138,10 @@ def _matrices(machine: machines.Machine) -> tuple[np.ndarray, np.ndarray]:
     """Phi and Gamma of one substep, from the plant's own equations."""
     plant = next(b for b in machine.plant_diagram.blocks if b.name == "plant")
     state = np.zeros(1, plant.state)[0]
-    module = {"ivu": "ivu", "ldu": "ldu"}[machine.kind]
-    source = __import__(f"rtctl.plants.{module}", fromlist=[module])
     A, G = np.zeros_like(state["m"]["A"]), np.zeros_like(state["m"]["G"])
     p = plant.params
     if machine.kind == "ivu":
-        source.assemble(p, p.R1, p.R2, p.J_1, p.J_2, A, G)
+        ivu.assemble(p, p.R1, p.R2, p.J_1, p.J_2, A, G)
     else:
-        source.assemble(p, A, G)
+        ldu.assemble(p, A, G)
     return linear.discretise(A, G, p.h)

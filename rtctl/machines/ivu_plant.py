@@ -7,6 +7,10 @@ from rtctl.machines.base import Block, Column, PlantDiagram, physics_lines
 from rtctl.machines.ivu_settings import IvuConfig
 from rtctl.plants import ivu as plant_ivu
 
+RIPPLE = (  # 22 kHz, averaged over each substep: what is left of it aliases, as it would on the machine
+    "s.plant.m.f[ivu.MOTOR1] += p.plant.K_m1 * l292.ripple_step(p.driver, s.ripple1, p.plant.h)",
+    "s.plant.m.f[ivu.MOTOR2] += p.plant.K_m2 * l292.ripple_step(p.driver, s.ripple2, p.plant.h)",
+)
 TRUTH = (
     Column("truth_tension1", "N", "tape tension at reel 1 in the emulator"),
     Column("truth_tension2", "N", "tape tension at reel 2 in the emulator"),
@@ -31,6 +35,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
     nodes = {name: (index, "1.0") for name, index in plant_ivu.NODES.items()}
     uses, terms, lines = physics_lines(config.plant.physics, "ivu", nodes, h)
     follow = ("ivu.follow_tape(p.plant, s.plant)",) if config.plant.follow_tape else ()
+    ripple = RIPPLE if config.plant.driver.ripple else ()
     blocks = (
         Block("plant", plant_ivu.build(config.plant, h, [driver, driver]), plant_ivu.IVU_STATE),
         Block("driver", l292.build(config.plant.driver, h), None),
@@ -44,6 +49,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
             Block(name, at_mio_16de.build_input(wire, h, board.dither, i, seed), at_mio_16de.ANALOG_INPUT_STATE)
             for i, (name, wire) in enumerate((("input1", board.reel1), ("input2", board.reel2)))
         ),
+        *(Block(name, None, l292.RIPPLE_STATE) for name in ("ripple1", "ripple2") if ripple),
         *terms,
     )  # fmt: skip
     advance = (
@@ -56,7 +62,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
                 "s.plant.m.u[1] = l292.limit(p.driver, u2)",
             ),
         ),
-        ("physics", ("linear.midpoint(s.plant.m)", *follow, *lines, "linear.advance(s.plant.m)")),
+        ("physics", ("linear.midpoint(s.plant.m)", *follow, *ripple, *lines, "linear.advance(s.plant.m)")),
         (
             "encoder",
             (

@@ -153,3 +153,11 @@ def test_terms_of_size_nothing_change_nothing():
 @pytest.mark.parametrize("sizes", SIZES, ids=["coulomb", "viscous", "stribeck"])
 def test_a_term_shows_in_the_recording(sizes):
     assert np.abs(with_friction(**sizes) - with_friction()).max() > 1
+
+
+def test_the_ripple_of_the_drivers_hardly_moves_the_tape():
+    """22 kHz of chopping is there when asked for, and averages out."""
+    plain = fused.run(fused.config("ivu", "steps"), 3.0)
+    rippled = fused.run(fused.config("ivu", "steps", plant__driver__ripple=True), 3.0)
+    change = np.abs(plain["truth_capstan"] - rippled["truth_capstan"]).max()
+    assert 0.0 < change < 5e-3
