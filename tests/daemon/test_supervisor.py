@@ -269,15 +269,14 @@ def test_a_capture_has_the_rows_around_its_trigger(live: Callable[..., Live], tm
     machine = live()
     machine.call("arm")
     machine.in_state("running")
-    time.sleep(0.3)
     out = tmp_path / "capture"
     given = machine.call("capture", seconds=0.2, pre=0.1, trigger="target > 0.05", out=str(out))
     assert not given["done"] and not given["triggered"]
     machine.call("setpoint", value=0.2)
     done = machine.until(lambda: (s := machine.call("capture_status", id=given["id"]))["done"] and s)
-    assert done["triggered"] and done["rows"] == 150
+    assert done["triggered"] and done["rows"] == 100
     rows = load_bundle(out).columns
-    assert (np.diff(rows["tick"]) == 1).all() and len(rows["tick"]) == 150
+    assert (np.diff(rows["tick"]) == 1).all() and len(rows["tick"]) == 100
     assert (rows["target"][:50] <= 0.05).all() and (rows["target"][50:] > 0.05).all()
     trace = machine.end()
     here = slice(int(rows["tick"][0]), int(rows["tick"][-1]) + 1)

@@ -8,13 +8,13 @@ from rtctl.loop import clock
 
 @tick
 def read():
-    return clock.now()  # type: ignore[call-arg]
+    return clock.now()
 
 
 @tick
 def sleep(ns):
     """How much later than asked for it woke, in ns, and the result of the call."""
-    wake = clock.now() + ns  # type: ignore[call-arg]
+    wake = clock.now() + ns
     result = clock.sleep_until(wake)
     return clock.now() - wake, result
 

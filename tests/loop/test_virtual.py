@@ -32,7 +32,7 @@ def test_a_stop_is_heard_while_it_waits(config: Callable[..., Any], bench: Calla
     made = bench(config(), rows=1000)
     thread = threading.Thread(target=made.loop.virtual, args=(10**6,))
     thread.start()
-    while int(made.segment["ring"][0]["head"]) < 900:
+    while thread.is_alive() and int(made.segment["ring"][0]["head"]) < 900:
         time.sleep(0.001)
     made.status["stop"] = 1
     thread.join(10)

@@ -102,8 +102,8 @@ def ping(socket, tx, rx, staged, rounds, pause):
         tx[0].seq = k
         if not zmq_link.send(socket, tx):
             return k
-        until = clock.now() + pause  # type: ignore[call-arg]
-        while clock.now() < until:  # type: ignore[call-arg]
+        until = clock.now() + pause
+        while clock.now() < until:
             pass
         if zmq_link.receive(socket, rx, staged) == 0 or rx[0].seq != k:
             return k
