@@ -25,6 +25,13 @@ CONFIGS = Path(__file__).parents[1] / "configs"
 number = itertools.count(1)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests on the wall clock one at a time: two FIFO loops on one CPU would judge each other."""
+    for item in items:
+        if item.get_closest_marker("realtime"):
+            item.add_marker(pytest.mark.xdist_group("realtime"))
+
+
 @pytest.fixture(scope="session")
 def runtime() -> Iterator[Path]:
     """A folder of our own for sockets and locks, with a short path: a socket's has 107 bytes at most."""
