@@ -422,7 +422,10 @@ static void advance(struct linear *m)
         if (force != 0.0)
             add_row(next, m->Gamma_T[NU + j], force);
     }
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+    int dry_nodes = 0;
+    for (int j = 0; j < NQ; j++)
+        dry_nodes += m->dry[j] > 0.0;
+    for (int sweep = 0; sweep < (dry_nodes > 1 ? SWEEPS : dry_nodes); sweep++) {
         for (int j = 0; j < NQ; j++) {
             if (m->dry[j] <= 0.0)
                 continue;

@@ -131,9 +131,9 @@ def parameters(settings: IvuSettings) -> IvuParameters:
     p = IvuParameters(**{**SETS[settings.set], **given})
     fill = {}
     if p.J_1 is None:
-        fill["J_1"] = reel_inertia(p.J_10, p.rho_tape * p.h_tape, p.R1, p.R_min)
+        fill["J_1"] = reel_inertia.py_func(p.J_10, p.rho_tape * p.h_tape, p.R1, p.R_min)
     if p.J_2 is None:
-        fill["J_2"] = reel_inertia(p.J_20, p.rho_tape * p.h_tape, p.R2, p.R_min)
+        fill["J_2"] = reel_inertia.py_func(p.J_20, p.rho_tape * p.h_tape, p.R2, p.R_min)
     return p.model_copy(update=fill)
 
 

@@ -1,6 +1,5 @@
 """`rtctl run CONFIG`: run a machine, show how it does, and report on its steps."""
 
-import signal
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,13 +46,9 @@ def run(
     length = common.seconds(duration, "--for")
     folder = out if out is not None else common.default_folder(settings.name)
     console = _console(json)
-    previous = signal.signal(signal.SIGTERM, _interrupt)
-    try:
-        session = Session(settings, folder, length, arm=arm, say=console.say)
-        with console.live(session):
-            result = session.run(console.update)
-    finally:
-        signal.signal(signal.SIGTERM, previous)
+    session = Session(settings, folder, length, arm=arm, say=console.say)
+    with console.live(session):
+        result = session.run(console.update)
     if plot:
         result["plot"] = session.draw()
     if json:
@@ -62,10 +57,6 @@ def run(
         console.report(result)
     if result["tripped"]:
         raise typer.Exit(1)
-
-
-def _interrupt(*_: Any) -> None:
-    raise KeyboardInterrupt
 
 
 def _console(json: bool) -> Any:

@@ -1,7 +1,9 @@
 """A run from start to end: supervise, arm, play the reference, record, and tell what came of it."""
 
+import contextlib
 import signal
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +34,10 @@ class Session:
     def run(self, update: Callable[[Supervisor], None] = lambda _: None) -> dict[str, Any]:
         """Run to the end; `update` is called at every turn. Returns what `rtctl run --json` prints."""
         supervisor = self.supervisor
-        interrupted = False
         supervisor.armed_at_start = self.arm
-        with supervisor:
-            try:
-                for _ in supervisor.run():
-                    update(supervisor)
-            except KeyboardInterrupt:
-                interrupted = True
-                signal.signal(signal.SIGINT, signal.default_int_handler)
+        with _signals(supervisor), supervisor:
+            for _ in supervisor.run():
+                update(supervisor)
             supervisor.stop()
             try:
                 self.bundle = supervisor.finish()
@@ -56,7 +53,7 @@ class Session:
             **result,
             "steps": self.steps,
             "tripped": result["trip"]["code"] if result["trip"] else None,
-            "interrupted": interrupted,
+            "interrupted": supervisor.interrupted,
             "bundle": str(self.bundle) if self.bundle else None,
         }
 
@@ -93,3 +90,26 @@ class Session:
         path = self.bundle / "run.png"
         plot_run(load_bundle(self.bundle), self.steps, path)
         return str(path)
+
+
+@contextlib.contextmanager
+def _signals(supervisor: Supervisor) -> Iterator[None]:
+    """Ctrl-C and SIGTERM end the run at its next turn; a second one does not wait for that.
+
+    An exception at any point whatever could leave a lock of the recorder taken, and the recording unfinished.
+    """
+
+    def note(*_: Any) -> None:
+        if supervisor.interrupted:
+            raise KeyboardInterrupt
+        supervisor.interrupted = True
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -58,6 +58,7 @@ class Supervisor:
         self.made = generate.generate(self.machine, self.link)
         self.lacks: list[str] = []
         self.armed_at_start = False
+        self.interrupted = False  # set by a signal handler; looked at between turns, never in the middle of one
         self.changes: list[dict[str, Any]] = []
         self._ended = False
         self._stack = contextlib.ExitStack()
@@ -153,6 +154,8 @@ class Supervisor:
     def _wait(self, child: ChildProcess, done: Callable[[], bool], who: str) -> None:
         deadline = time.monotonic() + START_TIMEOUT
         while not done():
+            if self.interrupted:
+                raise KeyboardInterrupt
             self._hear()
             if not child.running() and not done():
                 self._hear()
@@ -227,7 +230,7 @@ class Supervisor:
         virtual = self.config.loop.mode != "real"
         poller = zmq.Poller()
         poller.register(self.server.socket, zmq.POLLIN)
-        while self.turn():
+        while self.turn() and not self.interrupted:
             yield
             poller.poll(1 if virtual else TURN_MS)
 

@@ -57,7 +57,9 @@ GAIN_SCHEDULE_STATE = state(factor=float)  # the factor in force
 def build(settings: GainScheduleSettings, dt: float) -> GainScheduleParams:
     """Parameters; `dt` does not matter. Raises ValueError where the table is missing or not a table."""
     process = process_gain.build(settings.process, dt)
-    K_reference = float(process_gain.step(process, settings.R1_reference, settings.R2_reference))
+    K_reference = 0.0
+    if settings.mode == "model":  # the step is compiled here, which takes half a second
+        K_reference = float(process_gain.step(process, settings.R1_reference, settings.R2_reference))
     n_drive, n_other, R_drive, R_other, factor = 0, 0, np.zeros(MOST), np.zeros(MOST), np.ones((MOST, MOST))
     if settings.table is not None:
         n_drive, n_other = _fill(settings.table, R_drive, R_other, factor)

@@ -41,6 +41,7 @@ from numba import njit
 from rtctl.idiom import tick as compiled
 from rtctl.loop import clock, histogram, mailbox, ring
 from rtctl.loop import {link}_link as link
+from rtctl.loop.memory import borrowed
 from {machine} import {machine_name} as machine
 {imports}
 

@@ -6,6 +6,7 @@ What stands here is the loop as it runs; `tick`, `start`, `advance`, `sample` an
 from typing import Any
 
 from rtctl.loop import clock, histogram, mailbox, ring
+from rtctl.loop.memory import borrowed
 
 tick: Any = None  # the generated tick: tick(p, s, t, c, rx, tx, y, k, fresh, late)
 start: Any = None  # the generated plant: start(p, s), advance(p, s, tx), sample(p, s, rx)
@@ -37,6 +38,9 @@ def run_real(
     most,
 ):
     """Wake, tick, sleep, on the wall clock, until told to stop or `most` ticks are done."""
+    box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
+    p, s, c, staged, y = borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y)
+    tx, rx, rx_staged = borrowed(tx), borrowed(rx), borrowed(rx_staged)
     st = status[0]
     for _ in range(1000):  # samples that waited for us are old
         if link.receive_newest(inp, rx, rx_staged) == 0:
@@ -100,6 +104,9 @@ def run_lockstep(
     status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_staged, held, out, inp, period, ahead, first, most
 ):
     """Loop and plant take turns on a virtual clock: wait for a sample, tick, send what acts until the next."""
+    box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
+    p, s, c, staged, y = borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y)
+    tx, rx, rx_staged, held = borrowed(tx), borrowed(rx), borrowed(rx_staged), borrowed(held)
     st = status[0]
     for k in range(first, first + most):
         if st.stop != 0 or st.supervisor_lost != 0:
@@ -114,6 +121,9 @@ def run_lockstep(
 
 def run_fused(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, pp, ps, period, ahead, first, most):
     """Loop and plant in one process on a virtual clock, as fast as they go; to the bit as in lockstep."""
+    box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
+    p, s, c, staged, y = borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y)
+    tx, rx, held, pp, ps = borrowed(tx), borrowed(rx), borrowed(held), borrowed(pp), borrowed(ps)
     st = status[0]
     if first == 0:
         start(pp[0], ps[0])
@@ -167,6 +177,7 @@ def account(st, safety, k, lost_counts):
 
 def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind):
     """The emulated machine on its own clock: newest outputs in, one period on, sample out."""
+    p, s, tx, tx_staged, rx = borrowed(p), borrowed(s), borrowed(tx), borrowed(tx_staged), borrowed(rx)
     st = status[0]
     start(p[0], s[0])
     sample(p[0], s[0], rx[0])
@@ -193,6 +204,7 @@ def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind):
 
 def plant_lockstep(status, p, s, tx, tx_staged, rx, out, inp):
     """The emulated machine on the loop's virtual clock: sample out, outputs in, one period on."""
+    p, s, tx, tx_staged, rx = borrowed(p), borrowed(s), borrowed(tx), borrowed(tx_staged), borrowed(rx)
     st = status[0]
     start(p[0], s[0])
     while st.stop == 0:

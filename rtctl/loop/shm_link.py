@@ -71,7 +71,8 @@ def receive(slot, frame, staged):
         count = slot[0].count
         slot[0].wait[0] = TIMEOUT_NS // 1_000_000_000
         slot[0].wait[1] = 0
-        if count == slot[0].seen and syscall(SYS_FUTEX, slot.ctypes.data, WAIT, count, slot.wait.ctypes.data, 0, 0) < 0:
+        none = count == slot[0].seen or count % 2 == 1  # yet, or its sender was interrupted in the middle of it
+        if none and syscall(SYS_FUTEX, slot.ctypes.data, WAIT, count, slot.wait.ctypes.data, 0, 0) < 0:
             if receive_newest(slot, frame, staged) == 1:
                 return 1
             if slot[0].count == count:

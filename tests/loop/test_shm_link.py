@@ -106,11 +106,31 @@ def test_whoever_waits_is_woken() -> None:
     back = (outputs, inputs, plant["tx"], plant["rx"], plant["tx_staged"])
     ping(*there, 0)
     pong(*back, 0)  # both compiled
-    thread = threading.Thread(target=pong, args=(*back, 20_000))
+    thread = threading.Thread(target=pong, args=(*back, 2000))
     thread.start()
-    assert ping(*there, 20_000) == 20_000
+    assert ping(*there, 2000) == 2000
     thread.join(10)
     assert not thread.is_alive()
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_sender_that_was_interrupted_is_waited_for(ends: Ends, first: bool) -> None:
+    if not first:
+        ends.send(1)
+        ends.wait()
+    ends.tx["seq"] = 2
+    ends.slot["count"] += 1  # half a send; the other half comes later
+
+    def finish() -> None:
+        ends.slot["frame"] = ends.tx
+        ends.slot["count"] -= 1
+        shm_link.send(ends.slot, ends.tx)
+
+    shm_link.send(np.zeros(1, shm_link.OUTPUTS_SLOT), ends.tx)  # compiled
+    timer = threading.Timer(0.05, finish)
+    timer.start()
+    assert ends.wait() == 1 and ends.got["seq"] == 2
+    timer.join()
 
 
 @tick
@@ -145,7 +165,7 @@ def read_many(slot, frame, staged, last):
 
 def test_torn_frames_are_never_taken(ends: Ends) -> None:
     write_many(ends.slot, ends.tx, 0)
-    last = 300_000
+    last = 100_000
     thread = threading.Thread(target=write_many, args=(ends.slot, ends.tx, last))
     thread.start()
     assert read_many(ends.slot, ends.rx["tx"], ends.rx["tx_staged"], last) == 0
