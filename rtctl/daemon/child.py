@@ -81,6 +81,7 @@ def link_socket(context: zmq.Context, endpoint: str, bind: bool, timeout: float,
     zmq_link.load()
     socket = context.socket(zmq.DEALER)
     socket.set(zmq.LINGER, 100)
+    socket.set(zmq.RECONNECT_IVL, 10)
     socket.set(zmq.SNDHWM, LINK_WAITING)
     socket.set(zmq.RCVHWM, LINK_WAITING)
     socket.set(zmq.RCVTIMEO, int(timeout * 1000))

@@ -123,7 +123,7 @@ def main(argv: list[str]) -> int:
     if loop.mode == "fused":
         run.virtual(ticks)
     else:
-        _wait_for_plant(socket, run, machine.config.link.timeout, order["endpoint"], loop.mode)
+        _wait_for_plant(socket, run, order["patience"], order["endpoint"], loop.mode)
         if loop.mode == "lockstep":
             run.virtual(ticks)
         else:
@@ -148,7 +148,7 @@ def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoi
     deadline = time.monotonic() + timeout
     hello = generate.new_frames()["tx"]
     hello["seq"] = frames.HELLO
-    while time.monotonic() < deadline:
+    while time.monotonic() < deadline and not run.status[0]["stop"] and not run.status[0]["supervisor_lost"]:
         if socket is None:
             if int(run.inp[0]["count"]) > 0:
                 return
@@ -163,6 +163,8 @@ def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoi
                 if not socket.poll(200):
                     continue
             return
+    if time.monotonic() < deadline:
+        return  # told to stop
     raise UserError(
         f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, "
         "or leave link.endpoint out to have one started"

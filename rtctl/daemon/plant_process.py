@@ -86,10 +86,9 @@ def main(argv: list[str]) -> int:
         with contextlib.suppress(OSError):  # it runs anywhere; only its samples come a little later
             os.sched_setaffinity(0, {order["cpu"]})
     if order["link"] == "zmq":
-        serve(machine, order["endpoint"], status, lambda: child.report("listening"))
+        serve(machine, order["endpoint"], status, lambda: None)
     else:
         plant = Plant(machine, made, status, segment["inputs"], segment["outputs"])
-        child.report("listening")
         plant.run()
     child.report("ended")
     return 0

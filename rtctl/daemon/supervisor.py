@@ -133,6 +133,7 @@ class Supervisor:
             "link": self.link,
             "endpoint": endpoint,
             "ticks": self.ticks,
+            "patience": link.timeout,
             "cpu": others[0] if others else None,
         }
         entry = {"real": "run_real", "lockstep": "run_lockstep", "fused": "run_fused"}[config.loop.mode]
@@ -144,24 +145,23 @@ class Supervisor:
         if config.loop.mode != "fused" and link.spawns:
             self.plant = ChildProcess("plant", order)
             self.children.append(self.plant)
-            self._wait(self.plant, lambda: self.listening, "the plant")
+            order["patience"] = START_TIMEOUT  # it may have to compile; if it dies we hear of it
         self.loop = ChildProcess("loop", order)
         self.children.append(self.loop)
-        self._wait(self.loop, lambda: bool(self.status["ready"]) or bool(self.status["ended"]), "the loop")
+        self._wait_for_first_tick()
 
-    listening = False
-
-    def _wait(self, child: ChildProcess, done: Callable[[], bool], who: str) -> None:
+    def _wait_for_first_tick(self) -> None:
         deadline = time.monotonic() + START_TIMEOUT
-        while not done():
+        while not self.status["ready"] and not self.status["ended"]:
             if self.interrupted:
                 raise KeyboardInterrupt
             self._hear()
-            if not child.running() and not done():
-                self._hear()
-                raise RuntimeError(f"{who} ended while it started:\n{child.last_words()}")
+            for child in self.children:
+                if not child.running() and not self.status["ready"] and not self.status["ended"]:
+                    self._hear()
+                    raise RuntimeError(f"the {child.role} process ended while it started:\n{child.last_words()}")
             if time.monotonic() > deadline:
-                raise RuntimeError(f"{who} did not start within {START_TIMEOUT:g} s")
+                raise RuntimeError(f"the loop did not start within {START_TIMEOUT:g} s")
             time.sleep(0.002)
 
     def _hear(self) -> None:
@@ -173,8 +173,6 @@ class Supervisor:
                 if report["event"] == "lacks":
                     self.lacks = report["lacks"]
                     self.say("not fully real-time here: " + " | ".join(self.lacks))
-                if report["event"] == "listening":
-                    self.listening = True
 
     # one turn
 
