@@ -20,7 +20,7 @@ check: $(VENV)/installed-dev
 	@# drivers/ and plants/ become rtctl.drivers and rtctl.plants on installation; mypy is shown the same tree by links
 	@rm -rf build/types && mkdir -p build/types/rtctl && ln -s $(CURDIR)/rtctl/* build/types/rtctl/ \
 	  && ln -s $(CURDIR)/drivers $(CURDIR)/plants $(CURDIR)/configs build/types/rtctl/
-	cd build/types && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir $(CURDIR)/.mypy_cache -p rtctl
+	cd build/types && $(CURDIR)/$(BIN)/mypy --config-file $(CURDIR)/pyproject.toml --cache-dir .cache -p rtctl
 
 format: $(VENV)/installed-dev
 	$(BIN)/ruff check --fix .

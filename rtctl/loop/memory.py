@@ -35,7 +35,7 @@ def borrowed(typing_context, array):
     loop keeps the arrays alive.
     """
 
-    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+    def codegen(context, builder, signature, args):
         view = context.make_array(signature.args[0])(context, builder, args[0])
         view.meminfo = ir.Constant(view.meminfo.type, None)
         view.parent = ir.Constant(view.parent.type, None)
