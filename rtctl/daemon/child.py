@@ -18,6 +18,7 @@ from typing import Any
 import zmq
 
 from rtctl import machines
+from rtctl.config.errors import UserError
 from rtctl.daemon import keys, server
 from rtctl.loop import generate, zmq_link
 from rtctl.loop.memory import Segment
@@ -47,8 +48,11 @@ def machine_from(order: dict[str, Any]) -> Machine:
 
 
 def segment_from(order: dict[str, Any], made: generate.Generated) -> Segment:
-    """Map the shared memory that the supervisor made."""
-    return Segment.open(Path(order["segment"]), layout(made.params, made.tables, made.row, order["rows"]))
+    """Map the shared memory that the supervisor made. Raises UserError where a later supervisor has made another."""
+    segment = Segment.open(Path(order["segment"]), layout(made.params, made.tables, made.row, order["rows"]))
+    if segment.path.stat().st_ino != order["inode"]:
+        raise UserError(f"{segment.path} belongs to another supervisor by now; ours has died")
+    return segment
 
 
 def watch_parent(on_lost: Callable[[], None], on_stop: Callable[[], None], interrupt: bool = False) -> None:

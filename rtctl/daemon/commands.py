@@ -59,7 +59,8 @@ class Commands:
         return {"signals": [{"name": c.name, "unit": c.unit, "help": c.help} for c in self._of.made.columns]}
 
     def _arm(self) -> dict[str, Any]:
-        if int(self._of.status["state"]) == safety.TRIPPED:
+        taken_in = self._of.mailbox.seen == int(self._of.segment["mailbox"][0]["count"])  # or a reset is on its way
+        if taken_in and int(self._of.status["state"]) == safety.TRIPPED:
             raise UserError("the machine has tripped; look at `rtctl status`, then `rtctl reset` and arm again")
         return self._count("arm")
 

@@ -57,8 +57,13 @@ class Session:
             "bundle": str(self.bundle) if self.bundle else None,
         }
 
+    def _rows(self) -> int:
+        """Rows in the bundle: none where the run ended before its first tick."""
+        recorder = self.supervisor.recorder
+        return 0 if recorder is None else recorder.stats().rows_written
+
     def _metrics(self) -> list[dict[str, Any]]:
-        if self.bundle is None:
+        if self.bundle is None or not self._rows():
             return []
         from rtctl.trace.bundle import load_bundle
         from rtctl.trace.metrics import step_metrics
@@ -82,7 +87,7 @@ class Session:
 
     def draw(self) -> str | None:
         """Draw the run beside its bundle; returns the picture's path."""
-        if self.bundle is None:
+        if self.bundle is None or not self._rows():
             return None
         from rtctl.trace.bundle import load_bundle
         from rtctl.trace.plot import plot_run

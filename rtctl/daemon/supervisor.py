@@ -129,6 +129,7 @@ class Supervisor:
         order = {
             "config": config.model_dump(mode="json", exclude_unset=True),
             "segment": str(self.segment.path),
+            "inode": self.segment.path.stat().st_ino,  # a child that outlives us must not take the next one's segment
             "rows": rows,
             "link": self.link,
             "endpoint": endpoint,

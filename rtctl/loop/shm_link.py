@@ -55,10 +55,12 @@ def receive_newest(slot, frame, staged):
     fence()
     staged[0] = slot[0].frame
     fence()
-    if slot[0].count != count or not frames.valid(staged[0]):
+    if slot[0].count != count:
+        return 0
+    slot[0].seen = count
+    if not frames.valid(staged[0]):
         return 0
     frame[0] = staged[0]
-    slot[0].seen = count
     return 1
 
 
