@@ -77,3 +77,13 @@ def current(p, volts, direction):
     else:
         ampere = OFFSET_AMPERE + AMPERE_PER_VOLT * max(v - KNEE_VOLTS, 0.0)
     return ampere if direction != 0 else -ampere
+
+
+@tick
+def drive(p, volts, forward):
+    """Current in A for a signed voltage; at 0 V the direction bit decides, where the amplifier has an offset."""
+    if volts > 0.0:
+        return current(p, volts, 1)
+    if volts < 0.0:
+        return current(p, -volts, 0)
+    return current(p, 0.0, forward)

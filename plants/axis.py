@@ -17,6 +17,9 @@ from rtctl.plants import linear
 
 CARRIAGE = 0
 NODES = {"carriage": CARRIAGE}
+LINKS = {"carriage": 0}  # the spring to the frame
+DRIVES = {"drive": 0}
+SENSORS = {"sensor": 0}
 NQ, NU, NX = 1, 1, 2
 
 
@@ -42,7 +45,7 @@ class AxisParams(NamedTuple):
     k: float
 
 
-AXIS_STATE = state(m=linear.machine_state(NQ, NX, NU))
+AXIS_STATE = state(m=linear.machine_state(NQ, NX, NU, len(SENSORS), len(LINKS)))
 
 
 def build(settings: AxisSettings, h: float) -> AxisParams:
@@ -70,6 +73,13 @@ def start(p, s):
     s.m.dry_base[CARRIAGE] = p.F_c
     assemble(p, s.m.A, s.m.G)
     linear.discretise_into(s.m.A, s.m.G, s.m.h, s.m.Phi_T, s.m.Gamma_T, s.m.work)
+    linear.link(s.m, 0, CARRIAGE, 1.0, CARRIAGE, 0.0, p.k, 0.0)
+
+
+@tick
+def read(s):
+    """What the sensor would show, m or rad, into s.m.y."""
+    s.m.y[0] = s.m.x[CARRIAGE]
 
 
 def state_space(p: AxisParams) -> tuple[np.ndarray, np.ndarray]:

@@ -27,6 +27,9 @@ from rtctl.plants import linear
 
 MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 = range(5)
 NODES = {"motor1": MOTOR1, "reel1": REEL1, "capstan": CAPSTAN, "reel2": REEL2, "motor2": MOTOR2}
+LINKS = {"tape1": 0, "tape2": 1, "motor1": 2, "motor2": 3}  # the tapes, and the shaft behind each motor
+DRIVES = {"drive1": 0, "drive2": 1}
+SENSORS = {"encoder": 0, "reel1": 1, "reel2": 2}
 NQ, NU, NX = 5, 2, 14  # five rotations and their speeds, two states of each motor driver
 RELINEARISE = 5e-3  # of a radius: the explicit correction forces stay a hundred times below the linear ones
 
@@ -111,7 +114,7 @@ class IvuParams(NamedTuple):
 
 
 IVU_STATE = state(
-    m=linear.machine_state(NQ, NX, NU),
+    m=linear.machine_state(NQ, NX, NU, len(SENSORS), len(LINKS)),
     R1=float,  # m, now
     R2=float,
     J1=float,  # kg m^2, now
@@ -210,6 +213,16 @@ def _linearise(p, s):
     s.R1_lin, s.R2_lin, s.J1_lin, s.J2_lin = s.R1, s.R2, s.J1, s.J2
     assemble(p, s.R1, s.R2, s.J1, s.J2, s.m.A, s.m.G)
     linear.discretise_into(s.m.A, s.m.G, s.m.h, s.m.Phi_T, s.m.Gamma_T, s.m.work)
+    linear.link(s.m, 0, REEL1, s.R1, CAPSTAN, -p.R_c, p.c1, p.k1)  # positive when taut
+    linear.link(s.m, 1, REEL2, s.R2, CAPSTAN, p.R_c, p.c2, p.k2)
+    linear.link(s.m, 2, MOTOR1, 1.0, REEL1, -1.0, p.c_m1, p.k_m1)
+    linear.link(s.m, 3, MOTOR2, 1.0, REEL2, -1.0, p.c_m2, p.k_m2)
+
+
+@tick
+def read(s):
+    """What the sensors would show, rad, into s.m.y."""
+    s.m.y[0], s.m.y[1], s.m.y[2] = s.m.x[CAPSTAN], s.m.x[REEL1], s.m.x[REEL2]
 
 
 @tick
@@ -231,6 +244,10 @@ def follow_tape(p, s):
     F2_lin = p.c2 * (-x - s.R2_lin * q2) + p.k2 * (-dx - s.R2_lin * v2)
     F1 = p.c1 * (x - l1) + p.k1 * (dx - s.R1 * v1)
     F2 = p.c2 * (-x - l2) + p.k2 * (-dx - s.R2 * v2)
+    m.link_e[0] = l1 - s.R1_lin * q1
+    m.link_e[1] = l2 - s.R2_lin * q2
+    m.link_T[0] += F1_lin - F1 - p.c1 * m.link_e[0]  # with these linear.tension tells the tension on the true radius
+    m.link_T[1] += F2_lin - F2 - p.c2 * m.link_e[1]
     tau1 = p.c_m1 * (m.qm[MOTOR1] - q1) + p.k_m1 * (m.vm[MOTOR1] - v1)
     tau2 = p.c_m2 * (m.qm[MOTOR2] - q2) + p.k_m2 * (m.vm[MOTOR2] - v2)
     m.f[REEL1] += (F1 * s.R1 + tau1) * (s.J1_lin / s.J1) - (F1_lin * s.R1_lin + tau1)

@@ -24,6 +24,14 @@ from rtctl.plants import linear
 
 MOTOR, WHEEL, CAPSTAN, ENCODER = range(4)
 NODES = {"motor": MOTOR, "wheel": WHEEL, "capstan": CAPSTAN, "encoder": ENCODER}
+LINKS = {
+    "motor": 0,
+    "wheel": 0,
+    "capstan": 1,
+    "encoder": 2,
+}  # the shaft between motor and wheel, the two halves of the capstan
+DRIVES = {"drive": 0}
+SENSORS = {"encoder": 0, "scale": 1}
 NQ, NU, NX = 4, 1, 10  # four rotations and their speeds, two states of the amplifier
 
 
@@ -84,7 +92,7 @@ class LduParams(NamedTuple):
     drive: np.ndarray  # (2,) of the amplifier: natural frequency rad/s, damping
 
 
-LDU_STATE = state(m=linear.machine_state(NQ, NX, NU))
+LDU_STATE = state(m=linear.machine_state(NQ, NX, NU, len(SENSORS), 3))
 
 
 def parameters(settings: LduSettings) -> LduParameters:
@@ -145,6 +153,15 @@ def start(p, s):
     s.m.dry_base[CAPSTAN] = p.R_c * p.F_c
     assemble(p, s.m.A, s.m.G)
     linear.discretise_into(s.m.A, s.m.G, s.m.h, s.m.Phi_T, s.m.Gamma_T, s.m.work)
+    linear.link(s.m, 0, MOTOR, 1.0, WHEEL, -p.N, p.k_s, p.b_s)
+    linear.link(s.m, 1, WHEEL, 1.0, CAPSTAN, -1.0, p.k_c, p.b_c)
+    linear.link(s.m, 2, CAPSTAN, 1.0, ENCODER, -1.0, p.k_c, p.b_c)
+
+
+@tick
+def read(p, s):
+    """What the sensors would show, rad and m, into s.m.y."""
+    s.m.y[0], s.m.y[1] = s.m.x[ENCODER], p.R_c * s.m.x[CAPSTAN]
 
 
 def state_space(p: LduParams) -> tuple[np.ndarray, np.ndarray]:

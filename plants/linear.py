@@ -23,20 +23,24 @@ TAYLOR = 12  # terms; the argument is scaled below a half, so the remainder is u
 BALANCE_SWEEPS = 20
 
 
-def machine_state(nq: int, nx: int, nu: int) -> np.dtype:
+def machine_state(nq: int, nx: int, nu: int, ny: int, nl: int) -> np.dtype:
     """Record of a machine: its matrices for one substep, its state, and what acts on it.
 
-    `nq` positions come first in x, then their nq velocities, then other states; `nu` inputs, then nq node forces.
+    `nq` positions come first in x, then their nq velocities, then other states; `nu` inputs, then nq node forces;
+    `ny` sensors; `nl` links, each the spring of elongation a q_i + b q_j between two nodes that is already part of A.
     """
     n = nx + nu + nq
     return state(
         h=float,  # s, one substep
+        t=float,  # s, since the start
         A=(float, (nx, nx)),
         G=(float, (nx, nu + nq)),  # [B | E]
         Phi_T=(float, (nx, nx)),  # transposed: the inner loop runs along memory
         Gamma_T=(float, (nu + nq, nx)),
         work=(float, (4, n, n)),
-        u=(float, nu),
+        volts=(float, nu),  # at the input of each driver
+        u=(float, nu),  # what enters the linear machine: volts, or amperes asked for
+        y=(float, ny),  # what each sensor would show before it is cut into counts, rad or m
         x=(float, nx),
         x_next=(float, nx),
         qm=(float, nq),  # positions and velocities at the middle of the substep
@@ -46,6 +50,14 @@ def machine_state(nq: int, nx: int, nu: int) -> np.dtype:
         dry_base=(float, nq),
         dry=(float, nq),  # limit of the dry friction on each node
         r=(float, nq),  # dry friction in force
+        link_i=(int, nl),
+        link_j=(int, nl),
+        link_a=(float, nl),
+        link_b=(float, nl),
+        link_c=(float, nl),  # stiffness and damping of the linear spring
+        link_k=(float, nl),
+        link_T=(float, nl),  # what terms pull with on top of it, this substep
+        link_e=(float, nl),  # elongation that the linear model does not know, as of tape wound at another radius
     )
 
 
@@ -161,12 +173,49 @@ def midpoint(m):
         m.v_before[i] = v
         m.f[i] = 0.0
         m.dry[i] = m.dry_base[i]
+    for j in range(m.link_T.shape[0]):
+        m.link_T[j] = 0.0
+        m.link_e[j] = 0.0
+
+
+@tick
+def link(m, j, i1, a, i2, b, c, k):
+    """Say that link `j` is the spring of stiffness c and damping k with elongation a q_i1 + b q_i2."""
+    m.link_i[j], m.link_j[j] = i1, i2
+    m.link_a[j], m.link_b[j], m.link_c[j], m.link_k[j] = a, b, c, k
+
+
+@tick
+def stretch(m, j):
+    """Elongation of link `j` at the middle of the substep, m or rad."""
+    return m.link_a[j] * m.qm[m.link_i[j]] + m.link_b[j] * m.qm[m.link_j[j]] + m.link_e[j]
+
+
+@tick
+def stretch_rate(m, j):
+    """Its rate, m/s or rad/s."""
+    return m.link_a[j] * m.vm[m.link_i[j]] + m.link_b[j] * m.vm[m.link_j[j]]
+
+
+@tick
+def tension(m, j):
+    """Pull in link `j` at the middle of the substep: its spring and damper and what terms added so far, N or Nm."""
+    return m.link_c[j] * stretch(m, j) + m.link_k[j] * stretch_rate(m, j) + m.link_T[j]
+
+
+@tick
+def pull(m, j, T):
+    """Add a pull of `T` N or Nm in link `j` to the forces at its two ends."""
+    m.f[m.link_i[j]] -= m.link_a[j] * T
+    m.f[m.link_j[j]] -= m.link_b[j] * T
+    m.link_T[j] += T
 
 
 @tick
 def advance(m):
     """One substep with the inputs `m.u` and the smooth forces `m.f` held; dry friction `m.dry` closes it."""
     nx, nu, nq = m.x.shape[0], m.u.shape[0], m.r.shape[0]
+    m.t += m.h
     for i in range(0, nx - 1, 2):  # two sums at a time, which stay in registers; both add up in the order of j
         one, two = 0.0, 0.0
         for j in range(nx):

@@ -1,6 +1,39 @@
 """Terms of physics, one file a family. Emulator, fit and diagnosis all use these and no others."""
 
-from rtctl.plants.physics import friction
+from rtctl.plants.physics import (
+    contact,
+    drive,
+    drive_dynamics,
+    friction,
+    friction_direction,
+    friction_load,
+    geometry,
+    guide,
+    load,
+    presliding,
+    ripple,
+    ripple_tape,
+    sensor,
+    structure,
+    tape,
+    timing,
+    transmission,
+)
+from rtctl.plants.physics.place import Place, place
 from rtctl.plants.physics.term import Term
 
-TERMS: dict[str, Term] = {term.name: term for term in (friction.COULOMB, friction.VISCOUS, friction.STRIBECK)}
+FAMILIES = (  # in the order in which they act: what asymmetry scales and presliding replaces must be there before
+    timing, drive, drive_dynamics, friction, friction_load, load, friction_direction, presliding, transmission, contact,
+    structure, tape, ripple, ripple_tape, guide, sensor, geometry,
+)  # fmt: skip
+TERMS: dict[str, Term] = {
+    term.name: term for family in FAMILIES for term in vars(family).values() if isinstance(term, Term)
+}
+
+__all__ = ["TERMS", "Place", "Term", "ordered", "place"]
+
+
+def ordered(terms: list) -> list:
+    """Entries of a `physics:` list in the order in which their terms act."""
+    names = list(TERMS)
+    return sorted(terms, key=lambda settings: names.index(settings.term))

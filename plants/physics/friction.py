@@ -1,7 +1,8 @@
 """Friction: what resists motion at a node, dry (up to a limit, opposing) or viscous (in proportion to speed).
 
 Dry terms add to the limit of the node's dry friction and the solver finds the force, so that a node that sticks
-stands still. Viscous terms add a force.
+stands still; a sum of limits below zero counts as none. Viscous terms add a force. Sizes may be negative where the
+base model has more than the machine: the sum is what must not feed energy in.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, A survey of models, analysis tools and compensation methods for
 the control of machines with friction, Automatica 30 (1994); thesis (8.3).
@@ -18,9 +19,12 @@ SHAFTS = {
     "ldu": ("motor", "wheel", "capstan", "carriage"),
     "axis": ("carriage",),
 }
+DRY = {"ivu": ("motor1", "motor2", "capstan"), "ldu": ("carriage",), "axis": ("carriage",)}  # where the model has it
 
 
 class CoulombSettings(Settings):
+    """F_C is the size; negative where there is less dry friction than the base model has."""
+
     term: Literal["friction.coulomb"] = "friction.coulomb"
     node: str
     F_C: float = quantity(unit="", ge=-1e4, le=1e4, help="dry friction on top of the base model's, Nm or N by node")
@@ -42,9 +46,13 @@ def coulomb(p):
 
 
 class ViscousSettings(Settings):
+    """B is the size; negative, down to what the base model has, where there is less of it than believed."""
+
     term: Literal["friction.viscous"] = "friction.viscous"
     node: str
-    B: float = quantity(unit="", ge=0, le=1e5, help="viscous friction, Nms/rad or Ns/m by node")
+    B: float = quantity(
+        unit="", ge=-1e5, le=1e5, help="viscous friction on top of the base model's, Nms/rad or Ns/m by node"
+    )
 
 
 class ViscousParams(NamedTuple):
@@ -63,7 +71,10 @@ def viscous(p, v):
 
 
 class StribeckSettings(Settings):
-    """F_s is the friction at standstill; it falls to the base model's within a few v_s of speed (8.3)."""
+    """F_s is the friction at standstill; it falls to the base model's within a few v_s of speed (8.3).
+
+    The size is F_s less the base model's dry friction: there it does nothing.
+    """
 
     term: Literal["friction.stribeck"] = "friction.stribeck"
     node: str
@@ -110,14 +121,15 @@ COULOMB = Term(
     source="Coulomb 1785; Armstrong-Helouvry 1994",
     settings=CoulombSettings,
     build=build_coulomb,
-    act="{m}.dry[{i}] += {r} * friction.coulomb({p})",
+    act={"force": "{m}.dry[{i}] += {r} * friction.coulomb({p})"},
     nodes=SHAFTS,
     look_alikes={
         "friction.stribeck": "constant speeds from crawl to full: only Stribeck falls at the start",
         "friction.load": "the same motion at three tensions: only load friction grows",
         "drive.deadband": "push slowly both ways at standstill under a spring: the dead band shows in u, not in force",
     },
-    typical={"F_C": (0.05, 0.2)},
+    typical={"F_C": (0.3, 1.0)},
+    scale={"F_C": "dry"},
 )
 VISCOUS = Term(
     name="friction.viscous",
@@ -126,12 +138,14 @@ VISCOUS = Term(
     source="Armstrong-Helouvry 1994",
     settings=ViscousSettings,
     build=build_viscous,
-    act="{m}.f[{i}] += {r} * friction.viscous({p}, {r} * {m}.vm[{i}])",
+    act={"force": "{m}.f[{i}] += {r} * friction.viscous({p}, {r} * {m}.vm[{i}])"},
     nodes=SHAFTS,
     look_alikes={
         "friction.coulomb": "constant speeds over a decade: only viscous friction grows with speed",
         "drive.supply_sag": "load the other motor at constant speed: sag changes the gain, grease does not",
     },
+    typical={"B": (0.1, 0.5)},
+    scale={"B": "force/speed"},
 )
 STRIBECK = Term(
     name="friction.stribeck",
@@ -140,11 +154,14 @@ STRIBECK = Term(
     source="thesis (8.3); Bo & Pavelescu 1982; Hess & Soom 1990",
     settings=StribeckSettings,
     build=build_stribeck,
-    act="{m}.dry[{i}] += {r} * friction.stribeck({p}, {m}.dry_base[{i}] / {r}, {r} * {m}.vm[{i}])",
+    act={"force": "{m}.dry[{i}] += {r} * friction.stribeck({p}, {m}.dry_base[{i}] / {r}, {r} * {m}.vm[{i}])"},
     nodes=SHAFTS,
     look_alikes={
         "friction.presliding": "reverse within microns: a spring with hysteresis is presliding",
         "friction.coulomb": "constant speeds from crawl to full: Coulomb stays flat",
+        "friction.load": "break away at three tensions: sticking is there without any tension",
+        "drive.deadband": "break away against a spring: sticking shows in force, the dead band in voltage only",
     },
-    typical={"F_s": (1.1, 2.0), "v_s": (0.1, 5.0)},
+    typical={"F_s": (1.1, 2.0), "v_s": (0.02, 0.3)},
+    scale={"F_s": "dry", "v_s": "speed"},
 )

@@ -1,4 +1,23 @@
-"""What a term of physics tells the emulator, the fit, and the mechanic who reads the report."""
+"""What a term of physics tells the emulator, the fit, and the mechanic who reads the report.
+
+A term acts at one or more sites of a plant's substep. At each site it is one line of the generated plant, in which
+these names are filled in:
+
+    {p} {s}   its params and its state
+    {m}       the machine's record (plants/linear.py)
+    {i} {r}   the node's index, and the factor from the node's rotation to the term's own unit: 1, or the radius for a
+              node that slides ({r} * {m}.vm[{i}] is the node's speed in the term's unit)
+    {l}       the link (spring) that the node names: tape1, or the shaft that ends at a motor or a wheel
+    {c}       the channel: of the drive for a drive, of the sensor for a sensor
+
+The sites of a substep in their order:
+
+    command   {m}.volts[{c}], what stands at the driver's input, may be changed; {m}.volts holds all drives
+    force     {m}.qm and {m}.vm are position and speed at the middle of the substep; {r} times a force goes to
+              {m}.f[{i}], {r} times a limit of dry friction to {m}.dry[{i}]; linear.pull({m}, {l}, T) pulls at a link
+    reading   {m}.y[{c}], what the sensor would show before it is cut into counts, may be changed; {m}.x is the state at
+              the sample, {m}.t its time. It may be called once a substep or once a tick: it keeps no memory.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -8,15 +27,12 @@ import numpy as np
 
 from rtctl.idiom import Settings
 
+SITES = ("command", "force", "reading")
+
 
 @dataclass(frozen=True)
 class Term:
-    """One effect that a machine can have beyond its equations.
-
-    `act` is how a generated plant calls it, once a substep, with these names filled in: {p} and {s} its params and
-    state, {m} the machine's record, {i} the node's index, {r} the factor from the node's rotation to the term's own
-    unit (1, or a radius for a node that slides). It adds a smooth force to {m}.f or a limit of dry friction to {m}.dry.
-    """
+    """One effect that a machine can have beyond its equations."""
 
     name: str
     words: str
@@ -24,10 +40,15 @@ class Term:
     source: str
     settings: type[Settings]
     build: Callable[[Any, float], Any]
-    act: str
+    act: dict[str, str]  # site, or site:kind for one kind of plant -> line
     nodes: dict[str, tuple[str, ...]]  # plant kind -> nodes where it can stand
     look_alikes: dict[str, str]  # rival name -> the experiment that separates the two
-    typical: dict[str, tuple[float, float]] = field(
-        default_factory=dict
-    )  # parameter -> range; friction in base friction
+    typical: dict[str, tuple[float, float]] = field(default_factory=dict)  # parameter -> range; see `scale`
+    scale: dict[str, str] = field(default_factory=dict)  # parameter -> what its typical range is a multiple of
+    axis: str = "velocity"  # where the effect shows: time, velocity, position, angle, command, tension, frequency
+    passive: bool = True  # never feeds energy in
     state: np.dtype | None = None
+
+    def act_at(self, site: str, kind: str) -> str | None:
+        """Its line at a site of a plant, None where it does nothing there."""
+        return self.act.get(f"{site}:{kind}", self.act.get(site))

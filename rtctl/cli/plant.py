@@ -1,18 +1,22 @@
 """`rtctl plant CONFIG`: the emulated machine by itself, for a loop on this computer or another."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
 from rtctl.cli import common
-from rtctl.cli.common import ConfigArgument, ModeOption, SetOption
+from rtctl.cli.common import ModeOption, SetOption
 
 app = typer.Typer(add_completion=False)
 
 
 @app.command()
 def plant(
-    config: ConfigArgument,
+    config: Annotated[
+        str | None,
+        typer.Argument(metavar="CONFIG", help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis."),
+    ] = None,
     endpoint: Annotated[
         str | None,
         typer.Option(
@@ -21,23 +25,47 @@ def plant(
     ] = None,
     mode: ModeOption = None,
     set_: SetOption = None,
+    conceal: Annotated[
+        int | None,
+        typer.Option(metavar="SEED", min=0, help="Hide an effect in the machine, drawn by this seed; needs --seal."),
+    ] = None,
+    seal: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Where the hidden effect is written, and nowhere else.")
+    ] = None,
+    open_seal: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Check a seal, print what was hidden, and stop.")
+    ] = None,
 ) -> None:
     """Emulate a machine until Ctrl-C.
 
-    The loop that drives it has `link: {plant: external, endpoint: ...}` in its config.
+    The loop that drives it has `link: {plant: external, endpoint: ...}` in its config. With --conceal the machine has
+    one more effect than its config says; the loop and its recording do not learn which.
 
     Examples:
 
       rtctl plant ivu --endpoint tcp://127.0.0.1:5570
 
       rtctl run ivu --set link.plant=external --set link.endpoint=tcp://127.0.0.1:5570
+
+      rtctl plant ivu --conceal 7 --seal hidden.json
+
+      rtctl plant --open-seal hidden.json
     """
     from rtctl.config.errors import UserError
 
+    if open_seal is not None:
+        _open(open_seal)
+        return
+    if config is None:
+        raise UserError("missing argument 'CONFIG'; see rtctl plant --help")
+    if (conceal is None) != (seal is None):
+        raise UserError("--conceal SEED and --seal FILE go together: what is hidden is written into the file only")
     settings = common.with_loop(common.load_config(config, set_), mode, "zmq")
     if settings.loop.mode == "fused":
         raise UserError("a fused run has its plant inside; use --mode real or --mode lockstep")
     machine = common.machine_of(settings)
+    if conceal is not None and seal is not None:
+        machine = _hide(settings, conceal, seal)
 
     from rtctl.daemon.plant_process import alone
     from rtctl.daemon.server import runtime_dir
@@ -47,3 +75,25 @@ def plant(
     if not generate.is_warm(generate.write(machine, "zmq"), f"plant_{settings.loop.mode}"):
         typer.echo("compiling the plant, once for this config structure ...", err=True)
     alone(machine, where, lambda: typer.echo(f"{settings.name}: plant listens at {where}"))
+
+
+def _hide(settings: Any, seed: int, seal: Path) -> Any:
+    """The machine with an effect that only the seal knows of."""
+    from rtctl import machines
+    from rtctl.diagnose.conceal import conceal
+    from rtctl.diagnose.seal import close_seal
+
+    hidden, entry = conceal(settings, seed)
+    answer = {"name": settings.name, "plant": settings.machine, "seed": seed, "physics": [entry]}
+    typer.echo(f"{settings.name}: sealed in {seal}, sha256 {close_seal(seal, answer)}", err=True)
+    return machines.build(hidden)
+
+
+def _open(path: Path) -> None:
+    from rtctl.diagnose.seal import open_seal
+
+    answer, digest = open_seal(path)
+    typer.echo(f"{answer['name']} ({answer['plant']}), seed {answer['seed']}, sha256 {digest}: as it was sealed")
+    for entry in answer["physics"]:
+        first = ("term", "node", *(key for key in entry if key not in ("term", "node")))
+        typer.echo(f"- {{{', '.join(f'{key}: {entry[key]}' for key in first)}}}")

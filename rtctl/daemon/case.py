@@ -3,6 +3,7 @@
 Source: the exchange format for recordings of two-reel units, linear drives and axes (docs/bundle.md).
 """
 
+import math
 import platform
 import sys
 from typing import Any
@@ -11,6 +12,7 @@ import numba
 import numpy as np
 
 from rtctl import __version__
+from rtctl.drivers import l292
 from rtctl.loop import generate
 from rtctl.machines import Machine
 from rtctl.plants import axis, ivu, ldu
@@ -51,8 +53,12 @@ def _given(settings: Any) -> dict[str, float]:
 
 def _ivu(config: Any) -> dict[str, Any]:
     law = config.law
+    w, zeta = l292.second_order(config.plant.driver)[1:3]
+    parameters = _given(ivu.parameters(config.plant))
+    if not config.plant.follow_tape:
+        parameters["d_tape"] = 0.0
     return {
-        "parameters": _given(ivu.parameters(config.plant)),
+        "parameters": parameters,
         "sensors": {
             "capstan_counts_per_rev": config.sensors.capstan.lines * config.sensors.capstan.multiply,
             "reel_counts_per_rev": config.sensors.reel1.pulses,
@@ -61,6 +67,8 @@ def _ivu(config: Any) -> dict[str, Any]:
             "amp_per_volt": [law.tension.amp_per_volt, law.tension.amp_per_volt],
             "limit_volt": law.limit.high,
             "dac_bits": 12,
+            "bandwidth_hz": w / (2 * math.pi),
+            "damping": zeta,
         },
         "controller": {
             "kind": "pd",
@@ -89,7 +97,14 @@ def _ldu(config: Any) -> dict[str, Any]:
             "encoder_counts_per_rev": config.sensors.encoder.lines * config.sensors.encoder.multiply,
             "scale_m_per_count": config.sensors.scale.pitch,
         },
-        "drive": {"amp_per_volt": [0.1], "limit_volt": config.law.limit.high, "dac_bits": 12, "dac_range_volt": 10.0},
+        "drive": {
+            "amp_per_volt": [0.1],
+            "limit_volt": config.law.limit.high,
+            "dac_bits": 12,
+            "dac_range_volt": 10.0,
+            "bandwidth_hz": config.plant.bandwidth,
+            "damping": config.plant.damping,
+        },
         "controller": _position(config.law),
     }
 

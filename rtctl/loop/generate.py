@@ -143,11 +143,15 @@ def sources_hash() -> str:
     roots = [Path(__file__).parents[1], *map(Path, rtctl.plants.__path__), *map(Path, rtctl.drivers.__path__)]
     for root in roots:
         for path in sorted(root.rglob("*.py")):
-            if not {"cli", "daemon", "trace"} & set(path.parts[len(root.parts) :]):
+            if not {"cli", "daemon", "trace", "diagnose", "proof"} & set(path.parts[len(root.parts) :]):
                 digest.update(path.name.encode() + path.read_bytes())
-    versions = (__version__, numba.__version__, np.__version__, sys.version, platform.machine(), _cpu())
-    digest.update(repr(versions).encode())
+    digest.update(versions().encode())
     return digest.hexdigest()
+
+
+def versions() -> str:
+    """Of all that turns sources into machine code here."""
+    return repr((__version__, numba.__version__, np.__version__, sys.version, platform.machine(), _cpu()))
 
 
 def _cpu() -> str:

@@ -220,22 +220,30 @@ def substeps(config: AxisConfig, period: float) -> int:
 def plant_diagram(config: AxisConfig, period: float, seed: int) -> PlantDiagram:
     """Blocks and lines of the emulated machine, advanced by `period` s a call."""
     h = period / substeps(config, period)
-    nodes = {name: (index, "1.0") for name, index in plant_axis.NODES.items()}
-    uses, terms, lines = physics_lines(config.plant.physics, "axis", nodes, h)
+    terms = physics_lines(config.plant.physics, "axis", h)
     blocks = (
         Block("plant", plant_axis.build(config.plant, h), plant_axis.AXIS_STATE),
         Block("output", at_mio_16de.build_output(config.output, h), at_mio_16de.ANALOG_OUTPUT_STATE),
         Block("encoder", linear_scale.build(config.encoder, h), linear_scale.LINEAR_SCALE_STATE),
         Block("counter0", None, daq_stc.COUNTER_STATE),
-        *terms,
+        *terms.blocks,
     )
     advance = (
-        ("drive", ("s.plant.m.u[0] = at_mio_16de.output_step(p.output, s.output, tx.ao_codes[0], p.plant.h)",)),
-        ("physics", ("linear.midpoint(s.plant.m)", *lines, "linear.advance(s.plant.m)")),
+        (
+            "drive",
+            (
+                "s.plant.m.volts[0] = at_mio_16de.output_step(p.output, s.output, tx.ao_codes[0], p.plant.h)",
+                *terms.command,
+                "s.plant.m.u[0] = s.plant.m.volts[0]",
+            ),
+        ),
+        ("physics", ("linear.midpoint(s.plant.m)", *terms.force, "linear.advance(s.plant.m)")),
         (
             "encoder",
             (
-                "pulses = linear_scale.step(p.encoder, s.encoder, s.plant.m.x[0])",
+                "axis.read(s.plant)",
+                *terms.reading,
+                "pulses = linear_scale.step(p.encoder, s.encoder, s.plant.m.y[0])",
                 "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
             ),
         ),
@@ -251,7 +259,7 @@ def plant_diagram(config: AxisConfig, period: float, seed: int) -> PlantDiagram:
             "rtctl.drivers.linear_scale",
             "rtctl.plants.axis",
             "rtctl.plants.linear",
-            *uses,
+            *terms.uses,
         ),
         blocks=blocks,
         truth=TRUTH,

@@ -130,18 +130,36 @@ TRACE_LINES = (
 )
 
 
-def physics_lines(terms: list[Any], kind: str, nodes: dict[str, tuple[int, str]], dt: float) -> tuple[Any, Any, Any]:
-    """Modules, blocks and lines of the plant's terms. `nodes` gives index and the factor to the node's own unit."""
-    from rtctl.plants.physics import TERMS
+class PhysicsLines(NamedTuple):
+    """What the terms of a plant's `physics:` list bring into its diagram."""
 
-    uses: list[str] = []
+    uses: tuple[str, ...]
+    blocks: tuple[Block, ...]
+    command: tuple[str, ...]  # lines by site, see plants/physics/term.py
+    force: tuple[str, ...]
+    reading: tuple[str, ...]
+
+
+def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
+    """Modules, blocks and lines of the plant's terms, in the order in which they act."""
+    from rtctl.plants.physics import TERMS, ordered, place
+    from rtctl.plants.physics.term import SITES
+
     blocks: list[Block] = []
-    lines: list[str] = []
-    for number, settings in enumerate(terms):
+    uses: list[str] = []
+    lines: dict[str, list[str]] = {site: [] for site in SITES}
+    for number, settings in enumerate(ordered(terms)):
         term = TERMS[settings.term]
-        index, factor = nodes[settings.node]
         name = f"term{number}"
+        spot = place(kind, settings.node)
         blocks.append(Block(name, term.build(settings, dt), term.state))
         uses.append(term.build.__module__)
-        lines.append(term.act.format(p=f"p.{name}", s=f"s.{name}", m="s.plant.m", i=index, r=factor))
-    return tuple(dict.fromkeys(uses)), tuple(blocks), tuple(lines)
+        for site in SITES:
+            act = term.act_at(site, kind)
+            if act is not None:
+                line = act.format(
+                    p=f"p.{name}", s=f"s.{name}", m="s.plant.m", i=spot.node, l=spot.link, c=spot.channel,
+                    r=f"p.plant.{spot.factor}" if spot.factor else "1.0",
+                )  # fmt: skip
+                lines[site] += line.split("\n")
+    return PhysicsLines(tuple(dict.fromkeys(uses)), tuple(blocks), *(tuple(lines[site]) for site in SITES))

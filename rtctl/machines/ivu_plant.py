@@ -32,8 +32,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
     h = period / substeps(config, period)
     board = config.board
     driver = (*l292.second_order(config.plant.driver), config.plant.driver.R_F * config.plant.driver.C_F)
-    nodes = {name: (index, "1.0") for name, index in plant_ivu.NODES.items()}
-    uses, terms, lines = physics_lines(config.plant.physics, "ivu", nodes, h)
+    terms = physics_lines(config.plant.physics, "ivu", h)
     follow = ("ivu.follow_tape(p.plant, s.plant)",) if config.plant.follow_tape else ()
     ripple = RIPPLE if config.plant.driver.ripple else ()
     blocks = (
@@ -50,7 +49,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
             for i, (name, wire) in enumerate((("input1", board.reel1), ("input2", board.reel2)))
         ),
         *(Block(name, None, l292.RIPPLE_STATE) for name in ("ripple1", "ripple2") if ripple),
-        *terms,
+        *terms.blocks,
     )  # fmt: skip
     advance = (
         (
@@ -58,15 +57,20 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
             (
                 "u1 = at_mio_16de.output_step(p.output1, s.output1, tx.ao_codes[0], p.plant.h)",
                 "u2 = at_mio_16de.output_step(p.output2, s.output2, tx.ao_codes[1], p.plant.h)",
-                "s.plant.m.u[0] = l292.limit(p.driver, u1)",
-                "s.plant.m.u[1] = l292.limit(p.driver, u2)",
+                "s.plant.m.volts[0] = u1",
+                "s.plant.m.volts[1] = u2",
+                *terms.command,
+                "s.plant.m.u[0] = l292.limit(p.driver, s.plant.m.volts[0])",
+                "s.plant.m.u[1] = l292.limit(p.driver, s.plant.m.volts[1])",
             ),
         ),
-        ("physics", ("linear.midpoint(s.plant.m)", *follow, *ripple, *lines, "linear.advance(s.plant.m)")),
+        ("physics", ("linear.midpoint(s.plant.m)", *follow, *ripple, *terms.force, "linear.advance(s.plant.m)")),
         (
             "encoder",
             (
-                "pulses = ls7084.step(p.capstan, s.capstan, s.plant.m.x[ivu.CAPSTAN], p.plant.h)",
+                "ivu.read(s.plant)",
+                *terms.reading,
+                "pulses = ls7084.step(p.capstan, s.capstan, s.plant.m.y[0], p.plant.h)",
                 "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
             ),
         ),
@@ -76,8 +80,8 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
             "scan",
             (
                 "rx.counter_codes[0] = daq_stc.counter_step(s.counter0, 0, 1)",
-                "theta1 = s.plant.m.x[ivu.REEL1] + s.plant.m.x[ivu.NQ + ivu.REEL1] * p.input1.scan_delay",
-                "theta2 = s.plant.m.x[ivu.REEL2] + s.plant.m.x[ivu.NQ + ivu.REEL2] * p.input2.scan_delay",
+                "theta1 = s.plant.m.y[1] + s.plant.m.x[ivu.NQ + ivu.REEL1] * p.input1.scan_delay",
+                "theta2 = s.plant.m.y[2] + s.plant.m.x[ivu.NQ + ivu.REEL2] * p.input2.scan_delay",
                 "rx.ai_codes[0] = at_mio_16de.input_step(p.input1, s.input1, optical_sensor.volts(p.reel1, theta1))",
                 "rx.ai_codes[1] = at_mio_16de.input_step(p.input2, s.input2, optical_sensor.volts(p.reel2, theta2))",
                 "rx.lost_counts = s.capstan.lost",
@@ -106,7 +110,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
             "rtctl.drivers.optical_sensor",
             "rtctl.plants.ivu",
             "rtctl.plants.linear",
-            *uses,
+            *terms.uses,
         ),
         blocks=blocks,
         truth=TRUTH,

@@ -26,9 +26,7 @@ def substeps(config: "LduConfig", period: float) -> int:
 def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram:
     """Blocks and lines of the emulated machine, advanced by `period` s a call."""
     h = period / substeps(config, period)
-    nodes = {name: (index, "1.0") for name, index in plant_ldu.NODES.items()}
-    nodes["carriage"] = (plant_ldu.CAPSTAN, "p.plant.R_c")
-    uses, terms, lines = physics_lines(config.plant.physics, "ldu", nodes, h)
+    terms = physics_lines(config.plant.physics, "ldu", h)
     output = at_mio_16de.build_output(config.board.output, h)
     blocks = (
         Block(
@@ -42,7 +40,7 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
         Block("counter0", None, daq_stc.COUNTER_STATE),
         Block("scale", linear_scale.build(config.sensors.scale, h), linear_scale.LINEAR_SCALE_STATE),
         Block("counter1", None, daq_stc.COUNTER_STATE),
-        *terms,
+        *terms.blocks,
     )
     line = config.board.direction_line
     advance = (
@@ -50,16 +48,21 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
             "amplifier",
             (
                 "volts = at_mio_16de.output_step(p.output, s.output, tx.ao_codes[0], p.plant.h)",
-                f"s.plant.m.u[0] = ldu_amplifier.current(p.amplifier, volts, (tx.dio_lines >> {line}) & 1)",
+                f"forward = (tx.dio_lines >> {line}) & 1",
+                "s.plant.m.volts[0] = volts if forward != 0 else -volts",
+                *terms.command,
+                "s.plant.m.u[0] = ldu_amplifier.drive(p.amplifier, s.plant.m.volts[0], forward)",
             ),
         ),
-        ("physics", ("linear.midpoint(s.plant.m)", *lines, "linear.advance(s.plant.m)")),
+        ("physics", ("linear.midpoint(s.plant.m)", *terms.force, "linear.advance(s.plant.m)")),
         (
             "encoder and scale",
             (
-                "pulses = ls7084.step(p.encoder, s.encoder, s.plant.m.x[ldu.ENCODER], p.plant.h)",
+                "ldu.read(p.plant, s.plant)",
+                *terms.reading,
+                "pulses = ls7084.step(p.encoder, s.encoder, s.plant.m.y[0], p.plant.h)",
                 "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
-                "pulses = linear_scale.step(p.scale, s.scale, p.plant.R_c * s.plant.m.x[ldu.CAPSTAN])",
+                "pulses = linear_scale.step(p.scale, s.scale, s.plant.m.y[1])",
                 "daq_stc.counter_step(s.counter1, abs(pulses), pulses > 0)",
             ),
         ),
@@ -91,7 +94,7 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
             "rtctl.drivers.ls7084",
             "rtctl.plants.ldu",
             "rtctl.plants.linear",
-            *uses,
+            *terms.uses,
         ),
         blocks=blocks,
         truth=TRUTH,

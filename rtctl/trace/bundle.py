@@ -151,6 +151,8 @@ def replace(part: Path, path: Path) -> Path:
 
 def _numbers(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
     kind = column.type
+    if column.null_count == len(column) > 0:
+        return np.full(len(column), np.nan)  # nobody knows it, such as the reference of a law that is not known
     if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)):
         raise UserError(f"{path}: column '{name}' holds {kind}; it should hold numbers")
     if column.null_count:

@@ -7,6 +7,10 @@ import socket
 
 import pytest
 
+from rtctl.diagnose.seal import close_seal, open_seal
+from rtctl.plants.physics import TERMS
+from rtctl.trace.bundle import load_bundle
+
 LOOP = [
     "link.plant=external",
     "loop.realtime=off",
@@ -50,9 +54,59 @@ def test_a_loop_drives_a_plant_that_was_there_before(rtctl, started, endpoint, t
         (["ivu", "--endpoint", "tcp://0.0.0.0:5570"], "needs keys"),
         (["nix"], "no such file"),
         (["ivu", "--set", "plant.set=identifed"], "did you mean 'identified'"),
+        ([], "missing argument 'CONFIG'; see rtctl plant --help"),
+        (["ivu", "--conceal", "3"], "--conceal SEED and --seal FILE go together"),
+        (["ivu", "--seal", "x.json"], "--conceal SEED and --seal FILE go together"),
+        (["ivu", "--conceal", "-3", "--seal", "x.json"], "--conceal"),
+        (["ivu", "--conceal", "3", "--seal", "/no/such/x.json"], "cannot be written"),
+        (["--open-seal", "/no/such/x.json"], "is missing"),
     ],
 )
 def test_plants_that_cannot_be(rtctl, runtime, words, message):
     code, out, err = rtctl("plant", *words)
     assert (code, out) == (2, "")
     assert message in err
+
+
+def test_nobody_learns_what_a_plant_conceals(rtctl, started, runtime, tmp_path):
+    """Two processes in lockstep: the effect is in the plant and in the seal, and nowhere else."""
+    name, seal, folder = f"hidden{os.getpid()}", tmp_path / "seal.json", tmp_path / "bundle"
+    endpoint = f"ipc://{runtime}/{name}.plant"
+    words = ["--endpoint", endpoint, "--mode", "lockstep", "--conceal", "4", "--seal", str(seal)]
+    steps = "reference.steps=[{at: 0.1 s, to: 50 mm, ramp: 100 mm/s}, {at: 1 s, to: 0 mm, ramp: 100 mm/s}]"
+    changes = [f"name={name}", f"link.endpoint={endpoint}", "link.plant=external", "link.timeout=60", steps]
+    run = ["run", "axis", "--mode", "lockstep", "--for", "2s", "--json", "--no-plot", "--out", str(folder)]
+    with started("plant", "axis", "--set", f"name={name}", *words) as plant:
+        heard = plant.stdout.readline()
+        assert heard == f"{name}: plant listens at {endpoint}\n"
+        with started(*run, *(word for change in changes for word in ("--set", change))) as loop:
+            out, err = loop.communicate(timeout=200)
+        assert loop.returncode == 0, err
+        if plant.poll() is None:
+            plant.send_signal(signal.SIGINT)
+        heard_too, plant_err = plant.communicate(timeout=30)
+    answer, digest = open_seal(seal)
+    (entry,) = answer["physics"]
+    assert entry["term"] in TERMS
+    told = out + err + heard + heard_too + plant_err
+    assert f"sha256 {digest}" in plant_err
+    case = (folder / "case.json").read_text()
+    assert entry["term"] not in told
+    assert entry["term"] not in case
+    bundle = load_bundle(folder)
+    assert len(bundle.columns["t"]) == 2000
+    assert bundle.case["config"]["plant"].get("physics", []) == []
+    code, out, _ = rtctl("plant", "--open-seal", seal)
+    assert code == 0
+    assert out.startswith(f"{name} (axis), seed 4, sha256 {digest}: as it was sealed\n- {{term: {entry['term']}, ")
+
+
+def test_a_seal_that_was_changed(rtctl, tmp_path):
+    seal = tmp_path / "seal.json"
+    close_seal(seal, {"name": "ivu", "plant": "ivu", "seed": 1, "physics": []})
+    assert rtctl("plant", "--open-seal", seal).code == 0
+    content = json.loads(seal.read_text())
+    seal.write_text(json.dumps({**content, "salt": content["salt"][::-1]}))
+    code, out, err = rtctl("plant", "--open-seal", seal)
+    assert (code, out) == (2, "")
+    assert "is not what was sealed" in err

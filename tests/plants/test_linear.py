@@ -19,7 +19,7 @@ speeds = st.floats(-1.0, 1.0).map(lambda v: 0.0 if abs(v) < 1e-9 else v)
 
 def machine(A: np.ndarray, G: np.ndarray, h: float, nq: int, dry: list[float]) -> Any:
     """A machine's record, ready to advance."""
-    s = np.zeros(1, linear.machine_state(nq, len(A), G.shape[1] - nq)).view(np.recarray)[0]
+    s = np.zeros(1, linear.machine_state(nq, len(A), G.shape[1] - nq, 1, 1)).view(np.recarray)[0]
     s.h, s.A, s.G = h, A, G
     linear.discretise_into(s.A, s.G, h, s.Phi_T, s.Gamma_T, s.work)
     s.dry_base[:] = dry

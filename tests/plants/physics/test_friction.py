@@ -62,17 +62,25 @@ def test_coulomb_adds_to_the_limit():
     assert friction.coulomb(coulomb(0.3)) == 0.3
 
 
+@pytest.mark.parametrize("F", [-F_C, -2 * F_C])
+def test_less_dry_friction_than_none_is_none(F):
+    s = plant()
+    s.m.x[1] = s.m.v_before[0] = 0.1
+    free_run(s, coulomb(F), viscous(-203.5), stribeck(F_s=F_C, v_s=0.01), 1000)
+    assert s.m.x[1] == pytest.approx(0.1, rel=1e-6)  # nothing brakes it and nothing drives it
+
+
 @pytest.mark.parametrize(
     ("model", "values"),
     [
-        (friction.ViscousSettings, {"B": -1.0}),
+        (friction.ViscousSettings, {"B": math.inf}),
         (friction.StribeckSettings, {"F_s": -1.0, "v_s": 1.0}),
         (friction.StribeckSettings, {"F_s": 1.0, "v_s": 0.0}),
         (friction.StribeckSettings, {"F_s": 1.0, "v_s": 1.0, "form": "gauss"}),
         (friction.CoulombSettings, {"F_C": math.nan}),
     ],
 )
-def test_settings_that_feed_energy_are_refused(model, values):
+def test_settings_without_sense_are_refused(model, values):
     with pytest.raises(ValidationError):
         model(node="carriage", **values)
 

@@ -1,0 +1,202 @@
+"""Sliding of friction contacts: gross slip beyond a limit, and creep, the micro-slip that any rolling contact has.
+
+The tape lies on the capstan of the IVU, where the difference of the two tensions is what the contact carries; the motor
+shaft of the LDU rolls on the transmission wheel, and the capstan on the strip. What has slid is an offset in the
+elongation of the links beside it:
+
+    slip    |T - c d - k d'| <= F_max,  d' against it              T - c d - k d' = +-F_max while it slides
+    creep   d' = kappa (T - c d - k d') |v|                        the thesis's chapters 11.2 and 12.5
+
+with T the pull of the linear model, c and k of the links that share the contact and v the speed of the surface. Both
+are linear in d over a substep and are stepped by their exponential: exact for a constant T, any stiffness, no limit on
+h. Force times d' is never negative: sliding only takes energy.
+
+The contact of capstan and strip is rigid in the LDU's model: there the carriage, which the scale sees, falls behind
+R_c theta_c by what has slid. Slip keeps the momentum: the carriage gets F_max while the capstan runs ahead of it.
+
+Source: thesis 11.2 and 12.5; Kalker, Three-dimensional elastic bodies in rolling contact (1990), ch. 1; Shelton,
+Dynamics of web tension control, for tape on a roller.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants import linear
+from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.transmission import undone
+
+STRIP = "capstan"  # node of the LDU whose contact is rigid
+LINK1, LINK2 = 1, 2  # of the LDU: the halves of its capstan, before and behind the strip
+NODES = {"ivu": ("capstan",), "ldu": ("wheel", "capstan")}
+
+
+class SlipSettings(Settings):
+    """Without effect while F_max is above all that the contact carries; the size is 1 / F_max."""
+
+    term: Literal["transmission.slip"] = "transmission.slip"
+    node: str
+    F_max: float = quantity(unit="", gt=0, le=1e6, help="what the contact carries, N (Nm of the motor at a wheel)")
+    R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip slips")
+
+
+class CreepSettings(Settings):
+    """kappa is the size."""
+
+    term: Literal["transmission.creep"] = "transmission.creep"
+    node: str
+    kappa: float = quantity(
+        unit="", ge=0, le=1e3, help="way lost per way and force, 1/N (1/Nm of the motor at a wheel)"
+    )
+    R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip creeps")
+
+
+class SlipParams(NamedTuple):
+    h: float
+    F_max: float
+    R_c: float
+    strip: int
+
+
+class CreepParams(NamedTuple):
+    h: float
+    kappa: float
+    R_c: float
+    strip: int
+
+
+CONTACT_STATE = state(d=float, fallen=float, rate=float)  # offset in the links; of the carriage, m and m/s
+
+
+def build_slip(settings: SlipSettings, h: float) -> SlipParams:
+    """The substep comes in; the exponential depends on the links, which may change."""
+    return SlipParams(h, settings.F_max, settings.R_c, int(settings.node == STRIP))
+
+
+def build_creep(settings: CreepSettings, h: float) -> CreepParams:
+    """As `build_slip`."""
+    return CreepParams(h, settings.kappa, settings.R_c, int(settings.node == STRIP))
+
+
+@tick
+def slide(s, F_max, T, c, k, h):
+    """Slide where `T` less what has slid exceeds the limit; the change of the contact force, 0 or against T."""
+    held = T - c * s.d
+    if abs(held) <= F_max:
+        return -c * s.d
+    end = (T - math.copysign(F_max, held)) / c
+    s.d = end + (s.d - end) * (math.exp(-h * c / k) if k > 0.0 else 0.0)
+    return math.copysign(F_max, held) - T
+
+
+@tick
+def micro(s, grip, T, c, k, h):
+    """Creep at `grip` = kappa |v|; the mean change of the contact force over the substep."""
+    end = T / c
+    before = s.d
+    s.d = end + (before - end) * math.exp(-h * grip * c / (1.0 + grip * k))
+    middle = end + (before - end) * math.exp(-0.5 * h * grip * c / (1.0 + grip * k))
+    return -c * middle - k * (s.d - before) / h
+
+
+@tick
+def share(m, change):
+    """Spread a change of T2 - T1 over the two tapes as their springs do: both slide the same way."""
+    both = m.link_c[0] + m.link_c[1]
+    linear.pull(m, 1, change * m.link_c[1] / both)
+    linear.pull(m, 0, -change * m.link_c[0] / both)
+
+
+@tick
+def slip_tape(p, s, m):
+    """Slip of the tape on the capstan of the IVU."""
+    T = linear.tension(m, 1) - linear.tension(m, 0)
+    share(m, slide(s, p.F_max, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h))
+
+
+@tick
+def creep_tape(p, s, m, i):
+    """Creep of the tape on the capstan, node `i` of the IVU."""
+    grip = p.kappa * abs(m.link_b[1] * m.vm[i])
+    T = linear.tension(m, 1) - linear.tension(m, 0)
+    share(m, micro(s, grip, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h))
+
+
+@tick
+def strip_force(p, m):
+    """What the strip carries of the LDU's capstan, N."""
+    return (linear.tension(m, LINK1) - linear.tension(m, LINK2)) / p.R_c
+
+
+@tick
+def slip_wheel(p, s, m, i, j):
+    """Slip in link `j` of the LDU, or of node `i`, its capstan, on the strip."""
+    if p.strip == 0:
+        linear.pull(m, j, slide(s, p.F_max, undone(m, j), m.link_c[j], m.link_k[j], p.h))
+        return
+    gain = p.h * m.G[m.r.shape[0] + i, m.u.shape[0] + i] * p.R_c * p.R_c  # speed that a newton gives the carriage
+    free = s.rate + gain * strip_force(p, m)
+    rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
+    if abs(rate) < 1e-12 * abs(free):  # rounding of a stop
+        rate = 0.0
+    s.fallen += 0.5 * p.h * (s.rate + rate)
+    s.rate = rate
+
+
+@tick
+def creep_wheel(p, s, m, i, j):
+    """Creep in link `j` of the LDU, or of node `i`, its capstan, on the strip."""
+    if p.strip == 0:
+        grip = p.kappa * abs(m.link_a[j] * m.vm[m.link_i[j]])
+        linear.pull(m, j, micro(s, grip, linear.tension(m, j), m.link_c[j], m.link_k[j], p.h))
+        return
+    s.fallen += p.h * p.kappa * strip_force(p, m) * abs(p.R_c * m.vm[i])
+
+
+SLIP = Term(
+    name="transmission.slip",
+    words="slip: pushed too hard, the contact slides and what was gained is lost for good",
+    equation="|F| <= F_max; beyond it the contact slides",
+    source="thesis 11.2 and 12.5",
+    settings=SlipSettings,
+    build=build_slip,
+    act={
+        "force:ivu": "contact.slip_tape({p}, {s}, {m})",
+        "force:ldu": "contact.slip_wheel({p}, {s}, {m}, {i}, {l})",
+        "reading:ldu": "{m}.y[1] -= {s}.fallen",
+    },
+    nodes=NODES,
+    look_alikes={
+        "transmission.creep": "one way, softly and hard: creep is lost both times, slip only when hard",
+        "sensor.missed_counts": "hard acceleration at low top speed: counts go at speed, slip at force",
+        "drive.saturation": "read both sides of the contact: a drive that clips moves both alike",
+        "sensor.scale": "a long gentle move: a wrong scale errs by the way, slip not at all",
+    },
+    typical={"F_max": (0.5, 0.9)},
+    scale={"F_max": "contact"},
+    axis="tension",
+    state=CONTACT_STATE,
+)
+CREEP = Term(
+    name="transmission.creep",
+    words="creep: under load the contact loses a little on every turn",
+    equation="d' = kappa F |v|",
+    source="Kalker 1990; thesis 11.2",
+    settings=CreepSettings,
+    build=build_creep,
+    act={
+        "force:ivu": "contact.creep_tape({p}, {s}, {m}, {i})",
+        "force:ldu": "contact.creep_wheel({p}, {s}, {m}, {i}, {l})",
+        "reading:ldu": "{m}.y[1] -= {s}.fallen",
+    },
+    nodes=NODES,
+    look_alikes={
+        "sensor.scale": "out with load and back without: a wrong scale errs the same both ways, creep by the load",
+        "transmission.slip": "a gentle long move under load: slip needs a peak, creep only way",
+        "sensor.missed_counts": "hold the speed and raise the load: creep grows, lost counts do not",
+        "geometry.radius_change": "turn back to where it began: radii come back, what crept does not",
+    },
+    typical={"kappa": (1e-3, 0.5)},
+    axis="tension",
+    state=CONTACT_STATE,
+)

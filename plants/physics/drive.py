@@ -1,0 +1,280 @@
+"""Drives without memory: offset, dead band, another gain for each sign, a limit, and a supply that sags.
+
+Each takes the volts at the driver's input and gives what an ideal driver would have to get to do the same.
+
+Source: Slotine & Li, Applied Nonlinear Control (1991), 5.2 for dead zone and saturation; Krishnan, Electric Motor
+Drives (2001), ch. 4 for converters and their supply.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.physics.term import Term
+
+DRIVES = {"ivu": ("drive1", "drive2"), "ldu": ("drive",), "axis": ("drive",)}
+DEADBAND_FORMS = ("shift", "cut", "floor")
+SAG_FORMS = ("current", "power")
+
+
+class OffsetSettings(Settings):
+    """offset is the size."""
+
+    term: Literal["drive.offset"] = "drive.offset"
+    node: str
+    offset: float = quantity(unit="V", ge=-10, le=10, help="what stands at the driver when nothing is asked for")
+
+
+class OffsetParams(NamedTuple):
+    offset: float
+
+
+def build_offset(settings: OffsetSettings, h: float) -> OffsetParams:
+    """Nothing to discretise."""
+    return OffsetParams(settings.offset)
+
+
+@tick
+def offset(p, u):
+    """Volts at the driver for a command of `u` volts."""
+    return u + p.offset
+
+
+class DeadbandSettings(Settings):
+    """band is the size: half the width of the dead zone, so that nothing happens from -band to +band.
+
+    shift: beyond the band the output starts from zero; cut: it jumps to the command; floor: within the band the output
+    is +band or -band instead of nothing, by the sign of the command.
+    """
+
+    term: Literal["drive.deadband"] = "drive.deadband"
+    node: str
+    band: float = quantity(unit="V", ge=0, le=5, help="half width of the dead zone")
+    form: Literal["shift", "cut", "floor"] = "shift"
+    edge: float = quantity(0.1, unit="", ge=0, le=1, help="half width of the jump of `cut`, as a share of band")
+
+
+class DeadbandParams(NamedTuple):
+    band: float
+    form: int
+    edge: float  # V
+
+
+def build_deadband(settings: DeadbandSettings, h: float) -> DeadbandParams:
+    """Nothing to discretise."""
+    return DeadbandParams(settings.band, DEADBAND_FORMS.index(settings.form), settings.edge * settings.band)
+
+
+@tick
+def deadband(p, u):
+    """Volts at the driver for a command of `u` volts.
+
+    A jump of no width would make the effect a staircase in `band`, one stair for each step of the DAC; hence the edge.
+    """
+    a = abs(u)
+    if p.form == 0:
+        return math.copysign(max(a - p.band, 0.0), u)
+    if p.form == 2:
+        return math.copysign(max(a, p.band), u) if u != 0.0 else 0.0
+    if a >= p.band + p.edge:
+        return u
+    if a <= p.band - p.edge:
+        return 0.0
+    z = 0.5 * (a - p.band + p.edge) / p.edge
+    return u * z * z * (3.0 - 2.0 * z)
+
+
+class GainAsymmetrySettings(Settings):
+    """a is the size."""
+
+    term: Literal["drive.gain_asymmetry"] = "drive.gain_asymmetry"
+    node: str
+    a: float = quantity(unit="", ge=-0.95, le=0.95, help="gain is 1 + a for positive commands and 1 - a for negative")
+
+
+class GainAsymmetryParams(NamedTuple):
+    a: float
+
+
+def build_gain_asymmetry(settings: GainAsymmetrySettings, h: float) -> GainAsymmetryParams:
+    """Nothing to discretise."""
+    return GainAsymmetryParams(settings.a)
+
+
+@tick
+def gain_asymmetry(p, u):
+    """Volts at the driver for a command of `u` volts."""
+    return u + p.a * abs(u)
+
+
+class SaturationSettings(Settings):
+    """Without effect where limit is beyond what is commanded and rise is 0; knee alone has none."""
+
+    term: Literal["drive.saturation"] = "drive.saturation"
+    node: str
+    limit: float = quantity(unit="V", gt=0, le=1e3, help="the output gets no further than this")
+    knee: float = quantity(0.0, unit="", ge=0, le=0.9, help="share of the limit at which it starts to bend; 0 is sharp")
+    rise: float = quantity(0.0, unit="s/V", ge=0, le=10, help="time that a change of one volt takes; 0 is at once")
+
+
+class SaturationParams(NamedTuple):
+    limit: float
+    knee: float
+    step: float  # V in one substep; 0 where there is no limit to it
+
+
+SATURATION_STATE = state(u=float)
+
+
+def build_saturation(settings: SaturationSettings, h: float) -> SaturationParams:
+    """Largest change in a substep of `h` s."""
+    return SaturationParams(settings.limit, settings.knee, h / settings.rise if settings.rise > 0.0 else 0.0)
+
+
+@tick
+def saturation(p, s, u):
+    """Mean volts at the driver over a substep at a command of `u` volts."""
+    a = abs(u)
+    low, high = p.limit * (1.0 - p.knee), p.limit * (1.0 + p.knee)
+    if a >= high:
+        a = p.limit
+    elif a > low:
+        a -= 0.5 * (a - low) ** 2 / (high - low)
+    target = math.copysign(a, u)
+    if p.step == 0.0:
+        return target
+    ahead = target - s.u
+    if abs(ahead) > p.step:
+        move = math.copysign(p.step, ahead)
+        s.u += move
+        return s.u - 0.5 * move
+    s.u = target
+    return target - 0.5 * ahead * abs(ahead) / p.step
+
+
+class SupplySagSettings(Settings):
+    """k is the size. current: what the motors draw grows with |volts|; power: with their square."""
+
+    term: Literal["drive.supply_sag"] = "drive.supply_sag"
+    node: str
+    k: float = quantity(unit="", ge=0, le=1, help="share of gain lost per volt, or per volt squared, of all drives")
+    form: Literal["current", "power"] = "current"
+
+
+class SupplySagParams(NamedTuple):
+    k: float
+    form: int
+
+
+def build_supply_sag(settings: SupplySagSettings, h: float) -> SupplySagParams:
+    """Nothing to discretise."""
+    return SupplySagParams(settings.k, SAG_FORMS.index(settings.form))
+
+
+@tick
+def supply_sag(p, volts):
+    """Lower all `volts` (n,) by what all of them together draw."""
+    load = 0.0
+    for i in range(volts.shape[0]):
+        load += abs(volts[i]) if p.form == 0 else volts[i] * volts[i]
+    gain = max(1.0 - p.k * load, 0.0)
+    for i in range(volts.shape[0]):
+        volts[i] *= gain
+
+
+OFFSET = Term(
+    name="drive.offset",
+    words="a push that is always there: the drive gives something when nothing is asked for",
+    equation="u_out = u + offset",
+    source="Krishnan 2001",
+    settings=OffsetSettings,
+    build=build_offset,
+    act={"command": "{m}.volts[{c}] = drive.offset({p}, {m}.volts[{c}])"},
+    nodes=DRIVES,
+    look_alikes={
+        "friction.asymmetry": "stop slowly from both sides: an offset pushes at standstill, friction does not",
+        "drive.gain_asymmetry": "command at one, two and three times the size: an offset does not grow with it",
+        "drive.deadband": "commands of both signs: an offset shifts both the same way, a dead band towards zero",
+        "load.spring": "the same short move at both ends of the travel: an offset is the same everywhere",
+        "load.imbalance": "one slow turn: an offset is the same at every angle",
+        "tape.viscoelastic": "hold one tension for a minute: an offset does not change in that time",
+    },
+    typical={"offset": (0.02, 0.2)},
+    axis="command",
+    passive=False,
+)
+DEADBAND = Term(
+    name="drive.deadband",
+    words="a dead zone: small commands do nothing, the drive wakes up only beyond them",
+    equation="u_out = sign(u) max(|u| - band, 0)",
+    source="Slotine & Li 1991, 5.2",
+    settings=DeadbandSettings,
+    build=build_deadband,
+    act={"command": "{m}.volts[{c}] = drive.deadband({p}, {m}.volts[{c}])"},
+    nodes=DRIVES,
+    look_alikes={
+        "friction.coulomb": "move it by hand or by the other motor: friction is still there, a dead band is not",
+        "drive.offset": "commands of both signs: a dead band loses on both, an offset gains on one",
+        "friction.stribeck": "a constant speed under growing load: a dead band shows by command, sticking by speed",
+        "transmission.backlash": "small fast commands of one sign: a dead band loses them, backlash needs a reversal",
+    },
+    typical={"band": (0.02, 0.2)},
+    axis="command",
+)
+GAIN_ASYMMETRY = Term(
+    name="drive.gain_asymmetry",
+    words="stronger one way than the other: the same command gives more in one direction",
+    equation="u_out = (1 + a sign(u)) u",
+    source="Krishnan 2001",
+    settings=GainAsymmetrySettings,
+    build=build_gain_asymmetry,
+    act={"command": "{m}.volts[{c}] = drive.gain_asymmetry({p}, {m}.volts[{c}])"},
+    nodes=DRIVES,
+    look_alikes={
+        "friction.asymmetry": "brake at speed: the gain goes by the sign of the command, friction by that of the speed",
+        "drive.offset": "command at one, two and three times the size: a gain grows with it, an offset does not",
+        "friction.load": "both signs of command at one tension: friction is the same for both, a gain is not",
+    },
+    typical={"a": (0.03, 0.2)},
+    axis="command",
+    passive=False,
+)
+SATURATION = Term(
+    name="drive.saturation",
+    words="it runs out of push: beyond some command there is no more, or it cannot follow fast",
+    equation="|u_out| <= limit, |u_out'| <= 1/rise",
+    source="Slotine & Li 1991, 5.2",
+    settings=SaturationSettings,
+    build=build_saturation,
+    act={"command": "{m}.volts[{c}] = drive.saturation({p}, {s}, {m}.volts[{c}])"},
+    nodes=DRIVES,
+    look_alikes={
+        "drive.supply_sag": "a hard push of one motor alone and of both: a limit does not ask what the other draws",
+        "drive.lag": "small and large steps: a lag takes the same time for both, a limit only spoils the large",
+        "transmission.slip": "hold the load still and push: a limit shows in the force, slip in a way that is lost",
+        "friction.viscous": "hard acceleration from standstill: a limit shows at once, drag only at speed",
+    },
+    typical={"limit": (0.3, 0.9)},
+    scale={"limit": "largest command"},
+    axis="command",
+    state=SATURATION_STATE,
+)
+SUPPLY_SAG = Term(
+    name="drive.supply_sag",
+    words="a weak supply: the more all motors draw, the less each of them gets",
+    equation="u_out,i = u_i (1 - k sum_j |u_j|)",
+    source="Krishnan 2001",
+    settings=SupplySagSettings,
+    build=build_supply_sag,
+    act={"command": "drive.supply_sag({p}, {m}.volts)"},
+    nodes={"ivu": ("drive1",), "ldu": ("drive",), "axis": ("drive",)},
+    look_alikes={
+        "drive.saturation": "a hard push of one motor alone and of both: sag asks what the other draws",
+        "drive.thermal": "the same burst cold and after a minute: sag is there from the first moment",
+        "friction.viscous": "hold the load still and command more: sag shows without speed",
+        "friction.load": "load the other motor at constant tension: sag changes the gain, friction stays",
+    },
+    typical={"k": (0.01, 0.08)},
+    axis="command",
+    state=None,
+)

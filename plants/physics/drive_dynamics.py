@@ -1,0 +1,161 @@
+"""Drives with memory: a lag of the current, and a motor that warms.
+
+Both steps are exact for a command that is held over the substep; the lag gives the mean of its response over it.
+`drive.thermal` at a drive takes from the gain (resistance and magnets), at a node with dry friction from that (grease).
+Either way the heat is that of the motor's current.
+
+Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3 for the held input; Krishnan, Electric Motor
+Drives (2001), 2.8 for the thermal model of first order.
+"""
+
+import cmath
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.physics.drive import DRIVES
+from rtctl.plants.physics.term import Term
+
+
+class LagSettings(Settings):
+    """tau is the size. Order 2 has the natural frequency 1/tau rad/s and the damping zeta."""
+
+    term: Literal["drive.lag"] = "drive.lag"
+    node: str
+    tau: float = quantity(unit="s", ge=0, le=10, help="time constant; 0 is no lag")
+    order: Literal[1, 2] = 1
+    zeta: float = quantity(0.7, unit="", ge=0.05, le=20, help="damping of order 2")
+
+
+class LagParams(NamedTuple):
+    end: float  # e+ = end e + end_d d with e = y - u and d = tau y'
+    end_d: float
+    back: float  # d+ = back e + back_d d
+    back_d: float
+    mean: float  # of e over the substep
+    mean_d: float
+
+
+LAG_STATE = state(y=float, d=float)
+
+
+def build_lag(settings: LagSettings, h: float) -> LagParams:
+    """Exact transition over `h` s and mean of the response to a held input."""
+    tau = max(settings.tau, 0.0)
+    if tau == 0.0:
+        return LagParams(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    x = h / tau
+    if settings.order == 1:
+        end = math.exp(-x)
+        return LagParams(end, 0.0, 0.0, 0.0, -math.expm1(-x) / x, 0.0)
+    zeta = settings.zeta
+    d = cmath.sqrt(1.0 - zeta * zeta)  # imaginary above critical damping
+    plus, minus = cmath.exp((-zeta + 1j * d) * x), cmath.exp((-zeta - 1j * d) * x)
+    C = (0.5 * (plus + minus)).real
+    S = ((plus - minus) / (2j * d)).real if abs(d) > 1e-6 else x * math.exp(-zeta * x)
+    end, end_d, back, back_d = C + zeta * S, S, -S, C - zeta * S
+    # The mean is A^-1 (Phi - I) / x with A = [[0, 1], [-1, -2 zeta]], in e and d.
+    mean = (-2.0 * zeta * (end - 1.0) - back) / x
+    mean_d = (-2.0 * zeta * end_d - (back_d - 1.0)) / x
+    return LagParams(end, end_d, back, back_d, mean, mean_d)
+
+
+@tick
+def lag(p, s, u):
+    """Mean volts over a substep at a command of `u` volts."""
+    e, d = s.y - u, s.d
+    s.y = u + p.end * e + p.end_d * d
+    s.d = p.back * e + p.back_d * d
+    return u + p.mean * e + p.mean_d * d
+
+
+class ThermalSettings(Settings):
+    """a is the size: exp(-a) of the gain, or of the friction, is left after a long time at V_ref."""
+
+    term: Literal["drive.thermal"] = "drive.thermal"
+    node: str
+    a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm through; negative where it gains")
+    tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time that it takes to warm")
+    V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command at which it is warm")
+
+
+class ThermalParams(NamedTuple):
+    a: float
+    end: float  # exp(-h/tau)
+    per_volt2: float
+    channel: int
+    friction: int  # 1: at a node with dry friction
+
+
+THERMAL_STATE = state(heat=float)
+
+
+def build_thermal(settings: ThermalSettings, h: float) -> ThermalParams:
+    """Exact decay over `h` s; a node that is no drive has the friction of what that drive moves."""
+    at_drive = settings.node.startswith("drive")
+    channel = 1 if settings.node.endswith("2") else 0
+    return ThermalParams(settings.a, math.exp(-h / settings.tau), settings.V_ref**-2, channel, int(not at_drive))
+
+
+@tick
+def thermal_gain(p, s, volts):
+    """Warm the motor by its own of the `volts` (n,) over a substep and lower them where it takes from the gain."""
+    u = volts[p.channel]
+    load = u * u * p.per_volt2
+    if p.friction == 0:
+        volts[p.channel] = u * math.exp(-p.a * s.heat)
+    s.heat = load + (s.heat - load) * p.end
+
+
+@tick
+def thermal_friction(p, s, dry):
+    """Dry friction of a warm motor whose cold one is `dry`, Nm or N."""
+    return dry * math.exp(-p.a * s.heat) if p.friction != 0 else dry
+
+
+LAG = Term(
+    name="drive.lag",
+    words="it comes late and soft: the drive needs a moment to build up what is asked for",
+    equation="tau y' = u - y, or tau^2 y'' + 2 zeta tau y' + y = u",
+    source="Astrom & Wittenmark 1997, 2.3",
+    settings=LagSettings,
+    build=build_lag,
+    act={"command": "{m}.volts[{c}] = drive_dynamics.lag({p}, {s}, {m}.volts[{c}])"},
+    nodes=DRIVES,
+    look_alikes={
+        "timing.delay": "a sweep up to half the sample rate: a lag weakens the fast part, a delay only turns its phase",
+        "structure.resonance": "a sweep: a lag falls off for good, a resonance has a peak",
+        "tape.viscoelastic": "one motor with the tape off: a lag stays",
+        "drive.saturation": "small and large steps: a lag takes the same time for both, a limit only spoils the large",
+    },
+    typical={"tau": (0.3, 3.0)},
+    scale={"tau": "sample period"},
+    axis="frequency",
+    state=LAG_STATE,
+)
+THERMAL = Term(
+    name="drive.thermal",
+    words="it changes as it warms: after hard work the same command gives another push, or the grease runs easier",
+    equation="gain exp(-a h), tau h' = (u/V_ref)^2 - h",
+    source="Krishnan 2001, 2.8",
+    settings=ThermalSettings,
+    build=build_thermal,
+    act={
+        "command": "drive_dynamics.thermal_gain({p}, {s}, {m}.volts)",
+        "force": "{m}.dry[{i}] = drive_dynamics.thermal_friction({p}, {s}, {m}.dry[{i}])",
+    },
+    nodes={
+        "ivu": ("drive1", "drive2", "motor1", "motor2"),
+        "ldu": ("drive", "carriage"),
+        "axis": ("drive", "carriage"),
+    },
+    look_alikes={
+        "drive.supply_sag": "the same burst cold and after a minute of work: sag is there from the first moment",
+        "geometry.radius_change": "wind there and back slowly: a radius comes back with the tape, heat does not",
+        "friction.coulomb": "the same slow move cold and warm: Coulomb friction does not change",
+    },
+    typical={"a": (0.05, 0.4)},
+    axis="time",
+    passive=False,
+    state=THERMAL_STATE,
+)

@@ -1,0 +1,86 @@
+"""Dry friction that grows with what presses on the bearing: the tape's tension, or the force that a contact carries.
+
+A limit of mu |T| R at the node: mu of the contact or bearing, T in the spring beside it, R its lever on the node. The
+axis has no spring in its drive, there the force of the drive itself presses (a screw or a worm under thrust).
+
+Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), section 2; Hamel, Modele de frottement a
+l'entree des reducteurs, for gears under load; thesis 11.2 and 12.5 for the contacts of the linear drive.
+"""
+
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants import linear
+from rtctl.plants.physics.term import Term
+
+BESIDE = {"capstan": (0, 1), "reel1": (0, 0), "reel2": (1, 1), "motor1": (2, 2), "motor2": (3, 3)}  # links of the ivu
+
+
+class LoadSettings(Settings):
+    """mu is the size; negative only to take back what an earlier term has too much of."""
+
+    term: Literal["friction.load"] = "friction.load"
+    node: str
+    mu: float = quantity(unit="", ge=-1.0, le=1.0, help="friction as a share of the force that presses, at its lever")
+
+
+class LoadParams(NamedTuple):
+    mu: float
+    one: int  # links of the ivu whose pull presses on the node
+    two: int
+
+
+def build_load(settings: LoadSettings, h: float) -> LoadParams:
+    """Nothing to discretise."""
+    return LoadParams(settings.mu, *BESIDE.get(settings.node, (0, 0)))
+
+
+@tick
+def load(p, m, i, one, two):
+    """Limit of dry friction in Nm at node `i` between the links `one` and `two`, which may be the same."""
+    T = 0.5 * (lever(m, one, i) * abs(linear.tension(m, one)) + lever(m, two, i) * abs(linear.tension(m, two)))
+    return p.mu * T
+
+
+@tick
+def lever(m, j, i):
+    """How far from the centre of node `i` link `j` pulls, m (or the gear ratio of a shaft)."""
+    return abs(m.link_a[j]) if m.link_i[j] == i else abs(m.link_b[j])
+
+
+@tick
+def load_drive(p, m, i):
+    """Limit of dry friction at node `i` under the force of the drives, N."""
+    nq, nu = m.r.shape[0], m.u.shape[0]
+    F = 0.0
+    for d in range(nu):
+        F += m.G[nq + i, d] * m.u[d]
+    return p.mu * abs(F) / m.G[nq + i, nu + i]
+
+
+LOAD = Term(
+    name="friction.load",
+    words="dry friction that grows with load: the tighter the tape or the harder the push, the more it drags",
+    equation="|F| <= mu |T| R",
+    source="Armstrong-Helouvry 1994, section 2",
+    settings=LoadSettings,
+    build=build_load,
+    act={
+        "force": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {l}, {l})",
+        "force:ivu": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {p}.one, {p}.two)",
+        "force:axis": "{m}.dry[{i}] += friction_load.load_drive({p}, {m}, {i})",
+    },
+    nodes={
+        "ivu": ("capstan", "reel1", "reel2", "motor1", "motor2"),
+        "ldu": ("wheel", "capstan"),
+        "axis": ("carriage",),
+    },
+    look_alikes={
+        "friction.coulomb": "the same motion at three tensions: Coulomb friction stays the same",
+        "friction.viscous": "constant speeds at one tension: load friction stays flat",
+        "drive.supply_sag": "pull with both motors against each other at standstill: sag needs no motion",
+        "drive.gain_asymmetry": "the same load in both directions of travel: the drive's error follows its sign",
+    },
+    typical={"mu": (0.05, 0.3)},
+    axis="tension",
+)

@@ -1,0 +1,94 @@
+"""Geometry: a reel whose radius and inertia follow the tape that it winds.
+
+    R = R_0 + d q / 2 pi (4.3, 4.4),  l = integral of R dq,  J = J_0 + (pi/2) rho_h (R^4 - R_0^4) (4.1, 4.2)
+
+plants/ivu.py does this for both reels with the thickness that the owner gives, and takes its matrices anew on the way;
+here it is for one reel, on top of what the model has, as forces alone. Where the owner's tape has no thickness the two
+agree to a few percent of the effect over nine turns; a reel that is nearly empty is the worst.
+
+Source: thesis (4.1)-(4.8).
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants import ivu, linear
+from rtctl.plants.physics.ripple_tape import tape_of
+from rtctl.plants.physics.term import Term
+
+PAPER = 1700.0 * 0.037  # kg/m^2: density times width of the thesis's paper
+SMALLEST = 0.05  # of the inertia: a reel does not get lighter than this
+
+
+class RadiusChangeSettings(Settings):
+    """d is the size."""
+
+    term: Literal["geometry.radius_change"] = "geometry.radius_change"
+    node: str
+    d: float = quantity(unit="m", ge=-0.02, le=0.02, help="growth of the radius in a turn: the thickness of the tape")
+    rho_h: float = quantity(PAPER, unit="kg/m^2", ge=0, le=1e4, help="density times width of the tape, for the inertia")
+    R_min: float = quantity(0.02, unit="m", gt=0, le=1, help="radius of the empty reel")
+
+
+class RadiusChangeParams(NamedTuple):
+    grow: float  # m/rad
+    rho_h: float
+    R_min: float
+
+
+def build_radius_change(settings: RadiusChangeSettings, h: float) -> RadiusChangeParams:
+    """Nothing to discretise."""
+    return RadiusChangeParams(settings.d / (2.0 * math.pi), settings.rho_h, settings.R_min)
+
+
+@tick
+def radius_change(p, m, i):
+    """Forces on reel `i` and its tape that make its radius and inertia follow its angle."""
+    j = tape_of(m, i)
+    R_0 = m.link_a[j]
+    q, v = m.qm[i], m.vm[i]
+    R = max(R_0 + p.grow * q, min(p.R_min, R_0))
+    extra = R - R_0
+    wound = ivu.wound(q, R_0, p.grow, min(p.R_min, R_0)) - R_0 * q
+    linear.pull(m, j, m.link_c[j] * wound + m.link_k[j] * extra * v)
+    m.f[i] -= extra * linear.tension(m, j)
+    # All that turns the reel turns another inertia: what the matrices divide by the old one is put right as a force.
+    torque, c, k = m.f[i], 0.0, 0.0
+    for n in range(m.link_i.shape[0]):
+        T = m.link_c[n] * linear.stretch(m, n) + m.link_k[n] * linear.stretch_rate(m, n)
+        if m.link_i[n] == i:
+            torque -= m.link_a[n] * T
+            c += m.link_a[n] ** 2 * m.link_c[n]
+            k += m.link_a[n] ** 2 * m.link_k[n]
+        if m.link_j[n] == i:
+            torque -= m.link_b[n] * T
+            c += m.link_b[n] ** 2 * m.link_c[n]
+            k += m.link_b[n] ** 2 * m.link_k[n]
+    nq, nu = m.r.shape[0], m.u.shape[0]
+    J_0 = 1.0 / m.G[nq + i, nu + i]
+    J = max(J_0 + 0.5 * math.pi * p.rho_h * (R**4 - R_0**4), SMALLEST * J_0)
+    change = J_0 / J - 1.0
+    # A light reel follows its springs within a substep; held over one, the full force would make it ring ever louder.
+    m.f[i] += torque * change / (1.0 + abs(change) * m.h * (k + m.h * c) / J_0)
+
+
+RADIUS_CHANGE = Term(
+    name="geometry.radius_change",
+    words="the reel fills or empties: its radius and its inertia change as the tape moves",
+    equation="R = R_0 + d q / 2 pi, J = J_0 + (pi/2) rho_h (R^4 - R_0^4)",
+    source="thesis (4.1)-(4.8)",
+    settings=RadiusChangeSettings,
+    build=build_radius_change,
+    act={"force": "geometry.radius_change({p}, {m}, {i})"},
+    nodes={"ivu": ("reel1", "reel2")},
+    look_alikes={
+        "sensor.scale": "two turns and two more: a growing reel goes with the square of the way, a factor does not",
+        "drive.thermal": "wind there and back slowly: a radius comes back with the tape, heat does not",
+        "tape.viscoelastic": "hold the tape still under tension: a radius waits, relaxation goes on",
+        "transmission.creep": "the same winding at two tensions: creep grows with the force, a radius does not",
+        "load.spring": "the same short move at both ends of the travel: a spring pulls at rest, a radius does not",
+    },
+    typical={"d": (1e-4, 1e-3)},
+    axis="position",
+)

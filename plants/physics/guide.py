@@ -1,0 +1,165 @@
+"""The guide: what a strip or a rail does to the position of the carriage that rolls along it.
+
+    e = e_sys + e_l + e_s   (11.9)
+
+of which e_l is here; e_sys is ripple.capstan, ripple.encoder and sensor.scale, e_s is transmission.slip and creep.
+On the LDU the carriage stands off the place that the capstan's angle says, which only the scale sees.
+An error is taken as zero where the machine starts.
+
+Source: thesis 11.1, (11.6), (11.9); figure 11.7 for wavelengths of 150 and 300 mm.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.physics.term import Term
+
+GUIDES = {"ldu": ("carriage", "scale"), "axis": ("sensor",)}
+
+
+class ThicknessSettings(Settings):
+    """A is the size."""
+
+    term: Literal["guide.thickness"] = "guide.thickness"
+    node: str
+    A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="amplitude of the position error")
+    wavelength: float = quantity(0.15, unit="m", gt=1e-4, le=1e2, help="along the guide")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
+
+
+class ThicknessParams(NamedTuple):
+    A: float
+    n: float  # rad/m
+    phi: float
+    zero: float
+
+
+def build_thickness(settings: ThicknessSettings, h: float) -> ThicknessParams:
+    """Error at position 0, which counters never show."""
+    s = settings
+    return ThicknessParams(s.A, 2.0 * math.pi / s.wavelength, s.phi, s.A * math.sin(s.phi))
+
+
+@tick
+def thickness(p, x):
+    """Position error at `x` m, m."""
+    return p.A * math.sin(p.n * x + p.phi) - p.zero
+
+
+class StripSettings(Settings):
+    """longer is the size: 1e-5 is a strip 0.1 mm up and down over 100 mm, (pi y / wavelength)^2."""
+
+    term: Literal["guide.strip"] = "guide.strip"
+    node: str
+    longer: float = quantity(unit="", ge=0, le=0.02, help="share by which the path is longer than straight")
+    wavelength: float = quantity(0.1, unit="m", gt=1e-4, le=1e2, help="of the waves of the strip")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
+
+
+class StripParams(NamedTuple):
+    longer: float
+    n: float  # rad/m, of twice the wave
+    phi: float
+    zero: float
+
+
+def build_strip(settings: StripSettings, h: float) -> StripParams:
+    """Integral of the path at position 0."""
+    n = 4.0 * math.pi / settings.wavelength
+    return StripParams(settings.longer, n, 2.0 * settings.phi, math.sin(2.0 * settings.phi) / n)
+
+
+@tick
+def strip(p, x):
+    """Position less length of the path (11.6) at `x` m, m.
+
+    For y = Y sin(k x + phi) the path has sqrt(1 + y'^2) = 1 + y'^2/2 to a share of (k Y)^2/4, below 2 percent here;
+    its integral is x + longer (x + sin(2 k x + 2 phi)/2k) with longer = (k Y)^2/4.
+    """
+    return -p.longer * (x + math.sin(p.n * x + p.phi) / p.n - p.zero)
+
+
+class DirtSettings(Settings):
+    """A is the size."""
+
+    term: Literal["guide.dirt"] = "guide.dirt"
+    node: str
+    A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="largest position error")
+    at: float = quantity(unit="m", ge=-100, le=100, help="position of its middle")
+    width: float = quantity(1e-3, unit="m", gt=1e-6, le=10, help="standard deviation of the bell")
+
+
+class DirtParams(NamedTuple):
+    A: float
+    at: float
+    width: float
+    zero: float
+
+
+def build_dirt(settings: DirtSettings, h: float) -> DirtParams:
+    """Error at position 0, which counters never show."""
+    s = settings
+    return DirtParams(s.A, s.at, s.width, s.A * math.exp(-0.5 * (s.at / s.width) ** 2))
+
+
+@tick
+def dirt(p, x):
+    """Position error at `x` m, m."""
+    d = (x - p.at) / p.width
+    return p.A * math.exp(-0.5 * d * d) - p.zero
+
+
+THICKNESS = Term(
+    name="guide.thickness",
+    words="a strip or rail of uneven thickness: the carriage is a little off, in waves along the guide",
+    equation="e = A (sin(2 pi x / wavelength + phi) - sin(phi))",
+    source="thesis 11.1, figure 11.7",
+    settings=ThicknessSettings,
+    build=build_thickness,
+    act={"reading": "{m}.y[{c}] += guide.thickness({p}, {m}.y[{c}])"},
+    nodes=GUIDES,
+    look_alikes={
+        "ripple.capstan": "lift the carriage, turn the capstan half a turn and repeat: only the capstan's wave moves",
+        "ripple.encoder": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
+        "load.bump": "the same travel seen by both sensors: thickness shows as a difference, a bump in both",
+        "sensor.scale": "travel over several wavelengths: a scale error grows, waves do not",
+        "guide.strip": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
+        "guide.dirt": "several wavelengths of travel: dirt is at one place, thickness everywhere",
+    },
+    typical={"A": (2e-6, 3e-5), "wavelength": (0.05, 0.3)},
+    axis="position",
+)
+STRIP = Term(
+    name="guide.strip",
+    words="a wavy strip: the way along it is longer than the straight line",
+    equation="l = integral of sqrt(1 + y'(x)^2) dx",
+    source="thesis (11.6)",
+    settings=StripSettings,
+    build=build_strip,
+    act={"reading": "{m}.y[{c}] += guide.strip({p}, {m}.y[{c}])"},
+    nodes=GUIDES,
+    look_alikes={
+        "sensor.scale": "look for the waves on top of the trend, two to each wave of the strip: a scale error has none",
+        "guide.thickness": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
+    },
+    typical={"longer": (1e-6, 1e-4), "wavelength": (0.05, 0.3)},
+    axis="position",
+)
+DIRT = Term(
+    name="guide.dirt",
+    words="dirt on the strip: at one place the carriage is a little off, before and behind it is right",
+    equation="e = A exp(-((x - at)/width)^2 / 2)",
+    source="thesis 11.1",
+    settings=DirtSettings,
+    build=build_dirt,
+    act={"reading": "{m}.y[{c}] += guide.dirt({p}, {m}.y[{c}])"},
+    nodes=GUIDES,
+    look_alikes={
+        "load.bump": "the same travel seen by both sensors: dirt shows as a difference of the two, a bump in both",
+        "guide.thickness": "several wavelengths of travel: dirt is at one place, thickness everywhere",
+        "sensor.missed_counts": "pass the place ten times: dirt comes back to zero error, lost counts add up",
+    },
+    typical={"A": (5e-6, 5e-5), "width": (5e-4, 5e-3)},
+    axis="position",
+)

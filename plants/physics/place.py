@@ -1,0 +1,28 @@
+"""Where a node of a plant stands in its record: the words of the tables in plants/, as numbers."""
+
+from typing import NamedTuple
+
+from rtctl.plants import axis, ivu, ldu
+
+PLANTS = {"ivu": ivu, "ldu": ldu, "axis": axis}
+
+
+class Place(NamedTuple):
+    node: int  # index into positions and forces
+    link: int  # index of the spring that the node names
+    channel: int  # of the drive or the sensor
+    factor: str  # plant parameter that takes the node's rotation to its own unit; empty for 1
+
+
+def place(kind: str, node: str) -> Place:
+    """Place of a node by its name; what the node does not have is 0, since no term of that node asks for it."""
+    plant = PLANTS[kind]
+    index, factor = plant.NODES.get(node, 0), ""
+    channel = plant.DRIVES.get(node, plant.SENSORS.get(node, 0))
+    if kind == "ldu" and node in ("carriage", "scale"):
+        index, factor, channel = ldu.CAPSTAN, "R_c", ldu.SENSORS["scale"]
+    elif kind == "ldu" and node == "loop":  # what all sensors share: the carriage for the scale
+        index, factor = ldu.CAPSTAN, "R_c"
+    elif kind == "ivu" and node == "encoder":
+        index = ivu.CAPSTAN
+    return Place(index, plant.LINKS.get(node, 0), channel, factor)

@@ -1,0 +1,142 @@
+"""Ripple: what comes back every turn. Torque by the motor's angle, reading errors by the encoder's.
+
+A reading error is taken as zero where the machine starts, since counters start at zero there.
+
+Encoder on the LDU: eccentricity e of the disc on its bearing reads arctan(e cos(theta)/R_g) (11.5), a sine of amplitude
+e/R_g and a third harmonic below 1e-11 rad; the stator coupling adds a second sine of the same turn (11.7), and the two
+sum to one amplitude and phase. They are one term, since no record can tell them apart.
+
+Source: Hanselman, Brushless Permanent Magnet Motor Design (2003), ch. 4 for cogging; thesis (11.5), (11.7).
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.physics.term import Term
+
+TURN = 2.0 * math.pi
+
+
+class CoggingSettings(Settings):
+    """A, A2, A3 are the sizes: amplitudes of per_turn, 2 per_turn and 3 per_turn teeth."""
+
+    term: Literal["ripple.cogging"] = "ripple.cogging"
+    node: str
+    A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude, Nm or N by node")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
+    per_turn: float = quantity(1.0, unit="", gt=0, le=1e4, help="teeth in one turn")
+    A2: float = quantity(0.0, unit="", ge=-1e4, le=1e4, help="amplitude of the second harmonic")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    A3: float = quantity(0.0, unit="", ge=-1e4, le=1e4, help="amplitude of the third harmonic")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or the pitch in m where it slides")
+
+
+class CoggingParams(NamedTuple):
+    n: float  # teeth a rad or m
+    A: float
+    phi: float
+    A2: float
+    phi2: float
+    A3: float
+    phi3: float
+
+
+def build_cogging(settings: CoggingSettings, h: float) -> CoggingParams:
+    """Nothing to discretise; a tooth that passes within two substeps is not seen."""
+    s = settings
+    return CoggingParams(s.per_turn * TURN / s.turn, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3)
+
+
+@tick
+def cogging(p, q):
+    """Force on the node at position `q`, Nm or N: it has a potential, so a whole tooth takes no work."""
+    x = p.n * q
+    return p.A * math.sin(x + p.phi) + p.A2 * math.sin(2.0 * x + p.phi2) + p.A3 * math.sin(3.0 * x + p.phi3)
+
+
+class EncoderSettings(Settings):
+    """A, A2, A3 are the sizes: reading errors once, twice, three times in a turn (or `order` times as often)."""
+
+    term: Literal["ripple.encoder"] = "ripple.encoder"
+    node: str
+    A: float = quantity(unit="", ge=-10, le=10, help="amplitude of the error, rad (m where it slides)")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
+    A2: float = quantity(
+        0.0, unit="", ge=-10, le=10, help="amplitude of the second harmonic: an oval, or a tilted disc"
+    )
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    A3: float = quantity(0.0, unit="", ge=-10, le=10, help="amplitude of the third harmonic")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    order: float = quantity(1.0, unit="", gt=0, le=1e5, help="times a turn; number of lines for an error of division")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where it slides")
+
+
+class EncoderParams(NamedTuple):
+    n: float  # periods a rad or m
+    A: float
+    phi: float
+    A2: float
+    phi2: float
+    A3: float
+    phi3: float
+    zero: float  # error at position 0
+
+
+def build_encoder(settings: EncoderSettings, h: float) -> EncoderParams:
+    """Error at position 0, which counters never show."""
+    s = settings
+    zero = s.A * math.sin(s.phi) + s.A2 * math.sin(s.phi2) + s.A3 * math.sin(s.phi3)
+    return EncoderParams(s.order * TURN / s.turn, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3, zero)
+
+
+@tick
+def encoder(p, y):
+    """What is shown for a true reading of `y` rad or m."""
+    x = p.n * y
+    error = p.A * math.sin(x + p.phi) + p.A2 * math.sin(2.0 * x + p.phi2) + p.A3 * math.sin(3.0 * x + p.phi3)
+    return y + error - p.zero
+
+
+COGGING = Term(
+    name="ripple.cogging",
+    words="a notchy motor: turned slowly by hand it catches at even angles",
+    equation="tau = A sin(n theta + phi) + A2 sin(2 n theta + phi2) + A3 sin(3 n theta + phi3)",
+    source="Hanselman 2003, ch. 4",
+    settings=CoggingSettings,
+    build=build_cogging,
+    act={"force": "{m}.f[{i}] += {r} * ripple.cogging({p}, {r} * {m}.qm[{i}])"},
+    nodes={"ivu": ("motor1", "motor2"), "ldu": ("motor",), "axis": ("carriage",)},
+    look_alikes={
+        "load.imbalance": "turn slowly and count: imbalance comes once a turn, cogging many times",
+        "ripple.reel": "the same turns at another tension: cogging stays, an eccentric reel follows the tension",
+        "ripple.encoder": "slow and fast turns: a torque fades behind the inertia when it is fast, a reading error not",
+        "structure.resonance": "two constant speeds: cogging keeps its angle, a resonance its frequency",
+        "load.bump": "several turns: a bump stands at one place, cogging everywhere",
+    },
+    typical={"A": (0.02, 0.3), "per_turn": (3, 48)},
+    scale={"A": "force"},
+    axis="angle",
+)
+ENCODER = Term(
+    name="ripple.encoder",
+    words="a disc or coupling off centre: the reading runs ahead and behind once a turn though the shaft turns evenly",
+    equation="y = theta + A sin(theta + phi) + A2 sin(2 theta + phi2) + A3 sin(3 theta + phi3)",
+    source="thesis (11.5), (11.7)",
+    settings=EncoderSettings,
+    build=build_encoder,
+    act={"reading": "{m}.y[{c}] = ripple.encoder({p}, {m}.y[{c}])"},
+    nodes={"ivu": ("encoder",), "ldu": ("encoder",), "axis": ("sensor",)},
+    look_alikes={
+        "ripple.capstan": "on the LDU look at both sensors: a disc off centre does not move the carriage; on the IVU "
+        "change the tape's tension: a capstan out of round pulls harder, a reading error stays",
+        "ripple.cogging": "slow and fast turns: a reading error does not fade with the inertia, a torque does",
+        "load.imbalance": "slow and fast turns: a reading error does not fade with the inertia, a torque does",
+        "guide.thickness": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
+        "ripple.reel": "wind until the reel has another radius: a reel's wave in the capstan's angle moves with it",
+        "timing.jitter": "two constant speeds: ripple stays on its angle, jitter has none and grows with speed",
+    },
+    typical={"A": (3e-4, 1e-2)},
+    axis="angle",
+)

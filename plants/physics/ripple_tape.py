@@ -1,0 +1,153 @@
+"""Ripple of what the tape runs on: a reel off centre, and a capstan out of round.
+
+A wheel of radius R + e cos(q + phi) has wound or passed  R q + e (sin(q + phi) - sin(phi))  after an angle q. The
+second part stretches the tape, and the tape pulls at the changed arm: both follow from one potential, so a whole turn
+takes no work from a spring. It is zero where the machine starts.
+
+On the LDU a capstan off its bearings or out of round moves the carriage by the integral (11.3). Its arm changes by
+e/R_c, below one part in a thousand, and so does the force: this is left out.
+
+Source: Shelton, Dynamics of web tension control with velocity or torque control (1986); thesis (11.3), (11.4).
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants import linear
+from rtctl.plants.physics.term import Term
+
+
+class ReelSettings(Settings):
+    """e, e2, e3 are the sizes: the radius is R + e cos(q + phi) + e2 cos(2 q + phi2) + e3 cos(3 q + phi3)."""
+
+    term: Literal["ripple.reel"] = "ripple.reel"
+    node: str
+    e: float = quantity(unit="m", ge=-0.02, le=0.02, help="eccentricity")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
+    e2: float = quantity(0.0, unit="m", ge=-0.02, le=0.02, help="of the second harmonic: an oval")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    e3: float = quantity(0.0, unit="m", ge=-0.02, le=0.02, help="of the third harmonic: a triangle")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+
+
+class CapstanSettings(Settings):
+    """a, a2, a3 are the sizes: the way is off by a sin(theta + phi) + a2 sin(2 theta + phi2) + ..."""
+
+    term: Literal["ripple.capstan"] = "ripple.capstan"
+    node: str
+    a: float = quantity(unit="m", ge=-5e-3, le=5e-3, help="amplitude of the way: the eccentricity of the capstan")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
+    a2: float = quantity(0.0, unit="m", ge=-5e-3, le=5e-3, help="second harmonic: half the radius deviation of an oval")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    a3: float = quantity(0.0, unit="m", ge=-5e-3, le=5e-3, help="third harmonic")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+
+
+class WheelParams(NamedTuple):
+    a: float  # m, of the way
+    phi: float
+    a2: float
+    phi2: float
+    a3: float
+    phi3: float
+    zero: float  # m, way at angle 0
+
+
+def build_reel(settings: ReelSettings, h: float) -> WheelParams:
+    """The way is the integral of the radius over the angle."""
+    s = settings
+    return wheel(s.e, s.phi, 0.5 * s.e2, s.phi2, s.e3 / 3.0, s.phi3)
+
+
+def build_capstan(settings: CapstanSettings, h: float) -> WheelParams:
+    """Nothing to discretise."""
+    s = settings
+    return wheel(s.a, s.phi, s.a2, s.phi2, s.a3, s.phi3)
+
+
+def wheel(a: float, phi: float, a2: float, phi2: float, a3: float, phi3: float) -> WheelParams:
+    """The way at angle 0 filled in."""
+    return WheelParams(a, phi, a2, phi2, a3, phi3, a * math.sin(phi) + a2 * math.sin(phi2) + a3 * math.sin(phi3))
+
+
+@tick
+def way(p, q):
+    """Tape or travel beyond R q at angle `q`, m."""
+    return p.a * math.sin(q + p.phi) + p.a2 * math.sin(2.0 * q + p.phi2) + p.a3 * math.sin(3.0 * q + p.phi3) - p.zero
+
+
+@tick
+def arm(p, q):
+    """Radius beyond R at angle `q`, m: the slope of `way`."""
+    return p.a * math.cos(q + p.phi) + 2.0 * p.a2 * math.cos(2.0 * q + p.phi2) + 3.0 * p.a3 * math.cos(3.0 * q + p.phi3)
+
+
+@tick
+def tape_of(m, i):
+    """The link that starts at reel `i`."""
+    for j in range(m.link_i.shape[0]):
+        if m.link_i[j] == i:
+            return j
+    return 0
+
+
+@tick
+def reel(p, m, i):
+    """Stretch the tape of reel `i` by what the reel has wound too much, and let it pull at the arm that it has."""
+    j = tape_of(m, i)
+    extra = arm(p, m.qm[i])
+    linear.pull(m, j, m.link_c[j] * way(p, m.qm[i]) + m.link_k[j] * extra * m.vm[i])
+    m.f[i] -= extra * linear.tension(m, j)
+
+
+@tick
+def capstan(p, m, i):
+    """Move both tapes by what the capstan `i` has passed too much: tape 1 gets shorter by it and tape 2 longer."""
+    extra = arm(p, m.qm[i])
+    moved, speed = way(p, m.qm[i]), extra * m.vm[i]
+    linear.pull(m, 0, -(m.link_c[0] * moved + m.link_k[0] * speed))
+    linear.pull(m, 1, m.link_c[1] * moved + m.link_k[1] * speed)
+    m.f[i] += extra * (linear.tension(m, 0) - linear.tension(m, 1))
+
+
+REEL = Term(
+    name="ripple.reel",
+    words="a reel off centre: once a turn it pulls the tape taut and lets it go again",
+    equation="l = R q + e (sin(q + phi) - sin(phi)), arm R + e cos(q + phi)",
+    source="Shelton 1986",
+    settings=ReelSettings,
+    build=build_reel,
+    act={"force": "ripple_tape.reel({p}, {m}, {i})"},
+    nodes={"ivu": ("reel1", "reel2")},
+    look_alikes={
+        "load.imbalance": "the same turns at another tension: an eccentric reel follows the tension, a weight does not",
+        "ripple.cogging": "the same turns at another tension: an eccentric reel follows the tension, cogging does not",
+        "ripple.encoder": "wind until the reel has another radius: a reel's wave in the capstan's angle moves with it",
+        "ripple.capstan": "count the waves over ten turns of the reel: only the reel's own wave fits a whole number",
+    },
+    typical={"e": (5e-5, 5e-4)},
+    axis="angle",
+)
+CAPSTAN = Term(
+    name="ripple.capstan",
+    words="a capstan out of round or off its bearings: once a turn it moves a little too much and too little",
+    equation="x = R_c theta + a (sin(theta + phi) - sin(phi))",
+    source="thesis (11.3), (11.4)",
+    settings=CapstanSettings,
+    build=build_capstan,
+    act={
+        "force:ivu": "ripple_tape.capstan({p}, {m}, {i})",
+        "reading:ldu": "{m}.y[1] += ripple_tape.way({p}, {m}.x[{i}])",
+    },
+    nodes={"ivu": ("capstan",), "ldu": ("capstan",)},
+    look_alikes={
+        "ripple.encoder": "on the LDU both give the same difference of the sensors, and only in closed loop does the "
+        "carriage itself follow the encoder; on the IVU change the tension: only a capstan out of round pulls harder",
+        "guide.thickness": "lift the carriage, turn the capstan half a turn and repeat: only the capstan's wave moves",
+        "ripple.reel": "count the waves over ten turns of the capstan: only its own wave fits a whole number",
+        "load.imbalance": "turn without tape: imbalance is still there",
+    },
+    typical={"a": (2e-6, 2e-4)},
+    axis="angle",
+)

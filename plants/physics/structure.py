@@ -1,0 +1,135 @@
+"""Structure: a mass on a spring that the model lacks, and springs that stiffen as they bend.
+
+The mass m hangs on a node by a spring of its own frequency f_Hz (with the node held) and damping zeta:
+
+    m x_a'' = -k (x_a - x) - b (x_a' - x'),   F = -m x_a'',   k = m (2 pi f_Hz)^2,   b = 4 pi zeta m f_Hz
+
+The total inertia at the node grows by m: a base inertia that was fitted with the mass on it must come down by as much.
+Over a substep the node moves at its middle speed, the mass relative to it is then free, its 2 by 2 step is exact, and
+the force on the node is minus the momentum that the mass took, so that momentum is kept to rounding. Second order;
+stable while 2 pi f_Hz h stays below 0.7 with a mass as large as the node's own.
+
+Source: Den Hartog, Mechanical vibrations (1956), ch. 3; Kovacic & Brennan, The Duffing equation (2011), ch. 1; thesis
+12.3, for the print heads' resonances between 50 and 220 Hz.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.physics.friction import SHAFTS
+from rtctl.plants.physics.term import Term
+
+
+class ResonanceSettings(Settings):
+    """mass is the size."""
+
+    term: Literal["structure.resonance"] = "structure.resonance"
+    node: str
+    f_Hz: float = quantity(unit="", gt=0.1, le=5e3, help="natural frequency with the node held, in turns a second")
+    mass: float = quantity(unit="", ge=0, le=1e3, help="what swings, kg or kg m^2 by node")
+    zeta: float = quantity(0.02, unit="", ge=0, lt=1, help="damping ratio")
+
+
+class ResonanceParams(NamedTuple):
+    mass_h: float  # mass over substep
+    h: float
+    a11: float  # of the step of relative position and speed
+    a12: float
+    a21: float
+    a22: float
+
+
+RESONANCE_STATE = state(x=float, v=float)
+
+
+def build_resonance(settings: ResonanceSettings, h: float) -> ResonanceParams:
+    """Exact step of the free mass over `h` s."""
+    w = 2.0 * math.pi * settings.f_Hz
+    zeta = min(max(settings.zeta, 0.0), 0.999)
+    wd = w * math.sqrt(1.0 - zeta**2)
+    fade, c, s = math.exp(-zeta * w * h), math.cos(wd * h), math.sin(wd * h)
+    lean = zeta * w / wd
+    return ResonanceParams(
+        settings.mass / h, h, fade * (c + lean * s), fade * s / wd, -fade * s * w * w / wd, fade * (c - lean * s)
+    )
+
+
+@tick
+def resonance(p, s, x, v):
+    """Force on a node that is at `x` with speed `v` at the middle of the substep."""
+    way = s.x - (x - 0.5 * p.h * v)
+    rate = s.v - v
+    s.x = x + 0.5 * p.h * v + p.a11 * way + p.a12 * rate
+    before = s.v
+    s.v = v + p.a21 * way + p.a22 * rate
+    return -p.mass_h * (s.v - before)
+
+
+class StiffeningSettings(Settings):
+    """c3 is the size."""
+
+    term: Literal["structure.stiffening"] = "structure.stiffening"
+    node: str
+    c3: float = quantity(
+        unit="", ge=-1e15, le=1e15, help="cubic stiffness, N/m^3 or Nm/rad^3 by link; negative softens"
+    )
+
+
+class StiffeningParams(NamedTuple):
+    c3: float
+
+
+def build_stiffening(settings: StiffeningSettings, h: float) -> StiffeningParams:
+    """Nothing to discretise; stable while h sqrt(3 c3 e^2 / mass) stays below one."""
+    return StiffeningParams(settings.c3)
+
+
+@tick
+def stiffening(p, e):
+    """Pull at elongation `e` beside the linear spring."""
+    return p.c3 * e * e * e
+
+
+RESONANCE = Term(
+    name="structure.resonance",
+    words="something on it shakes: a mass on a spring that rings at its own frequency",
+    equation="m x_a'' = -k (x_a - x) - b (x_a' - x'), F = -m x_a''",
+    source="Den Hartog 1956; thesis 12.3",
+    settings=ResonanceSettings,
+    build=build_resonance,
+    act={"force": "{m}.f[{i}] += {r} * structure.resonance({p}, {s}, {r} * {m}.qm[{i}], {r} * {m}.vm[{i}])"},
+    nodes=SHAFTS,
+    look_alikes={
+        "timing.delay": "a sweep through the frequency: a resonance has a dip and a peak, a delay only lags",
+        "drive.lag": "a sweep through the frequency: a lag falls off and never rings",
+        "tape.viscoelastic": "let go and listen: a relaxing tape does not ring",
+        "ripple.cogging": "two speeds: ripple moves with the speed, a resonance stays at its frequency",
+    },
+    typical={"f_Hz": (20.0, 220.0), "mass": (0.1, 1.0), "zeta": (0.01, 0.1)},
+    scale={"mass": "inertia"},
+    axis="frequency",
+    state=RESONANCE_STATE,
+)
+STIFFENING = Term(
+    name="structure.stiffening",
+    words="a spring that grows stiffer the further it bends",
+    equation="T = c e + c3 e^3",
+    source="Kovacic & Brennan 2011",
+    settings=StiffeningSettings,
+    build=build_stiffening,
+    act={"force": "linear.pull({m}, {l}, structure.stiffening({p}, linear.stretch({m}, {l})))"},
+    nodes={
+        "ivu": ("tape1", "tape2", "motor1", "motor2"),
+        "ldu": ("wheel", "capstan"),
+        "axis": ("carriage",),
+    },
+    look_alikes={
+        "tape.viscoelastic": "the same load slowly and fast: stiffening does not ask how fast",
+        "transmission.backlash": "small motions about the middle: a gap is loose there, a cubic spring is linear",
+        "load.spring": "sweep at two amplitudes: only with the cubic does the resonance move",
+    },
+    typical={"c3": (0.1, 1.0)},
+    scale={"c3": "stiffness/stretch^2"},
+    axis="position",
+)

@@ -1,0 +1,136 @@
+"""Tape: it relaxes beside its one spring and damper, and it pulls but cannot push.
+
+A Maxwell branch is a spring c_branch in series with a dashpot of c_branch tau beside the tape's own spring:
+
+    T_b = c_branch (e - z),  z' = (e - z) / tau
+
+z is how far the dashpot has given. With the elongation moving evenly over a substep its step is exact for any tau; the
+pull is its mean over the substep. Slow loads see the tape's own c, fast ones c + c_branch.
+
+Source: Ferry, Viscoelastic properties of polymers (1980), ch. 1, generalised Maxwell body; Shelton, Dynamics of web
+tension control with velocity or torque control (1986), for tape and slack.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.physics.term import Term
+
+TAPES = {"ivu": ("tape1", "tape2")}
+
+
+class ViscoelasticSettings(Settings):
+    """c_branch and c_branch2 are the sizes."""
+
+    term: Literal["tape.viscoelastic"] = "tape.viscoelastic"
+    node: str
+    c_branch: float = quantity(unit="N/m", ge=0, le=1e6, help="stiffness that relaxes")
+    tau: float = quantity(unit="s", gt=0, le=1e4, help="how long it takes to relax")
+    c_branch2: float = quantity(0.0, unit="N/m", ge=0, le=1e6, help="stiffness of a second branch")
+    tau2: float = quantity(1.0, unit="s", gt=0, le=1e4, help="how long that one takes")
+
+
+class ViscoelasticParams(NamedTuple):
+    c_branch: float
+    end: float  # of what stands on the spring after a substep: y+ = end y + gain e'
+    mean: float  # over the substep: y = mean y + mean_gain e'
+    mean_gain: float
+    rate: float  # h / tau
+    half: float  # h / 2
+    c_branch2: float
+    end2: float
+    mean2: float
+    mean_gain2: float
+    rate2: float
+
+
+VISCOELASTIC_STATE = state(z=float, z2=float)
+
+
+def build_viscoelastic(settings: ViscoelasticSettings, h: float) -> ViscoelasticParams:
+    """Exact step of both branches over `h` s."""
+    one, two = branch(settings.tau, h), branch(settings.tau2, h)
+    return ViscoelasticParams(settings.c_branch, *one, 0.5 * h, settings.c_branch2, *two)
+
+
+def branch(tau: float, h: float) -> tuple[float, float, float, float]:
+    """Factors (end, mean, mean_gain, rate) of y' = e' - y / tau over `h` s."""
+    x = h / tau
+    end = math.exp(-x)
+    mean = -math.expm1(-x) / x
+    return end, mean, tau * (1.0 - mean), x
+
+
+@tick
+def viscoelastic(p, s, e, rate):
+    """Pull of the branches at elongation `e` m growing by `rate` m/s at the middle of the substep, N."""
+    start = e - p.half * rate
+    y = p.mean * (start - s.z) + p.mean_gain * rate
+    y2 = p.mean2 * (start - s.z2) + p.mean_gain2 * rate
+    s.z += p.rate * y
+    s.z2 += p.rate2 * y2
+    return p.c_branch * y + p.c_branch2 * y2
+
+
+class SlackSettings(Settings):
+    """share is the size: at 0 the tape pushes as a rod would."""
+
+    term: Literal["tape.slack"] = "tape.slack"
+    node: str
+    share: float = quantity(1.0, unit="", ge=0, le=1, help="of the push that is missing; 1: the tape cannot push")
+
+
+class SlackParams(NamedTuple):
+    share: float
+
+
+def build_slack(settings: SlackSettings, h: float) -> SlackParams:
+    """Nothing to discretise."""
+    return SlackParams(settings.share)
+
+
+@tick
+def slack(p, T):
+    """Pull that takes away the push of a tape whose model has the tension `T`, N."""
+    return p.share * max(-T, 0.0)
+
+
+VISCOELASTIC = Term(
+    name="tape.viscoelastic",
+    words="the tape gives way slowly: held taut it relaxes, let go it comes back late",
+    equation="T_b = c_branch (e - z), z' = (e - z) / tau",
+    source="Ferry 1980",
+    settings=ViscoelasticSettings,
+    build=build_viscoelastic,
+    act={
+        "force": "linear.pull({m}, {l}, tape.viscoelastic({p}, {s}, linear.stretch({m}, {l}), "
+        "linear.stretch_rate({m}, {l})))"
+    },
+    nodes=TAPES,
+    look_alikes={
+        "transmission.creep": "hold tension at standstill: creep needs travel, relaxation only time",
+        "friction.presliding": "hold and wait: bristles stay where they are, a relaxing tape moves on",
+        "timing.delay": "a slow sweep: a delay does nothing at a tenth of a hertz, relaxation does",
+        "drive.offset": "hold one tension for a minute: an offset does not change in that time",
+    },
+    typical={"c_branch": (0.3, 1.5), "tau": (0.01, 1.0)},
+    scale={"c_branch": "stiffness"},
+    axis="frequency",
+    state=VISCOELASTIC_STATE,
+)
+SLACK = Term(
+    name="tape.slack",
+    words="slack: the tape pulls and cannot push",
+    equation="T = max(0, c e + k e')",
+    source="Shelton 1986",
+    settings=SlackSettings,
+    build=build_slack,
+    act={"force": "linear.pull({m}, {l}, tape.slack({p}, linear.tension({m}, {l})))"},
+    nodes=TAPES,
+    look_alikes={
+        "transmission.backlash": "the same moves at a higher tension: the tape stays taut, play stays",
+        "transmission.slip": "the same moves at a higher tension: slack goes, slip goes too but leaves a lost way",
+    },
+    axis="tension",
+)

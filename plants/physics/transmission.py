@@ -1,0 +1,129 @@
+"""Lost motion: play in a coupling. A dead zone takes the place of the link's linear spring.
+
+    T = c d(e) + k (damping + (1 - damping) d'(e)) e',   d = e beyond half the gap, less half the gap; 0 within
+
+Beyond the gap it is the linear spring and damper of the link, shifted. At the edge the slope d' goes from 0 to 1 over
+`edge` of half the gap to either side, so that neither force nor its derivative jumps. At rest the link stands in the
+middle of its gap. The difference to the linear spring is a pull held over the substep, such that free ends leave it at
+the speed that they had: second order, for h times the link's own angular frequency w = sqrt(c (a^2/J_i + b^2/J_j)) up
+to 1; what it errs is the way across the gap, by (w h)^2 / 12 of it. The axis has no spring between motor and carriage:
+there the play is between carriage and sensor, and the reading follows with the hysteresis of a gap.
+
+Source: Nordin & Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38 (2002); Lurie & Enright,
+Classical feedback control, for the play operator.
+"""
+
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants import linear
+from rtctl.plants.physics.term import Term
+
+
+class BacklashSettings(Settings):
+    """gap is the size."""
+
+    term: Literal["transmission.backlash"] = "transmission.backlash"
+    node: str
+    gap: float = quantity(unit="", ge=0, le=1.0, help="total play, rad of the link's first end (m at an axis)")
+    damping: float = quantity(0.0, unit="", ge=0, le=1, help="share of the link's damping that also acts in the gap")
+    edge: float = quantity(0.2, unit="", ge=0, le=1, help="share of half the gap over which its edge is rounded")
+
+
+class BacklashParams(NamedTuple):
+    half: float
+    damping: float
+    edge: float
+
+
+BACKLASH_STATE = state(at=float)  # what the sensor of an axis is at
+
+
+def build_backlash(settings: BacklashSettings, h: float) -> BacklashParams:
+    """Half the gap; nothing to discretise."""
+    return BacklashParams(max(0.5 * settings.gap, 0.0), settings.damping, settings.edge)
+
+
+@tick
+def backlash(p, m, j):
+    """Pull to add to the linear spring of link `j`, Nm."""
+    k = 1.0 + ahead(m, j)
+    e0 = start(m, j)
+    e = e0 + k * (linear.stretch(m, j) - e0)
+    d, slope = dead_zone(e, p.half, p.edge)
+    damper = (1.0 - p.damping) * (slope - 1.0)
+    return m.link_c[j] * (d - e) + m.link_k[j] * damper * k * linear.stretch_rate(m, j)
+
+
+@tick
+def start(m, j):
+    """Elongation of link `j` at the start of the substep, rad or m."""
+    return m.link_a[j] * m.x[m.link_i[j]] + m.link_b[j] * m.x[m.link_j[j]]
+
+
+@tick
+def ahead(m, j):
+    """By which share a pull that shall undo link `j` for a substep must reach beyond its middle.
+
+    The spring of the linear model goes on acting about the point where the pull puts it. Its free ends keep their
+    relative speed if that point lies tan(w h/2) / (w h/2) times as far ahead as the middle; at the middle itself they
+    would lose (w h)^4 / 24 of it, which at the 2 kHz of the LDU's shaft is as much as a contact carries.
+    """
+    nq, nu = m.r.shape[0], m.u.shape[0]
+    a, b = m.link_a[j], m.link_b[j]
+    mobility = a * a * m.G[nq + m.link_i[j], nu + m.link_i[j]] + b * b * m.G[nq + m.link_j[j], nu + m.link_j[j]]
+    x = min(m.link_c[j] * mobility * m.h * m.h, 1.0)
+    return x * (1.0 + 0.1 * x) / 12.0
+
+
+@tick
+def undone(m, j):
+    """What a pull must take away for a substep so that link `j` does not pull at all, N or Nm."""
+    way = linear.stretch(m, j) - start(m, j)
+    more = m.link_c[j] * way + m.link_k[j] * linear.stretch_rate(m, j)
+    return linear.tension(m, j) + ahead(m, j) * more
+
+
+@tick
+def dead_zone(e, half, edge):
+    """What sticks out of the dead zone -half .. half, and its slope; parabolas join the straight parts."""
+    out = abs(e) - half
+    soft = edge * half
+    if out >= soft:
+        return (out if e > 0.0 else -out), 1.0
+    if out <= -soft:
+        return 0.0, 0.0
+    d = (out + soft) ** 2 / (4.0 * soft)
+    return (d if e > 0.0 else -d), (out + soft) / (2.0 * soft)
+
+
+@tick
+def follow(s, p, x):
+    """Sensor behind a gap, drawn along by its edges; the position that it shows. Any number of calls a way."""
+    s.at = min(max(s.at, x - p.half), x + p.half)
+    return s.at
+
+
+BACKLASH = Term(
+    name="transmission.backlash",
+    words="play: on reversal the motor turns a little before anything follows",
+    equation="T = c d(e), d = 0 for |e| < gap/2, e -+ gap/2 beyond",
+    source="Nordin & Gutman 2002",
+    settings=BacklashSettings,
+    build=build_backlash,
+    act={
+        "force": "linear.pull({m}, {l}, transmission.backlash({p}, {m}, {l}))",
+        "force:axis": "transmission.follow({s}, {p}, {m}.x[{i}])",
+        "reading:axis": "{m}.y[{c}] = min(max({s}.at, {m}.y[{c}] - {p}.half), {m}.y[{c}] + {p}.half)",
+    },
+    nodes={"ivu": ("motor1", "motor2"), "ldu": ("motor", "wheel", "capstan"), "axis": ("sensor",)},
+    look_alikes={
+        "friction.presliding": "reverse with a small force: in a gap nothing pushes back, bristles do at once",
+        "drive.deadband": "push both ways against a stop: a dead band has no memory of the side that it came from",
+        "friction.stribeck": "reverse at several speeds: the lost way stays the same, the sticking time does not",
+        "structure.stiffening": "load from zero to full: past the gap the stiffness is constant again",
+    },
+    typical={"gap": (2e-4, 4e-3)},
+    axis="velocity",
+    state=BACKLASH_STATE,
+)

@@ -1,0 +1,190 @@
+"""`rtctl diagnose`: find the physics that a simulation lacks, in one recording, in many, or on a running machine."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rtctl.cli import common
+from rtctl.cli.common import JsonOption, ModeOption, ReferenceOption, SetOption
+
+if TYPE_CHECKING:
+    from rtctl.diagnose.repair import Repair
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command()
+def diagnose(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="BUNDLE",
+            help="Folder with recording.parquet and case.json, or a folder of such; with --closed-loop a CONFIG.",
+        ),
+    ],
+    heldout: Annotated[
+        Path | None,
+        typer.Option("--heldout", metavar="BUNDLE2", help="A second recording of the same machine, to be predicted."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Where the results go; BUNDLE/diagnosis if absent."),
+    ] = None,
+    json: JsonOption = False,
+    report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Of a folder: processes side by side; one a core if absent.")
+    ] = None,
+    limit: Annotated[
+        str, typer.Option("--limit", metavar="T", help="Of a folder: longest time for a bundle, e.g. 600s.")
+    ] = "600s",
+    again: Annotated[bool, typer.Option("--again", help="Of a folder: also those that are diagnosed already.")] = False,
+    closed_loop: Annotated[
+        bool, typer.Option("--closed-loop", help="Record the machine of a CONFIG, diagnose it, write its model.")
+    ] = False,
+    duration: Annotated[
+        str | None, typer.Option("--for", metavar="T", help="With --closed-loop: length of a recording, e.g. 25s.")
+    ] = None,
+    reference: ReferenceOption = None,
+    mode: ModeOption = None,
+    set_: SetOption = None,
+) -> None:
+    """Diagnose a recording: what physics does its owner's model lack, where, and how large is it?
+
+    Writes diagnosis.json, model.yaml (for `rtctl run`, `rtctl plant` and `rtctl simulate`), report.html and, where two
+    answers are left, experiment.yaml, which tells them apart. Of a folder of bundles, those that are diagnosed already
+    are left alone, and NAME-heldout is the second recording of NAME.
+
+    With --closed-loop the machine is recorded first, and where two answers are left the experiment is run and diagnosed
+    as well. An emulated machine runs on virtual time.
+
+    Exit code 0 for any verdict, 2 for a bundle that is not right, 3 for one that supports no verdict.
+
+    Examples:
+
+      rtctl diagnose runs/ivu-20250102-101500
+
+      rtctl diagnose monday --heldout tuesday --out /tmp/d --json
+
+      rtctl diagnose recordings --jobs 2 --no-report
+
+      rtctl diagnose --closed-loop ivu --for 25s --reference constant_speed
+    """
+    from rtctl.cli.diagnose_console import DiagnoseConsole
+
+    console = DiagnoseConsole(json)
+    if closed_loop:
+        if heldout is not None:
+            _refuse("--heldout", "goes with a BUNDLE, not with --closed-loop")
+        _machine(console, what, set_, mode, reference, common.seconds(duration, "--for"), out, report, json)
+        return
+    alone = {"--for": duration, "--reference": reference, "--mode": mode, "--set": set_}
+    for option, given in alone.items():
+        if given is not None:
+            _refuse(option, "goes with --closed-loop CONFIG")
+
+    from rtctl.diagnose.folder import tasks
+
+    bundle = Path(what)
+    found = tasks(bundle, out, heldout)
+    if found:
+        length = common.seconds(limit, "--limit")
+        assert length is not None
+        _folder(console, found, jobs, length, report, again, json)
+    else:
+        _bundle(console, bundle, heldout, out, report, json)
+
+
+def _refuse(option: str, why: str) -> None:
+    from rtctl.config.errors import UserError
+
+    raise UserError(f"{option} {why}; see rtctl diagnose --help")
+
+
+def _bundle(console: Any, bundle: Path, other: Path | None, out: Path | None, report: bool, json: bool) -> None:
+    from rtctl.diagnose.chain import diagnose as chain
+    from rtctl.diagnose.diagnosis import as_json
+    from rtctl.diagnose.folder import FOLDER, finite, own_config, write
+
+    folder = out if out is not None else bundle / FOLDER
+    with console.stages() as stage:
+        d = chain(bundle, other, stage)
+        stage("writing the results")
+        faults = write(d, folder, own_config(bundle), report)
+    console.notes([*d.record.case.warnings, *faults])
+    if json:
+        common.print_json(finite(as_json(d)))
+    else:
+        console.result(d, folder)
+
+
+def _folder(
+    console: Any, found: list[Any], jobs: int | None, limit: float, report: bool, again: bool, json: bool
+) -> None:
+    import os
+    import time
+
+    from rtctl.diagnose.folder import BAD, OURS, diagnose_all, done
+
+    began = time.monotonic()
+    jobs = jobs or len(os.sched_getaffinity(0))
+    there = [] if again else [o for o in map(done, found) if o is not None]
+    names = {o.name for o in there}
+    outcomes = list(there)
+    with console.many(len(found)) as show:
+        for outcome in there:
+            show(outcome)
+        for outcome in diagnose_all([t for t in found if t.name not in names], jobs, limit, report):
+            outcomes.append(outcome)
+            show(outcome)
+    outcomes.sort(key=lambda o: o.name)
+    if json:
+        common.print_json({"bundles": {o.name: o.as_json() for o in outcomes}})
+    else:
+        console.summary(outcomes, time.monotonic() - began)
+    codes = {o.code for o in outcomes}
+    code = OURS if OURS in codes else BAD if BAD in codes else max(codes)
+    if code:
+        raise typer.Exit(code)
+
+
+def _machine(
+    console: Any,
+    what: str,
+    set_: list[str] | None,
+    mode: str | None,
+    reference: str | None,
+    length: float | None,
+    out: Path | None,
+    report: bool,
+    json: bool,
+) -> None:
+    from rtctl.diagnose import repair
+    from rtctl.diagnose.folder import finite, own_config, write
+
+    config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)
+    config = repair.ready(config, mode)
+    folder = out if out is not None else common.default_folder(config.name)
+    with console.stages() as stage:
+        made = repair.repair(config, folder, length, stage)
+        stage("writing the results")
+        faults = write(made.last, folder, own_config(made.bundle), report)
+    console.notes([*made.last.record.case.warnings, *faults])
+    if json:
+        common.print_json(finite(_repaired(made)))
+    else:
+        console.repaired(made, folder)
+
+
+def _repaired(made: "Repair") -> dict[str, Any]:
+    from rtctl.diagnose.diagnosis import as_json
+    from rtctl.diagnose.repair import changes
+
+    return {
+        **as_json(made.last),
+        "bundles": [str(bundle) for bundle in made.bundles],
+        "verdicts": [d.verdict for d in made.diagnoses],
+        "trips": list(made.trips),
+        "changes": [dict(zip(("key", "was", "is"), row, strict=True)) for row in changes(made.last)],
+    }

@@ -1,0 +1,131 @@
+"""`rtctl simulate MODEL BUNDLE`: run any model against any recording and say how far apart they are."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rtctl.cli import common
+from rtctl.cli.common import JsonOption
+
+if TYPE_CHECKING:
+    from rtctl.diagnose.measure import Comparison
+
+app = typer.Typer(add_completion=False)
+OWNER = "case"
+PEN = {"recorded": "#222222", "simulated": "#0b62a8", "error": "#b3262e"}
+MOST_POINTS = 6000  # of a line in the picture
+
+
+@app.command()
+def simulate(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="Config file, the name of one that comes with rtctl, or `case`: what its owner believes.",
+        ),
+    ],
+    bundle: Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder with recording.parquet and case.json.")],
+    closed: Annotated[
+        bool | None,
+        typer.Option(
+            "--closed-loop/--open-loop",
+            help="From the reference with its own law, or from the recorded command; closed where the law is known.",
+        ),
+    ] = None,
+    skip: Annotated[int, typer.Option("--skip", metavar="N", min=0, help="Rows at the start that do not count.")] = 0,
+    json: JsonOption = False,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE", help="Draw recorded, simulated and error into a PNG.")
+    ] = None,
+) -> None:
+    """Simulate a recording freely by a model: the `plant` section of any config, with its `physics` list.
+
+    Exit code 3 where the model runs away.
+
+    Examples:
+
+      rtctl simulate model.yaml runs/ivu-20250102-101500
+
+      rtctl simulate case emps --closed-loop --skip 20 --json
+    """
+    from rtctl.diagnose.kernel import CLOSED, OPEN
+    from rtctl.diagnose.measure import compare
+    from rtctl.diagnose.record import load_record
+
+    record = load_record(bundle)
+    mode = None if closed is None else (CLOSED if closed else OPEN)
+    if not json:
+        for warning in record.case.warnings:
+            typer.echo(f"note: {warning}", err=True)
+    result = compare(record, _model(model, bundle, record), mode, skip)
+    if plot is not None:
+        _draw(result, plot)
+    if json:
+        common.print_json(result.as_json())
+    else:
+        typer.echo("\n".join(_table(result)))
+
+
+def _model(name: str, bundle: Path, record: Any) -> Any:
+    from rtctl.config.errors import UserError
+    from rtctl.diagnose.export import read_model
+    from rtctl.diagnose.model import owner_model
+
+    if name != OWNER:
+        return read_model(name, record)
+    model = owner_model(record.case)
+    if model.kind == "axis":
+        for key, words in (("M", "the moving mass"), ("K", "the force per volt")):
+            if key not in model.base:
+                raise UserError(
+                    f"{bundle / 'case.json'}: parameters.{key} is missing, {words}; without it there is no belief to "
+                    "simulate, only a model that was fitted"
+                )
+    return model
+
+
+def _table(result: "Comparison") -> list[str]:
+    from rtctl.diagnose.measure import NAMES
+
+    width = max(map(len, result.channels)) + 2
+    rows = len(result.t)
+    lines = [f"{NAMES[result.mode]}, {rows} rows" + (f", the first {result.skipped} skipped" if result.skipped else "")]
+    lines.append(f"{'':{width}}{'rmse':>12} {'':8}{'nrmse':>10}")
+    for name, channel in result.channels.items():
+        lines.append(f"{name:{width}}{channel.rmse:12.6g} {channel.unit:8}{channel.nrmse:10.4g}")
+    return lines
+
+
+def _draw(result: "Comparison", path: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from rtctl.config.errors import UserError
+    from rtctl.diagnose.measure import NAMES
+
+    count = len(result.channels)
+    figure = Figure(figsize=(11, 1.0 + 2.4 * count), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(2 * count, 1, sharex=True, squeeze=False, height_ratios=[2, 1] * count)[:, 0]
+    every = max(1, len(result.t) // MOST_POINTS)
+    t = result.t[::every]
+    for i, (name, channel) in enumerate(result.channels.items()):
+        above, below = panels[2 * i], panels[2 * i + 1]
+        above.plot(t, channel.recorded[::every], color=PEN["recorded"], linewidth=1.0, label="recorded")
+        above.plot(t, channel.simulated[::every], color=PEN["simulated"], linewidth=0.8, label="simulated")
+        error = (channel.simulated - channel.recorded)[::every]
+        below.plot(t, error, color=PEN["error"], linewidth=0.8)
+        above.set_ylabel(f"{name}\n[{channel.unit}]")
+        below.set_ylabel("error")
+        above.set_title(f"rmse {channel.rmse:.4g} {channel.unit}, {100 * channel.nrmse:.3g} %", loc="right", fontsize=9)
+        for axes in (above, below):
+            axes.grid(alpha=0.3)
+    panels[0].legend(loc="upper left", fontsize=9, ncols=2)
+    panels[0].set_title(f"Free run, {NAMES[result.mode]}", loc="left", fontsize=12, fontweight="bold")
+    panels[-1].set_xlabel("time [s]")
+    try:
+        figure.savefig(path)
+    except (OSError, ValueError) as error:
+        raise UserError(f"--plot {path}: cannot be written ({error})") from None

@@ -1,0 +1,72 @@
+"""Judges what the search found: is it there, is it enough, and is it ahead of everything that looks like it?
+
+A term earns its place when it takes a material share off the error, beyond what the luckiest of all hypotheses takes
+off a record with nothing in it. It earns its name when the model with it explains what there was to explain, down to
+the noise, when no bound holds it, and when it beats each rival by more than chance, judged on blocks longer than the
+machine's memory, since errors of neighbouring ticks are not independent.
+
+Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Econometrica 59 (1991).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from rtctl.diagnose.fit import Fit, Problem
+
+MATERIAL = 0.08  # share of the cost that a term must take off
+NEARLY = 0.2  # the same where the model is already near the noise
+COMPLETE = 1.35  # times the noise floor of a quiet machine: what is left may well be noise
+MOSTLY = 0.75  # share of the excess that a name must explain besides
+ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
+SOME = 0.5  # share of the excess below which not even a guess is given
+TEMPER = 0.08  # how much of a difference in cost counts, since errors are not independent
+
+
+class Verdict(NamedTuple):
+    """How the best model stands."""
+
+    explained: float  # share of the excess over the noise, 0 to 1
+    complete: bool  # down to the noise
+    there: bool  # beyond parameters and noise
+
+
+def worth(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether a further term took enough off.
+
+    Below the floor there is nothing to take, and near it a term must take more: what is left there is the cut into
+    counts, which a lucky term may follow for a while.
+    """
+    if before.rms < problem.floor:
+        return False
+    share = NEARLY if complete(problem, before) else MATERIAL
+    return after.merit < (1.0 - share) * before.merit
+
+
+def complete(problem: Problem, fitted: Fit) -> bool:
+    """Whether what is left is noise."""
+    return fitted.rms < COMPLETE * problem.floor
+
+
+def explained(problem: Problem, before: Fit, after: Fit) -> float:
+    """Share of the error's excess over the noise floor that the terms of `after` explain."""
+    floor = min(problem.floor, after.rms) ** 2
+    return float(np.clip((before.rms**2 - after.rms**2) / max(before.rms**2 - floor, 1e-12), 0.0, 1.0))
+
+
+def p_value(best: Fit, rival: Fit, block: int) -> float:
+    """Chance that the rival explains the record as well as the best does (one-sided Vuong test on blocks)."""
+    d = 0.5 * (rival.r**2 - best.r**2)
+    sums = d[: len(d) // block * block].reshape(-1, block).sum(axis=1)
+    if len(sums) < 4:
+        return 1.0
+    spread = float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
+    return float(norm.sf(sums.sum() / max(spread, 1e-12)))
+
+
+def probabilities(fits: list[Fit]) -> np.ndarray:
+    """Tempered weights of rival models, by their cost and their number of parameters."""
+    cost = np.array([f.cost + 2.0 * len(f.x) for f in fits])
+    w = np.exp(-TEMPER * (cost - cost.min()))
+    return w / w.sum()

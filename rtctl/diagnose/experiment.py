@@ -1,0 +1,323 @@
+"""The experiment to run next, when a recording leaves several models in the running.
+
+Every rival is simulated with every motion of a menu, the loop closed by the machine's own law (where that is not known:
+kept on the motion by a slow correction). The motion whose readings differ most between the rivals, over the noise, is
+the one to run: T-optimality. What a rival could make up for by other values of its own terms does not count.
+
+Source: Atkinson & Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62 (1975).
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.kernel import CLOSED, TRACK
+from rtctl.diagnose.law import LawParams
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.motions import MENU, Limits, Motion
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.simulate import SHARE, Simulator, resolution
+from rtctl.diagnose.words import nice
+
+FILE = "experiment.yaml"
+EASE = (1.0, 0.6, 0.35, 0.2)  # of speed and size, until the command stays within its limit
+FULL = 0.95  # of the drive's limit
+OVER = 0.1  # share of the travel by which a simulated machine may overshoot it
+SPEED_OVER = 0.02  # s, a speed is taken over this
+STILL = 0.05  # s in which a sensor at rest does not change by a count
+LEAST = 0.05  # distance over the noise below which nothing is told apart
+NEARLY = 0.9  # of the largest distance: of all that come this near, the shortest motion is taken
+STEP = 0.02  # of a value, in difference quotients
+
+
+class Experiment(NamedTuple):
+    """A motion, and what it is expected to show."""
+
+    motion: Motion
+    limits: Limits
+    rivals: tuple[str, ...]
+    distance: dict[str, float]  # of each motion: how far the least distinct rivals are apart, over the noise
+    pairs: dict[str, dict[str, float]]  # of each motion: of each pair
+    refused: dict[str, str]  # motion -> why not
+
+    @property
+    def name(self) -> str:
+        return self.motion.name
+
+    @property
+    def words(self) -> str:
+        """What to do, in a sentence or two."""
+        return self.motion.words
+
+    @property
+    def why(self) -> str:
+        """What it is for, in a sentence."""
+        names = " from ".join(self.rivals) if len(self.rivals) == 2 else " and ".join(self.rivals) + " from each other"
+        return f"It tells {names}: they are {nice(self.distance[self.name])} times the noise apart."
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in diagnosis.json."""
+        limits = self.limits
+        return {
+            "name": self.name,
+            "words": self.words,
+            "why": {
+                "words": self.why,
+                "rivals": list(self.rivals),
+                "distance": {k: round(v, 4) for k, v in self.distance.items()},
+                "pairs": {k: round(v, 4) for k, v in self.pairs[self.name].items()},
+                "refused": dict(self.refused),
+            },
+            "reference": {
+                "unit": limits.unit,
+                "knots": [[round(float(t), 6), float(f"{r:.7g}")] for t, r in self.motion.knots],
+                "repeat": self.motion.repeat,
+                "relative": True,
+            },
+            "excitation": None,  # every motion of the menu is a reference
+            "seconds": round(self.motion.seconds, 3),
+            "limits": {"travel": [limits.low, limits.high], "speed": limits.speed, "command": limits.command},
+            "file": FILE,
+        }
+
+    def write(self, folder: Path | str) -> Path:
+        """Write experiment.yaml, which `rtctl run CONFIG --reference experiment.yaml` plays. Raises UserError."""
+        path, limits = Path(folder) / FILE, self.limits
+        said = self.as_dict()
+        low, high = (nice(x, limits.unit) for x in (limits.low, limits.high))
+        head = [
+            "The experiment to run next.",
+            self.words,
+            self.why,
+            f"Put the machine where the recording began, with room from {low} to {high} around it, and run",
+            f"    rtctl run CONFIG --reference {FILE} --for {said['seconds']:g}s",
+            "then diagnose that recording. Expected distance between the rivals, over the noise:",
+            *(f"    {name:18} {value:.3g}" for name, value in by_distance(self.distance)),
+            *(f"    {name:18} left out: {reason}" for name, reason in self.refused.items()),
+        ]
+        body = [] if self.motion.repeat is None else [f"repeat: {said['reference']['repeat']:.9g} s"]
+        body += ["relative: true", f"knots:  # s, {limits.unit}"]
+        body += [f"  - [{t:.9g}, {r:.9g}]" for t, r in said["reference"]["knots"]]
+        text = "\n".join([*(f"# {line}" for line in head), *body]) + "\n"
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise UserError(f"{path} cannot be written: {error.strerror}") from None
+        return path
+
+
+class Outcome(NamedTuple):
+    """What the rivals do under one motion."""
+
+    readings: list[np.ndarray]  # of each rival, (rows, channels), over sigma
+    slopes: list[list[np.ndarray]]  # of each rival, by each number of its own terms
+    moves: list[np.ndarray]  # of each rival, (rows,) whether the sensors change
+    trouble: str  # why the motion cannot be run; "" where it can
+
+
+def design(record: Record, rivals: Sequence[Model], sim: Simulator | None = None) -> Experiment:
+    """The motion of the menu that tells the rivals apart best, within what the machine did in the recording.
+
+    `sim` is a Simulator of that recording where there is one. Of more than two rivals the pair that is hardest to
+    tell apart counts, unless no motion tells it apart at all. Raises ValueError for fewer than two rivals and NoAnswer
+    where no motion stays within the limits.
+    """
+    if len(rivals) < 2:
+        raise ValueError(f"an experiment separates at least two models; {len(rivals)} given")
+    sim = Simulator(record) if sim is None else sim
+    problem, limits = Problem(sim), limits_of(sim)
+    labels = names_of(rivals)
+    motions: dict[str, Motion] = {}
+    pairs: dict[str, dict[str, float]] = {}
+    refused: dict[str, str] = {}
+    for make in MENU:
+        motion, outcome = eased(problem, limits, rivals, make)
+        if outcome.trouble:
+            refused[motion.name] = outcome.trouble
+            continue
+        motions[motion.name] = motion
+        pairs[motion.name] = {
+            f"{labels[i]} / {labels[j]}": distance(outcome, i, j) / problem.floor
+            for i, j in combinations(range(len(rivals)), 2)
+        }
+    if not pairs:
+        name, reason = next(iter(refused.items()))
+        raise NoAnswer(f"no motion stays within the limits of this recording ({name}: {reason})")
+    told = [p for p in next(iter(pairs.values())) if max(found[p] for found in pairs.values()) > LEAST]
+    counted = told or list(next(iter(pairs.values())))
+    worst = {name: min(found[p] for p in counted) for name, found in pairs.items()}
+    most = max(worst.values())
+    best = min((name for name in worst if worst[name] >= NEARLY * most), key=lambda name: motions[name].seconds)
+    return Experiment(motions[best], limits, labels, worst, pairs, refused)
+
+
+def by_distance(distance: dict[str, float]) -> list[tuple[str, float]]:
+    """Motions and their distances, the largest first."""
+    return sorted(distance.items(), key=lambda item: -item[1])
+
+
+def names_of(rivals: Sequence[Model]) -> tuple[str, ...]:
+    """Each rival by its terms, as term:node; numbered where two are alike."""
+    plain = [" + ".join(f"{t.term}:{t.node}" for t in model.terms) or "nothing" for model in rivals]  # type: ignore[attr-defined]
+    return tuple(f"{n} ({plain[:i].count(n) + 1})" if plain.count(n) > 1 else n for i, n in enumerate(plain))
+
+
+def limits_of(sim: Simulator) -> Limits:
+    """Travel, speed and command of the recording, from the main sensor."""
+    record, drive = sim.record, sim.case.drive
+    x = to_position(sim) * (sim.seen - sim.half)
+    x = x - x[0]
+    step = min(max(1, round(SPEED_OVER / record.dt)), len(x) // 8)
+    v = (x[step:] - x[:-step]) / (step * record.dt)
+    a = (v[step:] - v[:-step]) / (step * record.dt)
+    low, high = float(x.min()), float(x.max())
+    speed = float(np.quantile(np.abs(v), 0.99)) or float(np.abs(v).max())
+    return Limits(
+        plant=record.plant,
+        unit="rad" if record.plant == "ivu" else (sim.case.sensors.unit or "m"),
+        dt=record.dt,
+        low=low,
+        high=high,
+        speed=speed,
+        acceleration=max(float(np.quantile(np.abs(a), 0.98)), 0.5 * speed),
+        resolution=to_position(sim) * smallest_step(sim),
+        command=FULL * drive.limit_volt if drive.limit_volt else float(np.abs(record.u).max()),
+    )
+
+
+def smallest_step(sim: Simulator) -> float:
+    """What the main sensor can show at least, in its own unit."""
+    return resolution(sim.record) if sim.record.plant == "axis" else 1.0
+
+
+def to_position(sim: Simulator) -> float:
+    """Reference's unit for one unit of the main sensor."""
+    law: LawParams = sim.law
+    return float(law.to_unit)
+
+
+def eased(problem: Problem, limits: Limits, rivals: Sequence[Model], make: Any) -> tuple[Motion, Outcome]:
+    """A motion of the menu, made smaller until every rival stays within the limits, and what the rivals do."""
+    for ease in EASE:
+        motion = make(limits._replace(acceleration=ease * limits.acceleration), ease)
+        outcome = simulate(problem, limits, rivals, motion)
+        if not outcome.trouble:
+            break
+    return motion, outcome
+
+
+def simulate(problem: Problem, limits: Limits, rivals: Sequence[Model], motion: Motion) -> Outcome:
+    """Readings of all rivals under the motion, and their slopes by the numbers of the terms."""
+    blank = prepared(problem.sim, motion, rivals[0])
+    readings, slopes = [], []
+    for model in rivals:
+        out, trouble = respond(blank, limits, model)
+        if trouble:
+            return Outcome([], [], [], trouble)
+        readings.append(weighed(problem, out))
+    for model, y in zip(rivals, readings, strict=True):
+        found = []
+        for moved in neighbours(model):
+            slope = weighed(problem, respond(blank, limits, moved)[0]) - y
+            if np.isfinite(slope).all():
+                found.append(slope)
+        slopes.append(found)
+    moves = [moving(problem, y) for y in readings]
+    return Outcome(readings, slopes, moves, "")
+
+
+def prepared(sim: Simulator, motion: Motion, first: Model) -> Simulator:
+    """A Simulator for the motion; where the law is not known, with the command that the first rival would need."""
+    record = sim.record
+    n = round(motion.seconds / record.dt)
+    t = np.arange(n) * record.dt
+    ref = motion.reference(t)
+    y = {name: np.zeros(n) for name in record.y}
+    y[sim.channels[0]] = ref / to_position(sim) - sim.half
+    start = record.u[0] if record.closed_loop else np.median(record.u, axis=0)
+    blank = record._replace(t=t, ref=ref, w=np.zeros(n), u=np.tile(start, (n, 1)), y=y, columns={})
+    lead = sim.lead * record.dt
+    made = Simulator(blank, follow=sim.follow, lead=lead)
+    if record.closed_loop:
+        return made
+    push = made.everything(first, TRACK)[2]
+    return Simulator(blank._replace(u=blank.u + volts_of(made, push)), follow=sim.follow, lead=lead)
+
+
+def respond(sim: Simulator, limits: Limits, model: Model) -> tuple[np.ndarray, str]:
+    """Readings (n, sensors), and why this cannot be done with the machine, or nothing."""
+    mode = CLOSED if sim.record.closed_loop else TRACK
+    out, volts, push = sim.everything(model, mode)
+    if not np.isfinite(out).all():
+        return out, "a rival runs away"
+    if mode == TRACK:
+        volts = sim.volts + volts_of(sim, push)
+    most = float(np.abs(volts).max())
+    if most > limits.command:
+        return out, f"it takes {nice(most, 'V')}, and {nice(limits.command, 'V')} are the most"
+    x = out[:, 0] * to_position(sim)
+    room = OVER * (limits.high - limits.low)
+    if x.min() < limits.low - room or x.max() > limits.high + room:
+        return out, "a rival leaves the travel"
+    return out, ""
+
+
+def volts_of(sim: Simulator, push: np.ndarray) -> np.ndarray:
+    """The correction (n,) as a command (n, drives)."""
+    gain = sim.case.drive.amp_per_volt[0] if sim.record.plant == "ldu" else 1.0
+    return push[:, None] * np.array(SHARE[sim.record.plant]) / gain
+
+
+def weighed(problem: Problem, out: np.ndarray) -> np.ndarray:
+    """Readings of the channels that count over their noise (rows, channels), averaged as a fit averages its errors."""
+    e = out[:, problem.channels] / problem.sigma
+    keep = len(e) // problem.mean * problem.mean
+    return e[:keep].reshape(-1, problem.mean, e.shape[1]).mean(axis=1)
+
+
+def moving(problem: Problem, y: np.ndarray) -> np.ndarray:
+    """Rows (rows,) in which some sensor changes by a count. What is cut into counts says the same thing at rest, not
+    something new at every tick, however long the rest."""
+    lag = max(1, round(0.5 * STILL / (problem.sim.record.dt * problem.mean)))
+    padded = np.pad(y, ((lag, lag), (0, 0)), mode="edge")
+    change = np.abs(padded[2 * lag :] - padded[: -2 * lag]) * problem.sigma
+    return (change > smallest_step(problem.sim)).any(axis=1)
+
+
+def neighbours(model: Model) -> list[Model]:
+    """The model with each number of its own terms moved a little."""
+    out = []
+    for i, term in enumerate(model.terms):
+        for name in type(term).model_fields:
+            value = getattr(term, name, None)
+            if isinstance(value, float) and value != 0.0 and np.isfinite(value):
+                moved = term.model_copy(update={name: value * (1.0 + STEP)})
+                out.append(model._replace(terms=(*model.terms[:i], moved, *model.terms[i + 1 :])))
+    return out
+
+
+def distance(outcome: Outcome, i: int, j: int) -> float:
+    """rms of what neither of the two can make up for by other values of its own terms, over the whole motion."""
+    rows = outcome.moves[i] | outcome.moves[j]
+    d = (outcome.readings[i] - outcome.readings[j])[rows].ravel()
+    left = []
+    for k in (i, j):
+        e = beyond(d, [slope[rows].ravel() for slope in outcome.slopes[k]])
+        left.append(np.sqrt(e @ e / outcome.readings[i].size))
+    return float(min(left))
+
+
+def beyond(d: np.ndarray, slopes: list[np.ndarray]) -> np.ndarray:
+    """The part of d that is orthogonal to all slopes."""
+    if not slopes or not len(d):
+        return d
+    A = np.stack(slopes, axis=1)
+    A = A / np.maximum(np.linalg.norm(A, axis=0), 1e-12)
+    found: np.ndarray = d - A @ np.linalg.lstsq(A.T @ A, A.T @ d, rcond=1e-8)[0]
+    return found

@@ -1,0 +1,161 @@
+"""A model as the machine's config, and back: `rtctl run` and `rtctl plant` take it as it is.
+
+Of a recording by our own daemon, its config is taken and `plant.parameters` and `plant.physics` are replaced. Of any
+other one, the config is made from its case (see `carry`).
+"""
+
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rtctl.config.complaints import sentences
+from rtctl.config.errors import UserError
+from rtctl.config.fields import Shape, fill
+from rtctl.config.load import load_settings, to_yaml
+from rtctl.config.yaml_file import find, load_yaml
+from rtctl.diagnose.carry import carried, digits
+from rtctl.diagnose.case import PARAMETERS
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.record import Record
+from rtctl.idiom import Settings
+from rtctl.plants import ivu, ldu
+from rtctl.plants.physics import TERMS
+
+WIDTH = 110
+
+
+def to_config(model: Model, record: Record, config: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Plain data of the machine's config with the model in it, SI, its values with six significant digits.
+
+    `config` is what case.json of the recording holds under that name, where our own daemon made it. Raises UserError
+    where a value is out of its bounds.
+    """
+    return _settings_data(model, record, config)[0]
+
+
+def write_model(model: Model, record: Record, path: Path | str, config: dict[str, Any] | None = None) -> Path:
+    """Write the config as YAML, its head saying where it comes from and what it lacks; arguments as `to_config`.
+
+    Raises UserError where a value is out of its bounds, where the machine cannot be built, or the file not written.
+    """
+    from rtctl import machines
+
+    data, left = _settings_data(model, record, config)
+    settings = _checked(data, machines.CONFIGS[record.plant])
+    try:
+        machines.build(settings)
+    except ValueError as error:
+        raise UserError(f"the model cannot be run: {error}") from error
+    path = Path(path)
+    try:
+        path.write_text(_head(model, record, config is not None, left) + to_yaml(settings), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror}") from None
+    return path
+
+
+def read_model(path: Path | str, record: Record) -> Model:
+    """The `plant` section of any config as a model of the recorded machine; the rest is as in the bundle's case.
+
+    `path` is a file or the name of a config that comes with rtctl. Raises UserError where it is of another machine.
+    """
+    from rtctl import machines
+
+    file = find(str(path))
+    data = load_yaml(file).data
+    kind = data.get("machine") if isinstance(data, dict) else None
+    if kind not in machines.CONFIGS:
+        raise UserError(f"{path}: machine is {kind!r}; it should be {record.plant}, as in the bundle")
+    if kind != record.plant:
+        raise UserError(f"{path}: machine is {kind}, and the bundle was recorded on the {record.plant}")
+    plant = load_settings(file, machines.CONFIGS[kind]).plant
+    if kind == "ivu":
+        base = _numbers(ivu.parameters(plant))
+        if not plant.follow_tape:
+            base["d_tape"] = 0.0
+    elif kind == "ldu":
+        base = _numbers(ldu.parameters(plant))
+        base["N"] = base["R_t"] / base["R_s"]
+    else:
+        base = _numbers(plant.parameters)
+    return Model(kind, base, tuple(plant.physics))
+
+
+def _numbers(parameters: Settings) -> dict[str, float]:
+    return {name: float(value) for name, value in parameters.model_dump().items()}
+
+
+def _settings_data(model: Model, record: Record, config: dict[str, Any] | None) -> tuple[dict[str, Any], list[str]]:
+    if model.kind != record.plant:
+        raise UserError(f"the model is one of the {model.kind} and the recording one of the {record.plant}")
+    parameters = _parameters(model)
+    data, left = (dict(config), []) if config is not None else carried(model, record)
+    plant = dict(data.get("plant") or {})
+    plant["parameters"] = parameters
+    plant["physics"] = [_entry(term) for term in model.terms]
+    return {**data, "machine": model.kind, "plant": plant}, left
+
+
+def _parameters(model: Model) -> dict[str, float]:
+    """All of them, so that no named set and no default of a later version speaks with them."""
+    base = dict(model.base)
+    if model.kind == "ldu" and "N" in base and abs(base["R_t"] / base["R_s"] / base["N"] - 1.0) > 1e-9:
+        base["R_s"] = base["R_t"] / base["N"]  # the gear ratio is what the equations use
+    fields = PARAMETERS[model.kind]
+    absent = [name for name, field in fields.model_fields.items() if name not in base and _wanted(model.kind, name)]
+    if absent:
+        raise UserError(f"the model of the {model.kind} lacks {', '.join(absent)}; a fit or case.json should say it")
+    values = {name: digits(base[name]) for name in fields.model_fields if name in base}
+    _checked(values, fields, "parameters")
+    return values
+
+
+def _wanted(kind: str, name: str) -> bool:
+    return (kind, name) not in (("ivu", "J_1"), ("ivu", "J_2"), ("axis", "k"))
+
+
+def _entry(term: Settings) -> dict[str, Any]:
+    """One entry of `physics:`, what differs from the term's defaults only."""
+    entry: dict[str, Any] = {"term": term.term, "node": term.node}  # type: ignore[attr-defined]
+    settings = TERMS[entry["term"]].settings
+    for name, field in settings.model_fields.items():
+        if name in entry:
+            continue
+        value = _plain(getattr(term, name))
+        if field.is_required() or value != _plain(field.get_default(call_default_factory=True)):
+            entry[name] = value
+    _checked(entry, settings, f"{entry['term']} at {entry['node']}")
+    return entry
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (bool, str, int)):
+        return value
+    return digits(float(value))
+
+
+def _checked(data: dict[str, Any], model: type[Settings], where: str = "the model") -> Any:
+    try:
+        return model.model_validate(fill(Shape(model, model=model), data))
+    except ValidationError as error:
+        raise UserError(sentences(error, model, data, lambda path: where)) from None
+
+
+def _head(model: Model, record: Record, own: bool, left: list[str]) -> str:
+    """Comment lines on top of the file."""
+    seconds = len(record.t) * record.dt
+    lines = [
+        f"The {model.kind} as a recording of {seconds:.3g} s shows it: plant.parameters and plant.physics are new."
+    ]
+    if own:
+        lines.append("All else is as it was when the recording was made.")
+    else:
+        lines.append("All else is from the recording's case.json and, where that is silent, from the shipped config.")
+    if left:
+        lines += ["Not carried over:", *(f"- {words}" for words in left)]
+    wrapped = [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
+    return "".join(f"# {line}\n" for line in wrapped)

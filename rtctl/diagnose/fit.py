@@ -1,0 +1,261 @@
+"""Fits a model to a recording by the error of a simulation that follows it, within what the owner's values may miss.
+
+The unknowns are x: the logarithm of each plant parameter over the owner's value, and each term's parameter by its own
+scale. Gauss-Newton with Levenberg damping inside bounds; a weak prior of the owner's tolerance keeps what the record
+does not show where the owner put it.
+
+Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10; Ljung, System Identification (1999), ch. 7 for the
+prediction error in closed loop.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.kernel import TRACK
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.simulate import Simulator, resolution
+from rtctl.diagnose.space import Space
+
+FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # of SIGMA, on quiet machines
+TOLL = 0.01  # share of the cost that a further number of a term must take off
+FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
+THREADS = 2
+TOGETHER = 100.0  # errors that count as one
+MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
+FORGET = 8.0  # over the bandwidth of the correction
+SIGMA = {"encoder": 0.4, "scale": 0.5}  # counts: what quantisation and a quiet machine leave
+
+
+class Fit(NamedTuple):
+    """A model fitted to a record."""
+
+    space: Space
+    x: np.ndarray
+    r: np.ndarray  # weighted error (rows,)
+    J: np.ndarray  # (rows, unknowns), of r by x
+    cost: float  # half the sum of squares and of the prior
+
+    @property
+    def model(self) -> Model:
+        """The model itself."""
+        return self.space.model(self.x)
+
+    @property
+    def rms(self) -> float:
+        """Of the weighted error: 1 or less is all noise."""
+        return float(np.sqrt(np.mean(self.r**2)))
+
+    @property
+    def merit(self) -> float:
+        """Cost with a toll for each number of the terms: a further one must take off a share of what there is."""
+        return self.cost * (1.0 + TOLL * (len(self.x) - self.space.nb))
+
+    def bound(self) -> list[str]:
+        """Unknowns that ended at a bound."""
+        low, high = self.space.bounds()
+        near = np.minimum(self.x - low, high - self.x) < 1e-6
+        return [name for name, is_near in zip(self.space.labels(), near, strict=True) if is_near]
+
+
+class Problem:
+    """A recording, how its errors are weighed, and the rows that count."""
+
+    def __init__(
+        self, sim: Simulator, stop: int | None = None, channels: Sequence[int] | None = None, mean: int | None = None
+    ):
+        self.sim = sim
+        self.rows = slice(settled(sim), stop)
+        self.mean = max(1, round(MEAN / sim.record.dt)) if mean is None else mean  # ticks averaged into one error
+        self.channels = list(channels if channels is not None else main_channels(sim))
+        self.seen = np.stack([sim.record.y[sim.channels[c]] + sim.half for c in self.channels], axis=1)
+        self.sigma = np.array([_sigma(sim, c) for c in self.channels])
+        self.weight: Callable[[np.ndarray], np.ndarray] | None = None
+        self.n = len(self.seen) if stop is None else stop
+
+    @property
+    def floor(self) -> float:
+        """Weighted rms of the error where nothing is missing: counts, and a machine that is never quiet."""
+        share = [FLOOR.get(self.sim.channels[c], 0.0) for c in self.channels]
+        if not any(share):
+            return FINEST
+        mean = 0.62 if self.mean > 1 else 1.0
+        return float(np.sqrt(np.mean((np.array(share) * mean) ** 2)))
+
+    def error(self, model: Model) -> np.ndarray:
+        """Readings less simulation by their noise (rows, channels), without a constant offset of a second sensor."""
+        out = self.sim.run(model, TRACK, self.n)[:, self.channels]
+        e = ((self.seen[: self.n] - out) / self.sigma)[self.rows]
+        e[:, 1:] -= e[:, 1:].mean(axis=0)
+        if self.mean > 1:
+            keep = len(e) // self.mean * self.mean
+            e = e[:keep].reshape(-1, self.mean, e.shape[1]).mean(axis=1)
+        return e
+
+    def residual(self, model: Model) -> np.ndarray:
+        """The same as one row of numbers, whitened where a filter is set; 1e6 where the model runs away."""
+        e = np.nan_to_num(self.error(model), nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)
+        if self.weight is not None:
+            e = self.weight(e)
+        return e.T.ravel()
+
+
+def settled(sim: Simulator) -> int:
+    """First row whose error counts: the machine has moved and forgotten how it stood before the recording began."""
+    y = sim.seen
+    moved = int(np.argmax(np.abs(y - y[0]) > 0.01 * np.ptp(y)))
+    return min(moved + round(FORGET / sim.follow / sim.record.dt), len(y) // 5)
+
+
+def main_channels(sim: Simulator) -> list[int]:
+    """Sensors that know direction: rectified counters lose the way at every turn."""
+    return [i for i, name in enumerate(sim.channels) if not name.startswith("reel")]
+
+
+def _sigma(sim: Simulator, channel: int) -> float:
+    name = sim.channels[channel]
+    if name == "scale_counts":
+        return SIGMA["scale"]
+    if name.endswith("counts"):
+        return SIGMA["encoder"]
+    return 0.5 * resolution(sim.record)
+
+
+def parallel(jobs: Sequence[Callable[[], np.ndarray]]) -> list[np.ndarray]:
+    """Run simulations side by side: compiled code lets go of the interpreter."""
+    if len(jobs) < 2:
+        return [job() for job in jobs]
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(lambda job: job(), jobs))
+
+
+def jacobian(
+    problem: Problem, space: Space, x: np.ndarray, r: np.ndarray, columns: Sequence[int] | None = None
+) -> np.ndarray:
+    """Forward differences (rows, columns) of the residual by x, away from the upper bound."""
+    high, steps = space.bounds()[1], space.steps()
+
+    def column(i: int) -> np.ndarray:
+        step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
+        moved = x.copy()
+        moved[i] += step
+        return (problem.residual(space.model(moved)) - r) / step
+
+    wanted = range(len(x)) if columns is None else columns
+    found = parallel([lambda i=i: column(i) for i in wanted])
+    return np.stack(found, axis=1) if found else np.zeros((len(r), 0))
+
+
+def fit(
+    problem: Problem,
+    space: Space,
+    x: np.ndarray | None = None,
+    rounds: int = 20,
+    enough: float = 2e-3,
+    J: np.ndarray | None = None,
+    rough: bool = False,
+    give_up: Callable[[float], bool] | None = None,
+) -> Fit:
+    """Least squares from `x`.
+
+    Between full Jacobians the last one is kept up to date by Broyden's formula, which costs nothing; a guess `J` saves
+    the first. Stops when a round gains less than `enough` of the cost with a fresh Jacobian (`rough`: with any), or
+    where `give_up(cost)` says so. Source: Broyden, Math. Comp. 19 (1965).
+    """
+    low, high = space.bounds()
+    x = np.clip(space.start() if x is None else np.array(x, float), low, high)
+    r = problem.residual(space.model(x))
+    weight = space.prior() * trust(r)
+
+    def total(r: np.ndarray, x: np.ndarray) -> float:
+        return 0.5 * float(r @ r) + 0.5 * float(weight @ x**2)
+
+    cost = total(r, x)
+    damping, fresh = 1e-4, J is None
+    J = jacobian(problem, space, x, r) if J is None else J
+    for _ in range(rounds):
+        g = J.T @ r + weight * x
+        H = J.T @ J + np.diag(weight)
+        gained = False
+        for _ in range(12 if fresh else 3):
+            dx = bounded_step(H, g, x, low, high, damping)
+            if not np.abs(dx).max(initial=0.0) > 1e-9:
+                break
+            trial = problem.residual(space.model(x + dx))
+            new = total(trial, x + dx)
+            if new < cost:
+                gained = True
+                break
+            damping *= 10
+        if not gained:
+            if fresh or rough:
+                break
+            J, fresh, damping = jacobian(problem, space, x, r), True, 1e-4
+            continue
+        share = (cost - new) / max(cost, 1e-30)
+        hoped = -(g @ dx + 0.5 * dx @ H @ dx)
+        honest = (cost - new) > 0.3 * hoped
+        if honest:
+            J = J + np.outer(trial - r - J @ dx, dx) / float(dx @ dx)
+        x, r, damping = x + dx, trial, max(damping / 10, 1e-8)
+        weight = space.prior() * trust(r)
+        cost = total(r, x)
+        if give_up is not None and give_up(cost):
+            break
+        if share < enough and (fresh or rough):
+            break
+        if not honest or share < enough:
+            J, fresh = jacobian(problem, space, x, r), True
+        else:
+            fresh = False
+    return Fit(space, x, r, J, cost)
+
+
+def trust(r: np.ndarray) -> float:
+    """By how much the owner's values outweigh the errors' count.
+
+    Errors of neighbouring ticks go together, and where the model lacks something they are no noise at all. Without this
+    weight, parameters that hardly matter run into their bounds to serve what is missing, and the way back is barred.
+    """
+    return TOGETHER * max(1.0, float(np.mean(r**2)))
+
+
+def bounded_step(
+    H: np.ndarray, g: np.ndarray, x: np.ndarray, low: np.ndarray, high: np.ndarray, damping: float
+) -> np.ndarray:
+    """Minimum of g dx + dx H dx / 2 with relative `damping` inside the bounds, by an active set.
+
+    Source: Stark & Parker, Bounded-variable least squares, Computational Statistics 10 (1995).
+    """
+    d = np.sqrt(np.maximum(np.diag(H), 1e-12))
+    A = H / np.outer(d, d)
+    A[np.diag_indices_from(A)] += damping + 1e-10
+    b, lo, hi = -g / d, (low - x) * d, (high - x) * d
+    z = np.clip(np.linalg.solve(A, b), lo, hi)
+    state = np.where(z <= lo, -1, np.where(z >= hi, 1, 0))
+    for _ in range(4 * len(x)):
+        free = state == 0
+        if free.any():
+            rest = b[free] - A[np.ix_(free, ~free)] @ z[~free]
+            want = np.linalg.solve(A[np.ix_(free, free)], rest)
+            move = want - z[free]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                room = np.where(
+                    move > 0, (hi[free] - z[free]) / move, np.where(move < 0, (lo[free] - z[free]) / move, 1.0)
+                )
+            room = np.where(np.isfinite(room), room, 1.0)
+            step = min(1.0, float(room.min()))
+            z[free] += step * move
+            if step < 1.0:
+                hit = np.flatnonzero(free)[int(np.argmin(room))]
+                state[hit] = 1 if move[int(np.argmin(room))] > 0 else -1
+                z[hit] = hi[hit] if state[hit] > 0 else lo[hit]
+                continue
+        slope = A @ z - b
+        wrong = ((state == -1) & (slope < -1e-12)) | ((state == 1) & (slope > 1e-12))
+        if not wrong.any():
+            break
+        state[int(np.argmax(np.where(wrong, np.abs(slope), -1.0)))] = 0
+    return np.clip(z / d, low - x, high - x)

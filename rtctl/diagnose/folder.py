@@ -1,0 +1,297 @@
+"""Diagnoses on disk: the files of one, and a folder of bundles worked through by several processes.
+
+A bundle whose diagnosis is there and newer than its recording is not diagnosed again, so that work that was broken off
+goes on where it stopped. Of several processes each simulates with one thread, so that as many as there are cores use
+them all.
+"""
+
+import json
+import os
+import signal
+import time
+import traceback
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
+
+RESULT, MODEL, EXPERIMENT = "diagnosis.json", "model.yaml", "experiment.yaml"
+FOLDER = "diagnosis"  # in the bundle, where nobody says otherwise
+SECOND = "-heldout"  # a bundle of this name beside another is a second recording of the same machine
+ALONE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+LIMIT = 600.0  # s
+OURS, BAD, NO_VERDICT = 1, UserError.exit_code, NoAnswer.exit_code
+
+
+class Task(NamedTuple):
+    """A bundle, where its diagnosis goes, and a second recording of the same machine or None."""
+
+    name: str
+    bundle: Path
+    out: Path
+    other: Path | None = None
+
+
+class Outcome(NamedTuple):
+    """What came of one bundle. `code` is the exit code that it would have had by itself."""
+
+    name: str
+    code: int  # 0 a verdict, 1 our fault, 2 a bad bundle, 3 no verdict possible
+    seconds: float
+    diagnosis: dict[str, Any] | None = None  # as in diagnosis.json
+    message: str = ""
+    skipped: bool = False  # it was there already
+
+    def as_json(self) -> dict[str, Any]:
+        """The diagnosis, or what is wrong with the bundle."""
+        if self.diagnosis is not None:
+            return {**self.diagnosis, "skipped": self.skipped}
+        return {"error": self.message, "exit_code": self.code, "seconds": round(self.seconds, 2)}
+
+
+Work = Callable[[Task, bool], Outcome]
+
+
+def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bool = True) -> list[str]:
+    """diagnosis.json, model.yaml, experiment.yaml where there is one, report.html; each is there whole or not at all.
+
+    `config` is the recorded machine's own, see `own_config`. Returns a sentence on each file but the first that could
+    not be made: the verdict stands without them. Raises UserError where the disk does not take them.
+    """
+    from rtctl.diagnose.diagnosis import as_json
+    from rtctl.diagnose.export import write_model
+    from rtctl.diagnose.repair import experiment_yaml
+
+    faults: list[str] = []
+    _fresh(folder, (RESULT, MODEL, EXPERIMENT, "report.html"))
+    try:
+        _put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config))
+    except UserError as error:
+        faults.append(f"{folder / MODEL} is not written: {error}")
+    if d.experiment is not None:
+        text = experiment_yaml(d, config)
+        _put(folder / EXPERIMENT, lambda path: path.write_text(text, encoding="utf-8"))
+    if report:
+        try:
+            from rtctl.diagnose import report as page
+
+            html = page.html(d)
+            _put(folder / page.NAME, lambda path: path.write_text(html, encoding="utf-8"))
+        except UserError:
+            raise
+        except Exception as error:  # a figure that fails must not take the verdict with it
+            if os.environ.get("RTCTL_TRACEBACK"):
+                traceback.print_exc()
+            faults.append(f"the report is not written: internal error: {error!r}; RTCTL_TRACEBACK=1 shows where")
+    result = json.dumps(finite(as_json(d)), indent=1) + "\n"
+    _put(folder / RESULT, lambda path: path.write_text(result, encoding="utf-8"))
+    return faults
+
+
+def _fresh(folder: Path, names: tuple[str, ...]) -> None:
+    """The folder, without files that would pass for the new diagnosis's."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in names:
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise UserError(f"{folder} cannot be written to: {error.strerror}") from None
+
+
+def _put(path: Path, make: Callable[[Path], Any]) -> None:
+    part = path.with_name(f".{path.name}.tmp")
+    try:
+        make(part)
+        part.replace(path)
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror}") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def own_config(bundle: Path) -> dict[str, Any] | None:
+    """The config in case.json of a bundle that our own daemon recorded; None of any other."""
+    case = load_case(bundle)
+    config = case.get("config")
+    return config if isinstance(config, dict) and config.get("machine") == case.get("plant") else None
+
+
+def finite(value: Any) -> Any:
+    """The same with None for what is no finite number, and numpy's numbers as Python's: JSON knows no others."""
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if hasattr(value, "tolist"):
+        return finite(value.tolist())
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
+
+
+def is_bundle(folder: Path) -> bool:
+    """Whether the folder is a bundle, or what is left of one."""
+    return any((folder / name).is_file() for name in (CASE, PARQUET, ARROWS))
+
+
+def tasks(folder: Path, out: Path | None = None, other: Path | None = None) -> list[Task]:
+    """A task for each bundle in `folder`, by name; none where it is no folder of bundles.
+
+    Results go to `out`/NAME, or into each bundle. A second recording is `other`/NAME, or NAME-heldout beside NAME.
+    """
+    if not folder.is_dir() or is_bundle(folder):
+        return []
+    found = {p.name: p for p in sorted(folder.iterdir()) if p.is_dir() and is_bundle(p)}
+    made = []
+    for name, bundle in found.items():
+        if name.endswith(SECOND) and name.removesuffix(SECOND) in found:
+            continue
+        second = other / name if other is not None else found.get(name + SECOND)
+        made.append(Task(name, bundle, out / name if out is not None else bundle / FOLDER, second))
+    return made
+
+
+def done(task: Task) -> Outcome | None:
+    """The diagnosis of an earlier time, where it is newer than all that it was made from."""
+    path = task.out / RESULT
+    try:
+        made = path.stat().st_mtime_ns
+        sources = [folder / name for folder in (task.bundle, task.other) if folder for name in (PARQUET, CASE)]
+        if any(source.stat().st_mtime_ns > made for source in sources):
+            return None
+        diagnosis = json.loads(path.read_text("utf-8"))
+        return Outcome(task.name, 0, float(diagnosis["seconds"]), diagnosis, skipped=True)
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def one(task: Task, report: bool) -> Outcome:
+    """Diagnose one bundle into its folder. Nothing is raised: what went wrong is told in the outcome."""
+    from rtctl.diagnose.chain import diagnose
+    from rtctl.diagnose.diagnosis import as_json
+
+    began = time.monotonic()
+    try:
+        d = diagnose(task.bundle, task.other)
+        faults = write(d, task.out, own_config(task.bundle), report)
+        return Outcome(task.name, 0, time.monotonic() - began, finite(as_json(d)), "; ".join(faults))
+    except (UserError, NoAnswer) as error:
+        return Outcome(task.name, error.exit_code, time.monotonic() - began, message=_line(error))
+    except Exception as error:
+        if os.environ.get("RTCTL_TRACEBACK"):
+            traceback.print_exc()
+        return Outcome(task.name, OURS, time.monotonic() - began, message=f"internal error: {error!r}")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def diagnose_all(
+    waiting: list[Task], jobs: int = 1, limit: float = LIMIT, report: bool = True, work: Work = one
+) -> Iterator[Outcome]:
+    """Outcomes as they come, of up to `jobs` processes; one that takes longer than `limit` s is ended."""
+    left = deque(waiting)
+    crew: list[_Worker] = []
+    try:
+        while left or any(worker.task for worker in crew):
+            while left and len(crew) < min(jobs, len(waiting)):
+                crew.append(_Worker(jobs, report, work))
+            for worker in crew:
+                if left and worker.task is None:
+                    worker.give(left.popleft())
+            first = min(worker.began for worker in crew if worker.task) + limit
+            wait([worker.pipe for worker in crew if worker.task], max(first - time.monotonic(), 0.0))
+            for worker in [w for w in crew if w.task]:
+                outcome = worker.outcome(limit)
+                if outcome is not None:
+                    if not worker.alive:
+                        crew.remove(worker)
+                    yield outcome
+    finally:
+        for worker in crew:
+            worker.end()
+
+
+class _Worker:
+    """One process that diagnoses what it is given."""
+
+    def __init__(self, jobs: int, report: bool, work: Work):
+        context = get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_serve, args=(theirs, jobs, report, work), daemon=True)
+        with _alone():
+            self.process.start()
+        theirs.close()
+        self.task: Task | None = None
+        self.began = 0.0
+        self.alive = True
+
+    def give(self, task: Task) -> None:
+        """Begin with a bundle."""
+        self.task, self.began = task, time.monotonic()
+        self.pipe.send(task)
+
+    def outcome(self, limit: float) -> Outcome | None:
+        """What came of the task; None while it runs."""
+        assert self.task is not None
+        name, seconds = self.task.name, time.monotonic() - self.began
+        found: Outcome | None = None
+        if self.pipe.poll():
+            try:
+                found = self.pipe.recv()
+            except (EOFError, OSError):
+                self.end()
+                code = self.process.exitcode
+                found = Outcome(name, OURS, seconds, message=f"its process died (exit code {code})")
+        elif seconds >= limit:
+            self.end()
+            found = Outcome(name, OURS, seconds, message=f"not done within --limit {limit:g} s")
+        if found is not None:
+            self.task = None
+        return found
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self.alive = False
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+
+def _serve(pipe: Connection, jobs: int, report: bool, work: Work) -> None:
+    """Work through what comes in until the other side is gone. Ctrl-C is the other side's to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warnings.simplefilter("ignore", RuntimeWarning)  # a model that runs away overflows; the outcome says so
+    if jobs > 1:
+        from rtctl.diagnose import fit
+
+        fit.THREADS = 1
+    while True:
+        try:
+            task = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(work(task, report))
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """Processes that are started here use one thread for linear algebra."""
+    before = {name: os.environ.get(name) for name in ALONE}
+    os.environ.update(dict.fromkeys(ALONE, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -1,0 +1,115 @@
+"""What the record itself suggests: at which order, wavelength, place or time something is missing.
+
+The correction that keeps a fitted model on the recorded track is, up to its bandwidth, what the model lacks, in units
+of its input: a disturbance observer. Seen against the angle of a shaft it shows orders, against position spots and
+wavelengths. Sudden jumps of the error between two ticks show lost counts.
+
+Source: Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mechatronics 1 (1996) for the observer; order tracking by least
+squares on cosine and sine of the angle, since angles are not evenly sampled.
+"""
+
+import numpy as np
+
+from rtctl.diagnose.fit import settled
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.simulate import TRACK, Simulator, per_unit
+
+FAST = {"ivu": 8.0, "ldu": 2.0, "axis": 4.0}  # times the tracking bandwidth: how quickly the observer follows
+MOST = 4  # hints of a kind
+ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)])
+WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
+
+
+def observe(sim: Simulator, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Readings (n, sensors) of the model kept close to the track, and the input (n,) that it took to keep it there."""
+    for faster in (FAST[sim.record.plant], 1.0):  # a flexible machine bears only so much
+        out, _, push = sim.everything(model, TRACK, follow=faster * sim.follow)
+        if np.isfinite(out).all():
+            break
+    return out, push
+
+
+def hints(sim: Simulator, model: Model, error: np.ndarray) -> dict[str, list[float]]:
+    """Suggestions by kind (and node): order, wavelength, spot, jump. `error` (n,) is the model's at the main sensor."""
+    record = sim.record
+    start = settled(sim)
+    _, push = observe(sim, model)
+    x = (record.y[sim.channels[0]] / per_unit(record.case)[0])[start:]
+    d = push[start:]
+    thin = max(1, len(x) // 8000)
+    x, d = x[::thin], d[::thin]
+    ratios = {"": 1.0}
+    base = model.base
+    if record.plant == "ivu":
+        ratios = {":motor1": base["R_c"] / base["R1"], ":motor2": -base["R_c"] / base["R2"]}
+    elif record.plant == "ldu":
+        ratios = {":motor": base["N"], ":wheel": 1.0}
+    found: dict[str, list[float]] = {}
+    for node, ratio in ratios.items():
+        found["order" + node] = peaks(ORDERS, spectrum(x * ratio, d, ORDERS), MOST)
+    if record.plant != "ivu":
+        way = x * (base["R_c"] if record.plant == "ldu" else 1.0)
+        target = d
+        if "scale_counts" in record.y:
+            target = _second(sim, model, start)[::thin]
+        span = float(np.ptp(way)) or 1.0
+        waves = span * np.geomspace(0.1, 2.0, WAVES)
+        found["wavelength"] = peaks(waves, spectrum(way, target, 2 * np.pi / waves), MOST)
+        found["spot"] = spots(way, target, MOST)
+    found["jump"] = jumps(sim, error)
+    return found
+
+
+def _second(sim: Simulator, model: Model, start: int) -> np.ndarray:
+    """Error of the second sensor where the model is kept on the first one's track, counts."""
+    out, _ = observe(sim, model)
+    return (sim.record.y[sim.channels[1]] - out[:, 1])[start:]
+
+
+def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray) -> np.ndarray:
+    """Share of the variance of `signal` that a sinusoid of each order in `angle` explains, slow drift taken out."""
+    z = np.linspace(-1, 1, len(signal))
+    slow = np.stack([np.ones_like(z), angle - angle.mean(), np.sign(np.gradient(angle))], axis=1)
+    rest = signal - slow @ np.linalg.lstsq(slow, signal, rcond=None)[0]
+    total = float(rest @ rest) or 1.0
+    out = np.zeros(len(orders))
+    span = float(np.ptp(angle))
+    for k, order in enumerate(orders):
+        if order * span < np.pi:  # less than half a period
+            continue
+        A = np.stack([np.cos(order * angle), np.sin(order * angle)], axis=1)
+        A = A - slow @ np.linalg.lstsq(slow, A, rcond=None)[0]
+        fit = A @ np.linalg.lstsq(A, rest, rcond=None)[0]
+        out[k] = float(fit @ fit) / total
+    return out
+
+
+def peaks(grid: np.ndarray, height: np.ndarray, most: int) -> list[float]:
+    """The grid's highest local maxima, highest first."""
+    inner = np.flatnonzero((height > np.roll(height, 1)) & (height >= np.roll(height, -1)) & (height > 0))
+    return [float(grid[i]) for i in inner[np.argsort(-height[inner])][:most]]
+
+
+def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 60) -> list[float]:
+    """Places where the signal's mean stands out from that of the places around."""
+    edges = np.linspace(way.min(), way.max() + 1e-12, bins + 1)
+    index = np.clip(np.digitize(way, edges) - 1, 0, bins - 1)
+    count = np.bincount(index, minlength=bins)
+    mean = np.bincount(index, signal, bins) / np.maximum(count, 1)
+    around = np.convolve(np.pad(mean, 4, mode="edge"), np.ones(9) / 9, "valid")
+    off = np.abs(mean - around) * np.sqrt(np.minimum(count, np.median(count)))
+    return [float(0.5 * (edges[i] + edges[i + 1])) for i in np.argsort(-off)[:most]]
+
+
+def jumps(sim: Simulator, error: np.ndarray) -> list[float]:
+    """Times (s) of sudden steps of the error that do not come back at once, largest first."""
+    step = np.diff(error)
+    quiet = 1.4826 * np.median(np.abs(step - np.median(step))) + 0.3
+    far = np.flatnonzero(np.abs(step) > 6 * quiet)
+    stays = [
+        k
+        for k in far
+        if 3 < k < len(error) - 4 and abs(np.median(error[k + 1 : k + 4]) - np.median(error[k - 2 : k + 1])) > 4 * quiet
+    ]
+    best = sorted(stays, key=lambda k: -abs(step[k]))[:MOST]
+    return [float(sim.record.t[k + 1] - sim.record.t[0]) for k in best]

@@ -1,0 +1,313 @@
+"""Every hypothesis that a record can be asked about: each term of the library at each node where it can stand.
+
+The table says how a search walks through a term's parameters: which one is its size, by what it is measured, and from
+which shapes (speeds, times, frequencies) it starts. Starts are shares of what the recording itself shows of the node:
+its rms speed, its span, the rms force of its drive.
+"""
+
+from collections.abc import Iterable
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.scales import Scales, node_scales
+from rtctl.diagnose.simulate import per_unit, resolution
+from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis
+from rtctl.plants.physics import TERMS
+
+
+class Size(NamedTuple):
+    """A parameter that is zero (or `offset`) where the effect is not; `share` of its measure is a typical size."""
+
+    name: str
+    measure: str
+    share: float
+    signed: bool = False
+    most: float = np.inf  # in units of share times measure
+    least: float = -np.inf
+    offset: str = ""  # "dry": on top of the base's dry friction
+    finest: float = 0.0  # in steps of the sensor: less is no effect that this sensor could show
+
+
+class Shape(NamedTuple):
+    """A positive parameter that gives the effect its form; `starts` in units of its measure."""
+
+    name: str
+    measure: str
+    starts: tuple[float, ...]
+    reach: float = 20.0  # factor beyond the outermost starts that a fit may go
+    fixed: bool = False  # stays at its start
+
+
+class Limit(NamedTuple):
+    """A limit: without effect while it is far off; `start` in units of its measure."""
+
+    name: str
+    measure: str
+    start: float
+
+
+class Turn(NamedTuple):
+    """An amplitude with its phase."""
+
+    amplitude: str
+    phase: str
+    measure: str
+    share: float
+
+
+class At(NamedTuple):
+    """A place along the node's travel, started at `count` of them."""
+
+    name: str
+    count: int
+
+
+class Hint(NamedTuple):
+    """A shape or a place whose starts the record itself suggests: peaks of `kind` (see `hints`)."""
+
+    name: str
+    kind: str
+    reach: float = 0.15  # in logarithm for a shape, in shares of the span for a place
+    place: bool = False
+
+
+class Choice(NamedTuple):
+    """A setting that is not fitted: words, or numbers in units of a measure."""
+
+    name: str
+    values: tuple
+    measure: str = ""
+
+
+Part = Size | Limit | Shape | Turn | At | Hint | Choice
+SEARCH: dict[str, tuple[Part, ...]] = {
+    "friction.coulomb": (Size("F_C", "force", 0.1, signed=True),),
+    "friction.viscous": (Size("B", "drag", 0.1, signed=True),),
+    "friction.stribeck": (Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.05, 0.2, 0.7))),
+    "friction.presliding": (Size("z_s", "span", 1e-3, finest=1.0), Choice("form", ("dahl", "lugre"))),
+    "friction.asymmetry": (Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
+    "friction.load": (Size("mu", "one", 0.05, signed=True),),
+    "transmission.backlash": (Size("gap", "twist", 0.3),),
+    "transmission.slip": (Limit("F_max", "force", 1.0),),
+    "transmission.creep": (Size("kappa", "compliance", 1e-3),),
+    "structure.resonance": (
+        Size("mass", "inertia", 0.1), Shape("f_Hz", "hertz", (3.0, 8.0, 20.0, 40.0, 70.0, 110.0, 160.0, 220.0), 1.6),
+        Shape("zeta", "one", (0.02,), 30.0),
+    ),
+    "structure.stiffening": (Size("c3", "cubic", 0.2, signed=True),),
+    "tape.viscoelastic": (Size("c_branch", "stiffness", 0.5), Shape("tau", "seconds", (0.01, 0.05, 0.25, 1.2))),
+    "load.spring": (Size("k", "stiff", 0.2, signed=True),),
+    "load.imbalance": (Turn("A", "phi", "force", 0.1),),
+    "load.bump": (
+        Size("F", "force", 0.2, signed=True), At("at", 10), Shape("width", "span", (0.04,), 3.7),
+        Choice("form", ("drag", "hill", "push")),
+    ),
+    "drive.offset": (Size("offset", "volts", 0.05, signed=True),),
+    "drive.deadband": (Size("band", "volts", 0.1), Choice("form", ("shift", "cut", "floor"))),
+    "drive.gain_asymmetry": (Size("a", "one", 0.1, signed=True),),
+    "drive.saturation": (Limit("limit", "peak", 0.7),),
+    "drive.lag": (Size("tau", "tick", 0.5), Choice("order", (1, 2))),
+    "drive.supply_sag": (Size("k", "per_volt", 0.05), Choice("form", ("current", "power"))),
+    "drive.thermal": (
+        Size("a", "one", 0.1, signed=True), Shape("tau", "duration", (0.1, 0.5, 2.0), 5.0),
+        Choice("V_ref", (1.0,), "volts"),
+    ),
+    "timing.delay": (Size("extra", "tick", 0.5),),
+    "ripple.cogging": (Turn("A", "phi", "force", 0.05), Hint("per_turn", "order")),
+    "ripple.encoder": (Turn("A", "phi", "one", 2e-3),),
+    "ripple.reel": (Turn("e", "phi", "one", 1e-4),),
+    "ripple.capstan": (Turn("a", "phi", "one", 1e-5),),
+    "guide.thickness": (Turn("A", "phi", "one", 5e-6), Hint("wavelength", "wavelength", 0.3)),
+    "guide.dirt": (
+        Size("A", "one", 1e-5, signed=True), Hint("at", "spot", 0.05, True), Shape("width", "span", (0.02,), 10.0),
+    ),
+    "sensor.missed_counts": (Size("size", "counts", 4.0, signed=True), Hint("at", "jump", 1e-3, True)),
+    "sensor.rectified": (Size("share", "one", 0.5, most=1.0),),
+    "sensor.scale": (Size("relative", "one", 1e-3, signed=True),),
+    "geometry.radius_change": (Size("d", "one", 1e-4, signed=True),),
+    "tape.slack": (Size("share", "one", 1.0, most=1.0),),
+}  # fmt: skip
+
+
+EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, tried once the plain form stands
+    "ripple.cogging": (Turn("A2", "phi2", "force", 0.02), Turn("A3", "phi3", "force", 0.02)),
+    "ripple.encoder": (Turn("A2", "phi2", "one", 5e-4), Turn("A3", "phi3", "one", 5e-4)),
+    "ripple.reel": (Turn("e2", "phi2", "one", 3e-5), Turn("e3", "phi3", "one", 3e-5)),
+    "ripple.capstan": (Turn("a2", "phi2", "one", 3e-6), Turn("a3", "phi3", "one", 3e-6)),
+    "tape.viscoelastic": (Size("c_branch2", "stiffness", 0.2), Shape("tau2", "seconds", (0.5,), 60.0)),
+    "friction.asymmetry": (Size("B_a", "drag", 0.05, signed=True),),
+    "transmission.backlash": (Size("damping", "one", 0.5, most=1.0),),
+    "drive.lag": (Shape("zeta", "one", (0.7,), 20.0),),
+}
+
+
+ALONE = ("sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt")  # asks for a second sensor
+TURNING = {"axis": ("load.imbalance", "ripple.cogging", "ripple.encoder")}  # ask for an axis that turns
+
+
+def hypotheses(
+    record: Record, base: dict[str, float], hints: dict[str, list[float]] | None = None, only: Iterable[str] = ()
+) -> list[Hypothesis]:
+    """All of them for this plant, one for each start; `only` restricts to terms by name.
+
+    `hints` gives, as "kind" or "kind:node", what the record suggests for a Hint (see `hints.py`).
+    """
+    scales = node_scales(record, base)
+    measures = Measures(record, base, scales, hints or {})
+    out = []
+    for name, term in TERMS.items():
+        if (
+            name in SEARCH
+            and not (name in ALONE and len(record.y) < 2 and record.plant == "ldu")
+            and (not only or name in only)
+        ):
+            for node in term.nodes.get(record.plant, ()):
+                if (node == "sensor" and name in ALONE) or (
+                    record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ())
+                ):
+                    continue
+                out += _starts(name, node, SEARCH[name], measures)
+    return out
+
+
+def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis | None:
+    """The same hypothesis with the further parameters of its richer form; None where it has none."""
+    parts = EXTRAS.get(h.term)
+    if parts is None:
+        return None
+    measures = Measures(record, base, node_scales(record, base), {})
+    more = _starts(h.term, h.node, parts, measures)[0].coordinates
+    return h._replace(coordinates=(*h.coordinates, *more))
+
+
+class Measures:
+    """What a size or a shape is measured by, at a node."""
+
+    def __init__(
+        self, record: Record, base: dict[str, float], scales: dict[str, Scales], hints: dict[str, list[float]]
+    ):
+        self.record, self.base, self.scales, self.hints = record, base, scales, hints
+
+    def scale(self, node: str) -> Scales:
+        """Of the node, or of the main node for a drive or the loop."""
+        return self.scales.get(node) or next(iter(self.scales.values()))
+
+    def of(self, measure: str, node: str) -> float:
+        """The measure in SI at a node."""
+        s = self.scale(node)
+        volts = float(np.sqrt(np.mean(self.record.u**2)))
+        drive = self.record.case.drive
+        table = {
+            "one": 1.0,
+            "force": s.force,
+            "speed": s.speed,
+            "span": s.span,
+            "low": s.low,
+            "drag": s.force / s.speed,
+            "stiff": s.force / s.span,
+            "twist": s.force / self.stiffness(node),
+            "cubic": self.stiffness(node) ** 3 / s.force**2,
+            "stiffness": self.stiffness(node),
+            "compliance": 1.0 / s.force,
+            "inertia": self.inertia(node),
+            "seconds": 1.0,
+            "hertz": 1.0,
+            "tick": self.record.dt,
+            "duration": len(self.record.t) * self.record.dt,
+            "volts": volts,
+            "grain": resolution(self.record) * s.span / (self.scales.get("encoder") or self.scales["sensor"]).span,
+            "counts": 1.0 / per_unit(self.record.case)[-1 if node == "scale" else 0],
+            "per_volt": 1.0 / volts,
+            "limit": drive.limit_volt or float(np.abs(self.record.u).max()),
+            "peak": float(np.abs(self.record.u).max()),
+        }
+        return table[measure]
+
+    def dry(self, node: str) -> float:
+        """Dry friction of the base at a node, in its own unit."""
+        names = {"motor1": "tau_F1", "motor2": "tau_F2", "carriage": "F_c"}
+        name = "tau_Fc" if (node, self.record.plant) == ("capstan", "ivu") else names.get(node, "")
+        if self.record.plant == "ldu" and node == "capstan":
+            return self.base["F_c"] * self.base["R_c"]
+        return self.base.get("F_c" if self.record.plant == "axis" else name, 0.0)
+
+    def inertia(self, node: str) -> float:
+        """Inertia or mass that moves with a node."""
+        b = self.base
+        if self.record.plant == "ivu":
+            total = b["J_m1"] / b["R1"] ** 2 + b["J_m2"] / b["R2"] ** 2
+            return (
+                total
+                * {"motor1": b["R1"], "reel1": b["R1"], "motor2": b["R2"], "reel2": b["R2"]}.get(node, b["R_c"]) ** 2
+            )
+        if self.record.plant == "ldu":
+            mass = b["M"] + (b["J_m"] * b["N"] ** 2 + b["J_t"]) / b["R_c"] ** 2
+            lever = {"motor": b["R_c"] / b["N"], "carriage": 1.0, "scale": 1.0}.get(node, b["R_c"])
+            return mass * lever**2
+        return b.get("M", 1.0)
+
+    def stiffness(self, node: str) -> float:
+        """Of the spring that the node names; where it has none, of one that the drive stretches over the span."""
+        names = {
+            "ivu": {"tape1": "c1", "tape2": "c2", "motor1": "c_m1", "motor2": "c_m2"},
+            "ldu": {"motor": "k_s", "wheel": "k_s", "capstan": "k_c", "encoder": "k_c"},
+            "axis": {"carriage": "k"},
+        }[self.record.plant]
+        value = self.base.get(names.get(node, ""), 0.0)
+        s = self.scale(node)
+        return value or s.force / s.span
+
+
+def _starts(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[Hypothesis]:
+    """One hypothesis for each combination of starts."""
+    axes: list[list[tuple[tuple[Coordinate, ...], dict]]] = [list(_options(part, node, m)) for part in parts]
+    out = []
+    for combination in product(*axes):
+        coordinates = tuple(c for option, _ in combination for c in option)
+        fixed = {k: v for _, extra in combination for k, v in extra.items()}
+        out.append(Hypothesis(term, node, coordinates, fixed))
+    return out
+
+
+def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordinate, ...], dict]]:
+    if isinstance(part, Size):
+        scale = part.share * m.of(part.measure, node)
+        least = part.least if part.signed else part.finest * m.of("grain", node) / scale
+        offset = m.dry(node) if part.offset == "dry" else 0.0
+        yield (Coordinate(part.name, SIZE, scale, least, part.most / part.share if part.measure == "one" else part.most,
+                          offset=offset),), {}  # fmt: skip
+    elif isinstance(part, Shape):
+        measure = m.of(part.measure, node)
+        low, high = min(part.starts) * measure / part.reach, max(part.starts) * measure * part.reach
+        for start in part.starts:
+            value = start * measure
+            if part.fixed:
+                yield (), {part.name: value}
+            else:
+                yield (Coordinate(part.name, SHAPE, value, np.log(low / value), np.log(high / value)),), {}
+    elif isinstance(part, Limit):
+        yield (Coordinate(part.name, INVERSE, part.start * m.of(part.measure, node), 0.0),), {}
+    elif isinstance(part, Turn):
+        scale = part.share * m.of(part.measure, node)
+        name = f"{part.amplitude}|{part.phase}"
+        yield (Coordinate(name, COSINE, scale), Coordinate(name, SINE, scale)), {}
+    elif isinstance(part, Hint):
+        found = m.hints.get(f"{part.kind}:{node}", m.hints.get(part.kind, []))
+        s = m.scale(node)
+        for value in found:
+            if part.place:
+                yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=value),), {}
+            else:
+                yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach),), {}
+    elif isinstance(part, At):
+        s = m.scale(node)
+        for k in range(part.count):
+            middle = s.low + s.span * (k + 0.5) / part.count
+            reach = s.span / part.count
+            yield (Coordinate(part.name, PLACE, reach, -1.5, 1.5, offset=middle),), {}
+    else:
+        for value in part.values:
+            yield (), {part.name: value * m.of(part.measure, node) if part.measure else value}

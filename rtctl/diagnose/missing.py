@@ -1,0 +1,130 @@
+"""What a model lacks, as a force or a reading, against the axis where it lives."""
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.stats import t
+
+from rtctl.diagnose import words
+from rtctl.diagnose.diagnosis import Diagnosis
+from rtctl.diagnose.kernel import TRACK
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.scales import SMOOTH
+from rtctl.diagnose.simulate import SHARE, Simulator, per_unit
+from rtctl.plants.physics import TERMS
+
+FASTER = 2.0  # than the simulator's own observer
+LEAST = 12  # samples in a bin
+BLOCK = 0.1  # s, over which errors are taken as one
+GAP = 0.25  # of the axis: no line is drawn across
+
+
+def observe(sim: Simulator, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Readings (n, sensors) of the model on track and the push (n,) that keeps it there; fast, but not at any price:
+    with a faster observer the push would be the noise of the counters, and a springy machine runs away."""
+    for faster in (FASTER, 1.0):
+        out, _, push = sim.everything(model, TRACK, follow=faster * sim.follow)
+        if np.isfinite(out).all():
+            break
+    return out, np.nan_to_num(push)
+
+
+def speed(x: np.ndarray, kind: str, dt: float) -> np.ndarray:
+    """Rate (n,) of a reading, over a few ticks."""
+    return np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH[kind] / dt)) + 1), dt)
+
+
+class Missing:
+    """What the model lacks at a node, seen against the axis where it lives."""
+
+    def __init__(self, d: Diagnosis, sim: Simulator):
+        record = d.record
+        self.d, self.sim, self.kind = d, sim, record.plant
+        self.rows = slice(min(d.fit_rows[0] + round(0.2 / record.dt), len(record.t) // 4), None)
+        self.out, self.push = observe(sim, d.before)
+        after, push = observe(sim, d.after) if d.after.terms else (self.out, self.push)
+        self.law, self.shift = self.push - push, after - self.out
+        self.x = record.y[sim.channels[0]] / per_unit(record.case)[0]
+
+    def slides(self, node: str) -> bool:
+        """Whether the node moves in m and not in rad."""
+        return node in words.SLIDING.get(self.kind, ()) and self.d.record.case.sensors.unit != "rad"
+
+    def ratio(self, node: str) -> float:
+        """Way of the node for one of the main sensor."""
+        b, node = self.d.before.base, node.replace("drive", "motor")
+        if self.kind == "ivu":
+            way = {"1": b["R_c"] / b["R1"], "2": -b["R_c"] / b["R2"]}.get(node[-1:], 1.0)
+            return b["R_c"] * np.sign(way) if node.startswith("tape") else way
+        if self.kind == "ldu":
+            return {"motor": b["N"], "carriage": b["R_c"], "scale": b["R_c"]}.get(node, 1.0)
+        return 1.0
+
+    def force(self, node: str) -> tuple[np.ndarray, np.ndarray, str]:
+        """What is missing and what the terms give, both (n,), as a force on the node in its unit."""
+        node = node.replace("drive", "motor") if self.kind != "axis" else "carriage"
+        node = "motor" if (node, self.kind) == ("loop", "ldu") else node
+        b, amp = self.d.before.base, self.d.record.case.drive.amp_per_volt
+        if self.kind == "ivu":
+            gain = (
+                sum(abs(s) * b[f"K_m{i}"] * amp[i - 1] / b[f"R{i}"] for i, s in enumerate(SHARE["ivu"], 1)) * b["R_c"]
+            )
+        else:
+            gain = b["K_m1"] * b["N"] if self.kind == "ldu" else b["K"]
+        factor = gain / self.ratio(node)
+        return factor * self.push, factor * self.law, "N" if self.slides(node) else "Nm"
+
+    def reading(self) -> tuple[np.ndarray, np.ndarray, str]:
+        """Missing reading of the second sensor where there is one that knows direction."""
+        step = 1.0 / per_unit(self.d.record.case)[1]
+        e = (self.sim.record.y["scale_counts"] + self.sim.half - self.out[:, 1]) * step
+        law = self.shift[:, 1] * step
+        return e - np.mean(e[self.rows]), law - np.mean(law[self.rows]), "m"
+
+    def of(self, name: str, node: str) -> tuple[np.ndarray, np.ndarray, str, str]:
+        """Missing, law, unit and what it is, for a term at a node."""
+        acts = TERMS[name].act if name in TERMS else {}
+        if any(site.startswith("reading") for site in acts) and "scale_counts" in self.sim.channels:
+            return *self.reading(), "missing way of the scale"
+        y, law, unit = self.force(node)
+        return y, law, unit, f"missing {'force' if unit == 'N' else 'torque'}"
+
+    def abscissa(self, axis: str, node: str) -> tuple[np.ndarray, str, str]:
+        """Values (n,) of an axis, its name and unit."""
+        record, ratio, slides = self.d.record, self.ratio(node), self.slides(node)
+        if axis == "velocity":
+            return ratio * speed(self.x, self.kind, record.dt), "speed", "m/s" if slides else "rad/s"
+        if axis == "angle" and not slides:
+            return np.mod(ratio * self.x, 2 * np.pi), "angle", "rad"
+        if axis in ("position", "angle"):
+            return ratio * self.x, "position", "m" if slides else "rad"
+        if axis in ("command", "tension"):
+            channel = 1 if node.endswith("2") else 0
+            u = record.u if axis == "command" else np.abs(record.u)
+            return u[:, min(channel, u.shape[1] - 1)], "command" if axis == "command" else "size of the command", "V"
+        return record.t - record.t[0], "time", "s"
+
+
+def binned(x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int) -> np.ndarray:
+    """Along x: middles, medians of y, half widths of their 95 % bands, and medians of the law, (4, bins).
+
+    Neighbouring samples are not independent: the band comes from the scatter of the means of `block` rows, visit by
+    visit. Each bin has the same sum of its shares of the way along x and of the samples; a gap in x leaves a column of
+    nan.
+    """
+    lo, hi = np.quantile(x, (0.002, 0.998))
+    inside = np.sort(x[(x >= lo) & (x <= hi)])
+    share = 0.5 * ((inside - lo) / ((hi - lo) or 1.0) + np.linspace(0, 1, len(inside)))
+    edges = np.interp(np.linspace(0, 1, count + 1), share, inside)
+    index = np.searchsorted(edges, x) - 1
+    out: list[tuple[float, ...]] = []
+    for k in range(len(edges) - 1):
+        here = np.flatnonzero(index == k)
+        visits, number = np.unique(here // block, return_inverse=True)
+        if len(here) >= LEAST and len(visits) > 2:
+            means = np.bincount(number, y[here]) / np.bincount(number)
+            half = float(t.ppf(0.975, len(visits) - 1) * np.std(means, ddof=1) / np.sqrt(len(visits)))
+            at = float(np.median(x[here]))
+            if out and at - out[-1][0] > GAP * (hi - lo):
+                out.append((np.nan,) * 4)
+            out.append((at, float(np.median(y[here])), half, float(np.median(law[here]))))
+    return np.array(out, float).reshape(-1, 4).T

@@ -1,0 +1,98 @@
+"""A machine as somebody believes it: parameters of the plant's equations, and terms of physics on top of them."""
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.case import Case, believed
+from rtctl.idiom import Settings
+from rtctl.plants import axis, ivu, ldu
+
+if TYPE_CHECKING:
+    from rtctl.diagnose.record import Record
+
+DIRECT = 20e3  # Hz: bandwidth of a drive of which the owner says nothing
+DAMPING = np.sqrt(0.5)
+
+FITTED = {  # what a fit may move, in the order of the Jacobian's columns; the rest is geometry and counts
+    "ivu": (
+        "R1", "R2", "J_m1", "J_m2", "J_1", "J_2", "J_c", "K_m1", "K_m2", "tau_F1", "tau_F2", "tau_Fc",
+        "c_m1", "c_m2", "k_m1", "k_m2", "c1", "c2", "k1", "k2",
+    ),
+    "ldu": (
+        "R_c", "J_m", "J_t", "J_c", "J_e", "M", "K_m1", "K_m2", "B_c", "B_m", "F_c", "k_s", "k_c", "b_s", "b_c",
+    ),
+    "axis": ("M", "K", "F_v", "F_c", "k"),
+}  # fmt: skip
+KNOWN = 1e-3  # a tolerance below this is no freedom
+UNITS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts", "scale_counts")}
+
+
+class Model(NamedTuple):
+    """Parameters by name (SI) and the terms of the `physics:` list."""
+
+    kind: str
+    base: dict[str, float]
+    terms: tuple[Settings, ...] = ()
+
+    def change(self, **base: float) -> "Model":
+        """The same with other parameters."""
+        return self._replace(base={**self.base, **base})
+
+    def add(self, *terms: Settings) -> "Model":
+        """The same with more terms."""
+        return self._replace(terms=(*self.terms, *terms))
+
+
+def owner_model(case: Case, record: "Record | None" = None) -> Model:
+    """What the owner believes, without any term. An axis whose mass nobody knows is guessed from the record."""
+    base = {k: v for k, v in believed(case).items() if v is not None}
+    if case.plant == "axis" and "M" not in base and record is not None:
+        base |= guess(record, base)
+    return Model(case.plant, base)
+
+
+def guess(record: "Record", base: dict[str, float]) -> dict[str, float]:
+    """Values for an axis of which the owner says nothing: M, F_v and k by least squares on U = (k + j w F_v - w^2 M) X.
+
+    The held input is half a tick late; frequencies count by their power. Source: Pintelon & Schoukens, System
+    Identification (2012), ch. 8.
+    """
+    window = np.hanning(len(record.t))
+    x = np.fft.rfft((record.y[next(iter(record.y))] - np.mean(record.y[next(iter(record.y))])) * window)
+    u = np.fft.rfft((record.u[:, 0] - np.mean(record.u[:, 0])) * window) * base.get("K", 1.0)
+    w = 2 * np.pi * np.fft.rfftfreq(len(record.t), record.dt)
+    loud = (np.abs(u) > 0.05 * np.abs(u).max()) & (w > 0)
+    u = u[loud] * np.exp(-0.5j * w[loud] * record.dt)
+    A = np.stack([x[loud], 1j * w[loud] * x[loud], -(w[loud] ** 2) * x[loud]], axis=1)
+    size = np.abs(A).max(axis=0)
+    A, b = np.concatenate([A.real, A.imag]) / size, np.concatenate([u.real, u.imag])
+    k, F_v, M = np.linalg.lstsq(A, b, rcond=None)[0] / size
+    return {"M": abs(M), "F_v": max(F_v, 1e-3 * abs(M) * np.sqrt(abs(k / M))), "k": max(k, 0.0)}
+
+
+def free_parameters(case: Case, model: Model) -> tuple[str, ...]:
+    """Parameters that the owner's value may miss, in the fixed order."""
+    known = {"K"} if not np.isfinite(case.tolerance("M")) else set()  # of an unknown mass only the ratio is seen
+    names = (n for n in FITTED[case.plant] if n not in known)
+    return tuple(n for n in names if model.base.get(n, 0.0) != 0.0 and case.tolerance(n) > KNOWN)
+
+
+def plant_params(model: Model, case: Case, h: float) -> Any:
+    """The plant's params for substeps of `h` s, as its `build` would make them but without checking settings anew."""
+    base = model.base
+    if model.kind == "axis":
+        params = axis.AxisParams
+        return params(h, *(base.get(name, 0.0) for name in params._fields[1:]))
+    w = 2 * np.pi * (case.drive.bandwidth_hz or DIRECT)
+    zeta = case.drive.damping or DAMPING
+    if model.kind == "ldu":
+        drive = np.array([w, zeta])
+        return ldu.LduParams(h=h, drive=drive, **_pick(base, ldu.LduParams, "h", "drive"))
+    drive = np.array([[gain, w, zeta, 0.0] for gain in case.drive.amp_per_volt])
+    values = {**base, "rho_h": base["rho_tape"] * base["h_tape"]}
+    return ivu.IvuParams(h=h, drive=drive, **_pick(values, ivu.IvuParams, "h", "drive"))
+
+
+def _pick(values: dict[str, float], params: Any, *but: str) -> dict[str, float]:
+    return {name: values[name] for name in params._fields if name not in but}

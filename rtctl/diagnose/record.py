@@ -1,0 +1,383 @@
+"""A recording with its case, checked: what every stage of the diagnosis works on.
+
+Row k holds what the loop read at the start of tick k and what it wrote at its end. Where the law is known, recomputing
+it from the recorded columns must give the recorded voltages; where it does not, the recorded command is the input.
+"""
+
+import math
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from rtctl.config.errors import NoAnswer, UserError, nearest
+from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed, read_case
+from rtctl.drivers import ldu_amplifier
+from rtctl.trace.bundle import PARQUET, load_bundle
+
+COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
+READINGS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts",), "axis": ()}
+WRAPS = (16, 24, 32)  # bits of the counters in use
+COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
+RUNNING = 2  # in the column `state` of our own recordings
+LEAST_SECONDS, LEAST_ROWS = 2.0, 500
+RATE_OFF = 0.01  # share by which the median tick may differ from the sample rate
+AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
+AGREES_MEDIAN = 2e-3
+
+
+class Record(NamedTuple):
+    plant: str
+    case: Case
+    t: np.ndarray  # (n,) s, controller clock
+    dt: float  # s, nominal
+    ref: np.ndarray  # (n,) rad (ivu) or m; nan where nobody knows it
+    w: np.ndarray  # (n,) V
+    u: np.ndarray  # (n, nu) V, or what `case.drive.unit` says
+    y: dict[str, np.ndarray]  # name -> (n,) in the sensor's own unit; counters without their wraps
+    columns: dict[str, np.ndarray]  # as they stand in the file
+
+    @property
+    def closed_loop(self) -> bool:
+        """Whether the law is known, so that the reference is the input; otherwise the recorded command is."""
+        return self.case.controller_known and isinstance(self.case.controller, PdLaw | SectionsLaw | CascadeLaw)
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Names of the columns of u."""
+        return COMMANDS[self.plant]
+
+
+class Agreement(NamedTuple):
+    """How the recomputed law compares with the recorded command."""
+
+    share: float  # of rows that are equal to within 1e-9 V
+    nrmse: float  # of the command's spread
+    median: float  # of the difference, by the command's spread
+    worst: float  # V
+    worst_row: int
+
+    @property
+    def exact(self) -> bool:
+        return self.share == 1.0
+
+    @property
+    def holds(self) -> bool:
+        return self.exact or (self.nrmse < AGREES_RMS and self.median < AGREES_MEDIAN)
+
+
+def load_record(folder: Path | str) -> Record:
+    """Read and check a bundle.
+
+    Raises UserError (exit 2) that names file, column and row and says what would be right, NoAnswer (exit 3) where
+    the recording supports no verdict.
+    """
+    bundle = load_bundle(folder)
+    case = read_case(bundle.case, bundle.folder)
+    columns = bundle.columns
+    if isinstance(bundle.case.get("config"), dict) and "state" in columns:
+        rows = running(columns["state"])
+        if rows.stop - rows.start < len(columns["t"]):
+            told = f"{bundle.folder / PARQUET}: rows {rows.start} to {rows.stop - 1} are taken, where the loop ran"
+            case = case._replace(warnings=(*case.warnings, told))
+        columns = {name: values[rows] for name, values in columns.items()}
+        if case.plant == "ldu" and "u" in columns and _measured_amplifier(bundle.case["config"]):
+            columns["u"] = through_amplifier(columns["u"])
+    return check(columns, case, bundle.folder)
+
+
+def through_amplifier(u: np.ndarray) -> np.ndarray:
+    """Volts (n,) that give a current of 0.1 A/V what the measured amplifier gives at `u`, below where it runs away.
+
+    At 0 V it still has a current, whose direction is in the sign of that zero (12.3).
+    """
+    offset, knee = ldu_amplifier.OFFSET_VOLTS, ldu_amplifier.KNEE_VOLTS
+    return np.copysign(offset + np.maximum(np.abs(u) - knee, 0.0), u)
+
+
+def _measured_amplifier(config: dict) -> bool:
+    plant = config.get("plant")
+    amplifier = plant.get("amplifier") if isinstance(plant, dict) else None
+    return isinstance(amplifier, dict) and amplifier.get("kind") == "measured"
+
+
+def running(state: np.ndarray) -> slice:
+    """The longest stretch of rows in which our own loop ran: neither on its way there nor stopped by a trip."""
+    edges = np.diff(np.concatenate(([0], state == RUNNING, [0])).astype(np.int8))
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    if not len(first):
+        return slice(0, 0)
+    longest = int(np.argmax(last - first))
+    return slice(int(first[longest]), int(last[longest]))
+
+
+def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") -> Record:
+    """The Record of these columns, by the same rules as `load_record`."""
+    path = Path(folder) / PARQUET
+    warnings = list(case.warnings)
+    t = _column(path, columns, "t", "s, clock at the tick")
+    u = np.column_stack([_command(path, columns, case, name) for name in COMMANDS[case.plant]])
+    ref = _column(path, columns, "ref", "position reference", missing=not case.controller_known)
+    w = _column(path, columns, "w", "V, excitation, 0 where there is none")
+    raw = _readings(path, columns, case, warnings)
+    dt = _clock(path, t, case)
+    if isinstance(case.controller, PdLaw | SectionsLaw | CascadeLaw) and np.isnan(ref).any():
+        case = case._replace(controller_known=False)
+    y = {}
+    for name, values in raw.items():
+        if _is_counter(name):
+            off = np.flatnonzero(values != np.round(values))
+            if len(off):
+                raise UserError(
+                    f"{path}: column '{name}', row {off[0]}: {values[off[0]]:g} is not a whole number; a counter counts"
+                )
+            y[name] = unwrap(values)[0]
+        else:
+            y[name] = unwrap_turns(values) if case.sensors.unit == "rad" else values
+    _supports(path, t, u, y, case, warnings)
+    record = Record(case.plant, case, t, dt, ref, w, u, y, columns)
+    agreement = law_agreement(record)
+    if record.closed_loop and (agreement is None or not agreement.holds):
+        warnings.append(f"{path.parent}: {_disagrees(case, agreement)}; the recorded command is taken as the input")
+        case = case._replace(controller_known=False)
+    return record._replace(case=case._replace(warnings=tuple(warnings)))
+
+
+def split(record: Record, heldout: float = 0.25) -> tuple[slice, slice]:
+    """Rows to fit on and rows to predict: the last share `heldout` of the record. Raises ValueError beyond 0..0.9."""
+    if not 0.0 < heldout <= 0.9:
+        raise ValueError(f"the held-out share is {heldout:g}; it should be above 0 and at most 0.9")
+    n = len(record.t)
+    cut = n - max(1, round(heldout * n))
+    return slice(0, cut), slice(cut, n)
+
+
+def law_agreement(record: Record) -> Agreement | None:
+    """The recomputed law against the recorded command; None where there is no law to recompute."""
+    again = recompute_law(record)
+    if again is None:
+        return None
+    off = np.abs(again - record.u)
+    off[~np.isfinite(off)] = np.inf
+    spread = float(np.sqrt(np.sum(np.var(record.u, axis=0)))) or 1.0
+    rows = off.max(axis=1)
+    rms = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+    worst = int(np.argmax(rows))
+    return Agreement(
+        float(np.mean(rows < 1e-9)), rms / spread, float(np.median(rows)) / spread, float(rows[worst]), worst
+    )
+
+
+def recompute_law(record: Record) -> np.ndarray | None:
+    """The voltages (n, nu) that the law writes for the recorded columns; None where the law or its input is unknown."""
+    case, law = record.case, record.case.controller
+    p, drive = believed(case), case.drive
+    if np.isnan(record.ref).any():
+        return None
+    if isinstance(law, PdLaw) and case.plant == "ivu":
+        if not case.sensors.capstan_counts_per_rev:
+            return None
+        e = record.ref - 2 * math.pi * record.y["capstan_counts"] / case.sensors.capstan_counts_per_rev
+        a = 1.0
+        if law.derivative_filter_hz is not None:
+            a = 1.0 - math.exp(-2 * math.pi * law.derivative_filter_hz * record.dt)
+        gain1, gain2 = p["K_m1"] * drive.amp_per_volt[0], p["K_m2"] * drive.amp_per_volt[1]
+        step = np.sign(np.diff(record.ref, prepend=record.ref[0]))
+        u_c = law.P * e + law.D * _filtered_slope(e, a, record.dt) + law.friction_Nm * step / gain1 + record.w
+        T1, T2 = law.tension_N * p["R1"] / gain1, law.tension_N * p["R2"] / gain2
+        u = _allocate(law.allocation, u_c, T1, T2)
+    elif isinstance(law, SectionsLaw):
+        x = _position(record)
+        if x is None:
+            return None
+        u = (_sections(record.ref - x, np.array(law.sections)) + record.w)[:, None]
+    elif isinstance(law, CascadeLaw):
+        x = _position(record)
+        if x is None:
+            return None
+        mean = 0.5 * (x + np.concatenate((x[:1], x[:-1])))
+        v = np.diff(mean, prepend=mean[0]) / record.dt
+        u = (law.kp * law.kv * (record.ref - x) - law.kv * v + record.w)[:, None]
+    else:
+        return None
+    return to_dac(u, case)
+
+
+def to_dac(u: np.ndarray, case: Case) -> np.ndarray:
+    """Clip at the drive's limit and round to the nearest step of its DAC, halves upwards; V."""
+    drive = case.drive
+    if drive.limit_volt is not None:
+        u = np.clip(u, -drive.limit_volt, drive.limit_volt)
+    step = drive.step_volt
+    if step is None:
+        return u
+    return np.clip(np.floor(u / step + 0.5) * step, -drive.dac_range_volt, drive.dac_range_volt - step)
+
+
+def unwrap(counts: np.ndarray) -> tuple[np.ndarray, int | None, int]:
+    """Counts (n,) without the wraps of their counter, the counter's bits (None: it never wrapped), wraps."""
+    d = np.diff(counts)
+    span = float(np.ptp(counts)) if len(counts) else 0.0
+    for bits in WRAPS:
+        if span >= 2.0**bits:
+            continue
+        wrapped = np.abs(d) > 0.5 * 2.0**bits
+        if not wrapped.any():
+            continue
+        left = d - np.sign(d) * 2.0**bits
+        if np.abs(left[wrapped]).max() < 2.0 ** (bits - 4):  # what is left is a step as others are
+            d = np.where(wrapped, left, d)
+            return counts[0] + np.concatenate(([0.0], np.cumsum(d))), bits, int(wrapped.sum())
+    return counts.copy(), None, 0
+
+
+def unwrap_turns(angle: np.ndarray) -> np.ndarray:
+    """An angle (n,) in rad without its jumps of a turn; it is left alone where it has none."""
+    return np.unwrap(angle) if (np.abs(np.diff(angle)) > math.pi).any() else angle
+
+
+def _position(record: Record) -> np.ndarray | None:
+    """What the loop compares with `ref`, m (or rad)."""
+    case = record.case
+    if case.plant == "ldu":
+        per_rev, R_c = case.sensors.encoder_counts_per_rev, believed(case)["R_c"]
+        if not per_rev:
+            return None
+        return R_c * 2 * math.pi * record.y["encoder_counts"] / per_rev
+    return record.columns["x"] if COUNTED in record.columns and "x" in record.y else record.y.get("x")
+
+
+def _allocate(kind: str, u_c: np.ndarray, T1: float, T2: float) -> np.ndarray:
+    if kind == "pull":
+        return np.column_stack((T1 + np.maximum(u_c, 0.0), T2 + np.maximum(-u_c, 0.0)))
+    if kind == "differential":
+        return np.column_stack((T1 + u_c / 2, T2 - u_c / 2))
+    if kind == "motor1":
+        return np.column_stack((T1 + u_c, np.full_like(u_c, T2)))
+    return np.column_stack((np.full_like(u_c, T1), T2 - u_c))
+
+
+@njit(cache=True)  # called outside a generated module, which would keep it
+def _filtered_slope(e, a, dt):
+    d = np.zeros_like(e)
+    for k in range(1, len(e)):
+        d[k] = d[k - 1] + a * ((e[k] - e[k - 1]) / dt - d[k - 1])
+    return d
+
+
+@njit(cache=True)  # called outside a generated module, which would keep it
+def _sections(e, sections):
+    y = e.copy()
+    for j in range(len(sections)):
+        b0, b1, b2, a1, a2 = sections[j]
+        x1 = x2 = y1 = y2 = 0.0
+        for k in range(len(y)):
+            x = y[k]
+            y[k] = b0 * x + b1 * x1 + b2 * x2 - a1 * y1 - a2 * y2
+            x2, x1, y2, y1 = x1, x, y1, y[k]
+    return y
+
+
+def _column(path: Path, columns: dict, name: str, meaning: str, missing: bool = False) -> np.ndarray:
+    """The column as (n,) floats; `missing`: it may be nan all over, or not be there."""
+    if name not in columns:
+        if missing:
+            return np.full(len(columns["t"]), np.nan)
+        hint = nearest(name, columns)
+        raise UserError(f"{path} has no column '{name}' ({meaning})" + (f"; is it '{hint}'?" if hint else ""))
+    values = np.asarray(columns[name], dtype=float)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad) == len(values) and missing and np.isnan(values).all():
+        return values
+    if len(bad):
+        more = f" and {len(bad) - 1} more rows" if len(bad) > 1 else ""
+        raise UserError(
+            f"{path}: column '{name}', row {bad[0]}{more}: {values[bad[0]]:g}; it should be a finite number"
+        )
+    return values
+
+
+def _command(path: Path, columns: dict, case: Case, name: str) -> np.ndarray:
+    if name not in columns and case.drive.column in columns:
+        name = str(case.drive.column)
+    return _column(path, columns, name, f"{case.drive.unit}, written at this tick")
+
+
+def _readings(path: Path, columns: dict, case: Case, warnings: list[str]) -> dict[str, np.ndarray]:
+    raw = {name: _column(path, columns, name, "counts") for name in READINGS[case.plant]}
+    if case.plant == "ldu":
+        if "scale_counts" in columns:
+            raw["scale_counts"] = _column(path, columns, "scale_counts", "counts")
+            if case.sensors.scale_m_per_count is None:
+                raise UserError(
+                    f"{path.parent / 'case.json'}: sensors.scale_m_per_count is missing where the recording has "
+                    "scale_counts; it should say the metres for a count, such as 5e-07"
+                )
+        elif case.sensors.scale_m_per_count is not None:
+            warnings.append(f"{path} has no column 'scale_counts', which sensors.scale_m_per_count speaks of")
+    if case.plant == "axis":
+        names = [name for name in (case.sensors.column, "x", "speed") if name is not None and name in columns]
+        if not names:
+            raise UserError(f"{path} has no column 'x' (m, measured position) and no column 'speed'")
+        key = "speed" if names[0] == "speed" else "x"
+        raw[key] = _column(path, columns, names[0], "measured position")
+        if key == "x" and COUNTED in columns and case.sensors.x_resolution_m:
+            raw[key] = raw[key] + 0.5 * case.sensors.x_resolution_m  # a count stands for all that lies up to the next
+    wanted = {"ivu": ("capstan_counts_per_rev", "reel_counts_per_rev"), "ldu": ("encoder_counts_per_rev",), "axis": ()}
+    for key in wanted[case.plant]:
+        if getattr(case.sensors, key) is None:
+            raise UserError(f"{path.parent / 'case.json'}: sensors.{key} is missing; it turns counts into an angle")
+    return raw
+
+
+def _clock(path: Path, t: np.ndarray, case: Case) -> float:
+    """Nominal tick in s."""
+    if len(t) < 2:
+        raise NoAnswer(f"{path} holds {len(t)} rows; a verdict needs {LEAST_ROWS}")
+    d = np.diff(t)
+    back = np.flatnonzero(d <= 0)
+    if len(back):
+        k = int(back[0]) + 1
+        raise UserError(f"{path}: column 't', row {k}: {t[k]:.9g} s after {t[k - 1]:.9g} s; time should increase")
+    median = float(np.median(d))
+    if case.sample_rate is None:
+        return median
+    if abs(median * case.sample_rate - 1.0) > RATE_OFF:
+        raise UserError(
+            f"{path}: column 't' has {1 / median:.6g} rows a second where sample_rate in case.json is "
+            f"{case.sample_rate:g} Hz; one of the two is wrong"
+        )
+    return 1.0 / case.sample_rate
+
+
+def _supports(
+    path: Path, t: np.ndarray, u: np.ndarray, y: dict[str, np.ndarray], case: Case, warnings: list[str]
+) -> None:
+    n, seconds = len(t), float(t[-1] - t[0])
+    if n < LEAST_ROWS:
+        raise NoAnswer(f"{path} holds {n} rows; it supports no verdict, which needs {LEAST_ROWS}")
+    if seconds < 0.999 * LEAST_SECONDS:
+        raise NoAnswer(f"{path} lasts {seconds:.3g} s; it supports no verdict, which needs {LEAST_SECONDS:g} s")
+    if not np.ptp(u, axis=0).any():
+        names = " and ".join(f"'{name}'" for name in COMMANDS[case.plant])
+        raise NoAnswer(f"{path}: {names} never changes; the machine was not driven, so it supports no verdict")
+    for k, (name, values) in enumerate(y.items()):
+        if np.ptp(values) == 0.0:
+            if k == 0:
+                raise NoAnswer(f"{path}: column '{name}' never changes; nothing moved, so it supports no verdict")
+            warnings.append(f"{path}: column '{name}' never changes")
+
+
+def _is_counter(name: str) -> bool:
+    return name.endswith("_counts")
+
+
+def _disagrees(case: Case, agreement: Agreement | None) -> str:
+    has = f"; in its config the law has {', '.join(case.beyond)}" if case.beyond else ""
+    if agreement is None:
+        return f"the law '{case.controller.kind}' cannot be recomputed from this recording{has}"
+    return (
+        f"the law '{case.controller.kind}' does not give the recorded command (off by {agreement.worst:.3g} V in row "
+        f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms{has})"
+    )

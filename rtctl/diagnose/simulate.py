@@ -1,0 +1,186 @@
+"""Runs any model against any recording: the recorded command in, readings out.
+
+    open    the recorded command alone: a free run
+    track   the recorded command plus a slow correction that makes the model follow the recorded main sensor. An error
+            of the model stays where it arises instead of adding up, and its size is what the correction leaves over.
+    closed  the reference in, the loop closed by the machine's own law: a free run of machine and controller
+
+All three compare readings before they are cut into counts with counts plus a half.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from rtctl.diagnose import kernel, law
+from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed
+from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
+from rtctl.diagnose.model import DAMPING, Model, plant_params
+from rtctl.diagnose.record import Record
+from rtctl.idiom import fill_record, record_dtype
+from rtctl.plants import ivu, ldu
+from rtctl.plants.physics import ordered
+from rtctl.plants.physics.place import PLANTS
+
+MODES = {"open": OPEN, "track": TRACK, "closed": CLOSED}
+SUBSTEP = {"ivu": 1e-3, "ldu": 100e-6, "axis": 0.25e-3}  # s, at most: the linear part is exact at any
+STIFF = ("transmission.", "tape.", "structure.")  # terms that alter a spring need shorter ones
+FINER = {"ivu": 2, "ldu": 2, "axis": 2}
+FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
+LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
+SHARE = {"ivu": (0.5, -0.5), "ldu": (1.0,), "axis": (1.0,)}
+CHANNELS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts", "scale_counts")}
+
+
+class Simulator:
+    """A recording, ready to be simulated by models; one call is one run, and calls may go on in several threads."""
+
+    def __init__(self, record: Record, finer: int = 1, follow: float | None = None, lead: float | None = None):
+        self.record = record
+        self.case: Case = record.case
+        self.kernel = kernel.kernel(record.plant)
+        self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP[record.plant] - 1e-9))) * finer
+        self.follow = FOLLOW[record.plant] if follow is None else follow
+        self.lead = round((LEAD[record.plant] if lead is None else lead) / record.dt)
+        self.channels = channels(record)
+        self.half = 0.5 if record.plant != "axis" else 0.0
+        self.seen = np.ascontiguousarray(record.y[self.channels[0]] + self.half)
+        self.volts = np.ascontiguousarray(record.u.reshape(len(record.t), -1))
+        self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
+        self.law = law_params(record)
+
+    def run(self, model: Model, mode: int = TRACK, n: int | None = None) -> np.ndarray:
+        """Readings (n, sensors) in the sensors' units; nan from the tick on at which the model ran away."""
+        return self.everything(model, mode, n)[0]
+
+    def everything(
+        self, model: Model, mode: int = TRACK, n: int | None = None, follow: float | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Readings, the volts that the law wrote (CLOSED) and the correction (n,) that kept the model on track (TRACK).
+
+        The correction is in the unit of the linear machine's input; `follow` is its bandwidth in rad/s.
+        """
+        k = self.kernel
+        n = len(self.seen) if n is None else n
+        stiff = any(t.term.startswith(STIFF) for t in model.terms)
+        substeps = self.substeps * (FINER[self.record.plant] if stiff else 1)
+        h = self.record.dt / substeps
+        params = plant_params(model, self.case, h)
+        p = np.zeros(1, _dtype(params))
+        fill_record(p[0], params)
+        slots = np.zeros(max(len(model.terms), 1), k.slot)
+        for slot, settings in zip(slots, ordered(list(model.terms)), strict=False):
+            kernel.fill_slot(k, slot, settings, params)
+        job = self._job(params, mode, self.follow if follow is None else follow, substeps)
+        laws = np.zeros(1, record_dtype(self.law))
+        fill_record(laws[0], self.law)
+        out = np.zeros((n, len(job["per_unit"][0])))
+        written = np.zeros((n if mode == CLOSED else 1, self.volts.shape[1]))
+        push = np.zeros(n)
+        done = k.module.run(
+            job, p, np.zeros(1, k.state), slots, np.zeros(len(slots), k.slot_state), laws,
+            np.zeros(1, law.LAW_STATE), self.lead, self.ref[:n], self.record.w[:n], self.volts[:n], self.seen[:n], out,
+            written, push,
+        )  # fmt: skip
+        out[max(done, 0) :] = np.nan
+        return out, written, push
+
+    def _job(self, params: Any, mode: int, follow: float, substeps: int) -> np.ndarray:
+        case, plant = self.case, self.record.plant
+        job = np.zeros(1, self.kernel.job)
+        j = job[0]
+        j["mode"], j["substeps"], j["rate"], j["half"] = mode, substeps, 1.0 / self.record.dt, self.half
+        late = case.delay_samples * self.record.dt
+        if plant == "axis" and case.drive.bandwidth_hz:  # its plant has no driver: what that holds back is a delay
+            late += 2 * (case.drive.damping or DAMPING) / (2 * np.pi * case.drive.bandwidth_hz)
+        j["delay"] = round(late / self.record.dt * substeps)
+        j["gain"] = case.drive.amp_per_volt[0] if case.drive.amp_per_volt else 1.0
+        j["current_limit"] = case.drive.current_limit or np.inf
+        j["per_unit"] = per_unit(case)
+        j["rectified"] = [0, 1, 1] if plant == "ivu" else 0
+        j["share"] = SHARE[plant]
+        rigid = rigid_gain(params, plant)
+        j["P"], j["D"] = follow**2 / rigid, 1.4 * follow / rigid
+        j["a"] = -np.expm1(-10 * follow * self.record.dt)
+        return job
+
+
+_dtypes: dict[type, np.dtype] = {}
+
+
+def _dtype(params: Any) -> np.dtype:
+    return _dtypes.setdefault(type(params), record_dtype(params))
+
+
+def channels(record: Record) -> tuple[str, ...]:
+    """Recorded sensors in the order of the plant's, those that are missing left out at the end."""
+    wanted = CHANNELS.get(record.plant, tuple(record.y))
+    return tuple(name for name in wanted if name in record.y)
+
+
+def per_unit(case: Case) -> Any:
+    """Counts of each sensor a rad or m."""
+    s = case.sensors
+    turn = 2 * np.pi
+    if case.plant == "ivu":
+        reel = (s.reel_counts_per_rev or 209) / turn
+        return [(s.capstan_counts_per_rev or 10000) / turn, reel, reel]
+    if case.plant == "ldu":
+        return [(s.encoder_counts_per_rev or 20000) / turn, 1.0 / (s.scale_m_per_count or 0.5e-6)]
+    return [1.0]
+
+
+def resolution(record: Record) -> float:
+    """Step of the main sensor in rad or m: one count, what the owner says, or the smallest step that occurs."""
+    sensors, plant = record.case.sensors, record.plant
+    if plant != "axis":
+        return float(1.0 / per_unit(record.case)[0])
+    if sensors.x_counts_per_rev:
+        return float(2 * np.pi / sensors.x_counts_per_rev)
+    if sensors.x_resolution_m:
+        return float(sensors.x_resolution_m)
+    steps = np.abs(np.diff(next(iter(record.y.values()))))
+    return float(np.quantile(steps[steps > 0], 0.01)) if (steps > 0).any() else 1e-12
+
+
+def rigid_gain(params: Any, kind: str) -> float:
+    """Acceleration of the main sensor for one unit of correction, all springs taken as stiff, rad/s^2 or m/s^2."""
+    if kind == "axis":
+        return float(params.K / params.M)
+    plant = PLANTS[kind]
+    A, B = plant.state_space(params)
+    w = 2 * np.pi * 0.1
+    sensor = {"ivu": ivu.CAPSTAN, "ldu": ldu.ENCODER, "axis": 0}[kind]
+    x = np.linalg.solve(1j * w * np.eye(len(A)) - A, B @ np.array(SHARE[kind]))
+    return float(np.abs(x[sensor]) * w**2)
+
+
+def law_params(record: Record) -> law.LawParams:
+    """The recorded machine's law for the compiled loop; kind NONE where it is not known."""
+    case, dt = record.case, record.dt
+    c, drive = case.controller, case.drive
+    values: dict[str, Any] = dict.fromkeys(law.LawParams._fields, 0.0)
+    values |= {"kind": law.NONE, "Ts": dt, "limit": drive.limit_volt or 1e9, "lsb": drive.step_volt or 0.0}
+    values["top"] = drive.dac_range_volt - values["lsb"]
+    values |= {
+        "allocation": 0,
+        "n_sections": 0,
+        "sections": np.zeros((law.MAX_SECTIONS, 5)),
+        "to_unit": 1 / per_unit(case)[0],
+    }
+    if isinstance(c, PdLaw):
+        p, amp = believed(case), drive.amp_per_volt
+        volts = [1.0 / (p[f"K_m{i}"] * amp[i - 1]) for i in (1, 2)]
+        f = c.derivative_filter_hz
+        values |= {
+            "kind": law.PD, "P": c.P, "D": c.D, "a": 1.0 if f is None else -np.expm1(-2 * np.pi * f * dt),
+            "pull1": c.tension_N * p["R1"] * volts[0], "pull2": c.tension_N * p["R2"] * volts[1],
+            "friction": c.friction_Nm * volts[0], "allocation": law.ALLOCATIONS.index(c.allocation),
+        }  # fmt: skip
+    elif isinstance(c, SectionsLaw):
+        values["to_unit"] *= believed(case)["R_c"] if case.plant == "ldu" else 1.0
+        values |= {"kind": law.SECTIONS, "n_sections": len(c.sections)}
+        values["sections"][: len(c.sections)] = c.sections
+    elif isinstance(c, CascadeLaw):
+        values |= {"kind": law.CASCADE, "kp": c.kp, "kv": c.kv}
+    return law.LawParams(**values)

@@ -1,0 +1,101 @@
+"""How sure the numbers are: intervals from the Jacobian, with errors that go together for a while.
+
+cov = (J'J + P)^-1 (B + P) (J'J + P)^-1 with P the prior's weight and B the sum over blocks of J'r r'J within a block.
+
+Source: White, Econometrica 48 (1980) for the sandwich; Kunsch, Annals of Statistics 17 (1989) for blocks.
+"""
+
+import numpy as np
+
+from rtctl.diagnose.case import PARAMETERS
+from rtctl.diagnose.diagnosis import Interval
+from rtctl.diagnose.fit import Fit, trust
+from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, Hypothesis
+from rtctl.diagnose.words import unit_at
+
+Z90 = 1.645
+
+
+def covariance(fitted: Fit, block: int) -> np.ndarray:
+    """Covariance of x (n, n)."""
+    prior = fitted.space.prior() * trust(fitted.r)
+    n = len(fitted.r) // block * block
+    if n < 2 * block:
+        n, block = len(fitted.r), 1
+    scores = (fitted.J[:n] * fitted.r[:n, None]).reshape(-1, block, fitted.J.shape[1]).sum(axis=1)
+    A = fitted.J.T @ fitted.J + np.diag(prior)
+    d = np.sqrt(np.maximum(np.diag(A), 1e-12))
+    inverse = np.linalg.pinv(A / np.outer(d, d), rcond=1e-12) / np.outer(d, d)
+    white = fitted.J.T @ fitted.J * float(np.mean(fitted.r**2))
+    meat = scores.T @ scores
+    meat = np.where(np.eye(len(d), dtype=bool), np.maximum(meat, white), meat)
+    return inverse @ (meat + np.diag(prior)) @ inverse
+
+
+def parameter_intervals(fitted: Fit, cov: np.ndarray) -> dict[str, Interval]:
+    """90 % intervals of the plant's parameters, within the owner's tolerance."""
+    low, high = fitted.space.bounds()
+    out = {}
+    for i, name in enumerate(fitted.space.names):
+        owner = fitted.space.owner.base[name]
+        half = Z90 * float(np.sqrt(max(cov[i, i], 0.0)))
+        ends = np.clip([fitted.x[i] - half, fitted.x[i] + half], low[i], high[i])
+        a, b = sorted(owner * np.exp(ends))
+        out[name] = Interval(
+            float(owner * np.exp(fitted.x[i])), float(a), float(b), plant_unit(fitted.model.kind, name)
+        )
+    return out
+
+
+def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Interval]:
+    """90 % intervals of the parameters of one hypothesis."""
+    h, kind = fitted.space.hypotheses[index], fitted.model.kind
+    at = fitted.space.nb + sum(len(g.coordinates) for g in fitted.space.hypotheses[:index])
+    x = fitted.space.parts(fitted.x)[index]
+    values = h.values(x)
+    out: dict[str, Interval] = {}
+    for i, c in enumerate(h.coordinates):
+        half = Z90 * float(np.sqrt(max(cov[at + i, at + i], 0.0)))
+        if c.kind == COSINE:
+            out |= _turn(kind, h, x, i, cov[at + i : at + i + 2, at + i : at + i + 2], values)
+        elif c.kind == SHAPE:
+            v = values[c.name]
+            out[c.name] = Interval(
+                v, v * float(np.exp(-min(half, 5))), v * float(np.exp(min(half, 5))), parameter_unit(kind, h, c.name)
+            )
+        elif c.kind == INVERSE:
+            ends = [c.scale / max(x[i] + s * half, 1e-9) for s in (1, -1)]
+            out[c.name] = Interval(values[c.name], *ends, parameter_unit(kind, h, c.name))
+        elif c.kind in ("size", PLACE):
+            v, w = values[c.name], abs(c.scale) * half
+            out[c.name] = Interval(v, v - w, v + w, parameter_unit(kind, h, c.name))
+    return out
+
+
+def _turn(
+    kind: str, h: Hypothesis, x: np.ndarray, i: int, cov: np.ndarray, values: dict[str, float]
+) -> dict[str, Interval]:
+    c = h.coordinates[i]
+    amplitude, phase = c.name.split("|")
+    size = float(np.hypot(x[i], x[i + 1])) or 1e-12
+    along = np.array([x[i], x[i + 1]]) / size
+    across = np.array([-along[1], along[0]])
+    a = Z90 * c.scale * float(np.sqrt(max(along @ cov @ along, 0.0)))
+    p = Z90 * float(np.sqrt(max(across @ cov @ across, 0.0))) / size
+    A, phi = values[amplitude], values[phase]
+    return {
+        amplitude: Interval(A, A - a, A + a, parameter_unit(kind, h, amplitude)),
+        phase: Interval(phi, phi - p, phi + p, "rad"),
+    }
+
+
+def parameter_unit(kind: str, h: Hypothesis, name: str) -> str:
+    """Unit of a term's parameter at its node."""
+    return unit_at(kind, h.term, h.node, name)
+
+
+def plant_unit(kind: str, name: str) -> str:
+    """Unit of a plant's parameter."""
+    info = PARAMETERS[kind].model_fields.get(name)
+    extra = info.json_schema_extra if info is not None else None
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""

@@ -1,0 +1,86 @@
+"""Turns what the search found into a verdict: named, ambiguous, unnamed or nothing, each name with its confidence.
+
+A name stands when the model with it explains what there was to explain and no other name does nearly as well in its
+place. How much of a difference in cost counts is tempered, since errors of neighbouring ticks go together.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose import decide
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Rival
+from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.space import Hypothesis
+from rtctl.diagnose.uncertainty import covariance, effect_intervals
+
+SURE = 0.7  # weight of a name among its rivals
+POSSIBLE = 0.05  # weight from which a rival is mentioned
+MOST = 3  # names in an answer
+
+
+class Alternative(NamedTuple):
+    """A fit in which hypothesis `index` stands in the place of one of the best model's."""
+
+    fit: Fit
+    index: int
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """The one that stands there."""
+        return self.fit.space.hypotheses[self.index]
+
+
+class Verdict(NamedTuple):
+    verdict: str
+    effects: tuple[Effect, ...]
+    explained: float  # share of the excess over the noise
+
+
+def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alternative]], block: int) -> Verdict:
+    """The verdict on `best`; `rivals` holds for each of its hypotheses the fits with another one in its place."""
+    if not best.space.hypotheses:
+        return Verdict(NOTHING, (), 0.0)
+    share = decide.explained(problem, base, best)
+    whole = decide.complete(problem, best) and share > decide.MOSTLY
+    if not whole and share < decide.ENOUGH:
+        return Verdict(UNNAMED, (), share)
+    trust = 0.98 if whole else 0.6 + 0.35 * share
+    own, others = [], []
+    doubt = False
+    for index in range(len(best.space.hypotheses)):
+        places = [Alternative(best, index), *rivals[index]]
+        weights = decide.probabilities([p.fit for p in places])
+        names = weigh(places, weights)
+        term = places[0].hypothesis.term
+        own.append(_effect(places[0], names[term] * trust, best, rivals[index], block))
+        if names[term] < SURE:
+            doubt = True
+            for name, weight in sorted(names.items(), key=lambda item: -item[1]):
+                if name != term and weight > POSSIBLE:
+                    place = next(p for p in places if p.hypothesis.term == name)
+                    others.append(_effect(place, weight * trust, best, (), block))
+    if not doubt:
+        return Verdict(NAMED, tuple(own), share)
+    new = [e for e in others if e.name not in {o.name for o in own}]
+    return Verdict(AMBIGUOUS, tuple([*own, *new][:MOST]), share)
+
+
+def weigh(places: Sequence[Alternative], weights: np.ndarray) -> dict[str, float]:
+    """Weight of each name: nodes and starts of one term count together."""
+    out: dict[str, float] = {}
+    for place, weight in zip(places, weights, strict=True):
+        out[place.hypothesis.term] = out.get(place.hypothesis.term, 0.0) + float(weight)
+    return out
+
+
+def _effect(place: Alternative, weight: float, best: Fit, rivals: Sequence[Alternative], block: int) -> Effect:
+    h = place.hypothesis
+    looks = tuple(
+        Rival(r.hypothesis.term, r.hypothesis.node, decide.p_value(best, r.fit, block), r.fit.rms)
+        for r in rivals
+        if r.hypothesis.term != h.term
+    )
+    intervals = effect_intervals(place.fit, place.index, covariance(place.fit, block))
+    return Effect(h.term, h.node, min(weight, 0.99), intervals, looks)

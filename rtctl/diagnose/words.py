@@ -1,0 +1,368 @@
+"""A diagnosis in words that a mechanic understands: what the machine does, where, and how large it is."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, UNNAMED, Diagnosis, Effect, Interval
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.phrases import PHRASES
+from rtctl.plants.physics import TERMS
+
+PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}
+PREFIXED = ("Nm", "N", "V", "s", "Hz", "m", "rad", "A", "m/s", "rad/s", "N/m", "Nm/rad", "Nms/rad", "Ns/m")
+LARGE = ("N/m", "Nm/rad", "Hz")  # of which kilo is in use
+MOST_HIDDEN = 4  # smallest sizes named in a verdict of nothing, these first
+HIDDEN_FIRST = "friction.coulomb", "friction.stribeck", "drive.deadband", "transmission.backlash", "ripple.cogging"
+
+NODES = {
+    "motor": "the motor", "capstan": "the capstan", "carriage": "the carriage", "wheel": "the friction wheel",
+    "encoder": "the encoder", "scale": "the scale", "sensor": "the sensor", "drive": "the drive", "loop": "the loop",
+    "tape1": "the tape at reel 1", "tape2": "the tape at reel 2",
+}  # fmt: skip
+SLIDING = {
+    "ivu": ("tape1", "tape2"),
+    "ldu": ("carriage", "scale"),
+    "axis": ("carriage", "sensor"),
+}  # nodes that move in m and not in rad
+DIMENSIONS = {  # unit of a parameter where a node turns, and where it slides
+    "force": ("Nm", "N"), "speed": ("rad/s", "m/s"), "way": ("rad", "m"), "drag": ("Nms/rad", "Ns/m"),
+    "stiff": ("Nm/rad", "N/m"), "inertia": ("kg m^2", "kg"), "cubic": ("Nm/rad^3", "N/m^3"),
+}  # fmt: skip
+BY_NODE = {
+    "F_C": "force", "F_s": "force", "F": "force", "F_h": "force", "B": "drag", "B_a": "drag", "v_s": "speed",
+    "z_s": "way", "z_h": "way", "gap": "way", "size": "way", "each": "way", "mark": "way", "at": "way", "width": "way",
+    "x0": "way", "turn": "way", "mass": "inertia", "c3": "cubic", "k": "stiff",
+}  # fmt: skip
+AMPLITUDES = {"load.imbalance": "force", "ripple.cogging": "force", "ripple.encoder": "way"}
+SPECIAL = {"f_Hz": "Hz", "transmission.creep.kappa": "1/N", "transmission.slip.F_max": "N", "drive.supply_sag.k": "1/V",
+           "sensor.missed_counts.at": "s"}  # fmt: skip
+
+
+def nice(value: float, unit: str = "", digits: int = 2) -> str:
+    """A number as a person writes it, with a prefix that fits: nice(0.0031, "Nm") is "3.1 mNm"."""
+    if not math.isfinite(value):
+        return "any size" if value > 0 else "unknown"
+    power = prefix(value, unit, digits)
+    return f"{figures(value / 10.0**power, digits)} {PREFIXES[power]}{unit}".rstrip()
+
+
+def prefix(value: float, unit: str, digits: int = 2) -> int:
+    """Power of ten of the prefix that fits a size; 0 for units that take none."""
+    if unit not in PREFIXED or value == 0 or not math.isfinite(value):
+        return 0
+    rounded = float(f"{abs(value):.{max(digits, 2) - 1}e}")
+    power = 3 * math.floor(math.log10(rounded) / 3 + 1e-12)
+    if unit in ("rad/s", "Hz", "m/s") and rounded >= 0.1:  # nobody says 300 mHz
+        power = max(power, 0)
+    return min(max(power, -9), 6 if unit in LARGE else 0)
+
+
+def figures(x: float, digits: int) -> str:
+    """`digits` figures, none of them lost, and no exponent within reason."""
+    if x == 0:
+        return "0"
+    x = float(f"{x:.{digits - 1}e}")
+    size = math.floor(math.log10(abs(x)) + 1e-12)
+    if not -4 <= size <= 6:
+        return f"{x:.{digits - 1}e}"
+    return f"{x:.{max(digits - 1 - size, 0)}f}"
+
+
+def both(a: float, b: float, unit: str = "") -> tuple[str, str]:
+    """Two sizes with as many figures as it takes to see them differ."""
+    for digits in (2, 3, 4):
+        one, two = nice(a, unit, digits), nice(b, unit, digits)
+        if one != two:
+            break
+    return one, two
+
+
+def percent(share: float) -> str:
+    """A share, as "3.4 %"."""
+    return f"{figures(100 * share, 2)} %"
+
+
+def node_words(node: str) -> str:
+    """A node as it is called at the machine: "motor 1", "the tape at reel 2"."""
+    if node in NODES:
+        return NODES[node]
+    stem = node.rstrip("0123456789")
+    return f"{stem} {node[len(stem) :]}".strip() if node else "the machine"
+
+
+def channel_words(channel: str) -> str:
+    """A recorded channel: "the capstan's counter"."""
+    if channel.endswith("_counts"):
+        return f"the counter of {node_words(channel.removesuffix('_counts'))}"
+    return {"x": "the position", "speed": "the speed"}.get(channel, channel.replace("_", " "))
+
+
+def unit_at(kind: str, name: str, node: str, parameter: str) -> str:
+    """Unit of a term's parameter at a node; "" for a bare number."""
+    if parameter in SPECIAL:
+        return SPECIAL[parameter]
+    key = f"{name}.{parameter}"
+    if key in SPECIAL:
+        turns = name.startswith("transmission") and node == "wheel"
+        return {"N": "Nm", "1/N": "1/Nm"}[SPECIAL[key]] if turns else SPECIAL[key]
+    field = TERMS[name].settings.model_fields.get(parameter) if name in TERMS else None
+    unit = (
+        str((field.json_schema_extra or {}).get("unit", ""))
+        if field and isinstance(field.json_schema_extra, dict)
+        else ""
+    )
+    stem = parameter.rstrip("23")
+    dimension = BY_NODE.get(parameter) or (AMPLITUDES.get(name) if stem == "A" else None)
+    if unit or dimension is None:
+        return unit
+    return DIMENSIONS[dimension][node in SLIDING.get(kind, ())]
+
+
+class Sizes:
+    """The numbers of an effect, found in its intervals or else in the model, as words."""
+
+    def __init__(self, name: str, node: str, parameters: dict[str, Interval], model: Model):
+        self.name, self.node, self.parameters, self.model = name, node, parameters, model
+        self.here = node_words(node)
+        terms: list[Any] = list(model.terms)
+        self.term: Any = next((t for t in terms if (t.term, t.node) == (name, node)), None)
+
+    def value(self, name: str) -> float:
+        """SI value; nan where nobody knows it."""
+        if name in self.parameters:
+            return float(self.parameters[name].value)
+        found = getattr(self.term, name, None)
+        if found is None and self.name in TERMS:
+            field = TERMS[self.name].settings.model_fields.get(name)
+            found = None if field is None or field.is_required() else field.get_default(call_default_factory=True)
+        return float(found) if isinstance(found, int | float) else math.nan
+
+    def text(self, name: str) -> str:
+        """Which of several forms it has."""
+        return str(getattr(self.term, name, ""))
+
+    def unit(self, name: str) -> str:
+        """Of a parameter."""
+        given = self.parameters[name].unit if name in self.parameters else ""
+        return given or unit_at(self.model.kind, self.name, self.node, name)
+
+
+def base_dry(model: Model, node: str) -> float:
+    """Dry friction that the model has at a node without Stribeck's, Nm or N; nan where its equations have none."""
+    name = {
+        "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
+        "ldu": {"capstan": "F_c", "carriage": "F_c"},
+        "axis": {"carriage": "F_c"},
+    }[model.kind].get(node)
+    dry = model.base.get(name, 0.0) if name else 0.0
+    if model.kind == "ldu" and node == "capstan":
+        dry *= model.base.get("R_c", 1.0)
+    terms: list[Any] = list(model.terms)
+    return dry + sum(float(t.F_C) for t in terms if (t.term, t.node) == ("friction.coulomb", node))
+
+
+class _Slot:
+    """One name in a phrase."""
+
+    def __init__(self, sizes: Sizes, name: str):
+        self.sizes, self.name = sizes, name
+
+    def __format__(self, form: str) -> str:
+        s, name = self.sizes, self.name
+        if form == "words":
+            return SPECIAL_WORDS[name](s)
+        value = s.value(name)
+        if "|" in form:
+            return form.split("|")[int(value < 0)]
+        if form == "%":
+            return percent(abs(value))
+        if form == "g":
+            return f"{value:.3g}"
+        if form == "+":
+            return nice(value, s.unit(name))
+        return nice(abs(value) if form == "" else value, s.unit(name), int(form or 2))
+
+
+class _Slots(dict):
+    def __init__(self, sizes: Sizes):
+        super().__init__(here=sizes.here)
+        self.sizes = sizes
+
+    def __missing__(self, name: str) -> _Slot:
+        return _Slot(self.sizes, name)
+
+
+def _sticking(s: Sizes) -> str:
+    dry = base_dry(s.model, s.node)
+    start, keep = both(s.value("F_s"), dry, s.unit("F_s"))
+    return f"it needs {start} to start but {keep} to keep moving"
+
+
+def _form(s: Sizes) -> str:
+    if s.name == "drive.supply_sag":
+        return "volt squared" if s.text("form") == "power" else "volt"
+    return "all give the same" if s.text("form") == "floor" else "do nothing"
+
+
+def _jumps(s: Sizes) -> str:
+    if s.value("each"):
+        return f"each passage of one mark shifts the reading by {nice(abs(s.value('each')), s.unit('each'))}"
+    count = 1 + len(getattr(s.term, "more", None) or ())
+    size = nice(abs(s.value("size")), s.unit("size"))
+    jumps = "it jumps once" if count == 1 else f"it jumps {count} times, first"
+    return f"{jumps} by {size}, at {nice(s.value('at'), 's', 3)}"
+
+
+def _harmonics(s: Sizes) -> str:
+    stem = {"ripple.reel": "e", "ripple.capstan": "a"}.get(s.name, "A")
+    again = [(f"{stem}{n}", w) for n, w in ((2, "twice"), (3, "three times")) if s.value(f"{stem}{n}") > 0]
+    base = " as often" if s.name == "ripple.cogging" else ""
+    return "".join(f", {nice(s.value(k), s.unit(k))} {w}{base}" for k, w in again)
+
+
+SPECIAL_WORDS = {"sticking": _sticking, "form": _form, "jumps": _jumps, "harmonics": _harmonics}
+
+
+def effect_clause(effect: Effect, model: Model) -> tuple[str, str]:
+    """What the effect does and how much: ("motor 1 sticks", "it needs 3.1 mNm to start ...")."""
+    s = Sizes(effect.name, effect.node, effect.parameters, model)
+    if effect.name not in PHRASES:
+        sizes = [f"{name} {nice(v.value, v.unit)}" for name, v in effect.parameters.items()]
+        return f"{s.here} shows {effect.name}", ", ".join(sizes)
+    phrase, slots = PHRASES[effect.name], _Slots(s)
+    return phrase.head.format_map(slots), phrase.detail.format_map(slots)
+
+
+def noun(name: str, node: str = "") -> str:
+    """An effect in a few words: "sticking, motor 1"."""
+    word = PHRASES[name].noun if name in PHRASES else name
+    return f"{word}, {node_words(node).removeprefix('the ')}" if node else word
+
+
+def entry_noun(entry: str) -> str:
+    """The same of "name:node"."""
+    name, _, node = entry.partition(":")
+    return noun(name, node)
+
+
+def sentence(entry: str, *more: str) -> str:
+    """Why a hypothesis "name:node" cannot be tested, and at `more` nodes: what a record would have to hold."""
+    name, _, node = entry.partition(":")
+    at = f" at {_join([node_words(n) for n in (node, *more)], 'and')}" if node else ""
+    if name not in PHRASES:
+        return f"This record cannot show {name}{at}."
+    return f"This record cannot show {PHRASES[name].noun}{at}: that takes {PHRASES[name].need}."
+
+
+def main_unit(d: Diagnosis) -> str:
+    """Unit of the main channel: counts, or that of x."""
+    channel = next(iter(d.record.y))
+    if channel.endswith("counts"):
+        return "counts"
+    return "m/s" if channel == "speed" else (d.record.case.sensors.unit or "m")
+
+
+def heldout_error(d: Diagnosis, nrmse: float) -> float:
+    """A held-out nrmse as rms error of the main channel in its own unit."""
+    return nrmse * float(np.std(next(iter(d.record.y.values()))))
+
+
+def falls(d: Diagnosis) -> str:
+    """How the held-out error changed: "falls from 12 to 0.4 counts"."""
+    unit = main_unit(d)
+    before, after = heldout_error(d, d.heldout_before), heldout_error(d, d.heldout_after)
+    one, two = both(before, after, unit)
+    if one.split()[1:] == two.split()[1:]:
+        one = one.split()[0]
+    return f"{'falls' if after < before else 'goes'} from {one} to {two}"
+
+
+def verdict_sentences(d: Diagnosis) -> str:
+    """The verdict in two sentences with sizes and units."""
+    if d.verdict == NAMED and d.effects:
+        clauses = [effect_clause(e, d.after) for e in d.effects]
+        if len(clauses) == 1:
+            first = f"{clauses[0][0]}: {clauses[0][1]}."
+        else:
+            count = {2: "two", 3: "three"}.get(len(clauses), str(len(clauses)))
+            first = f"{count} things are missing: " + _join([f"{h} ({t})" for h, t in clauses], "and") + "."
+        rest = "that" if len(clauses) == 1 else "them"
+        second = f"With {rest} in the model the error on the part that was not fitted {falls(d)}."
+    elif d.verdict == AMBIGUOUS and d.effects:
+        choices = [f"{h} ({t})" for h, t in (effect_clause(e, d.after) for e in d.effects)]
+        first = (
+            f"either {_join(choices, 'or')}: this record cannot tell."
+            if len(choices) > 1
+            else f"perhaps {choices[0]}: this record cannot tell."
+        )
+        second = f"Run this next: {separating(d)}."
+    elif d.verdict == UNNAMED or d.effects:
+        first, second = _unnamed(d)
+    else:
+        first, second = _nothing(d)
+    return f"{first[0].upper()}{first[1:]} {second}"
+
+
+def separating(d: Diagnosis) -> str:
+    """What tells the rivals apart, in words."""
+    for a in d.effects:
+        for rival in [b.name for b in d.effects] + [b.name for b in a.look_alikes]:
+            if a.name in TERMS and rival in TERMS[a.name].look_alikes:
+                return TERMS[a.name].look_alikes[rival].rstrip(".")
+    names = {e.name for e in d.effects}
+    if len(names) == 1:
+        return "drive one motor alone, then the other, so that only one of the places is loaded"
+    needs = [PHRASES[n].need for n in sorted(names) if n in PHRASES]
+    return "a record with " + _join(list(dict.fromkeys(needs)), "and") if needs else "a longer record with richer moves"
+
+
+def _unnamed(d: Diagnosis) -> tuple[str, str]:
+    unit = main_unit(d)
+    left, noise = heldout_error(d, d.heldout_after), heldout_error(d, d.noise_floor)
+    one, two = both(left, noise, unit)
+    amount = f"the error on the part that was not fitted is {one} where noise leaves {two}"
+    if d.located is None:
+        return "Something is missing that no known effect explains.", f"It has no clear place: {amount}."
+    at = node_words(d.located.node)
+    since = f", from {nice(d.located.since_s, 's', 3)} on" if d.located.since_s > 0 else ""
+    kind = f"it goes with {d.located.axis}, {d.located.where}{since}"
+    share = f"{percent(d.located.share)} of the error lies there"
+    return (
+        f"Something is missing at {at} that no known effect explains: {kind}.",
+        f"{_capital(channel_words(d.located.channel))} shows it, {share}; {amount}.",
+    )
+
+
+def _nothing(d: Diagnosis) -> tuple[str, str]:
+    unit = main_unit(d)
+    left, noise = (nice(heldout_error(d, x), unit) for x in (d.heldout_after, d.noise_floor))
+    first = f"Nothing is missing: the part that was not fitted is predicted to {left}, and noise alone makes {noise}."
+    if not d.hides:
+        return first, "How large an effect could be and still hide was not worked out."
+    words: list[str] = []
+    seen: set[str] = set()
+    for entry in sorted(d.hides, key=lambda e: not e.startswith(HIDDEN_FIRST)):
+        name, _, node = entry.partition(":")
+        if name not in seen and len(words) < MOST_HIDDEN:
+            seen.add(name)
+            words.append(f"{noun(name)} of {hidden_size(d, entry)} at {node_words(node)}")
+    return first, f"It would have shown {_join(words, 'and')}."
+
+
+def hidden_size(d: Diagnosis, entry: str) -> str:
+    """The smallest size of "term:node" that the record would have shown, with its unit."""
+    size = d.hides[entry]
+    name, _, node = entry.partition(":")
+    known = name in TERMS and size.unit in TERMS[name].settings.model_fields  # the main parameter instead of its unit
+    unit = unit_at(d.record.plant, name, node, size.unit) if known else size.unit
+    return nice(abs(size.value), unit) if unit else percent(abs(size.value))
+
+
+def _join(parts: list[str], word: str) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {word} {parts[-1]}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

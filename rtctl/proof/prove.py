@@ -1,0 +1,99 @@
+"""The whole proof: generate and seal, diagnose every case, open the seal, score, report. Goes on where it stopped."""
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rtctl.config.errors import UserError
+from rtctl.proof import report, seal
+
+SCORES, REPORT, RESULT = "scores.json", "report.md", "diagnosis.json"
+FAILED = "failed.json"  # beside a case: what went wrong, so that it is not tried again
+
+Progress = Callable[[int, int], None]
+
+
+def prepare(
+    folder: Path | str,
+    count: int,
+    seed: int,
+    plants: tuple[str, ...],
+    jobs: int,
+    heldout: bool,
+    progress: Progress | None,
+) -> str:
+    """Generate and seal, unless the folder holds just these cases; returns the hash of the answers.
+
+    Raises UserError where the folder holds other cases or its answers are not the sealed ones.
+    """
+    folder = Path(folder)
+    if (folder / seal.SEAL).is_file():
+        found = json.loads((folder / seal.SEAL).read_text("utf-8"))
+        answers = seal.open_seal(folder)
+        if answers.get("mix") != f"proof seed {seed}" or len(answers["cases"]) != count:
+            raise UserError(
+                f"{folder} holds {len(answers['cases'])} cases of '{answers.get('mix')}'; name another --out"
+            )
+        return str(found["sha256"])
+    from rtctl.proof.generate import generate
+
+    generate(folder, count, seed, plants, progress, jobs, heldout)
+    return str(json.loads((folder / seal.SEAL).read_text("utf-8"))["sha256"])
+
+
+def cases(folder: Path) -> list[Path]:
+    return sorted(p for p in Path(folder).glob("case-*") if p.is_dir() and not p.name.endswith("-heldout"))
+
+
+def diagnose_all(folder: Path | str, jobs: int = 1, progress: Progress | None = None, work: Any = None) -> None:
+    """Diagnose every case that has neither a diagnosis nor a failure on record; `work` stands in for it in tests."""
+    from rtctl.diagnose import folder as many
+
+    every = cases(Path(folder))
+    left = [c for c in every if not any((c / "diagnosis" / f).exists() for f in (RESULT, FAILED))]
+    done = len(every) - len(left)
+    tasks = [many.Task(c.name, c, c / "diagnosis") for c in left]
+    for outcome in many.diagnose_all(tasks, min(jobs, os.cpu_count() or 1), report=False, work=work or many.one):
+        out = Path(folder) / outcome.name / "diagnosis"
+        out.mkdir(exist_ok=True)
+        if outcome.code:  # a failure of the tool is written down, not raised
+            (out / FAILED).write_text(json.dumps({"error": outcome.message}) + "\n", "utf-8")
+        (out / "seconds.json").write_text(json.dumps(outcome.seconds) + "\n", "utf-8")
+        done += 1
+        if progress:
+            progress(done, len(every))
+
+
+def score_all(folder: Path | str) -> dict[str, Any]:
+    """Open the seal, score, and write scores.json and report.md. Raises UserError where the seal is broken."""
+    from rtctl.proof.score import score
+
+    folder = Path(folder)
+    answers = seal.open_seal(folder)
+    diagnoses: dict[str, Any] = {}
+    seconds: dict[str, float] = {}
+    for bundle in cases(folder):
+        diagnoses[bundle.name] = _json(bundle / "diagnosis" / RESULT)
+        took = _json(bundle / "diagnosis" / "seconds.json")
+        if isinstance(took, float):
+            seconds[bundle.name] = took
+    result = score(answers, diagnoses, seconds=seconds)
+    (folder / SCORES).write_text(json.dumps(result, sort_keys=True, indent=1) + "\n", "utf-8")
+    (folder / REPORT).write_text(report.markdown(result, f"Concealed cases, {answers.get('mix')}"), "utf-8")
+    return result
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def words(result: dict[str, Any]) -> str:
+    """The main table for a terminal."""
+    rows = [[report._cell(x) for x in row] for row in report.summary(result)]
+    width = max(len(row[0]) for row in rows)
+    return "\n".join(f"{what:{width}}  {figure:>8}  {of:>5}" for what, figure, of in rows)

@@ -1,0 +1,61 @@
+"""The seal: a hash of the answers, written before the tool runs, that anyone can check afterwards."""
+
+import hashlib
+import json
+import secrets
+from pathlib import Path
+from typing import Any
+
+from rtctl.config.errors import UserError
+
+ANSWERS, SEAL = "answers.json", "seal.json"
+
+
+def canonical(answers: dict[str, Any]) -> str:
+    """The answers as one text that does not depend on the order of keys or on spaces."""
+    return json.dumps(answers, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def digest(answers: dict[str, Any], salt: str) -> str:
+    return hashlib.sha256((salt + canonical(answers)).encode()).hexdigest()
+
+
+def close_seal(folder: Path | str, answers: dict[str, Any]) -> str:
+    """Write answers.json and seal.json; returns the hash, to be shown before the tool runs."""
+    folder = Path(folder)
+    salt = secrets.token_hex(16)
+    sha = digest(answers, salt)
+    (folder / ANSWERS).write_text(json.dumps(answers, sort_keys=True, indent=1, allow_nan=False) + "\n", "utf-8")
+    seal = {"format": 1, "sha256": sha, "salt": salt, "cases": len(answers["cases"])}
+    (folder / SEAL).write_text(json.dumps(seal, indent=1) + "\n", "utf-8")
+    return sha
+
+
+def open_seal(folder: Path | str) -> dict[str, Any]:
+    """The answers, after their hash was checked. Raises UserError where they are not the ones that were sealed."""
+    folder = Path(folder)
+    seal, answers = _read(folder / SEAL), _read(folder / ANSWERS)
+    for key in ("sha256", "salt"):
+        if not isinstance(seal.get(key), str):
+            raise UserError(f"{folder / SEAL} has no '{key}'; it is not a seal that `rtctl prove` wrote")
+    found = digest(answers, seal["salt"])
+    if found != seal["sha256"]:
+        raise UserError(
+            f"{folder / ANSWERS} is not what was sealed: its hash is {found[:16]}..., {SEAL} says "
+            f"{seal['sha256'][:16]}...; generate the cases anew"
+        )
+    return answers
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise UserError(f"{path} is missing; `rtctl prove --generate-only` writes it") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path} cannot be read: {error}") from None
+    except json.JSONDecodeError as error:
+        raise UserError(f"{path}, line {error.lineno}: not JSON, {error.msg}") from None
+    if not isinstance(found, dict):
+        raise UserError(f"{path} holds a {type(found).__name__}; it should hold one object {{...}}")
+    return found

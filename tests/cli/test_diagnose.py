@@ -1,0 +1,198 @@
+"""Diagnoses from the command line: of one bundle, of many, of a machine."""
+
+import json
+import os
+import shutil
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from rich.console import Console
+
+from rtctl.cli import diagnose_console
+from rtctl.cli.main import main
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.folder import Outcome
+from rtctl.diagnose.kernel import CLOSED
+from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.simulate import Simulator
+from rtctl.plants.physics import TERMS
+from rtctl.trace.bundle import save_case
+
+STEP = 1e-6  # m, of the encoder
+CASE = {
+    "format": 1,
+    "plant": "axis",
+    "sample_rate": 1000.0,
+    "parameters": {"M": 95.0, "F_v": 200.0, "F_c": 20.0},
+    "sensors": {"x_resolution_m": STEP},
+    "drive": {"newton_per_volt": 35.0, "limit_volt": 10.0},
+    "delay_samples": 0.0,
+    "controller": {"kind": "cascade_p_v", "kp": 160.0, "kv": 243.0},
+    "controller_known": True,
+    "reaches": {"parameter_tolerance": 0.15},
+}
+SPRING = TERMS["load.spring"].settings(term="load.spring", node="carriage", k=600.0)
+
+
+def record_into(folder, n=5000):
+    """A bundle of an axis with a spring that its owner does not know of."""
+    folder.mkdir(parents=True)
+    case = read_case(CASE, folder)
+    t, zero = np.arange(n) * 1e-3, np.zeros(n)
+    ref = 0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t)
+    empty = Record("axis", case, t, 1e-3, ref, zero, zero[:, None], {"x": zero}, {})
+    out, volts, _ = Simulator(empty).everything(owner_model(case).add(SPRING), CLOSED)
+    x = np.round(out[:, 0] / STEP) * STEP
+    pq.write_table(pa.table({"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": x}), folder / "recording.parquet")
+    save_case(folder, {**CASE, "controller_known": False})
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory):
+    """Diagnosed once, its results in the bundle."""
+    folder = record_into(tmp_path_factory.mktemp("many") / "axis")
+    assert main(["diagnose", str(folder)]) == 0
+    return folder
+
+
+def test_what_is_written(bundle):
+    found = json.loads((bundle / "diagnosis" / "diagnosis.json").read_text())
+    assert "load.spring" in {e["name"] for e in found["effects"]}
+    assert found["verdict"] in ("named", "ambiguous")
+    model = yaml.safe_load((bundle / "diagnosis" / "model.yaml").read_text())
+    assert "load.spring" in {entry["term"] for entry in model["plant"]["physics"]}
+    page = (bundle / "diagnosis" / "report.html").read_text()
+    assert "<html" in page and "src=" not in page
+
+
+def test_the_model_does_better_than_the_owners_belief(rtctl, bundle):
+    nrmse = [
+        json.loads(rtctl("simulate", model, bundle, "--json").out)["nrmse"]["x"]
+        for model in (bundle / "diagnosis" / "model.yaml", "case")
+    ]
+    assert nrmse[0] < 0.2 * nrmse[1]
+
+
+def test_json_is_all_of_standard_output(rtctl, bundle, tmp_path):
+    code, out, _ = rtctl("diagnose", bundle, "--json", "--no-report", "--out", tmp_path)
+    found = json.loads(out)
+    assert code == 0
+    written = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert {**found, "seconds": 0} == {**written, "seconds": 0}
+    assert {p.name for p in tmp_path.iterdir()} == {"diagnosis.json", "model.yaml"}
+
+
+def test_many_go_on_where_one_is_broken(rtctl, bundle, tmp_path):
+    many = bundle.parent
+    folder = tmp_path / "many"
+    shutil.copytree(many, folder)
+    for name in ("empty", "short", "typo"):
+        (folder / name).mkdir()
+        save_case(folder / name, CASE if name != "typo" else {**CASE, "plant": "axi"})
+    table = pq.read_table(bundle / "recording.parquet")
+    pq.write_table(table.slice(0, 400), folder / "short" / "recording.parquet")
+    pq.write_table(table, folder / "typo" / "recording.parquet")
+    code, out, _ = rtctl("diagnose", folder, "--jobs", "2")
+    assert code == 2
+    lines = {line.split()[0]: line for line in out.splitlines() if line}
+    assert "load.spring at carriage" in lines["axis"] and "done before" in lines["axis"]
+    assert "is missing" in lines["empty"]
+    assert "supports no verdict" in lines["short"] and "400 rows" in lines["short"]
+    assert "is it 'axis'?" in lines["typo"]
+    code, out, _ = rtctl("diagnose", folder, "--json")
+    found = json.loads(out)["bundles"]
+    assert code == 2 and found.keys() == {"axis", "empty", "short", "typo"}
+    assert found["axis"]["skipped"] and found["short"]["exit_code"] == 3
+
+
+def test_no_verdict_alone_is_3(rtctl, bundle, tmp_path):
+    (tmp_path / "a").mkdir()
+    save_case(tmp_path / "a", CASE)
+    pq.write_table(pq.read_table(bundle / "recording.parquet").slice(0, 400), tmp_path / "a" / "recording.parquet")
+    assert rtctl("diagnose", tmp_path).code == 3
+    said = rtctl("diagnose", tmp_path / "a")
+    assert said.code == 3 and "400 rows" in said.err and said.out == ""
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (["nowhere"], "nowhere is not a folder"),
+        (["x", "--for", "3s"], "--for goes with --closed-loop"),
+        (["axis", "--closed-loop", "--heldout", "x"], "--heldout goes with a BUNDLE"),
+        (["axis", "--closed-loop", "--for", "long"], "not a duration"),
+        (["axis", "--closed-loop", "--set", "link.plant=external"], "--reference"),
+        (["nomachine", "--closed-loop"], "nomachine"),
+    ],
+)
+def test_mistakes(rtctl, tmp_path, monkeypatch, words, message):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = rtctl("diagnose", *words)
+    assert code == 2 and message in err and out == ""
+
+
+def test_a_machine_that_is_recorded_and_diagnosed(rtctl, tmp_path, monkeypatch):
+    """What is shown of it; what is done is the business of `repair`."""
+    from rtctl.diagnose import folder, repair
+
+    seen = {}
+
+    def recorded(config, out, length, progress):
+        seen.update(mode=config.loop.mode, steps=len(config.reference.steps), out=out, length=length)
+        progress("recording 3 s")
+        d = SimpleNamespace(record=SimpleNamespace(case=SimpleNamespace(warnings=("mind this",))), verdict="nothing")
+        return repair.Repair((out / "recording",), (d,), ("",))
+
+    monkeypatch.setattr(repair, "repair", recorded)
+    monkeypatch.setattr(repair, "changes", lambda d: [("plant.physics.0", "-", "load.spring at carriage")])
+    monkeypatch.setattr(folder, "own_config", lambda bundle: None)
+    monkeypatch.setattr(folder, "write", lambda *_: ["no report"])
+    monkeypatch.setattr(diagnose_console.DiagnoseConsole, "result", lambda *_: None)
+    code, out, err = rtctl("diagnose", "--closed-loop", "axis", "--for", "3s", "--out", tmp_path)
+    assert code == 0
+    assert seen == {"mode": "fused", "steps": len(repair.LEGS), "out": tmp_path, "length": 3.0}
+    assert "load.spring at carriage" in out and f"{tmp_path / 'recording'}" in out.replace("\n", "")
+    assert "recording 3 s" in err and "note: mind this" in err and "note: no report" in err
+
+
+def test_help_is_there(rtctl):
+    code, out, _ = rtctl("diagnose", "--help")
+    assert code == 0 and "--closed-loop" in out
+    assert rtctl("prove", "--help").code == 0
+
+
+def test_the_bar_moves_on_and_starts_again_with_another_recording():
+    said = ["recording 25 s", "preflight", "fitting the owner's parameters", "screening 60 hypotheses",
+            "fitting a:b", "screening 3 hypotheses beside a:b", "fitting a:b + c:d", "look-alikes of a:b",
+            "predicting rows that were not fitted", "writing the results"]  # fmt: skip
+    done = [0.0]
+    for text in said:
+        done.append(diagnose_console.onward(done[-1], text))
+    assert all(a < b for a, b in pairwise(done[1:])) and done[-1] < 1.0
+    assert diagnose_console.onward(0.8, "recording 25 s") == 0.0
+
+
+def test_a_line_of_a_bundle():
+    effects = [{"name": "drive.offset", "node": "drive1", "confidence": 0.914}]
+    line = diagnose_console.line(Outcome("a", 0, 12.34, {"verdict": "named", "effects": effects}))
+    assert line.plain.split() == ["a", "named", "drive.offset", "at", "drive1", "91", "%", "12.3", "s"]
+    failed = diagnose_console.line(Outcome("[b]", 1, 1.0, message="its process died (exit code -9)"))
+    assert failed.plain.split()[:2] == ["[b]", "failed:"]
+
+
+def test_stages_on_a_terminal_leave_nothing_behind():
+    console = diagnose_console.DiagnoseConsole(json=True)
+    with Path(os.devnull).open("w") as nowhere:
+        console.err = Console(file=nowhere, force_terminal=True)
+        with console.stages() as stage:
+            stage("preflight")
+        with console.many(1) as show:
+            show(Outcome("a", 2, 0.1, message="no column 't'"))

@@ -1,0 +1,163 @@
+"""Models against recordings, from the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.export import write_model
+from rtctl.diagnose.kernel import CLOSED
+from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.record import Record, load_record
+from rtctl.diagnose.simulate import Simulator
+from rtctl.plants.physics import TERMS
+from rtctl.trace.bundle import save_case
+
+SHARED = Path(__file__).parents[2].parent / "shared"
+CASE = {
+    "format": 1,
+    "plant": "axis",
+    "sample_rate": 1000.0,
+    "parameters": {"M": 95.0, "F_v": 200.0, "F_c": 20.0},
+    "sensors": {"x_resolution_m": 5e-8},
+    "drive": {"newton_per_volt": 35.0, "limit_volt": 10.0},
+    "delay_samples": 0.0,
+    "controller": {"kind": "cascade_p_v", "kp": 160.0, "kv": 243.0},
+    "controller_known": True,
+    "reaches": {"parameter_tolerance": 0.15},
+}
+SPRING = TERMS["load.spring"].settings(term="load.spring", node="carriage", k=800.0)
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory):
+    """A machine with a spring that its owner does not know of."""
+    folder = tmp_path_factory.mktemp("bundle")
+    case, n = read_case(CASE, folder), 4000
+    t, zero = np.arange(n) * 1e-3, np.zeros(n)
+    ref = 0.1 * (1 - np.cos(2 * np.pi * t))
+    empty = Record("axis", case, t, 1e-3, ref, zero, zero[:, None], {"x": zero}, {})
+    out, volts, _ = Simulator(empty).everything(owner_model(case).add(SPRING), CLOSED)
+    columns = {"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": out[:, 0]}
+    pq.write_table(pa.table(columns), folder / "recording.parquet")
+    save_case(folder, CASE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def model(bundle, tmp_path_factory):
+    record = load_record(bundle)
+    return write_model(owner_model(record.case).add(SPRING), record, tmp_path_factory.mktemp("model") / "model.yaml")
+
+
+def test_the_model_that_has_it_all(rtctl, bundle, model):
+    code, out, err = rtctl("simulate", model, bundle, "--json")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    assert found.keys() == {"rmse", "nrmse", "unit", "skipped"}
+    assert found["rmse"].keys() == found["nrmse"].keys() == found["unit"].keys() == {"x", "u"}
+    assert found["unit"] == {"x": "m", "u": "V"}
+    assert found["skipped"] == 0
+    assert max(found["nrmse"].values()) < 1e-6
+
+
+def test_the_owners_belief_lacks_something(rtctl, bundle, model):
+    fitted, believed = (
+        json.loads(rtctl("simulate", name, bundle, "--open-loop", "--json").out)["rmse"] for name in (model, "case")
+    )
+    assert fitted.keys() == {"x"}
+    assert fitted["x"] < 1e-6 < 1e-3 < believed["x"]
+
+
+def test_a_table_for_people(rtctl, bundle, model):
+    code, out, err = rtctl("simulate", model, bundle, "--closed-loop", "--skip", "20")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "closed loop, 3980 rows, the first 20 skipped"
+    assert lines[1].split() == ["rmse", "nrmse"]
+    assert [line.split()[0] for line in lines[2:]] == ["x", "u"]
+    assert lines[2].split()[2] == "m"
+
+
+def test_a_plain_config_is_a_model(rtctl, bundle):
+    code, out, _ = rtctl("simulate", "axis", bundle, "--json", "--skip", "20")
+    assert code == 0
+    assert json.loads(out)["skipped"] == 20
+
+
+def test_a_picture(rtctl, bundle, model, tmp_path):
+    code, _, err = rtctl("simulate", model, bundle, "--plot", tmp_path / "p.png")
+    assert (code, err) == (0, "")
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    code, _, err = rtctl("simulate", model, bundle, "--plot", tmp_path / "no" / "p.png")
+    assert (code, "cannot be written" in err) == (2, True)
+
+
+def test_a_model_that_runs_away(rtctl, bundle, model, tmp_path):
+    data = yaml.safe_load(model.read_text())
+    data["plant"]["physics"] = [{"term": "load.spring", "node": "carriage", "k": -1e6}]
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump(data))
+    code, out, err = rtctl("simulate", tmp_path / "m.yaml", bundle, "--open-loop")
+    assert (code, out) == (3, "")
+    assert "the model ran away at tick" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["nix", "{bundle}"], "no such file"),
+        (["ivu", "{bundle}"], "machine is ivu, and the bundle was recorded on the axis"),
+        (["case", "{bundle}/nix"], "is not a folder"),
+        (["case", "{bundle}", "--skip", "4000"], "--skip 4000: the recording has 4000 rows"),
+        (["case", "{bundle}", "--skip", "-1"], "--skip"),
+        (["case"], "missing argument 'BUNDLE'"),
+    ],
+)
+def test_what_cannot_be_simulated(rtctl, bundle, words, message):
+    code, out, err = rtctl("simulate", *(word.format(bundle=bundle) for word in words))
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.splitlines()) == 1
+
+
+@pytest.fixture
+def changed(bundle, tmp_path):
+    """`changed(**keys)`: the bundle with another case."""
+
+    def make(**keys):
+        (tmp_path / "recording.parquet").write_bytes((bundle / "recording.parquet").read_bytes())
+        save_case(tmp_path, {**CASE, **keys})
+        return tmp_path
+
+    return make
+
+
+def test_a_law_that_is_not_known(rtctl, changed):
+    folder = changed(controller={"kind": "unknown"}, controller_known=False)
+    code, _, err = rtctl("simulate", "case", folder, "--closed-loop")
+    assert code == 2
+    assert "the loop cannot be closed" in err
+    code, out, _ = rtctl("simulate", "case", folder)
+    assert code == 0
+    assert out.startswith("open loop, 4000 rows")
+
+
+def test_a_belief_without_a_mass(rtctl, changed):
+    code, _, err = rtctl("simulate", "case", changed(parameters={}))
+    assert code == 2
+    assert "parameters.M is missing" in err
+
+
+def test_a_real_axis(rtctl):
+    folder = SHARED / "data" / "emps"
+    if not folder.is_dir():
+        pytest.skip("needs the recordings in ../shared")
+    found = json.loads(rtctl("simulate", "axis", folder, "--skip", "20", "--json").out)
+    assert found["skipped"] == 20
+    assert found["rmse"]["x"] < 1e-4
+    assert 0 < found["nrmse"]["u"] < 0.2

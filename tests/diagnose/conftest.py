@@ -1,0 +1,187 @@
+"""What tests of the diagnosis share: recordings of an axis, made by the simulator itself and cut to their resolution."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from rtctl.diagnose.base import base_fit
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.decide import complete, worth
+from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.kernel import CLOSED
+from rtctl.diagnose.model import Model, owner_model
+from rtctl.diagnose.name import Search, search
+from rtctl.diagnose.record import Record, check
+from rtctl.diagnose.simulate import Simulator
+from rtctl.plants.physics import TERMS
+
+SHARED = Path(__file__).parents[3] / "shared"
+STEP = 2e-6  # m, of the encoder
+RATE, SECONDS = 1000.0, 8.0
+CASE: dict[str, Any] = {
+    "format": 1,
+    "plant": "axis",
+    "sample_rate": RATE,
+    "parameters": {"M": 95.0, "F_v": 200.0, "F_c": 20.0},
+    "sensors": {"x_resolution_m": STEP},
+    "drive": {"newton_per_volt": 35.0, "limit_volt": 10.0},
+    "delay_samples": 0.0,
+    "controller": {"kind": "cascade_p_v", "kp": 160.0, "kv": 243.0},
+    "controller_known": True,
+    "reaches": {"parameter_tolerance": 0.15},
+}
+
+IVU_CASE: dict[str, Any] = {
+    "format": 1,
+    "plant": "ivu",
+    "sample_rate": 500.0,
+    "parameters": {"R1": 0.035, "R2": 0.028, "d_tape": 0.0, "tau_F1": 2.4e-3, "tau_F2": 2.6e-3},
+    "sensors": {"capstan_counts_per_rev": 10000, "reel_counts_per_rev": 209},
+    "drive": {"amp_per_volt": [0.2, 0.2], "limit_volt": 10.0, "dac_bits": 12, "bandwidth_hz": 3000.0, "damping": 0.7},
+    "delay_samples": 1.0,
+    "controller": {"kind": "pd", "P": 4.3, "D": 0.7, "derivative_filter_hz": 80.0, "tension_N": 0.08},
+    "reaches": {"parameter_tolerance": 0.15, "radius_tolerance": 0.02},
+}
+LDU_CASE: dict[str, Any] = {
+    "format": 1,
+    "plant": "ldu",
+    "sample_rate": 10e3,
+    "parameters": {"F_c": 5.0, "B_m": 0.5},
+    "sensors": {"encoder_counts_per_rev": 20000, "scale_m_per_count": 0.5e-6},
+    "drive": {"amp_per_volt": [0.1], "limit_volt": 3.0, "dac_bits": 12, "current_limit": 0.3},
+    "delay_samples": 1.0,
+    "controller": {"kind": "unknown"},
+    "reaches": {"parameter_tolerance": 0.15},
+}
+CASES = {"axis": CASE, "ivu": IVU_CASE, "ldu": LDU_CASE}
+SENSORS = {
+    "axis": ("x",),
+    "ivu": ("capstan_counts", "reel1_counts", "reel2_counts"),
+    "ldu": ("encoder_counts", "scale_counts"),
+}
+
+
+def command(n: int) -> np.ndarray:
+    """Reference (n,) m: two slow sines, so that every speed and place is passed both ways, and stops at both ends.
+
+    Without the stops friction that has a direction would be the same as a constant push.
+    """
+    t = np.arange(n) / RATE
+    return np.clip(0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t), 0.01, 0.09) - 0.01
+
+
+class Axis:
+    """A recording of the axis, and the model that it was made with."""
+
+    def __init__(self, record: Record, model: Model, uncut: np.ndarray, sim: Simulator):
+        self.record, self.model, self.uncut, self.sim = record, model, uncut, sim
+
+
+def record_axis(*physics: dict[str, Any], seconds: float = SECONDS, step: float = STEP, **true: float) -> Axis:
+    """What the axis with `physics` in it does; `true` parameters differ from the owner's. `step` 0: it is not cut.
+
+    The law saw the reading before it was cut, so that the recorded command is taken as the input.
+    """
+    case, n = read_case(CASE, "."), round(RATE * seconds)
+    t, ref, zero = np.arange(n) / RATE, command(n), np.zeros(n)
+    empty = Record("axis", case, t, 1 / RATE, ref, zero, zero[:, None], {"x": zero}, {})
+    model = owner_model(case).change(**true).add(*(TERMS[p["term"]].settings(**p) for p in physics))
+    out, volts, _ = Simulator(empty).everything(model, CLOSED)
+    x = np.round(out[:, 0] / step) * step if step else out[:, 0].copy()
+    columns = {"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": x}
+    record = check(columns, case._replace(controller_known=False))
+    return Axis(record, model, out[:, 0], Simulator(record))
+
+
+@pytest.fixture(scope="session")
+def blank() -> Callable[..., Record]:
+    """`blank("ivu", u, y)` is a record of any plant with volts u (n, drives) and its main sensor's readings y (n,)."""
+
+    def make(plant: str, u: np.ndarray, y: np.ndarray | None = None, **changes: Any) -> Record:
+        case = read_case({**CASES[plant], **changes}, ".")
+        n, dt = len(u), 1 / float(case.sample_rate or 1.0)
+        zero = np.zeros(n)
+        readings = {name: zero if y is None else np.array(y, float) for name in SENSORS[plant]}
+        return Record(plant, case, np.arange(n) * dt, dt, zero, zero, u.reshape(n, -1), readings, {})
+
+    return make
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread():
+    """Small matrices: threads of the linear algebra would only stand in each other's way."""
+    with threadpool_limits(1):
+        yield
+
+
+@pytest.fixture(scope="session")
+def make_axis() -> Callable[..., Axis]:
+    """`make_axis({"term": ...}, M=100.0)` is a recording with these terms and parameters, made once."""
+
+    @lru_cache
+    def made(physics: tuple, options: tuple) -> Axis:
+        return record_axis(*(dict(p) for p in physics), **dict(options))
+
+    def make(*physics: dict[str, Any], **options: float) -> Axis:
+        return made(tuple(tuple(p.items()) for p in physics), tuple(sorted(options.items())))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def plain(make_axis: Callable[..., Axis]) -> Axis:
+    """An axis with nothing in it beyond the owner's equations, whose numbers the owner has wrong."""
+    return make_axis(M=100.0, F_v=180.0, F_c=22.0)
+
+
+ASYMMETRY = {"term": "friction.asymmetry", "node": "carriage", "a": 0.25}
+RIVALS = (
+    "friction.asymmetry", "friction.coulomb", "friction.viscous", "friction.stribeck", "friction.load", "load.spring",
+    "drive.offset", "drive.deadband", "drive.gain_asymmetry", "timing.delay",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def tilted(make_axis: Callable[..., Axis]) -> Axis:
+    """An axis whose dry friction is larger one way than the other."""
+    return make_axis(ASYMMETRY, M=100.0, F_v=190.0)
+
+
+@pytest.fixture(scope="session")
+def searched() -> Callable[[Axis], tuple[Problem, Fit, Search]]:
+    """`searched(axis)` is problem, base fit and search with a dozen hypotheses, done once for each axis."""
+    done: dict[int, tuple[Problem, Fit, Search]] = {}
+
+    def make(made: Axis) -> tuple[Problem, Fit, Search]:
+        if id(made) not in done:
+            problem = Problem(made.sim)
+            base = base_fit(made.sim, problem)
+            asked = hypotheses(made.record, base.model.base, only=RIVALS)
+            done[id(made)] = problem, base, search(problem, base, asked, lambda f: complete(problem, f), worth)
+        return done[id(made)]
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def practice() -> Path:
+    """Folder of the practice bundles, which lies beside the project where it is there at all."""
+    folder = SHARED / "blind" / "practice"
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not here")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """Folder of recordings of real machines, beside the project."""
+    folder = SHARED / "data"
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is not here")
+    return folder

@@ -1,0 +1,258 @@
+import copy
+import json
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.config.errors import UserError
+from rtctl.diagnose.case import (
+    CascadeLaw,
+    NoLaw,
+    PdLaw,
+    SectionsLaw,
+    UnknownLaw,
+    believed,
+    beyond_format,
+    pd_section,
+    read_case,
+)
+
+SHARED = Path(__file__).parents[2].parent / "shared"
+
+IVU = {
+    "format": 1,
+    "plant": "ivu",
+    "sample_rate": 500.0,
+    "parameters": {"R1": 0.038, "R2": 0.022, "J_m1": 0.0015, "K_m1": 0.06, "K_m2": 0.05, "tau_F1": 0.0024},
+    "sensors": {"capstan_counts_per_rev": 10000, "reel_counts_per_rev": 209},
+    "drive": {"amp_per_volt": [0.2, 0.2], "limit_volt": 10.0, "dac_bits": 12},
+    "delay_samples": 1.0,
+    "controller": {"kind": "pd", "P": 6.2, "D": 1.0, "derivative_filter_hz": 80.0, "tension_N": 0.1},
+    "controller_known": True,
+    "reaches": {"parameter_tolerance": 0.15, "radius_tolerance": 0.02},
+    "notes": "free text",
+}
+LDU = {
+    "format": 1,
+    "plant": "ldu",
+    "sample_rate": 1000.0,
+    "parameters": {"R_c": 0.003, "M": 1.25, "N": 20.0},
+    "sensors": {"encoder_counts_per_rev": 20000, "scale_m_per_count": 5e-7},
+    "drive": {"amp_per_volt": [0.1], "limit_volt": 3.0, "dac_bits": 12},
+    "delay_samples": 1.0,
+    "controller": {"kind": "lead_lag", "sections": [[2000.0, -1900.0, 0.0, -0.5, 0.0], [0.5, 0.25, 0.0, -0.2, 0.1]]},
+    "controller_known": True,
+}
+AXIS = {
+    "format": 1,
+    "plant": "axis",
+    "sample_rate": 1000.0,
+    "parameters": {"M": 95.0},
+    "drive": {"newton_per_volt": 35.0, "limit_volt": 10.0},
+    "sensors": {"x_resolution_m": 5e-8},
+    "delay_samples": 0.0,
+    "controller": {"kind": "cascade_p_v", "kp": 160.0, "kv": 243.0},
+    "controller_known": True,
+    "reaches": {"parameter_tolerance": 0.15},
+}
+CASES = {"ivu": IVU, "ldu": LDU, "axis": AXIS}
+
+
+@pytest.fixture
+def case_of():
+    """`case_of("ivu", **keys)`: a case as json has it; `parameters__R1=1` goes one level down."""
+
+    def make(kind, **changes):
+        case = copy.deepcopy(CASES[kind])
+        for key, value in changes.items():
+            *path, last = key.split("__")
+            place = case
+            for part in path:
+                place = place.setdefault(part, {})
+            place[last] = value
+        return case
+
+    return make
+
+
+@pytest.fixture
+def shared():
+    """`shared("data/emps")`: a recording from outside the project; skips where it is missing."""
+
+    def find(name):
+        folder = SHARED / name
+        if not (folder / "case.json").is_file():
+            pytest.skip(f"{folder} is missing")
+        return folder
+
+    return find
+
+
+def refused(case):
+    with pytest.raises(UserError) as error:
+        read_case(case, "bundle")
+    return str(error.value)
+
+
+def test_reads_what_the_owner_believes(case_of):
+    case = read_case(case_of("ivu"), "bundle")
+    assert case.sample_rate == 500.0
+    assert case.parameters["R1"] == 0.038
+    assert case.drive.amp_per_volt == (0.2, 0.2)
+    assert case.drive.step_volt == pytest.approx(20 / 4096)
+    assert isinstance(case.controller, PdLaw)
+    assert case.controller_known
+    assert (case.tolerance("J_m1"), case.tolerance("R1"), case.tolerance("R_c")) == (0.15, 0.02, 0.0)
+
+
+def test_takes_each_kind_of_controller(case_of):
+    assert isinstance(read_case(case_of("ldu"), "b").controller, SectionsLaw)
+    assert isinstance(read_case(case_of("axis"), "b").controller, CascadeLaw)
+    assert isinstance(read_case(case_of("axis", controller={"kind": "none"}), "b").controller, NoLaw)
+    pd = read_case(case_of("ldu", controller={"kind": "pd", "P": 2.0, "D": 0.1, "derivative_filter_hz": 50}), "b")
+    assert isinstance(pd.controller, SectionsLaw)
+
+
+def test_a_pd_as_a_section_has_its_gain_at_rest_and_its_slope():
+    b0, b1, b2, a1, a2 = pd_section(2360.5, 154.4335, 200.0, 1e-4)
+    assert (b0 + b1 + b2) / (1 + a1 + a2) == pytest.approx(2360.5)
+    assert b0 == pytest.approx(2360.5 + 154.4335 * (1 - math.exp(-2 * math.pi * 200 * 1e-4)) / 1e-4)
+
+
+def test_an_unknown_controller_is_a_warning_and_its_command_the_input(case_of):
+    case = read_case(case_of("ldu", controller={"kind": "sliding_mode"}), "bundle")
+    assert isinstance(case.controller, UnknownLaw)
+    assert not case.controller_known
+    assert any("sliding_mode" in w for w in case.warnings)
+
+
+def test_unknown_keys_are_warned_of_with_the_nearest_name(case_of):
+    strange = case_of("ivu", parameters__tau_FC=1.0, drive__limit_volts=5.0, sensors__colour="red", delay_sample=2.0)
+    warnings = " ".join(read_case(strange, "bundle").warnings)
+    for said in (
+        "parameters.tau_FC",
+        "'tau_Fc'",
+        "drive.limit_volts",
+        "'limit_volt'",
+        "sensors.colour",
+        "'delay_samples'",
+    ):
+        assert said in warnings
+
+
+def test_the_daemons_own_keys_are_no_surprise(case_of):
+    case = case_of("axis", config={}, seed=1, versions={}, run={}, changes=[], rows=5, losses={}, complete=True)
+    assert read_case(case, "bundle").warnings == ()
+
+
+def test_says_what_the_law_of_a_config_has_beyond_the_format(case_of):
+    law = {"friction": {"motor1": {"tau_C": 1}}, "gain_schedule": {"mode": "on"}, "limit": {"slew": 3.0}}
+    beyond = " ".join(read_case(case_of("ivu", config={"machine": "ivu", "law": law}), "bundle").beyond)
+    assert "friction" in beyond
+    assert "gain schedule" in beyond
+    assert "slew" in beyond
+    assert "inertia" in beyond
+    assert "inertia" not in " ".join(beyond_format({"machine": "ivu", "law": {"inertia": {"share": 0}}}))
+    law = {"position": {"kind": "pi_velocity"}}
+    own = case_of("axis", controller={"kind": "pi_velocity"}, config={"machine": "axis", "law": law})
+    assert "filtered speed" in " ".join(read_case(own, "bundle").warnings)
+
+
+def test_a_rotary_axis_has_an_inertia_for_a_mass(case_of):
+    drive = {"newton_metre_per_ampere": 0.0083, "unit": "A"}
+    case = read_case(case_of("axis", parameters={"J": 2.5e-4}, drive=drive, sample_rate=None), "bundle")
+    assert case.sample_rate is None
+    assert believed(case) == {"M": 2.5e-4, "K": 0.0083, "F_v": 0.0, "F_c": 0.0, "k": 0.0}
+
+
+def test_absent_terms_are_zero_and_absent_parameters_the_models_own(case_of):
+    case = read_case(case_of("ivu"), "bundle")
+    full = believed(case)
+    assert full["tau_F1"] == 0.0024
+    assert (full["tau_F2"], full["tau_Fc"], full["d_tape"]) == (0.0, 0.0, 0.0)
+    assert full["c1"] == 450.0
+    assert full["J_1"] > full["J_10"]
+    assert "c1" in case.warnings[-1]
+    assert "tau_F2" not in case.warnings[-1]
+    assert believed(read_case(case_of("ldu"), "bundle"))["F_c"] == 0.0
+
+
+def test_tolerance_null_means_anything(case_of):
+    case = read_case(case_of("axis", parameters={}, reaches={"parameter_tolerance": None}), "bundle")
+    assert case.tolerance("M") == math.inf
+    assert "M" not in believed(case)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"plant": "ivo"}, ("plant is 'ivo'", "is it 'ivu'")),
+        ({"plant": None}, ("plant is None", "ivu, ldu or axis")),
+        ({"sample_rate": 0}, ("sample_rate is 0", "above 0 Hz")),
+        ({"sample_rate": "fast"}, ("sample_rate is 'fast'", "number")),
+        ({"delay_samples": -1}, ("delay_samples is -1", "between 0 and 100")),
+        ({"parameters__J_m1": -0.0015}, ("parameters: J_m1", "more than 0")),
+        ({"parameters__tau_F1": -1e-3}, ("parameters: tau_F1", "at least 0")),
+        ({"parameters__R1": math.nan}, ("parameters.R1 is nan", "finite")),
+        ({"parameters__R1": 10**400}, ("parameters.R1", "finite")),
+        ({"parameters__R1": "3 cm"}, ("parameters.R1 is '3 cm'", "SI")),
+        ({"parameters__R1": True}, ("parameters.R1 is True", "SI")),
+        ({"parameters": [1]}, ("parameters is a list",)),
+        ({"drive__amp_per_volt": [0.2]}, ("drive.amp_per_volt has 1", "2")),
+        ({"drive__amp_per_volt": [0.2, -0.2]}, ("drive.amp_per_volt", "above 0")),
+        ({"drive__limit_volt": -3}, ("drive: limit_volt", "more than 0")),
+        ({"drive__dac_bits": "twelve"}, ("drive: dac_bits",)),
+        ({"sensors__capstan_counts_per_rev": 0}, ("sensors: capstan_counts_per_rev", "more than 0")),
+        ({"controller__P": None}, ("controller: P",)),
+        ({"controller__allocation": "both"}, ("controller: allocation", "differential")),
+        ({"controller": "pd"}, ("controller is a str",)),
+        ({"controller_known": "yes"}, ("controller_known is 'yes'", "true or false")),
+        ({"reaches__parameter_tolerance": -0.1}, ("reaches: parameter_tolerance",)),
+        ({"reaches__parameter_tolerance": math.inf}, ("reaches.parameter_tolerance", "finite")),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_key(case_of, change, said):
+    message = refused(case_of("ivu", **change))
+    assert message.startswith("bundle/case.json")
+    assert "\n" not in message
+    for part in said:
+        assert part in message
+
+
+def test_one_parameter_has_one_value(case_of):
+    assert "one and the same" in refused(case_of("axis", parameters={"J": 1.0, "M": 2.0}))
+    assert "N is -20" in refused(case_of("ldu", parameters__N=-20.0))
+
+
+anything = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    st.sampled_from(["ivu", "ldu", "axis"]),
+    st.dictionaries(
+        st.sampled_from(["sample_rate", "parameters", "sensors", "drive", "controller", "reaches", "notes", "x"]),
+        anything,
+    ),
+)
+def test_no_case_ends_in_anything_but_a_case_or_a_sentence(plant, keys):
+    try:
+        read_case({"plant": plant, **keys}, "bundle")
+    except UserError as error:
+        assert str(error).startswith("bundle/case.json")
+
+
+@pytest.mark.parametrize("name", [f"case-{k:04d}" for k in range(1, 25)])
+def test_practice_cases_are_read_without_a_warning(shared, name):
+    folder = shared(f"blind/practice/{name}")
+    case = read_case(json.loads((folder / "case.json").read_text()), folder)
+    assert case.warnings == ()
+    assert case.controller_known
+    assert set(case.parameters) <= set(believed(case))

@@ -1,0 +1,118 @@
+"""The whole diagnosis on small recordings of an axis, made by the simulator itself and cut into counts."""
+
+import numpy as np
+import pytest
+
+from rtctl.config.errors import NoAnswer
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.chain import diagnose_record
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
+from rtctl.diagnose.kernel import CLOSED
+from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.record import Record, check, running, through_amplifier
+from rtctl.diagnose.simulate import Simulator
+from rtctl.plants.physics import TERMS
+
+STEP = 1e-6  # m, of the encoder
+CASE = {
+    "format": 1,
+    "plant": "axis",
+    "sample_rate": 1000.0,
+    "parameters": {"M": 95.0, "F_v": 200.0, "F_c": 20.0},
+    "sensors": {"x_resolution_m": STEP},
+    "drive": {"newton_per_volt": 35.0, "limit_volt": 10.0},
+    "delay_samples": 0.0,
+    "controller": {"kind": "cascade_p_v", "kp": 160.0, "kv": 243.0},
+    "controller_known": True,
+    "reaches": {"parameter_tolerance": 0.15},
+}
+SPRING = {"term": "load.spring", "node": "carriage", "k": 600.0}
+
+
+def recording(*physics, seconds=10.0, true=None) -> Record:
+    """What the axis with `physics` in it does on a sum of two slow sines; `true` parameters differ from the owner's."""
+    case, n = read_case(CASE, "."), round(1000 * seconds)
+    t, zero = np.arange(n) * 1e-3, np.zeros(n)
+    ref = 0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t)
+    empty = Record("axis", case, t, 1e-3, ref, zero, zero[:, None], {"x": zero}, {})
+    model = owner_model(case).change(**(true or {}))
+    model = model.add(*(TERMS[entry["term"]].settings(**entry) for entry in physics))
+    out, volts, _ = Simulator(empty).everything(model, CLOSED)
+    x = np.round(out[:, 0] / STEP) * STEP
+    # the law saw the reading before it was cut: the recorded command is the input
+    case = case._replace(controller_known=False)
+    return check({"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": x}, case)
+
+
+@pytest.fixture(scope="module")
+def spring():
+    said = []
+    return diagnose_record(recording(SPRING), progress=said.append), said
+
+
+def test_what_is_missing_is_named_where_it_is_and_as_large_as_it_is(spring):
+    d, _ = spring
+    assert d.verdict in (NAMED, AMBIGUOUS)
+    effect = next(e for e in d.effects if e.name == "load.spring")
+    assert effect.node == "carriage"
+    assert effect.parameters["k"].value == pytest.approx(600.0, rel=0.05)
+    assert effect.parameters["k"].low <= effect.parameters["k"].value <= effect.parameters["k"].high
+
+
+def test_the_new_model_predicts_what_it_was_not_fitted_on(spring):
+    d, _ = spring
+    assert d.heldout_after < 0.2 * d.heldout_before
+    assert d.fit_rows[1] < len(d.record.t)
+    assert any(term.term == "load.spring" for term in d.after.terms)
+    assert d.before.terms == ()
+
+
+def test_its_stages_are_told_in_order(spring):
+    _, said = spring
+    assert said[0] == "preflight"
+    assert said.index("fitting the owner's parameters") == 1
+    assert any(text.startswith("screening ") for text in said)
+    assert said[-1].startswith("predicting ")
+
+
+def test_its_form_on_disk(spring):
+    made = as_json(spring[0])
+    assert made["verdict"] in ("named", "ambiguous")
+    assert {"name", "node", "confidence", "parameters", "look_alikes"} <= made["effects"][0].keys()
+    assert 0.0 < made["effects"][0]["confidence"] < 1.0
+    assert made["fit"].keys() == {"heldout_nrmse_before", "heldout_nrmse_after", "noise_floor"}
+    assert all(name.count(":") == 1 for name in made["cannot_test"])
+
+
+def test_wrong_values_are_not_missing_physics():
+    d = diagnose_record(recording(true={"M": 88.0, "F_v": 215.0}))
+    assert d.verdict == NOTHING
+    assert d.effects == ()
+    assert d.after == d.before
+    assert d.parameters["M"].value == pytest.approx(88.0, rel=0.02)
+    assert d.hides  # how large each effect could be and still hide
+
+
+def test_a_second_recording_is_predicted_whole(spring):
+    other = recording(SPRING, seconds=4.0)
+    d = diagnose_record(recording(SPRING, seconds=5.0), other)
+    assert d.heldout_after < d.heldout_before
+
+
+def test_no_verdict_from_too_little():
+    with pytest.raises(NoAnswer, match="supports no verdict"):
+        recording(SPRING, seconds=0.4)
+
+
+@pytest.mark.parametrize(
+    "state, rows",
+    [([0, 1, 2, 2, 3], (2, 4)), ([2, 2], (0, 2)), ([2, 0, 2, 2, 0], (2, 4)), ([0, 1, 1], (0, 0)), ([], (0, 0))],
+)
+def test_rows_in_which_our_own_loop_ran(state, rows):
+    found = running(np.array(state))
+    assert (found.start, found.stop) == rows
+
+
+def test_the_measured_amplifier_in_volts():
+    u = np.array([-2.8, -0.0, 0.0, 0.5, 0.8, 2.8])
+    assert 0.1 * through_amplifier(u) == pytest.approx([-0.242, -0.042, 0.042, 0.042, 0.042, 0.242])  # A, (12.3)

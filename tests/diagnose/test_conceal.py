@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from rtctl import machines
+from rtctl.config.load import load_settings, set_path
+from rtctl.config.yaml_file import find
+from rtctl.diagnose.conceal import FEEDBACK, OWN, TYPICAL, WORDS, conceal, nodes, sized
+from rtctl.diagnose.ordinary import measure
+from rtctl.plants.physics import TERMS
+
+KINDS = ("ivu", "ldu", "axis")
+SEEDS = range(200)
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def config(request):
+    return load_settings(find(request.param), machines.CONFIGS[request.param])
+
+
+def test_the_same_seed_hides_the_same(config):
+    assert [conceal(config, seed)[1] for seed in range(20)] == [conceal(config, seed)[1] for seed in range(20)]
+
+
+def test_what_is_drawn_is_valid_for_every_seed(config):
+    drawn = set()
+    for seed in SEEDS:
+        hidden, entry = conceal(config, seed)
+        TERMS[entry["term"]].settings.model_validate(entry)
+        assert entry["node"] in TERMS[entry["term"]].nodes[config.machine]
+        assert len(hidden.plant.physics) == len(config.plant.physics) + 1
+        assert hidden.plant.physics[-1].term == entry["term"]
+        assert hidden.model_copy(update={"plant": config.plant}) == config
+        drawn.add(entry["term"])
+    assert len(drawn) > 20
+
+
+def test_every_effect_can_be_hidden_at_every_node_that_it_has(config):
+    """No draw is thrown away for its bounds, whatever the luck."""
+    rng = np.random.default_rng(1)
+    for name in TERMS:
+        for node in nodes(name, config):
+            for _ in range(5):
+                entry = sized(name, node, config, rng)
+                machines.build(set_path(config, f"plant.physics.{len(config.plant.physics)}", entry))
+
+
+def test_a_loop_keeps_the_sign_of_its_sensor(config):
+    assert not set(nodes("sensor.rectified", config)) & set(FEEDBACK[config.machine])
+
+
+def test_what_the_machine_believes_already_stays(config):
+    node = {"ivu": "drive1"}.get(config.machine, "drive")
+    known = set_path(config, "plant.physics", [{"term": "drive.offset", "node": node, "offset": 0.1}])
+    hidden, _ = conceal(known, 3)
+    assert hidden.plant.physics[0] == known.plant.physics[0]
+    assert len(hidden.plant.physics) == 2
+
+
+def test_sizes_follow_the_machine():
+    light = load_settings(find("axis"), machines.CONFIGS["axis"], ["plant.parameters.F_c=2", "plant.parameters.M=9"])
+    heavy = load_settings(find("axis"), machines.CONFIGS["axis"], ["plant.parameters.F_c=20", "plant.parameters.M=90"])
+    sizes = [
+        sized("friction.coulomb", "carriage", config, np.random.default_rng(5))["F_C"] for config in (light, heavy)
+    ]
+    assert sizes[1] == pytest.approx(10 * sizes[0], rel=1e-2)
+
+
+def test_the_tables_speak_of_what_there_is(config):
+    for name, ranges in OWN.items():
+        assert set(ranges) <= set(TERMS[name].settings.model_fields)
+        for span in ranges.values():
+            assert 0 <= span.low <= span.high
+            if name in TERMS and TERMS[name].nodes.get(config.machine):
+                assert measure(span.measure, TERMS[name].nodes[config.machine][0], config) > 0
+    for term in TERMS.values():
+        assert all(term.scale.get(key, "") in TYPICAL for key in term.typical if key not in OWN.get(term.name, {}))
+    for name, words in WORDS.items():
+        assert set(words) <= set(TERMS[name].settings.model_fields)

@@ -1,0 +1,126 @@
+"""The judge's numbers, on fits made by hand and on errors of known distribution."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import kstest
+
+from rtctl.diagnose.decide import complete, explained, p_value, probabilities, worth
+from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
+
+
+class Floor:
+    """As much of a Problem as the judge looks at."""
+
+    def __init__(self, floor):
+        self.floor = floor
+
+
+def made(r, terms=0, x=None):
+    one = Hypothesis("friction.viscous", "carriage", (Coordinate("B", SIZE, 1.0),))
+    space = Space(Model("axis", {"M": 1.0}), (), lambda name: 0.1, (one,) * terms)
+    r = np.asarray(r, float)
+    x = np.zeros(terms) if x is None else x
+    return Fit(space, x, r, np.zeros((len(r), len(x))), 0.5 * float(r @ r))
+
+
+rms = st.floats(0.1, 100.0)
+
+
+@settings(deadline=None)
+@given(rms, rms, rms)
+def test_what_is_explained_is_a_share(before, after, floor):
+    share = explained(Floor(floor), made(np.full(50, before)), made(np.full(50, after)))  # type: ignore[arg-type]
+    assert 0.0 <= share <= 1.0
+    if after >= before:
+        assert share == 0.0
+
+
+@settings(deadline=None)
+@given(st.floats(1.5, 100.0))
+def test_down_to_the_floor_all_is_explained_and_with_nothing_gained_nothing(before):
+    full, half = made(np.full(50, before)), made(np.full(50, np.sqrt(0.5 * (before**2 + 1.0))))
+    assert explained(Floor(1.0), full, made(np.ones(50))) == pytest.approx(1.0)  # type: ignore[arg-type]
+    assert explained(Floor(1.0), full, made(np.full(50, 0.7))) == pytest.approx(1.0)  # type: ignore[arg-type]
+    assert explained(Floor(1.0), full, half) == pytest.approx(0.5, abs=1e-9)  # type: ignore[arg-type]
+    assert explained(Floor(1.0), full, full) == 0.0  # type: ignore[arg-type]
+
+
+def test_a_term_is_worth_it_where_it_takes_a_material_share_off():
+    before = made(np.full(1000, 2.0))
+    assert worth(before, made(np.full(1000, 1.0), 1))
+    assert not worth(before, made(np.full(1000, 1.99), 1))
+    assert not worth(before, before)
+    assert not worth(before, made(np.full(1000, 3.0), 1))
+
+
+def test_what_many_terms_gain_is_less_worth_than_what_one_does():
+    before, r = made(np.full(1000, 2.0)), np.full(1000, 1.9)
+    assert worth(before, made(r, 1))
+    assert not worth(before, made(r, 9))
+
+
+def test_a_fit_is_complete_near_the_floor():
+    assert complete(Floor(1.0), made(np.full(10, 0.5)))  # type: ignore[arg-type]
+    assert complete(Floor(1.0), made(np.full(10, 1.0)))  # type: ignore[arg-type]
+    assert not complete(Floor(1.0), made(np.full(10, 1.5)))  # type: ignore[arg-type]
+
+
+def smooth(rng, n, memory):
+    """Errors (n,) of variance one that go together for `memory` rows."""
+    white = rng.standard_normal(n + 8 * memory)
+    kernel = np.exp(-np.arange(8 * memory) / memory)
+    return np.convolve(white, kernel / np.linalg.norm(kernel), "valid")[:n]
+
+
+@pytest.mark.parametrize("memory", [1, 10])
+def test_between_equals_every_p_value_is_as_likely_as_any_other(memory):
+    """Two models whose errors are alike and independent; blocks are longer than the errors go together."""
+    rng = np.random.default_rng(5)
+    p = [p_value(made(smooth(rng, 4000, memory)), made(smooth(rng, 4000, memory)), 100) for _ in range(300)]
+    assert kstest(p, "uniform").pvalue > 0.01
+
+
+def test_errors_that_go_together_would_deceive_a_test_of_single_rows():
+    rng = np.random.default_rng(5)
+    p = np.array([p_value(made(smooth(rng, 4000, 20)), made(smooth(rng, 4000, 20)), 1) for _ in range(200)])
+    assert np.mean(p < 0.05) > 0.1  # which is why there are blocks
+
+
+def test_a_rival_that_is_worse_has_a_small_p_value_and_one_that_is_better_a_large_one():
+    rng = np.random.default_rng(1)
+    best = rng.standard_normal(4000)
+    assert p_value(made(best), made(1.1 * best), 100) < 1e-6
+    assert p_value(made(1.1 * best), made(best), 100) > 1 - 1e-6
+    assert p_value(made(best), made(best), 100) == pytest.approx(0.5)
+
+
+def test_p_values_of_the_two_directions_add_up_to_one():
+    rng = np.random.default_rng(2)
+    one, two = made(rng.standard_normal(2000)), made(1.02 * rng.standard_normal(2000))
+    assert p_value(one, two, 50) + p_value(two, one, 50) == pytest.approx(1.0)
+
+
+def test_a_record_of_a_few_blocks_proves_nothing():
+    assert p_value(made(np.ones(300)), made(np.full(300, 9.0)), 100) == 1.0
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(rms, st.integers(0, 5)), min_size=1, max_size=6))
+def test_probabilities_add_up_to_one_and_go_by_cost(told):
+    fits = [made(np.full(20, r), terms) for r, terms in told]
+    p = probabilities(fits)
+    assert p.sum() == pytest.approx(1.0)
+    assert (p >= 0.0).all()
+    penalised = [f.cost + 2.0 * len(f.x) for f in fits]
+    assert p[int(np.argmin(penalised))] == p.max()
+
+
+def test_equals_share_and_the_one_with_more_numbers_is_less_likely():
+    same = probabilities([made(np.ones(20), 1), made(np.ones(20), 1)])
+    np.testing.assert_allclose(same, [0.5, 0.5])
+    fewer = probabilities([made(np.ones(20), 1), made(np.ones(20), 4)])
+    assert fewer[0] > fewer[1]

@@ -1,0 +1,213 @@
+"""Diagnoses on disk, and many of them side by side."""
+
+import json
+import os
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtctl.config.errors import UserError
+from rtctl.diagnose import diagnosis, export, folder, report
+from rtctl.diagnose.folder import BAD, OURS, RESULT, Outcome, Task, diagnose_all, done, finite, one, tasks
+from rtctl.trace.bundle import CASE, PARQUET
+
+WORK = '''
+import os
+import time
+from rtctl.diagnose.folder import Outcome
+
+def work(task, report):
+    """Does as the bundle's name says."""
+    if task.name == "stuck":
+        time.sleep(600)
+    if task.name == "dies":
+        os._exit(7)
+    from rtctl.diagnose import fit
+    alone = os.environ.get("OPENBLAS_NUM_THREADS")
+    return Outcome(task.name, 0, 0.1, {"threads": fit.THREADS, "blas": alone, "report": report, "pid": os.getpid()})
+'''
+
+
+@pytest.fixture
+def work(tmp_path, monkeypatch):
+    """Something quick to do in other processes, which find it by its name."""
+    (tmp_path / "quick_work.py").write_text(WORK)
+    monkeypatch.syspath_prepend(tmp_path)
+    import quick_work
+
+    return quick_work.work
+
+
+def named(*names):
+    return [Task(name, Path(name), Path(name)) for name in names]
+
+
+def bundle(path, rows=10):
+    path.mkdir(parents=True)
+    pq.write_table(pa.table({"t": np.arange(rows) * 1e-3}), path / PARQUET)
+    (path / CASE).write_text(json.dumps({"plant": "axis"}))
+    return path
+
+
+def test_what_dies_does_not_stop_the_others(work):
+    names = ("a", "dies", "b", "c")
+    outcomes = {o.name: o for o in diagnose_all(named(*names), jobs=2, work=work)}
+    assert outcomes.keys() == set(names)
+    assert [outcomes[name].code for name in names] == [0, OURS, 0, 0]
+    assert "exit code 7" in outcomes["dies"].message
+    assert outcomes["a"].diagnosis["threads"] == 1
+    assert outcomes["a"].diagnosis["blas"] == "1"
+
+
+def test_what_gets_stuck_is_ended_and_the_next_begins(work):
+    outcomes = list(diagnose_all(named("stuck", "stuck"), limit=0.2, work=work))
+    assert [o.code for o in outcomes] == [OURS, OURS]
+    assert "not done within --limit 0.2 s" in outcomes[1].message
+
+
+def test_one_process_has_the_cores_to_itself(work, monkeypatch):
+    from rtctl.diagnose import fit
+
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    outcomes = list(diagnose_all(named("a", "b"), jobs=1, report=False, work=work))
+    assert {o.diagnosis["threads"] for o in outcomes} == {fit.THREADS}
+    assert not outcomes[0].diagnosis["report"]
+    assert len({o.diagnosis["pid"] for o in outcomes}) == 1
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
+
+
+def test_leaving_early_ends_the_processes(work):
+    running = diagnose_all(named("a", "stuck"), jobs=2, work=work)
+    pid = next(running).diagnosis["pid"]
+    running.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def test_nothing_to_do():
+    assert list(diagnose_all([])) == []
+
+
+def test_bundles_are_found_by_name(tmp_path):
+    for name in ("b", "a", "a-heldout", "lonely-heldout"):
+        bundle(tmp_path / name)
+    (tmp_path / "notes").mkdir()
+    found = tasks(tmp_path)
+    assert [t.name for t in found] == ["a", "b", "lonely-heldout"]
+    assert found[0].out == tmp_path / "a" / "diagnosis"
+    assert [t.other for t in found] == [tmp_path / "a-heldout", None, None]
+
+
+def test_results_and_second_recordings_elsewhere(tmp_path):
+    bundle(tmp_path / "x" / "a")
+    found = tasks(tmp_path / "x", tmp_path / "out", tmp_path / "later")
+    assert found == [Task("a", tmp_path / "x" / "a", tmp_path / "out" / "a", tmp_path / "later" / "a")]
+
+
+def test_a_bundle_is_no_folder_of_bundles(tmp_path):
+    bundle(tmp_path / "a")
+    bundle(tmp_path / "a" / "inner")
+    assert tasks(tmp_path / "a") == []
+    assert tasks(tmp_path / "nowhere") == []
+
+
+def test_done_as_long_as_nothing_is_newer(tmp_path):
+    task = Task("a", bundle(tmp_path / "a"), tmp_path / "out")
+    assert done(task) is None
+    task.out.mkdir()
+    result = task.out / RESULT
+    result.write_text(json.dumps({"verdict": "nothing", "seconds": 3.5}))
+    os.utime(result, ns=(2**61, 2**61))
+    assert done(task) == Outcome("a", 0, 3.5, {"verdict": "nothing", "seconds": 3.5}, skipped=True)
+    os.utime(task.bundle / PARQUET, ns=(2**61 + 10**9, 2**61 + 10**9))
+    assert done(task) is None
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"seconds": null}'])
+def test_half_a_result_is_none(tmp_path, text):
+    task = Task("a", bundle(tmp_path / "a"), tmp_path)
+    (tmp_path / RESULT).write_text(text)
+    os.utime(tmp_path / RESULT, ns=(2**61, 2**61))
+    assert done(task) is None
+
+
+def test_a_bad_bundle_is_told_in_one_line(tmp_path):
+    outcome = one(Task("a", bundle(tmp_path / "a"), tmp_path / "out"), report=False)
+    assert outcome.code == BAD
+    assert "no column 'u'" in outcome.message and "\n" not in outcome.message
+    assert outcome.as_json()["exit_code"] == BAD
+    assert not (tmp_path / "out").exists()
+
+
+def test_our_own_fault_is_told_as_ours(tmp_path, monkeypatch):
+    from rtctl.diagnose import chain
+
+    def broken(*_):
+        raise ZeroDivisionError("oh")
+
+    monkeypatch.setattr(chain, "diagnose", broken)
+    outcome = one(Task("a", tmp_path, tmp_path), report=False)
+    assert outcome.code == OURS and "internal error: ZeroDivisionError('oh')" in outcome.message
+
+
+@pytest.fixture
+def plain(monkeypatch):
+    """A diagnosis of which only the writing counts."""
+    monkeypatch.setattr(diagnosis, "as_json", lambda d: {"verdict": "nothing", "bad": float("nan"), "n": np.float64(2)})
+    monkeypatch.setattr(export, "write_model", lambda after, record, path, config: path.write_text(f"{config}"))
+    monkeypatch.setattr(report, "html", lambda d: "<p>")
+    return SimpleNamespace(after=None, record=None, experiment=None)
+
+
+def test_all_files_and_nothing_else(tmp_path, plain):
+    assert folder.write(plain, tmp_path / "new", {"machine": "axis"}) == []
+    assert {p.name for p in (tmp_path / "new").iterdir()} == {"diagnosis.json", "model.yaml", "report.html"}
+    assert json.loads((tmp_path / "new" / RESULT).read_text()) == {"verdict": "nothing", "bad": None, "n": 2.0}
+    assert (tmp_path / "new" / "model.yaml").read_text() == "{'machine': 'axis'}"
+
+
+def test_the_verdict_stands_where_model_and_report_cannot_be_made(tmp_path, plain, monkeypatch):
+    (tmp_path / "model.yaml").write_text("old")
+
+    def refuse(*_):
+        raise UserError("M is too large")
+
+    def fail(_):
+        raise KeyError("figure")
+
+    monkeypatch.setattr(export, "write_model", refuse)
+    monkeypatch.setattr(report, "html", fail)
+    faults = folder.write(plain, tmp_path)
+    assert len(faults) == 2 and "M is too large" in faults[0] and "KeyError('figure')" in faults[1]
+    assert {p.name for p in tmp_path.iterdir()} == {RESULT}
+
+
+def test_an_experiment_of_another_time_is_taken_away(tmp_path, plain):
+    (tmp_path / "experiment.yaml").write_text("old")
+    folder.write(plain, tmp_path, report=False)
+    assert not (tmp_path / "experiment.yaml").exists()
+
+
+def test_where_nothing_can_be_written(tmp_path, plain):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="file"):
+        folder.write(plain, tmp_path / "file")
+
+
+def test_whose_config_it_is(tmp_path):
+    path = bundle(tmp_path / "a")
+    assert folder.own_config(path) is None
+    for config, ours in (({"machine": "axis"}, True), ({"machine": "ivu"}, False), ("axis", False)):
+        (path / CASE).write_text(json.dumps({"plant": "axis", "config": config}))
+        assert (folder.own_config(path) is not None) == ours
+
+
+@given(st.recursive(st.floats() | st.integers() | st.none() | st.text(), lambda c: st.lists(c) | st.tuples(c, c)))
+def test_finite_is_json(value):
+    json.dumps(finite({"value": value, "array": np.array([1.0, np.inf])}), allow_nan=False)

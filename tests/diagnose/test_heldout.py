@@ -1,0 +1,74 @@
+"""Prediction: free runs on rows that no fit saw."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.case import NoLaw
+from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.heldout import mode_of, nrmse, refit, whole
+from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
+from rtctl.diagnose.simulate import Simulator
+
+
+def test_the_free_run_closes_the_loop_where_the_law_is_known_and_keeps_to_the_track_where_it_is_not(plain):
+    case = plain.record.case
+    assert mode_of(plain.record) == TRACK
+    assert mode_of(plain.record._replace(case=case._replace(controller_known=True))) == CLOSED
+    driven = case._replace(controller=NoLaw(), controller_known=True)
+    assert mode_of(plain.record._replace(case=driven)) == OPEN
+
+
+def test_the_true_model_predicts_and_a_wrong_one_does_not(plain):
+    closed = Simulator(plain.record._replace(case=plain.record.case._replace(controller_known=True)))
+    rows = slice(6000, None)
+    good, bad = (nrmse(closed, m, rows) for m in (plain.model, plain.model.change(M=130.0, F_c=5.0)))
+    assert good < 1e-4
+    assert bad > 10 * good
+
+
+def test_an_error_is_told_by_the_spread_of_the_whole_recording(make_axis):
+    made = make_axis(step=0.0, M=100.0, F_v=180.0, F_c=22.0)
+    spread = float(np.std(made.sim.seen))
+    off = Simulator(made.record._replace(y={"x": made.record.y["x"] + 0.1 * spread}))
+    off.record = made.record._replace(case=made.record.case._replace(controller=NoLaw(), controller_known=True))
+    assert nrmse(off, made.model, slice(5000, None)) == pytest.approx(0.1, rel=1e-6)
+    assert nrmse(off, made.model, slice(0, 100)) == pytest.approx(0.1, rel=1e-6)
+
+
+def test_a_model_that_runs_away_predicts_nothing(plain):
+    assert nrmse(plain.sim, plain.model.change(k=-1e9), slice(6000, None)) == 1e3
+
+
+def test_a_fit_on_the_first_rows_does_not_see_the_last(tilted, searched):
+    """It comes out the same when the last rows are something else altogether."""
+    problem, base, looked = searched(tilted)
+    found = looked.rounds[0][0]
+    one = refit(tilted.sim, problem, found, 6000)
+    y = tilted.record.y["x"].copy()
+    y[6000:] = y[5999]
+    u = tilted.record.u.copy()
+    u[6000:] = 0.0
+    spoiled = Simulator(tilted.record._replace(y={"x": y}, u=u))
+    spoiled.follow = tilted.sim.follow
+    two = refit(spoiled, problem, found, 6000)
+    np.testing.assert_array_equal(one.x, two.x)
+    assert len(one.r) < len(found.r)
+    assert two.model.terms[0].a == pytest.approx(0.25, rel=0.1)
+
+
+def test_what_was_found_predicts_better_than_the_base(tilted, searched):
+    problem, base, looked = searched(tilted)
+    before, after = (
+        nrmse(tilted.sim, refit(tilted.sim, problem, f, 6000).model, slice(6000, None))
+        for f in (base, looked.rounds[0][0])
+    )
+    assert after < 0.2 * before
+
+
+def test_on_another_recording_nothing_is_fitted(plain, tilted, searched):
+    _, _, looked = searched(tilted)
+    found = looked.rounds[0][0]
+    other = whole(plain.sim, found)
+    np.testing.assert_array_equal(other.x, found.x)
+    assert other.rms > found.rms  # that axis has no such friction
+    np.testing.assert_array_equal(other.r, Problem(plain.sim).residual(found.model))

@@ -1,0 +1,125 @@
+"""What a record suggests by itself, on signals in which it is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.diagnose.hints import MOST, ORDERS, hints, jumps, observe, peaks, spectrum, spots
+
+
+class Told:
+    """As much of a simulator as `jumps` looks at."""
+
+    class record:  # noqa: N801
+        t = np.arange(4000) / 1000.0 + 5.0
+
+
+def turning(n=6000, turns=3.0, seed=0):
+    """An angle (n,) rad that goes to and fro, at uneven speed."""
+    t = np.linspace(0, 1, n)
+    return turns * 2 * np.pi * (0.5 - 0.5 * np.cos(2 * np.pi * 2 * t)) + 0.3 * np.sin(2 * np.pi * 5 * t)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.sampled_from([1.0, 2.0, 4.5, 7.0, 13.0, 28.5]), st.floats(-3.1, 3.1), st.integers(0, 1000))
+def test_an_order_is_found_in_drift_friction_and_noise(order, phase, seed):
+    angle = turning()
+    rng = np.random.default_rng(seed)
+    signal = np.cos(order * angle + phase) + 0.7 * rng.standard_normal(len(angle))
+    signal += 2.0 + 0.1 * angle + 1.5 * np.sign(np.gradient(angle))
+    found = peaks(ORDERS, spectrum(angle, signal, ORDERS), MOST)
+    assert found[0] == pytest.approx(order, abs=0.26 if order < 12 else 0.51)
+
+
+def test_a_share_of_the_variance_is_between_none_and_all():
+    angle = turning()
+    share = spectrum(angle, np.cos(3 * angle), np.array([3.0, 7.0]))
+    assert share[0] == pytest.approx(1.0, abs=1e-6)
+    assert 0.0 <= share[1] < 0.2
+
+
+def test_of_less_than_half_a_period_nothing_is_said():
+    angle = np.linspace(0, 1.0, 500)
+    share = spectrum(angle, np.cos(angle), np.array([0.5, 2.0, 4.0]))
+    assert (share[:2] == 0.0).all()
+    assert share[2] > 0.0
+
+
+def test_a_signal_of_nothing_has_no_peaks():
+    angle = turning()
+    assert peaks(ORDERS, spectrum(angle, np.zeros(len(angle)), ORDERS), MOST) == []
+
+
+def test_peaks_come_highest_first():
+    height = np.array([0, 1, 0, 3, 0, 2, 0, 0.5, 0, 0])
+    assert peaks(np.arange(10.0), height, 3) == [3.0, 5.0, 1.0]
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.floats(0.1, 0.9), st.sampled_from([-1.0, 1.0]))
+def test_a_spot_is_found_beside_a_slope(where, sign):
+    way = 0.05 * (1 - np.cos(np.linspace(0, 12 * np.pi, 8000)))
+    at = 0.1 * where
+    signal = sign * np.exp(-0.5 * ((way - at) / 1.5e-3) ** 2) + 5.0 * way
+    signal += 0.05 * np.random.default_rng(0).standard_normal(len(way))
+    assert spots(way, signal, 4)[0] == pytest.approx(at, abs=2.5e-3)
+    assert len(spots(way, signal, 3)) == 3
+
+
+def test_counts_that_were_lost_for_good_are_found_largest_first():
+    rng = np.random.default_rng(0)
+    error = 0.3 * rng.standard_normal(4000)
+    error[1500:] += 20.0
+    error[3000:] -= 60.0
+    error[2200] += 40.0  # comes back at once
+    assert jumps(Told, error)[:2] == pytest.approx([3.0, 1.5], abs=1.5e-3)  # type: ignore[arg-type]
+    assert not any(abs(t - 2.2) < 0.01 for t in jumps(Told, error))  # type: ignore[arg-type]
+
+
+def test_in_noise_nothing_jumps():
+    error = 0.5 * np.random.default_rng(1).standard_normal(4000)
+    assert jumps(Told, error) == []  # type: ignore[arg-type]
+
+
+def test_what_keeps_the_model_on_track_is_what_it_lacks(make_axis):
+    """A constant of 0.2 V at the drive shows as 0.2 V while the axis moves."""
+    made = make_axis({"term": "drive.offset", "node": "drive", "offset": 0.2}, step=0.0)
+    _, push = observe(made.sim, made.model._replace(terms=()))
+    x = made.uncut
+    moving = np.abs(np.gradient(x, 1e-3)) > 0.05
+    assert np.median(push[500:][moving[500:]]) == pytest.approx(0.2, rel=0.05)
+
+
+def test_a_bump_on_the_way_is_suggested_as_a_spot(make_axis):
+    bump = {"term": "load.bump", "node": "carriage", "F": 60.0, "at": 0.05, "width": 2e-3, "form": "push"}
+    made = make_axis(bump)
+    plain = made.model._replace(terms=())
+    found = hints(made.sim, plain, made.sim.seen - made.sim.run(plain)[:, 0])
+    assert set(found) == {"order", "wavelength", "spot", "jump"}
+    assert min(abs(s - 0.05) for s in found["spot"][:2]) < 4e-3
+    assert all(len(v) <= MOST for v in found.values())
+
+
+def test_a_two_reel_unit_is_asked_about_each_of_its_motors(monkeypatch, plain, blank):
+    """By the ratio of its radii, the second one backwards; places along a carriage are not for it."""
+    from rtctl.diagnose import hints as module
+    from rtctl.diagnose.model import owner_model
+
+    n = 3000
+    angle = 40 * (1 - np.cos(np.linspace(0, 4 * np.pi, n)))
+    record = blank("ivu", np.ones((n, 2)), np.round(angle * 10000 / (2 * np.pi)))
+    base = owner_model(record.case).base
+    push = np.cos(6.0 * angle * base["R_c"] / base["R1"])
+
+    class Sim:
+        channels = ("capstan_counts",)
+        seen = record.y["capstan_counts"]
+        follow = 10.0
+
+    Sim.record = record  # type: ignore[attr-defined]
+    monkeypatch.setattr(module, "observe", lambda sim, model: (None, push))
+    found = hints(Sim, owner_model(record.case), np.zeros(n))  # type: ignore[arg-type]
+    assert set(found) == {"order:motor1", "order:motor2", "jump"}
+    assert found["order:motor1"][0] == pytest.approx(6.0, abs=0.26)
+    assert found["order:motor2"][0] == pytest.approx(6.0 * base["R2"] / base["R1"], abs=0.26)

@@ -1,0 +1,144 @@
+"""The list of what a record can be asked about: complete, within the terms' own bounds, and of a size that shows."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.hypotheses import EXTRAS, SEARCH, Choice, Hint, Turn, hypotheses
+from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.space import PLACE, SHAPE
+from rtctl.plants.physics import TERMS
+
+HINTS = {"order": [2.0, 7.0], "wavelength": [0.01], "spot": [0.005], "jump": [0.3, 0.7]}
+
+
+@pytest.fixture(scope="module")
+def moved(blank):
+    """A record of each plant that moves to and fro, with the model of its owner."""
+
+    def make(kind):
+        rate = {"axis": 1000, "ivu": 500, "ldu": 10000}[kind]
+        t = np.arange(2 * rate) / rate
+        u = np.sin(2 * np.pi * t)
+        counts = {"axis": 0.05, "ivu": 5000.0, "ldu": 20000.0}[kind] * (1 - np.cos(2 * np.pi * t))
+        record = blank(kind, np.stack([u, 0.5 - u], axis=1) if kind == "ivu" else u, counts)
+        return record, owner_model(record.case).base
+
+    return make
+
+
+def names(parts):
+    out = []
+    for part in parts:
+        out += [part.amplitude, part.phase] if isinstance(part, Turn) else [part.name]
+    return out
+
+
+@pytest.mark.parametrize("term", SEARCH)
+def test_the_search_walks_along_settings_that_the_term_has(term):
+    fields = TERMS[term].settings.model_fields
+    for name in names((*SEARCH[term], *EXTRAS.get(term, ()))):
+        assert name in fields, f"{term} has no {name}"
+    given = set(names(SEARCH[term]))
+    needed = {name for name, info in fields.items() if info.is_required() and name != "node"}
+    assert needed <= given
+
+
+def test_extras_belong_to_a_form_that_is_searched_for():
+    assert set(EXTRAS) <= set(SEARCH)
+
+
+@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
+def test_every_one_stands_where_its_term_can_and_all_are_there(moved, kind):
+    record, base = moved(kind)
+    found = hypotheses(record, base, HINTS)
+    for h in found:
+        assert h.node in TERMS[h.term].nodes[kind]
+    wanted = {name for name in SEARCH if TERMS[name].nodes.get(kind)}
+    if kind == "axis":  # this one slides, and it has one sensor, which would have to disagree with itself
+        wanted -= {"load.imbalance", "ripple.cogging", "ripple.encoder"}
+        wanted -= {"sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt"}
+    assert wanted == {h.term for h in found}
+
+
+@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
+def test_values_are_finite_and_at_a_typical_size_within_the_settings_own_bounds(moved, kind):
+    record, base = moved(kind)
+    for h in hypotheses(record, base, HINTS):
+        x = h.start()
+        x[h.sizes] = 0.5
+        for value in h.values(x).values():
+            assert np.isfinite(value)
+        for c in h.coordinates:
+            assert np.isfinite(c.scale)
+            assert c.scale > 0.0
+            assert c.low < c.high
+            assert c.start <= c.high
+            if c.name != "z_s":  # less of it than the sensor can show is none: it starts below its bound
+                assert c.low <= c.start
+        made = h.settings(x)
+        again = TERMS[h.term].settings(**made.model_dump())  # checked as what a person writes
+        assert again == made
+        TERMS[h.term].build(made, 1e-4)
+
+
+@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
+def test_none_is_the_same_as_another(moved, kind):
+    record, base = moved(kind)
+    seen = [(h.name, h.coordinates, tuple(sorted(h.fixed.items()))) for h in hypotheses(record, base, HINTS)]
+    assert len(seen) == len(set(seen))
+
+
+def test_only_some_may_be_asked_about(moved):
+    record, base = moved("axis")
+    some = hypotheses(record, base, only=("friction.coulomb", "friction.stribeck"))
+    assert [h.name for h in some] == ["friction.coulomb:carriage"] + ["friction.stribeck:carriage"] * 3
+
+
+def test_starts_of_a_shape_are_shares_of_what_the_node_does(moved):
+    record, base = moved("axis")
+    speeds = [h.coordinates[1].scale for h in hypotheses(record, base, only=("friction.stribeck",))]
+    rms = 0.05 * 2 * np.pi / np.sqrt(2)
+    np.testing.assert_allclose(speeds, [0.05 * rms, 0.2 * rms, 0.7 * rms], rtol=0.05)
+    size = hypotheses(record, base, only=("friction.stribeck",))[0].coordinates[0]
+    assert size.offset == 20.0
+
+
+def test_without_hints_nothing_that_needs_one_is_asked(moved):
+    record, base = moved("axis")
+    asked = {h.term for h in hypotheses(record, base)}
+    needing = {t for t, parts in SEARCH.items() if any(isinstance(p, Hint) for p in parts)}
+    assert not asked & needing
+    assert "sensor.missed_counts" in {h.term for h in hypotheses(record, base, {"jump": [0.5]})}
+
+
+def test_a_hint_of_a_node_goes_before_a_hint_for_all(moved):
+    record, base = moved("ivu")
+    found = hypotheses(record, base, {"order": [3.0], "order:motor1": [5.0, 6.0]}, only=("ripple.cogging",))
+    orders = {(h.node, c.scale) for h in found for c in h.coordinates if c.kind == SHAPE}
+    assert {("motor1", 5.0), ("motor1", 6.0), ("motor2", 3.0)} <= orders
+    assert ("motor1", 3.0) not in orders
+
+
+def test_places_cover_the_travel_of_the_node(moved):
+    record, base = moved("axis")
+    bumps = hypotheses(record, base, only=("load.bump",))
+    at = sorted({c.offset for h in bumps for c in h.coordinates if c.kind == PLACE})
+    assert len(at) == 10
+    np.testing.assert_allclose(at, 0.1 * (np.arange(10) + 0.5) / 10, atol=1e-4)
+    forms = {h.fixed["form"] for h in bumps}
+    assert forms == set(next(p.values for p in SEARCH["load.bump"] if isinstance(p, Choice)))
+
+
+def test_a_drive_that_turns_may_be_asked_about_turns(blank):
+    t = np.arange(2000) / 1000
+    record = blank("axis", np.sin(t), 30 * np.sin(t), sensors={"x_counts_per_rev": 4096, "unit": "rad"})
+    asked = {h.term for h in hypotheses(record, owner_model(record.case).base, HINTS)}
+    assert {"load.imbalance", "ripple.cogging", "ripple.encoder"} <= asked
+
+
+def test_a_linear_drive_with_one_sensor_is_not_asked_about_its_second(moved):
+    record, base = moved("ldu")
+    alone = record._replace(y={"encoder_counts": record.y["encoder_counts"]})
+    lost = {h.term for h in hypotheses(record, base, HINTS)} - {h.term for h in hypotheses(alone, base, HINTS)}
+    assert "sensor.scale" in lost
+    assert lost <= {"sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt"}

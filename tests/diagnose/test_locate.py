@@ -1,0 +1,72 @@
+"""Where simulation and recording part, in words and numbers."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.locate import located, where
+from rtctl.diagnose.name import Search
+from rtctl.plants.physics import TERMS
+
+
+def span(text):
+    """The two numbers of `position 0.01 to 0.02`."""
+    _, low, _, high = text.split()
+    return float(low), float(high)
+
+
+def test_the_error_is_where_the_effect_that_was_found_stands(tilted, searched):
+    problem, base, looked = searched(tilted)
+    best = looked.rounds[0][0]
+    told = located(tilted.sim, problem, base, best, looked)
+    assert told.channel == "x"
+    assert told.node == "carriage"
+    assert told.axis == TERMS["friction.asymmetry"].axis
+    assert told.share == pytest.approx(1.0 - best.cost / base.cost)
+    assert told.share > 0.9
+    assert problem.rows.start * tilted.record.dt <= told.since_s < 2.0
+
+
+def test_without_a_name_the_nearest_one_tells_where(tilted, searched):
+    problem, base, looked = searched(tilted)
+    told = located(tilted.sim, problem, base, base, looked)
+    assert told.node == looked.fits[0].space.hypotheses[0].node
+    assert 0.0 <= told.share <= 1.0
+
+
+def test_where_nothing_was_even_tried_it_is_the_loop(tilted, searched):
+    problem, base, _ = searched(tilted)
+    told = located(tilted.sim, problem, base, base, Search(base, (), ()))
+    assert (told.node, told.axis, told.share) == ("loop", "time", 0.0)
+
+
+def test_an_error_that_comes_late_is_there_since_then(tilted, searched):
+    problem, base, looked = searched(tilted)
+    r = 0.1 * np.ones(len(base.r))
+    r[4000:] = 100.0
+    late = Fit(base.space, base.x, r, base.J, 0.5 * float(r @ r))
+    told = located(tilted.sim, problem, late, looked.rounds[0][0], looked)
+    assert told.since_s == pytest.approx((problem.rows.start + 4000 * problem.mean) * tilted.record.dt, abs=2e-3)
+
+
+@pytest.mark.parametrize("axis", ["position", "velocity", "command", "time"])
+def test_the_loud_part_of_an_axis_is_told(tilted, searched, axis):
+    problem, _, _ = searched(tilted)
+    x = tilted.record.y["x"]
+    values = {"position": x, "velocity": np.gradient(x, 1e-3), "command": tilted.record.u[:, 0],
+              "time": tilted.record.t}[axis][problem.rows]  # fmt: skip
+    values = values[: len(values) // problem.mean * problem.mean].reshape(-1, problem.mean).mean(axis=1)
+    low, high = np.quantile(values, [0.27, 0.36])
+    error = np.where((values > low) & (values < high), 10.0, 0.1)
+    told = where(tilted.sim, problem, error, axis)
+    assert told.startswith(axis)
+    a, b = span(told)
+    assert a < high
+    assert b > low
+
+
+def test_an_error_everywhere_is_told_as_that(tilted, searched):
+    problem, base, _ = searched(tilted)
+    error = np.random.default_rng(0).standard_normal(len(base.r))
+    assert where(tilted.sim, problem, error, "position") == "over all of the position"
+    assert "over all" in where(tilted.sim, problem, error, "frequency")

@@ -1,0 +1,94 @@
+"""What the owner believes, as a model: values, freedom, and the plant's params made of them."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.kernel import OPEN
+from rtctl.diagnose.model import FITTED, Model, free_parameters, owner_model, plant_params
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.simulate import Simulator
+from rtctl.plants import axis, ivu, ldu
+from rtctl.plants.physics import TERMS
+
+
+def same(one, two):
+    for name in type(one)._fields:
+        np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-12, err_msg=name)
+
+
+def test_a_change_or_a_further_term_leaves_the_model_as_it_was():
+    model = Model("axis", {"M": 1.0, "k": 2.0})
+    offset = TERMS["drive.offset"].settings(node="drive", offset=0.1)
+    assert model.change(M=3.0).base == {"M": 3.0, "k": 2.0}
+    assert model.add(offset).add(offset).terms == (offset, offset)
+    assert model == Model("axis", {"M": 1.0, "k": 2.0})
+
+
+def test_params_of_an_axis_are_those_of_its_own_build(blank):
+    case = blank("axis", np.zeros(5)).case
+    model = owner_model(case)
+    wanted = axis.build(axis.AxisSettings(parameters={"M": 95.0, "K": 35.0, "F_v": 200.0, "F_c": 20.0}), 1e-3)
+    same(plant_params(model, case, 1e-3), wanted)
+
+
+def test_params_of_a_two_reel_unit_are_those_of_its_own_build(blank):
+    case = blank("ivu", np.zeros((5, 2))).case
+    given = {**case.parameters, "tau_Fc": 0.0}
+    drives = [(0.2, 2 * np.pi * 3000.0, 0.7, 0.0)] * 2
+    same(plant_params(owner_model(case), case, 1e-3), ivu.build(ivu.IvuSettings(parameters=given), 1e-3, drives))
+
+
+def test_params_of_a_linear_drive_are_those_of_its_own_build(blank):
+    case = blank("ldu", np.zeros(5), drive={"amp_per_volt": [0.1], "bandwidth_hz": 900.0, "damping": 0.6}).case
+    given = {**case.parameters, "B_c": 0.0, "K_m2": 0.0}
+    wanted = ldu.build(ldu.LduSettings(parameters=given), 1e-4, (2 * np.pi * 900.0, 0.6))
+    same(plant_params(owner_model(case), case, 1e-4), wanted)
+
+
+@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
+def test_what_may_move_is_what_is_there_and_not_exact(blank, kind):
+    case = blank(kind, np.zeros((5, 2 if kind == "ivu" else 1))).case
+    model = owner_model(case)
+    free = free_parameters(case, model)
+    assert list(free) == [n for n in FITTED[kind] if n in free]  # the order of the Jacobian's columns
+    assert "R_c" not in free or kind == "ldu"
+    assert all(model.base[n] != 0.0 for n in free)
+    zero = model.change(**{free[-1]: 0.0})
+    assert free_parameters(case, zero) == free[:-1]
+
+
+def test_where_the_owner_is_certain_nothing_moves(blank):
+    case = blank("axis", np.zeros(5), reaches={"parameter_tolerance": 0.0}).case
+    assert free_parameters(case, owner_model(case)) == ()
+
+
+def test_of_an_unknown_mass_the_force_stays_fixed(blank):
+    case = blank("axis", np.zeros(5), reaches={"parameter_tolerance": None}).case
+    assert free_parameters(case, owner_model(case)) == ("M", "F_v", "F_c")
+
+
+def test_a_mass_spring_damper_of_which_nobody_says_anything_is_guessed_from_its_record():
+    """As in a recording of an oscillator driven open loop by noise."""
+    case = read_case(
+        {
+            "plant": "axis", "sample_rate": 600.0, "parameters": {}, "drive": {"newton_per_volt": 1.0},
+            "controller": {"kind": "none"}, "reaches": {"parameter_tolerance": None},
+        },
+        ".",
+    )  # fmt: skip
+    n, dt = 6000, 1 / 600
+    tones = np.arange(5, 1200) / (n * dt)  # 0.5 to 120 Hz, across the resonance at 71 Hz
+    phases = np.random.default_rng(3).uniform(0, 2 * np.pi, len(tones))
+    volts = 3e-3 * np.cos(2 * np.pi * np.outer(np.arange(n) * dt, tones) + phases).sum(axis=1)
+    zero = np.zeros(n)
+    record = Record("axis", case, np.arange(n) * dt, dt, zero, zero, volts[:, None], {"x": zero}, {})
+    true = {"M": 5e-6, "F_v": 2e-4, "k": 1.0, "K": 1.0, "F_c": 0.0}
+    x = Simulator(record).run(Model("axis", true), OPEN)[:, 0]
+    found = owner_model(case, record._replace(y={"x": x})).base
+    for name, tolerance in (("M", 0.1), ("k", 0.1), ("F_v", 0.3)):  # to start a fit from
+        assert found[name] == pytest.approx(true[name], rel=tolerance), name
+
+
+def test_an_axis_whose_mass_is_said_is_not_guessed(plain):
+    assert owner_model(plain.record.case, plain.record).base == owner_model(plain.record.case).base

@@ -1,0 +1,127 @@
+"""The search: single effects, a pair, and what is taken out again."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.decide import worth
+from rtctl.diagnose.fit import Fit, fit
+from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.name import Hopeless, best_starts, drop, eliminate, names, polish, rivals, shortlist
+from rtctl.diagnose.screen import Score
+from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
+
+DEADBAND = {"term": "drive.deadband", "node": "drive", "band": 0.12}
+SPRING = {"term": "load.spring", "node": "carriage", "k": 600.0}
+ASYMMETRY = {"term": "friction.asymmetry", "node": "carriage", "a": 0.25}
+
+
+def best(problem, base, looked):
+    """As the chain takes it: another term has to be worth it."""
+    found = base
+    for level in looked.rounds:
+        if worth(found, level[0]):
+            found = level[0]
+    return eliminate(problem, found, worth) if len(found.space.hypotheses) > 1 else found
+
+
+def test_asymmetric_friction_is_found_with_its_size(tilted, searched):
+    problem, base, looked = searched(tilted)
+    found = best(problem, base, looked)
+    assert names(found) == ("friction.asymmetry:carriage",)
+    assert found.model.terms[0].a == pytest.approx(0.25, rel=0.05)
+    assert found.rms < 1.1 * problem.floor
+
+
+def test_a_dead_band_is_found_with_its_size(make_axis, searched):
+    problem, base, looked = searched(make_axis(DEADBAND, M=100.0, F_v=190.0))
+    found = best(problem, base, looked)
+    assert names(found) == ("drive.deadband:drive",)
+    assert found.model.terms[0].band == pytest.approx(0.12, rel=0.05)
+
+
+def test_a_pair_is_found_whole(make_axis, searched):
+    problem, base, looked = searched(make_axis(ASYMMETRY, SPRING, M=100.0))
+    found = best(problem, base, looked)
+    assert names(found) == ("friction.asymmetry:carriage", "load.spring:carriage")
+    sizes = {t.term: t for t in found.model.terms}
+    assert sizes["load.spring"].k == pytest.approx(600.0, rel=0.05)
+    assert sizes["friction.asymmetry"].a == pytest.approx(0.25, rel=0.05)
+
+
+def test_on_a_record_with_nothing_in_it_no_term_earns_its_place(plain, searched):
+    problem, base, looked = searched(plain)
+    assert best(problem, base, looked) is base
+
+
+def test_every_combination_that_was_fitted_is_told_best_first(tilted, searched):
+    _, base, looked = searched(tilted)
+    merits = [f.merit for f in looked.fits]
+    assert merits == sorted(merits)
+    assert {len(f.space.hypotheses) for f in looked.rounds[0]} == {1}
+    assert looked.base is base
+    assert looked.scores
+
+
+def test_a_useless_term_is_taken_out_and_the_useful_one_stays(tilted, searched):
+    problem, base, looked = searched(tilted)
+    found = looked.rounds[0][0]
+    useless = Hypothesis("drive.offset", "drive", (Coordinate("offset", SIZE, 0.05),))
+    both = found.space.add(useless)
+    full = fit(problem, both, np.append(found.x, 0.0))
+    left = eliminate(problem, full, worth)
+    assert names(left) == names(found)
+    assert left.merit < 1.02 * found.merit
+
+
+def test_dropping_a_hypothesis_takes_its_numbers_out_of_x(tilted, searched):
+    _, base, _ = searched(tilted)
+    one = Hypothesis("load.bump", "carriage", (Coordinate("F", SIZE, 1.0), Coordinate("at", "place", 1.0)))
+    two = Hypothesis("drive.offset", "drive", (Coordinate("offset", SIZE, 1.0),))
+    space = base.space.add(one, two)
+    x = np.arange(float(space.nb + 3))
+    held = Fit(space, x, base.r, base.J, base.cost)
+    np.testing.assert_array_equal(drop(held, 0), [*range(space.nb), space.nb + 2])
+    np.testing.assert_array_equal(drop(held, 1), range(space.nb + 2))
+
+
+def test_rivals_stand_in_the_place_of_the_term_and_do_worse(tilted, searched):
+    problem, base, looked = searched(tilted)
+    found = polish(problem, looked.rounds[0][0])
+    others = rivals(problem, found, 0, hypotheses(tilted.record, base.model.base, only=(
+        "drive.offset", "drive.gain_asymmetry", "load.spring", "friction.asymmetry")), most=2)  # fmt: skip
+    assert others
+    assert all(names(f) != names(found) and len(f.space.hypotheses) == 1 for f in others)
+    assert [f.merit for f in others] == sorted(f.merit for f in others)
+    assert others[0].merit > 1.05 * found.merit  # a constant push, which only the stops tell from it
+    assert others[1].merit > 2.0 * found.merit
+
+
+def test_polishing_never_makes_it_worse(tilted, searched):
+    problem, _, looked = searched(tilted)
+    for found in looked.rounds[0][:2]:
+        assert polish(problem, found).cost <= found.cost * (1 + 1e-9)
+
+
+def scores(*told):
+    made = [Hypothesis(t, n, (Coordinate("x", SIZE, 1.0),), {"start": i}) for i, (t, n, _) in enumerate(told)]
+    return [Score(h, gain, np.zeros(1), 0.0, 1.0) for h, (_, _, gain) in zip(made, told, strict=True)]
+
+
+def test_a_shortlist_has_two_starts_of_one_and_three_nodes_of_one_at_most():
+    told = [("a", "m1", 9.0)] * 3 + [("a", n, 8.0) for n in ("m2", "m3", "m4")] + [("b", "m1", 1.0), ("c", "m1", 0.0)]
+    chosen = [(s.hypothesis.term, s.hypothesis.node) for s in shortlist(scores(*told), 20)]
+    assert chosen == [("a", "m1"), ("a", "m1"), ("a", "m2"), ("a", "m3"), ("b", "m1")]
+    assert len(shortlist(scores(*told), 2)) == 2
+
+
+def test_later_rounds_try_the_best_starts_of_each():
+    kept = best_starts(scores(*[("a", "m1", 9.0 - i) for i in range(6)], ("b", "m1", 1.0)))
+    assert [h.term for h in kept] == ["a", "a", "a", "b"]
+    assert [h.fixed["start"] for h in kept] == [0, 1, 2, 6]
+
+
+def test_a_fit_far_behind_is_hopeless_only_after_some_rounds():
+    hopeless = Hopeless(1.0, factor=5.0, rounds=3)
+    assert [hopeless(100.0) for _ in range(4)] == [False, False, True, True]
+    near = Hopeless(1.0, factor=5.0, rounds=3)
+    assert not any(near(4.0) for _ in range(5))

@@ -1,0 +1,185 @@
+"""A machine is recorded, diagnosed, and where that leaves two answers recorded once more."""
+
+import json
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.load import set_path
+from rtctl.diagnose import repair
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.folder import own_config, write
+from rtctl.diagnose.model import Model, owner_model
+from rtctl.diagnose.record import Record, load_record
+from rtctl.machines import CONFIGS
+from rtctl.plants.physics import TERMS
+
+STEP = {"at": 0.5, "to": 0.02}
+SPRING = {"term": "load.spring", "node": "carriage", "k": 800.0}
+EXPERIMENT = {
+    "words": "Crawl to and fro.",
+    "why": {"words": "It tells drive.lag from timing.delay."},
+    "reference": {"unit": "m", "knots": [[0.0, 0.0], [0.5, np.float64(0.02)]], "repeat": 2.0, "relative": True},
+    "excitation": None,
+    "seconds": 7.0,
+}
+
+
+def found(verdict, experiment=None, names=("drive.lag", "timing.delay")):
+    """As much of a diagnosis as a repair looks at."""
+    effects = tuple(SimpleNamespace(name=name) for name in names)
+    return SimpleNamespace(verdict=verdict, experiment=experiment, effects=effects)
+
+
+class Bench:
+    """A machine that notes what it is made to do, and a chain that answers as it is told."""
+
+    def __init__(self, *answers, trips=()):
+        self.answers, self.trips = list(answers), list(trips)
+        self.played, self.said = [], []
+
+    def record(self, config, bundle, seconds):
+        self.played.append((config.reference, bundle.name, seconds))
+        return {"tripped": self.trips.pop(0) if self.trips else None}
+
+    def diagnose(self, bundle, other, progress):
+        answer = self.answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def repair(self, config, tmp_path, length=None):
+        return repair.repair(config, tmp_path, length, self.said.append, self.record, self.diagnose)
+
+
+@pytest.fixture
+def axis(config):
+    return repair.ready(config("axis"))
+
+
+def test_one_recording_where_it_is_clear(axis, tmp_path):
+    bench = Bench(found("named", EXPERIMENT))
+    made = bench.repair(axis, tmp_path)
+    assert [name for _, name, _ in bench.played] == ["recording"]
+    assert bench.played[0][2] == repair.LENGTH["axis"]
+    assert made.last.verdict == "named" and made.bundle == tmp_path / "recording"
+
+
+def test_the_experiment_where_two_answers_are_left(axis, tmp_path):
+    bench = Bench(found("ambiguous", EXPERIMENT), found("named"))
+    made = bench.repair(axis, tmp_path, 12.0)
+    (first, _, length), (second, name, seconds) = bench.played
+    assert (length, name, seconds) == (12.0, "experiment", 7.0)
+    assert first == axis.reference
+    assert second.knots[1] == (0.5, 0.02) and second.repeat == 2.0
+    assert made.last.verdict == "named" and made.bundle == tmp_path / "experiment"
+    assert any("drive.lag or timing.delay" in text for text in bench.said)
+
+
+@pytest.mark.parametrize("verdict, experiment", [("ambiguous", None), ("nothing", EXPERIMENT), ("unnamed", EXPERIMENT)])
+def test_no_experiment_without_need_or_plan(axis, tmp_path, verdict, experiment):
+    bench = Bench(found(verdict, experiment))
+    assert bench.repair(axis, tmp_path).last.verdict == verdict
+    assert len(bench.played) == 1
+
+
+def test_an_experiment_that_fails_takes_nothing_away(axis, tmp_path):
+    bench = Bench(found("ambiguous", EXPERIMENT), NoAnswer("nothing moved"))
+    made = bench.repair(axis, tmp_path)
+    assert made.last.verdict == "ambiguous" and made.bundle == tmp_path / "recording"
+    assert len(made.bundles) == 2
+    assert any("nothing moved" in text for text in bench.said)
+
+
+def test_a_trip_in_the_experiment(axis, tmp_path):
+    bench = Bench(found("ambiguous", EXPERIMENT), found("nothing"), trips=(None, "following_error"))
+    made = bench.repair(axis, tmp_path)
+    assert made.last.verdict == "ambiguous"
+    assert made.trips == ("", "following_error")
+
+
+def test_a_first_recording_that_supports_no_verdict(axis, tmp_path):
+    with pytest.raises(NoAnswer):
+        Bench(NoAnswer("too short")).repair(axis, tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
+def test_an_emulated_machine_has_something_to_do(config, kind):
+    ready = repair.ready(config(kind, mode="real"))
+    assert ready.loop.mode == "fused"
+    assert ready.reference.repeat <= repair.LENGTH[kind] + 0.001
+    steps = ready.reference.steps
+    assert steps[-1].to == 0.0 and all(a.at < b.at for a, b in pairwise(steps))
+
+
+def test_its_own_reference_and_mode_are_left_alone(config):
+    ready = repair.ready(set_path(config("axis", mode="lockstep"), "reference", {"steps": [STEP]}), "lockstep")
+    assert ready.loop.mode == "lockstep" and len(ready.reference.steps) == 1
+
+
+def test_a_machine_that_is_not_ours_is_not_moved_unasked(config):
+    external = set_path(config("axis", mode="real", link="zmq"), "link.plant", "external")
+    with pytest.raises(UserError, match="--reference"):
+        repair.ready(external)
+    told = repair.ready(set_path(external, "reference", {"steps": [STEP]}))
+    assert told.loop.mode == "real"
+
+
+def small(before, after, experiment=None):
+    """A diagnosis with models only, of an axis that anybody recorded."""
+    case = read_case({"plant": "axis", "sample_rate": 1000.0, "parameters": before.base, "controller": None}, ".")
+    t = np.arange(2000) * 1e-3
+    record = Record("axis", case, t, 1e-3, t * np.nan, 0 * t, np.zeros((2000, 1)), {"x": t}, {})
+    return SimpleNamespace(owner=before, after=after, record=record, experiment=experiment, effects=found("").effects)
+
+
+AXIS = Model("axis", {"M": 95.0, "K": 35.0, "F_v": 200.0, "F_c": 20.0, "k": 0.0})
+
+
+def test_what_the_experiment_file_holds():
+    text = repair.experiment_yaml(small(AXIS, AXIS, EXPERIMENT))
+    head = "".join(line for line in text.splitlines() if line.startswith("#"))
+    assert "Crawl" in head and "drive.lag from timing.delay" in head and "--for 7s" in head and "not ours" in head
+    settings = CONFIGS["axis"].model_validate(yaml.safe_load(text))
+    assert settings.reference.knots[1] == (0.5, 0.02)
+    assert settings.plant.parameters.M == 95.0
+
+
+def test_the_experiment_on_our_own_machine_is_its_config(config):
+    own = config("axis", set={"law.limit.high": 6.0}).model_dump(mode="json", exclude_unset=True)
+    text = repair.experiment_yaml(small(AXIS, AXIS, EXPERIMENT), own)
+    settings = CONFIGS["axis"].model_validate(yaml.safe_load(text))
+    assert "not ours" not in text
+    assert settings.law.limit.high == 6.0 and settings.name == own["name"]
+
+
+@given(M=st.floats(1.0, 1e3), k=st.floats(1.0, 1e4))
+def test_changes_are_those_of_the_model(M, k):
+    spring = TERMS["load.spring"].settings(**{**SPRING, "k": k})
+    rows = repair.changes(small(AXIS, AXIS.change(M=M).add(spring)))
+    keys = [key for key, _, _ in rows]
+    assert ("plant.parameters.M" in keys) == (abs(M - 95.0) > 1e-4 * max(M, 95.0))
+    assert keys[-1] == "plant.physics.0" and "load.spring at carriage" in rows[-1][2]
+    assert repair.changes(small(AXIS, AXIS)) == []
+
+
+def test_a_spring_on_an_emulated_axis_is_found_and_added(runtime, config, tmp_path):
+    machine = repair.ready(config("axis", set={"plant.physics": [SPRING]}))
+    made = repair.repair(machine, tmp_path, 9.0)
+    record = load_record(made.bundle)
+    assert np.ptp(record.columns["state"]) == 0  # rows on the way there are left out
+    assert record.y["x"] - record.columns["x"] == pytest.approx(0.5e-6)  # the middle of what a count stands for
+    assert owner_model(record.case).terms == ()  # the recording does not say what is hidden
+    assert "load.spring" in {e.name for e in made.last.effects}, made.last.effects
+    assert write(made.last, tmp_path, own_config(made.bundle), report=False) == []
+    written = yaml.safe_load((tmp_path / "model.yaml").read_text())
+    spring = next(entry for entry in written["plant"]["physics"] if entry["term"] == "load.spring")
+    assert spring["k"] == pytest.approx(800.0, rel=0.1)
+    assert written["law"] == json.loads((made.bundle / "case.json").read_text())["config"]["law"]
+    assert CONFIGS["axis"].model_validate(written).loop.mode == "fused"

@@ -1,0 +1,199 @@
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.diagnose import words
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Interval, Located, Rival
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.preflight import Preflight
+from rtctl.diagnose.words import nice, node_words, sentence, verdict_sentences
+from rtctl.plants.physics import TERMS
+
+IVU = {"tau_F1": 0.0024, "tau_F2": 0.0026, "tau_Fc": 1e-4}
+SCALE = {"N": {"": 1, "m": 1e-3, "u": 1e-6, "n": 1e-9}}
+
+
+class FakeRecord:
+    """What words ask of a record."""
+
+    plant = "ivu"
+    y = {"capstan_counts": np.array([-1000.0, 1000.0] * 50)}  # noqa: RUF012
+
+
+def diagnosis(verdict=NAMED, effects=(), after=None, **more) -> Diagnosis:
+    base = Model("ivu", IVU)
+    values = dict.fromkeys(Diagnosis._fields) | {
+        "record": FakeRecord(), "preflight": Preflight(()), "verdict": verdict, "effects": tuple(effects),
+        "parameters": {}, "owner": base, "before": base, "after": after or base, "heldout_before": 0.012,
+        "heldout_after": 0.0004, "noise_floor": 0.0003, "evidence": (), "null_line": 0.08, "cannot_test": (),
+        "hides": {}, "fit_rows": (0, 75), "seconds": 1.0,
+    }  # fmt: skip
+    return Diagnosis(**(values | more))
+
+
+def sample(name: str, value: float = 0.01) -> dict[str, Interval]:
+    """Any values for the parameters that a term asks for."""
+    fields = TERMS[name].settings.model_fields
+    wanted = [n for n, f in fields.items() if f.is_required() and n != "node"]
+    return {n: Interval(value, 0.9 * value, 1.1 * value) for n in wanted}
+
+
+STICKS = Effect("friction.stribeck", "motor1", 0.94, {"F_s": Interval(0.0031, 0.003, 0.0032, "Nm")}, ())
+DEAD = Effect("drive.deadband", "drive2", 0.8, {"band": Interval(0.075, 0.07, 0.08, "V")}, ())
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0031, "Nm", "3.1 mNm"), (1.2e-6, "m", "1.2 um"), (-0.123, "V", "-120 mV"), (0.0012, "s", "1.2 ms"),
+        (123.4, "Hz", "120 Hz"), (1.5e6, "N/m", "1.5 MN/m"), (0.9999, "V", "1.0 V"), (0.53, "rad/s", "0.53 rad/s"),
+        (12.0, "counts", "12 counts"), (0.4, "counts", "0.40 counts"), (0.0, "Nm", "0 Nm"), (1500.0, "s", "1500 s"),
+        (3e-12, "m", "0.0030 nm"), (0.25, "", "0.25"), (float("inf"), "V", "any size"), (float("nan"), "V", "unknown"),
+    ],
+)  # fmt: skip
+def test_numbers_with_sensible_prefixes(value, unit, text):
+    assert nice(value, unit) == text
+
+
+@settings(deadline=None)
+@given(st.floats(1e-9, 1e6), st.sampled_from(["Nm", "V", "s", "m"]))
+def test_a_formatted_number_reads_back_to_its_figures(value, unit):
+    number, shown = nice(value, unit, 3).split()
+    prefix = shown.removesuffix(unit)
+    assert float(number) * SCALE["N"][prefix] == pytest.approx(value, rel=5.1e-3)
+
+
+def test_two_sizes_show_where_they_differ():
+    assert words.both(0.003124, 0.003081, "Nm") == ("3.12 mNm", "3.08 mNm")
+
+
+def test_every_term_of_the_library_has_a_phrase():
+    assert set(words.PHRASES) == set(TERMS)
+
+
+@pytest.mark.parametrize("name", TERMS)
+@pytest.mark.parametrize("value", [0.01, -0.01])
+def test_every_phrase_fills_in_at_every_node(name, value):
+    for kind, nodes in TERMS[name].nodes.items():
+        for node in nodes:
+            effect = Effect(name, node, 0.9, sample(name, value), ())
+            head, detail = words.effect_clause(effect, Model(kind, {**IVU, "F_c": 1.0, "R_c": 0.01}))
+            assert head and detail and not re.search(r"[{}_]|unknown|None|\bnan\b", head + detail), (head, detail)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_sizes_and_units_stand_in_the_sentence(name):
+    kind, nodes = next(iter(TERMS[name].nodes.items()))
+    effect = Effect(name, nodes[0], 0.9, sample(name), ())
+    _, detail = words.effect_clause(effect, Model(kind, {**IVU, "F_c": 1.0, "R_c": 0.01}))
+    if effect.parameters:
+        assert re.search(r"\d", detail), detail
+
+
+def test_one_effect():
+    assert verdict_sentences(diagnosis(effects=[STICKS])) == (
+        "Motor 1 sticks: it needs 3.1 mNm to start but 2.4 mNm to keep moving. "
+        "With that in the model the error on the part that was not fitted falls from 12 to 0.40 counts."
+    )
+
+
+def test_several_effects_are_joined():
+    text = verdict_sentences(diagnosis(effects=[STICKS, DEAD]))
+    assert text.startswith("Two things are missing: motor 1 sticks (it needs 3.1 mNm")
+    assert "and drive 2 has a dead zone (commands below 75 mV do nothing). With them" in text
+
+
+def test_a_prediction_that_got_worse_is_not_said_to_fall():
+    assert "goes from" in verdict_sentences(diagnosis(effects=[STICKS], heldout_after=0.02))
+
+
+def test_sticking_counts_dry_friction_that_was_added():
+    more = TERMS["friction.coulomb"].settings(node="motor1", F_C=0.0004)
+    text = verdict_sentences(diagnosis(effects=[STICKS], after=Model("ivu", IVU, (more,))))
+    assert "2.8 mNm to keep moving" in text
+
+
+def test_ambiguous_names_both_and_what_to_run():
+    rival = Effect("friction.presliding", "motor1", 0.4, {"z_s": Interval(0.002, 0.001, 0.003, "rad")}, ())
+    text = verdict_sentences(diagnosis(AMBIGUOUS, [STICKS, rival]))
+    assert text.startswith("Either motor 1 sticks (") and " or motor 1 gives like a spring" in text
+    assert "this record cannot tell. Run this next: " in text
+    assert TERMS["friction.stribeck"].look_alikes["friction.presliding"].rstrip(".") in text
+
+
+def test_ambiguous_between_places():
+    text = verdict_sentences(diagnosis(AMBIGUOUS, [STICKS, STICKS._replace(node="motor2")]))
+    assert "motor 2 sticks" in text and "Run this next: drive one motor alone" in text
+
+
+def test_ambiguous_with_a_rival_that_was_fitted():
+    lone = STICKS._replace(look_alikes=(Rival("friction.load", "motor1", 0.4, 1.0),))
+    assert "Perhaps motor 1 sticks" in verdict_sentences(diagnosis(AMBIGUOUS, [lone]))
+
+
+def test_unnamed_says_where_and_how_much():
+    at = Located("capstan_counts", "tape2", "velocity", "below 0.4 rad/s", 2.5, 0.81)
+    text = verdict_sentences(diagnosis(UNNAMED, located=at, heldout_after=0.009))
+    assert "missing at the tape at reel 2" in text and "velocity, below 0.4 rad/s, from 2.50 s on" in text
+    assert "81 %" in text and "9.0 counts where noise leaves 0.30 counts" in text
+
+
+def test_unnamed_without_a_place():
+    assert "no clear place" in verdict_sentences(diagnosis(UNNAMED))
+
+
+def test_nothing_says_what_would_have_shown():
+    hides = {
+        "friction.coulomb:motor1": Interval(1e-4, 1e-4, 1e-4, "Nm"),
+        "friction.coulomb:motor2": Interval(1e-4, 1e-4, 1e-4, "Nm"),
+        "drive.deadband:drive1": Interval(0.012, 0.012, 0.012, "band"),  # the parameter in place of its unit
+        "drive.gain_asymmetry:drive1": Interval(0.02, 0.02, 0.02, ""),
+    }
+    text = verdict_sentences(diagnosis(NOTHING, heldout_after=0.00031, hides=hides))
+    assert text.startswith("Nothing is missing: ") and "0.31 counts" in text
+    assert "dry friction of 100 uNm at motor 1, a dead zone of 12 mV at drive 1 and unequal gain of 2.0 %" in text
+    assert "motor 2" not in text  # one node of each effect is enough for a sentence
+
+
+def test_nothing_without_sizes():
+    assert "was not worked out" in verdict_sentences(diagnosis(NOTHING))
+
+
+@pytest.mark.parametrize(
+    ("node", "text"),
+    [("motor1", "motor 1"), ("tape2", "the tape at reel 2"), ("carriage", "the carriage"), ("drive1", "drive 1")],
+)
+def test_nodes_in_words(node, text):
+    assert node_words(node) == text
+
+
+def test_every_node_of_the_library_has_words():
+    nodes = {n for term in TERMS.values() for where in term.nodes.values() for n in where}
+    assert all(re.fullmatch(r"[a-z ]+\d?", node_words(n)) for n in nodes)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_what_cannot_be_tested_is_a_sentence(name):
+    text = sentence(f"{name}:motor1", "motor2")
+    assert text.startswith("This record cannot show ") and text.endswith(".")
+    assert "at motor 1 and motor 2" in text and "that takes" in text
+
+
+def test_an_unknown_entry_is_still_a_sentence():
+    assert sentence("friction.magic:motor1") == "This record cannot show friction.magic at motor 1."
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "node", "parameter", "unit"),
+    [
+        ("ivu", "friction.coulomb", "motor1", "F_C", "Nm"), ("ldu", "friction.coulomb", "carriage", "F_C", "N"),
+        ("ldu", "ripple.encoder", "encoder", "A", "rad"), ("ivu", "drive.deadband", "drive1", "band", "V"),
+        ("ldu", "transmission.creep", "wheel", "kappa", "1/Nm"), ("ivu", "friction.load", "motor1", "mu", ""),
+        ("ivu", "structure.stiffening", "tape1", "c3", "N/m^3"), ("ivu", "transmission.slip", "capstan", "F_max", "N"),
+    ],
+)  # fmt: skip
+def test_units_by_node(kind, name, node, parameter, unit):
+    assert words.unit_at(kind, name, node, parameter) == unit

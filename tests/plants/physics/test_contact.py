@@ -1,0 +1,85 @@
+"""Sliding contacts: no force beyond the limit, creep in proportion, what slid stays, and the strip falls behind."""
+
+import bench
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.plants.physics import contact
+
+forces = st.floats(-100, 100)
+
+
+def state(d: float = 0.0) -> np.recarray:
+    s = np.zeros(1, contact.CONTACT_STATE).view(np.recarray)[0]
+    s.d = d
+    return s
+
+
+@settings(deadline=None)
+@given(st.lists(forces, min_size=1, max_size=30), st.floats(0.1, 50), st.floats(1, 1e4), st.floats(0, 10))
+def test_slip_holds_the_force_at_its_limit_and_takes_energy(pulls, F_max, c, k):
+    s = state()
+    for T in pulls:
+        before = s.d
+        F = T + contact.slide(s, F_max, T, c, k, 1e-3)
+        assert abs(F) <= F_max * (1 + 1e-9) + 1e-9
+        assert F * (s.d - before) >= -1e-12
+
+
+@settings(deadline=None)
+@given(forces, st.floats(0, 10), st.floats(1, 1e4), st.floats(0, 10), st.integers(1, 20))
+def test_creep_is_exact_for_a_constant_pull(T, grip, c, k, n):
+    once, often = state(), state()
+    contact.micro(once, grip, T, c, k, 1e-2)
+    for _ in range(n):
+        contact.micro(often, grip, T, c, k, 1e-2 / n)
+    assert once.d == pytest.approx(often.d, rel=1e-9, abs=1e-12)
+    assert once.d * T >= 0.0 and abs(c * once.d) <= abs(T) * (1 + 1e-12) + 1e-300
+
+
+def test_creep_loses_way_in_proportion_to_force_and_way():
+    """The strip under a steady pull: kappa F of the way."""
+    kappa, term = 1e-3, bench.usual("transmission.creep", "ldu", "capstan", kappa=1e-3)
+    r = bench.run("ldu", [term], np.full((400, 1), 0.12))
+    way = 3e-3 * r.q[:, 2]
+    F = (7.6 * (r.q[:, 1] - r.q[:, 2]) - 7.6 * (r.q[:, 2] - r.q[:, 3]))[300] / 3e-3
+    assert (way - r.y[:, 1])[-1] == pytest.approx(kappa * F * way[-1], rel=0.02)
+
+
+@pytest.mark.parametrize(("current", "slips"), [(0.09, False), (0.4, True)])
+def test_the_strip_slips_beyond_what_it_carries(current, slips):
+    F = 7.3 + 1.25 * (current * 21e-3 * 20 / 3e-3 - 7.3) / 47.1  # most of the push goes into the motor's own inertia
+    term = bench.usual("transmission.slip", "ldu", "capstan", F_max=7.7)
+    r = bench.run("ldu", [term], np.concatenate([np.linspace(0, current, 200), np.full(200, current)]), B_m=0.0)
+    behind = 3e-3 * r.q[:, 2] - r.y[:, 1]
+    assert (abs(behind[-1]) > 1e-4) == slips
+    if slips:
+        rate = np.diff(behind[-100:], 2).mean() / 1e-6
+        assert rate == pytest.approx((F - 7.7) / 1.25, rel=0.1)
+
+
+def test_the_strip_grips_again_and_what_was_lost_stays_lost():
+    term = bench.usual("transmission.slip", "ldu", "capstan", F_max=7.7)
+    r = bench.run("ldu", [term], np.concatenate([np.full(50, 0.4), np.zeros(400)]))
+    behind = 3e-3 * r.q[:, 2] - r.y[:, 1]
+    assert behind[-1] > 1e-5
+    assert np.ptp(behind[-100:]) == 0.0
+
+
+def test_the_wheel_slips_at_its_torque():
+    term = bench.usual("transmission.slip", "ldu", "wheel", F_max=8e-4)
+    r = bench.run("ldu", [term], np.full(200, 0.1))  # 2.1 mNm
+    rate = (r.v[-1, 0] - r.v[100, 0]) / 0.099
+    assert rate == pytest.approx((2.1e-3 - 8e-4) / 1e-6, rel=0.03)
+
+
+def test_the_tape_slides_on_a_capstan_that_will_not_turn():
+    """Its bearing holds 5 mNm, the contact 20 mN: 0.25 mNm; the tape runs on and the capstan stands."""
+    inputs = np.concatenate([np.full((300, 2), 0.6), np.tile([1.2, 0.2], (1500, 1))])
+    stuck = bench.run("ivu", [], inputs, tau_Fc=5e-3)
+    r = bench.run("ivu", [bench.usual("transmission.slip", "ivu", F_max=0.02)], inputs, tau_Fc=5e-3)
+    assert abs(r.q[-1, 2]) < 1e-3
+    assert r.q[-1, 1] * 0.038 > stuck.q[-1, 1] * 0.038 + 5e-3
+    assert r.q[-1, 1] * 0.038 == pytest.approx(-r.q[-1, 3] * 0.022, abs=2e-3)  # what one winds the other gives

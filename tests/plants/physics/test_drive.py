@@ -1,0 +1,132 @@
+"""Drives without memory: limits, signs, what they do at no size, and how they stand on a machine."""
+
+import numpy as np
+import pytest
+import stand
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from rtctl.plants.physics import drive
+
+H = 1e-3
+volts = st.floats(-10, 10)
+forms = st.sampled_from(drive.DEADBAND_FORMS)
+
+
+def deadband(band: float, form: str = "shift", edge: float = 0.1) -> drive.DeadbandParams:
+    return drive.build_deadband(drive.DeadbandSettings(node="drive", band=band, form=form, edge=edge), H)
+
+
+def saturation(limit: float, knee: float = 0.0, rise: float = 0.0) -> drive.SaturationParams:
+    return drive.build_saturation(drive.SaturationSettings(node="drive", limit=limit, knee=knee, rise=rise), H)
+
+
+def memory() -> np.record:
+    return np.zeros(1, drive.SATURATION_STATE).view(np.recarray)[0]
+
+
+@settings(deadline=None)
+@given(volts, st.floats(-1, 1))
+def test_offset_and_gain_asymmetry(u, a):
+    off = drive.build_offset(drive.OffsetSettings(node="drive", offset=a), H)
+    assert drive.offset(off, u) == u + a
+    lop = drive.build_gain_asymmetry(drive.GainAsymmetrySettings(node="drive", a=0.9 * a), H)
+    share = 1 + 0.9 * a if u > 0 else 1 - 0.9 * a
+    assert drive.gain_asymmetry(lop, u) == pytest.approx(share * u)
+
+
+@settings(deadline=None)
+@given(volts, st.floats(0, 3), forms, st.floats(0, 1))
+def test_dead_band_is_odd_keeps_the_sign_and_is_nothing_without_a_band(u, band, form, edge):
+    p = deadband(band, form, edge)
+    out = drive.deadband(p, u)
+    assert drive.deadband(p, -u) == -out
+    assert out * u >= 0.0
+    assert drive.deadband(deadband(0.0, form, edge), u) == u
+    assert abs(out - u) <= band * (1 + edge) + 1e-12
+
+
+@pytest.mark.parametrize(("form", "inside", "outside"), [("shift", 0.0, 0.5), ("cut", 0.0, 1.5), ("floor", 1.0, 1.5)])
+def test_forms_of_the_dead_band(form, inside, outside):
+    p = deadband(1.0, form)
+    assert drive.deadband(p, 0.5) == inside
+    assert drive.deadband(p, 1.5) == outside
+    assert drive.deadband(p, 0.0) == 0.0
+
+
+def test_the_edge_of_a_cut_is_even():
+    p = deadband(1.0, "cut", 0.2)
+    out = np.array([drive.deadband(p, u) for u in np.linspace(0.7, 1.3, 601)])
+    assert np.diff(out).min() >= 0.0 and np.diff(out).max() < 0.01
+    assert drive.deadband(p, 1.0) == pytest.approx(0.5)
+    sharp = deadband(1.0, "cut", 0.0)
+    assert drive.deadband(sharp, 0.999) == 0.0 and drive.deadband(sharp, 1.0) == 1.0
+
+
+@settings(deadline=None)
+@given(volts, volts, st.floats(0.1, 20), st.floats(0, 0.9))
+def test_saturation_is_a_limit_that_never_falls(u, w, limit, knee):
+    p, s = saturation(limit, knee), memory()
+    one, two = sorted((u, w))
+    low, high = drive.saturation(p, s, one), drive.saturation(p, s, two)
+    assert low <= high + 1e-12
+    assert abs(high) <= limit
+    assert drive.saturation(p, s, -u) == -drive.saturation(p, s, u)
+    if abs(u) <= limit * (1 - knee):
+        assert drive.saturation(p, s, u) == u
+
+
+def test_a_slow_rise_takes_its_time_and_its_mean():
+    p, s = saturation(100.0, rise=0.01), memory()  # 10 ms a volt: 0.1 V in a substep
+    assert drive.saturation(p, s, 1.0) == pytest.approx(0.05)
+    out = [drive.saturation(p, s, 1.0) for _ in range(20)]
+    assert out[7] == pytest.approx(0.85) and out[-1] == 1.0
+    assert drive.saturation(p, s, 0.95) == pytest.approx(0.95 + 0.5 * 0.05 * 0.5)  # there after half a substep
+    assert drive.saturation(p, s, 0.95) == pytest.approx(0.95)
+
+
+def test_sag_lowers_all_by_what_all_draw():
+    p = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1), H)
+    u = np.array([1.0, -2.0])
+    drive.supply_sag(p, u)
+    assert u == pytest.approx([0.7, -1.4])
+    p = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1, form="power"), H)
+    u = np.array([1.0, -2.0])
+    drive.supply_sag(p, u)
+    assert u == pytest.approx([0.5, -1.0])
+    u = np.array([9.0, 9.0])
+    drive.supply_sag(p, u)
+    assert list(u) == [0.0, 0.0]  # nothing is left, and it does not turn
+
+
+def test_sag_of_one_motor_is_felt_by_the_other():
+    term = stand.make("drive.supply_sag", "ivu", k=0.05)
+    alone, both = np.tile([0.5, 0.5], (200, 1)), np.tile([0.5, 3.0], (200, 1))
+    loss = [stand.run("ivu", [term], u).x[-1, 10] / stand.run("ivu", [], u).x[-1, 10] for u in (alone, both)]
+    assert loss == pytest.approx([0.95, 0.825], rel=1e-3)  # x[10] is the current of motor 1
+
+
+@pytest.mark.parametrize(("node", "channel"), [("drive1", 0), ("drive2", 1)])
+def test_a_term_stands_at_its_own_drive(node, channel):
+    u = np.tile([0.5, 0.5], (200, 1))
+    change = stand.run("ivu", [stand.make("drive.offset", "ivu", node, offset=0.1)], u).x - stand.run("ivu", [], u).x
+    assert change[-1, 10 + 2 * channel] == pytest.approx(0.1 * 0.2, rel=1e-3)  # 0.2 A/V
+    assert change[-1, 12 - 2 * channel] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [
+        (drive.OffsetSettings, {"offset": np.nan}),
+        (drive.DeadbandSettings, {"band": -0.1}),
+        (drive.DeadbandSettings, {"band": 0.1, "form": "step"}),
+        (drive.GainAsymmetrySettings, {"a": 1.0}),
+        (drive.SaturationSettings, {"limit": 0.0}),
+        (drive.SaturationSettings, {"limit": 1.0, "rise": -1.0}),
+        (drive.SupplySagSettings, {"k": -0.1}),
+    ],
+)
+def test_settings_out_of_bounds_are_refused(model, values):
+    with pytest.raises(ValidationError):
+        model(node="drive", **values)

@@ -1,0 +1,100 @@
+"""Lag and warmth: exact responses whatever the step, and no effect where there is none."""
+
+import math
+
+import numpy as np
+import pytest
+import stand
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.plants.physics import drive_dynamics
+from rtctl.plants.physics.drive_dynamics import LagSettings, ThermalSettings, build_lag, build_thermal
+
+
+def zeros(dtype: np.dtype) -> np.record:
+    return np.zeros(1, dtype).view(np.recarray)[0]
+
+
+def step_response(t: np.ndarray, tau: float, order: int, zeta: float) -> np.ndarray:
+    """Of the lag to one volt at t = 0, in closed form."""
+    x = t / tau
+    if order == 1:
+        return 1 - np.exp(-x)
+    d = np.sqrt(complex(1 - zeta**2))
+    return (1 - np.exp(-zeta * x) * (np.cos(d * x) + zeta / d * np.sin(d * x))).real
+
+
+@settings(deadline=None)
+@given(st.floats(1e-4, 1e-1), st.sampled_from([1, 2]), st.sampled_from([0.1, 0.7, 1.5, 6.0]), st.floats(1e-4, 1e-2))
+def test_lag_gives_the_mean_of_the_response(tau, order, zeta, h):
+    p, s = build_lag(LagSettings(node="drive", tau=tau, order=order, zeta=zeta), h), zeros(drive_dynamics.LAG_STATE)
+    fine = np.linspace(0, h, 4001)
+    for k in range(5):
+        response = step_response(fine + k * h, tau, order, zeta)
+        assert drive_dynamics.lag(p, s, 1.0) == pytest.approx(np.trapezoid(response, fine) / h, rel=1e-4, abs=1e-5)
+    assert s.y == pytest.approx(step_response(np.array([5 * h]), tau, order, zeta)[0], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("zeta", [0.3, 1.0, 1.0 + 1e-9, 3.0])
+def test_lag_fades_to_nothing_and_ends_at_the_command(order, zeta):
+    def first(tau: float) -> float:
+        p = build_lag(LagSettings(node="drive", tau=tau, order=order, zeta=zeta), 1e-3)
+        return float(drive_dynamics.lag(p, zeros(drive_dynamics.LAG_STATE), 1.0))
+
+    assert first(0.0) == 1.0
+    change = [1.0 - first(tau) for tau in (1e-9, 1e-6, 1e-5)]
+    assert change[0] < 1e-5 and change[0] < change[1] < change[2]
+    assert change[2] / change[1] == pytest.approx(10.0, rel=1e-3)  # in proportion to tau: good for a fit
+    p, s = build_lag(LagSettings(node="drive", tau=0.01, order=order, zeta=zeta), 1e-3), zeros(drive_dynamics.LAG_STATE)
+    out = [drive_dynamics.lag(p, s, 2.0) for _ in range(1000)]
+    assert out[-1] == pytest.approx(2.0, rel=1e-4)
+
+
+def test_a_critical_lag_is_between_its_neighbours():
+    out = []
+    for zeta in (0.999, 1.0, 1.001):
+        p, s = build_lag(LagSettings(node="drive", tau=0.01, order=2, zeta=zeta), 1e-3), zeros(drive_dynamics.LAG_STATE)
+        out.append([drive_dynamics.lag(p, s, 1.0) for _ in range(20)])
+    assert np.allclose(out[1], 0.5 * (np.array(out[0]) + np.array(out[2])), atol=1e-6)
+
+
+def warm(node: str, a: float = 0.5, tau: float = 2.0) -> tuple:
+    p = build_thermal(ThermalSettings(node=node, a=a, tau=tau, V_ref=2.0), 1e-2)
+    return p, zeros(drive_dynamics.THERMAL_STATE)
+
+
+def test_gain_falls_as_it_warms_and_comes_back():
+    p, s = warm("drive")
+    gains = []
+    for k in range(2000):
+        u = np.array([2.0 if k < 1000 else 0.1])
+        was = u[0]
+        drive_dynamics.thermal_gain(p, s, u)
+        gains.append(u[0] / was)
+    assert gains[0] == 1.0
+    assert gains[200] == pytest.approx(math.exp(-0.5 * (1 - math.exp(-1.0))), rel=1e-9)  # after tau
+    assert gains[999] == pytest.approx(math.exp(-0.5), rel=1e-2)
+    assert gains[-1] > 0.98
+    assert drive_dynamics.thermal_friction(p, s, 3.0) == 3.0  # that of a drive leaves friction alone
+
+
+def test_friction_falls_at_a_motor_and_its_gain_stays():
+    p, s = warm("motor2")
+    for _ in range(200):
+        u = np.array([9.0, 2.0])
+        drive_dynamics.thermal_gain(p, s, u)
+        assert list(u) == [9.0, 2.0]
+    assert drive_dynamics.thermal_friction(p, s, 3.0) == pytest.approx(3.0 * math.exp(-0.5 * (1 - math.exp(-1.0))))
+
+
+def test_each_drive_is_warmed_by_its_own_motor():
+    u = np.tile([0.5, 3.0], (500, 1))
+    base = stand.run("ivu", [], u).x[-1]
+    for node, i, other in (("drive1", 10, 12), ("drive2", 12, 10)):
+        term = stand.make("drive.thermal", "ivu", node, a=0.3, tau=0.1, V_ref=1.0)
+        x = stand.run("ivu", [term], u).x[-1]
+        volts = u[0, (i - 10) // 2]
+        assert x[i] / base[i] == pytest.approx(math.exp(-0.3 * volts**2), rel=1e-3)
+        assert x[other] == pytest.approx(base[other], rel=1e-9)

@@ -1,0 +1,52 @@
+"""Friction that knows a direction: more one way, less the other, and no push at all."""
+
+import bench
+import numpy as np
+import pytest
+
+F_C, K, M = 20.4, 35.15, 95.1
+
+
+def run(inputs: np.ndarray, substeps: int = 4, **changes: float) -> bench.Run:
+    term = bench.usual("friction.asymmetry", "axis", **{"a": 0.3, "B_a": 0.0, **changes})
+    return bench.run("axis", [term], inputs, substeps=substeps, F_v=0.0)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize("a", [0.3, -0.2])
+def test_it_slides_harder_one_way(way, a):
+    r = run(np.full(500, way * 2.0), a=a)
+    rate = (r.v[-1, 0] - r.v[100, 0]) / 0.399
+    assert rate == pytest.approx(way * (2.0 * K - F_C * (1 + way * a)) / M, rel=1e-9)
+
+
+@pytest.mark.parametrize(("force", "moves"), [(25.0, False), (28.0, True), (-13.0, False), (-16.0, True)])
+def test_it_breaks_away_at_its_own_force_each_way(force, moves):
+    ramp = np.concatenate([np.linspace(0, force, 1000), np.full(200, force)])
+    assert (np.abs(run(ramp / K).q[-1, 0]) > 1e-4) == moves
+
+
+def test_at_rest_it_never_pushes():
+    r = run(np.concatenate([np.zeros(100), np.full(100, 2.0), np.zeros(3000)]))
+    assert (r.q[:100] == 0.0).all()
+    assert (r.v[-1000:] == 0.0).all()
+
+
+def test_the_part_that_grows_with_speed():
+    there, back = (run(np.full(500, way * 3.0), a=0.0, B_a=20.0) for way in (1.0, -1.0))
+    slow = run(np.full(500, 3.0), a=0.0)
+    assert abs(there.q[-1, 0]) < abs(slow.q[-1, 0]) < abs(back.q[-1, 0])
+
+
+def test_below_nothing_there_is_nothing():
+    r = run(np.full(4000, -3.0), a=0.0, B_a=1e3)  # would make friction negative beyond 2 cm/s
+    rate = np.diff(r.v[-100:, 0]) / 1e-3
+    assert rate == pytest.approx(-3.0 * K / M, rel=1e-9)
+
+
+def test_a_reversal_is_right_to_second_order():
+    inputs = bench.moves("axis")
+    exact = run(inputs, 32)
+    one, two = (np.abs(run(inputs, n).q - exact.q).max() for n in (1, 2))
+    assert two < 0.35 * one
+    assert one < 1e-6

@@ -1,0 +1,78 @@
+"""A reel that fills: the same as what the plant does by itself with a thickness of tape."""
+
+import numpy as np
+import pytest
+import stand
+
+from rtctl.idiom import tick
+from rtctl.plants import ivu, linear
+from rtctl.plants.physics import geometry
+
+
+@tick
+def wind(p, s, volts, substeps, x):
+    """The plant with its own radii that follow the tape."""
+    m = s.m
+    for k in range(volts.shape[0]):
+        for _ in range(substeps):
+            m.u[0], m.u[1] = volts[k, 0], volts[k, 1]
+            linear.midpoint(m)
+            ivu.follow_tape(p, s)
+            linear.advance(m)
+        for i in range(m.x.shape[0]):
+            x[k, i] = m.x[i]
+
+
+def volts(n: int = 1500) -> np.ndarray:
+    """To and fro over several turns of the reels."""
+    wave = np.sin(2 * np.pi * np.arange(n) / n)
+    return np.stack([2.0 + 6.0 * wave, 2.0 - 6.0 * wave], axis=1)
+
+
+@pytest.mark.parametrize(("radii", "within"), [({"R1": 0.035, "R2": 0.028}, 0.06), ({}, 0.2)])
+@pytest.mark.parametrize("d", [2e-4, 1e-3])
+def test_both_reels_are_the_plant_with_a_thickness(d, radii, within):
+    """Over four to nine turns at the longest substep in use; the second set has a reel that is nearly empty."""
+    u = volts()
+    terms = [stand.make("geometry.radius_change", "ivu", node, d=d) for node in ("reel1", "reel2")]
+    got = stand.run("ivu", terms, u, d_tape=0.0, **radii).x
+    base = stand.run("ivu", [], u, d_tape=0.0, **radii).x
+    p, s = stand.plant("ivu", 5e-4, d_tape=d, **radii)
+    expected = np.zeros_like(got)
+    wind(p, s, u, 4, expected)
+    assert np.abs(expected[:, :5]).max(axis=0).min() > 3 * 2 * np.pi
+    change = np.abs(expected - base)[:, :5].max(axis=0)
+    assert (change > 0.1).all()
+    assert (np.abs(got - expected)[:, :5].max(axis=0) < within * change).all()
+
+
+def test_the_plant_tells_the_tension_on_its_true_radius():
+    p, s = stand.plant("ivu", 2.5e-4, d_tape=1e-3)
+    wind(p, s, volts(600), 8, np.zeros((600, 14)))
+    linear.midpoint(s.m)
+    ivu.follow_tape(p, s)
+    ivu.tensions(p, s)
+    assert [linear.tension(s.m, 0), linear.tension(s.m, 1)] == pytest.approx([s.T1, s.T2], abs=0.02)
+
+
+@pytest.mark.parametrize("node", ["reel1", "reel2"])
+def test_it_is_in_proportion_to_the_thickness(node):
+    u = volts(600)
+
+    def change(d: float) -> np.ndarray:
+        term = stand.make("geometry.radius_change", "ivu", node, d=d)
+        return stand.run("ivu", [term], u, d_tape=0.0).x - stand.run("ivu", [], u, d_tape=0.0).x
+
+    one, two = change(1e-5), change(2e-5)
+    assert np.abs(one[:, :5]).max() > 1e-4
+    assert np.allclose(two[:, :5], 2 * one[:, :5], atol=0.02 * np.abs(one[:, :5]).max())
+
+
+def test_an_empty_reel_gets_no_smaller():
+    _, s = stand.plant("ivu", 2.5e-4, d_tape=0.0)
+    p = geometry.build_radius_change(geometry.RadiusChangeSettings(node="reel1", d=1e-3), 2.5e-4)
+    s.m.qm[ivu.REEL1], s.m.qm[ivu.CAPSTAN] = -500.0, -500.0 * 0.02 / 0.0125
+    geometry.radius_change(p, s.m, ivu.REEL1)
+    wound = (linear.tension(s.m, 0) / 450.0) + 0.0125 * s.m.qm[ivu.CAPSTAN]
+    turns = (0.038 - 0.02) / (1e-3 / (2 * np.pi))
+    assert wound == pytest.approx(-(0.029 * turns + 0.02 * (500.0 - turns)))

@@ -1,0 +1,96 @@
+"""Loads by position: springs, chains, an unbalanced wheel and bumps, each with the energy that it must keep."""
+
+import math
+
+import bench
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.plants.physics import load
+
+M, K = 95.1, 35.15
+
+
+def test_the_spring_pulls_to_its_rest():
+    term = bench.usual("load.spring", "axis", k=1e4, x0=1e-3)
+    r = bench.run("axis", [term], np.zeros(8000), F_c=0.0, F_v=2e3)
+    assert r.q[-1, 0] == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_the_spring_of_a_carriage_is_in_newtons_a_metre():
+    term = bench.usual("load.spring", "ldu", k=2e3)
+    r = bench.run("ldu", [term], np.linspace(0, 0.15, 2000), F_c=0.0, B_m=30.0)
+    assert r.y[-1, 1] == pytest.approx(0.15 * 21e-3 * 20 / 3e-3 / 2e3, rel=0.03)
+
+
+def test_the_chain_drags_behind_on_reversal():
+    p = load.build_cable_chain(load.CableChainSettings(node="carriage", k=20.0, F_h=2.0, z_h=2e-3), 1e-3)
+    s = np.zeros(1, load.CABLE_CHAIN_STATE).view(np.recarray)[0]
+    out = np.linspace(0, 0.1, 1001)
+    there = [load.cable_chain(p, s, x) for x in out]
+    back = [load.cable_chain(p, s, x) for x in out[::-1]]
+    assert there[-1] == pytest.approx(-2.0 - 2.0)
+    assert back[500] - there[500] == pytest.approx(4.0)  # twice the drag
+    assert back[1] - there[-1] < 0.5  # but not at once
+    assert np.trapezoid(there, out) - np.trapezoid(back[::-1], out) < 0.0  # a loop costs energy
+
+
+@settings(deadline=None)
+@given(st.floats(-10, 10), st.floats(-7, 7), st.floats(0.01, 10))
+def test_imbalance_comes_once_a_turn(A, phi, turn):
+    p = load.build_imbalance(load.ImbalanceSettings(node="carriage", A=A, phi=phi, turn=turn), 1e-3)
+    x = np.linspace(0, turn, 65)[:-1]
+    force = np.array([load.imbalance(p, v) for v in x])
+    assert abs(force.sum()) < 1e-9
+    assert np.abs(force).max() <= abs(A)
+    assert force[0] == pytest.approx(A * math.sin(phi))
+
+
+def bump(form: str, **values) -> load.BumpSettings:
+    return bench.usual("load.bump", "axis", form=form, at=0.02, width=2e-3, **values)
+
+
+@pytest.mark.parametrize("v", [0.05, 0.2])
+def test_a_hill_gives_back_what_it_took_and_drag_does_not(v):
+    free = {"F_c": 0.0, "F_v": 0.0}
+    hill = bench.run("axis", [bump("hill", F=20.0)], np.zeros(1000), speeds={"carriage": v}, **free)
+    height = 20.0 * 2e-3 * math.sqrt(math.e)
+    assert hill.v.min() == pytest.approx(math.sqrt(v**2 - 2 * height / M), rel=1e-3)
+    assert hill.v[-1, 0] == pytest.approx(v, rel=1e-5)
+    drag = bench.run("axis", [bump("drag", F=20.0)], np.zeros(1000), speeds={"carriage": v}, **free)
+    taken = 20.0 * 2e-3 * math.sqrt(2 * math.pi)
+    assert drag.v[-1, 0] == pytest.approx(math.sqrt(v**2 - 2 * taken / M), rel=1e-4)
+
+
+@settings(deadline=None)
+@given(st.floats(-0.02, 0.06))
+def test_a_hill_pushes_back_before_and_on_behind(x):
+    p = load.build_bump(bump("hill", F=3.0), 1e-3)
+    d, height = load.bell(p, x)
+    force = p.F * load.HILL * d * height
+    assert force * (x - 0.02) >= 0.0
+    assert abs(force) <= 3.0 * (1 + 1e-12)
+
+
+def test_a_slow_carriage_does_not_pass():
+    stopped = bench.run("axis", [bump("hill", F=20.0)], np.zeros(6000), speeds={"carriage": 0.03}, F_c=0.0, F_v=0.0)
+    assert stopped.v[-1, 0] == pytest.approx(-0.03, rel=1e-3)
+    assert stopped.q.max() < 0.02
+
+
+@pytest.mark.parametrize("form", ["drag", "hill", "push"])
+def test_it_stands_every_turn_or_once(form):
+    once = load.build_bump(bump(form), 1e-3)
+    always = load.build_bump(bump(form, every_turn=True), 1e-3)
+    x = 0.0205
+    for turns in (-2, 0, 3):
+        assert load.bell(always, x + turns * 2 * math.pi) == pytest.approx(load.bell(once, x))
+    assert load.bell(once, x + 2 * math.pi)[1] == 0.0
+
+
+def test_a_push_goes_one_way_wherever_one_comes_from():
+    r = bench.run("axis", [bump("push", F=30.0)], np.zeros(1000), speeds={"carriage": 0.05}, F_c=0.0, F_v=0.0)
+    gained = 30.0 * 2e-3 * math.sqrt(2 * math.pi)
+    assert r.v[-1, 0] == pytest.approx(math.sqrt(0.05**2 + 2 * gained / M), rel=1e-4)

@@ -1,0 +1,120 @@
+"""Wheels out of round: the way is the integral of the arm, and a turn takes no work."""
+
+import math
+
+import numpy as np
+import pytest
+import stand
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.plants import ivu, linear
+from rtctl.plants.physics import ripple_tape
+
+H = 5e-4
+phases = st.floats(-4, 4)
+
+
+def reel(**values: float) -> ripple_tape.WheelParams:
+    return ripple_tape.build_reel(ripple_tape.ReelSettings(node="reel1", **{"e": 0.0, **values}), H)
+
+
+def capstan(**values: float) -> ripple_tape.WheelParams:
+    return ripple_tape.build_capstan(ripple_tape.CapstanSettings(node="capstan", **{"a": 0.0, **values}), H)
+
+
+@settings(deadline=None)
+@given(phases, phases, phases, st.floats(-50, 50))
+def test_the_arm_is_the_slope_of_the_way(phi, phi2, phi3, q):
+    p = reel(e=1e-3, phi=phi, e2=3e-4, phi2=phi2, e3=-2e-4, phi3=phi3)
+    d = 1e-5
+    slope = (ripple_tape.way(p, q + d) - ripple_tape.way(p, q - d)) / (2 * d)
+    assert ripple_tape.arm(p, q) == pytest.approx(slope, abs=1e-9)
+    radius = 1e-3 * math.cos(q + phi) + 3e-4 * math.cos(2 * q + phi2) - 2e-4 * math.cos(3 * q + phi3)
+    assert ripple_tape.arm(p, q) == pytest.approx(radius, abs=1e-15)
+    assert ripple_tape.way(p, 0.0) == 0.0
+    assert ripple_tape.way(p, q + 2 * math.pi) == pytest.approx(ripple_tape.way(p, q), abs=1e-12)
+
+
+def test_an_oval_capstan_is_off_by_what_the_thesis_says():
+    """Radii of 3 mm +- 2 um as one sine a turn: 4 um at most from where it starts (11.3, figure 11.2)."""
+    p = capstan(a=2e-6, phi=-math.pi / 2)
+    e = [ripple_tape.way(p, q) for q in np.linspace(0, 2 * math.pi, 361)]
+    assert max(map(abs, e)) == pytest.approx(4e-6, rel=1e-4)
+
+
+def forces(act, node: int, q: np.ndarray, v: np.ndarray, damped: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Forces on all nodes of the linear springs and the term at middles q, v (5,), and the pulls in both tapes."""
+    _, s = stand.plant("ivu", H, d_tape=0.0, **({} if damped else {"k1": 0.0, "k2": 0.0}))
+    s.m.qm[:], s.m.vm[:] = q, v
+    linear_part = np.zeros(5)
+    for j in (0, 1):
+        T = linear.tension(s.m, j)
+        linear_part[s.m.link_i[j]] -= s.m.link_a[j] * T
+        linear_part[s.m.link_j[j]] -= s.m.link_b[j] * T
+    act(s.m, node)
+    return linear_part + s.m.f, np.array([linear.tension(s.m, 0), linear.tension(s.m, 1)])
+
+
+CASES = {
+    "reel1": (ivu.REEL1, reel(e=2e-3, phi=0.4, e2=1e-3, phi2=2.0), ripple_tape.reel),
+    "reel2": (ivu.REEL2, reel(e=2e-3, phi=0.4, e3=1e-3, phi3=2.0), ripple_tape.reel),
+    "capstan": (ivu.CAPSTAN, capstan(a=5e-4, phi=0.4, a2=3e-4, phi2=1.0), ripple_tape.capstan),
+}
+
+
+@pytest.mark.parametrize("node", CASES)
+def test_forces_come_from_one_potential(node):
+    """The springs' energy at the true stretch: its slope by each angle is the force there, so a cycle takes no work."""
+    at, p, function = CASES[node]
+
+    def stretches(q: np.ndarray) -> tuple[float, float]:
+        one = 0.038 * q[ivu.REEL1] - 0.0125 * q[ivu.CAPSTAN]
+        two = 0.022 * q[ivu.REEL2] + 0.0125 * q[ivu.CAPSTAN]
+        extra = ripple_tape.way(p, q[at])
+        if node == "capstan":
+            return one - extra, two + extra
+        return (one + extra, two) if node == "reel1" else (one, two + extra)
+
+    def energy(q: np.ndarray) -> float:
+        return 0.5 * 450.0 * sum(e * e for e in stretches(q))
+
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        q = rng.normal(size=5) * 3
+        force, pulls = forces(lambda m, i: function(p, m, i), at, q, np.zeros(5))
+        slope = np.array([(energy(q + d) - energy(q - d)) / 2e-5 for d in 1e-5 * np.eye(5)])
+        assert np.allclose(force, -slope, rtol=1e-6, atol=1e-6)
+        assert np.allclose(pulls, 450.0 * np.array(stretches(q)))
+
+
+@pytest.mark.parametrize("node", CASES)
+def test_the_damper_only_takes_energy(node):
+    at, p, function = CASES[node]
+    rng = np.random.default_rng(4)
+    for _ in range(50):
+        q, v = rng.normal(size=5) * 3, rng.normal(size=5)
+        still, _ = forces(lambda m, i: function(p, m, i), at, q, np.zeros(5), damped=True)
+        moving, _ = forces(lambda m, i: function(p, m, i), at, q, v, damped=True)
+        assert (moving - still) @ v <= 1e-12
+
+
+def test_a_reel_off_centre_shows_once_a_turn_and_with_the_tension():
+    u = np.tile([0.9, 0.3], (2500, 1))  # both pull, motor 1 winds
+
+    def wave(volts: np.ndarray, e: float) -> np.ndarray:
+        term = stand.make("ripple.reel", "ivu", "reel1", e=e, phi=1.0)
+        options = {"d_tape": 0.0, "tau_F1": 0.0, "tau_F2": 0.0, "tau_Fc": 0.0}
+        return stand.run("ivu", [term], volts, **options).x - stand.run("ivu", [], volts, **options).x
+
+    change = wave(u, 2e-4)
+    assert np.allclose(wave(u, 4e-4), 2 * change, atol=0.05 * np.abs(change).max())  # in proportion to e
+    assert np.abs(change[:, ivu.CAPSTAN]).max() > 3 * 2 * np.pi / 10_000
+
+
+def test_ldu_shows_it_at_the_scale_alone():
+    u = stand.excitation("ldu", 300)
+    one, two = stand.run("ldu", [], u), stand.run("ldu", [stand.make("ripple.capstan", "ldu", a=2e-6, phi=1.0)], u)
+    assert np.array_equal(one.x, two.x) and np.array_equal(one.y[:, 0], two.y[:, 0])
+    theta = one.x[:, 2]
+    assert np.allclose(two.y[:, 1] - one.y[:, 1], 2e-6 * (np.sin(theta + 1) - math.sin(1)), atol=1e-12)

@@ -1,0 +1,53 @@
+"""A mass on a spring, exact in itself and keeping momentum; a spring that stiffens."""
+
+import bench
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from rtctl.plants.physics import structure
+
+M = 95.1
+
+
+@settings(deadline=None)
+@given(st.floats(1, 300), st.floats(0, 0.9), st.floats(1e-5, 1e-3))
+def test_its_step_is_the_matrix_exponential(f, zeta, h):
+    p = structure.build_resonance(structure.ResonanceSettings(node="carriage", f_Hz=f, mass=1.0, zeta=zeta), h)
+    w = 2 * np.pi * f
+    exact = expm(np.array([[0.0, 1.0], [-w * w, -2 * zeta * w]]) * h)
+    assert np.array([[p.a11, p.a12], [p.a21, p.a22]]) == pytest.approx(exact, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.1, 1.0, 2.0])
+def test_momentum_is_kept_and_the_pair_rings_at_its_frequency(share):
+    term = bench.usual("structure.resonance", "axis", f_Hz=50.0, mass=share * M, zeta=0.0)
+    r = bench.run("axis", [term], np.zeros(2000), speeds={"carriage": 0.1}, F_v=0.0, F_c=0.0, substeps=8)
+    swing = r.v[:, 0] - 0.1 / (1 + share)
+    assert abs(r.v[:, 0].mean() - 0.1 / (1 + share)) < 2e-4
+    crossings = np.count_nonzero(np.diff(np.sign(swing)))
+    assert crossings == pytest.approx(2 * 2.0 * 50.0 * np.sqrt(1 + share), abs=2)
+    assert np.abs(swing[-200:]).max() == pytest.approx(np.abs(swing[:200]).max(), rel=0.02)  # neither fed nor braked
+
+
+def test_below_its_frequency_it_is_dead_mass():
+    term = bench.usual("structure.resonance", "axis", f_Hz=200.0, mass=0.5 * M, zeta=0.05)
+    r = bench.run("axis", [term], np.linspace(0, 2, 1000), F_v=0.0, F_c=0.0)
+    rigid = bench.run("axis", [], np.linspace(0, 2, 1000), F_v=0.0, F_c=0.0, M=1.5 * M)
+    assert r.q[-1, 0] == pytest.approx(rigid.q[-1, 0], rel=1e-4)
+
+
+def test_the_cubic_spring_holds_what_it_should():
+    c3 = 1e6
+    term = bench.usual("structure.stiffening", "axis", c3=c3)
+    r = bench.run("axis", [term], np.minimum(np.linspace(0, 2, 8000), 1.0), k=1e4, F_c=0.0, F_v=2e3)
+    x = r.q[-1, 0]
+    assert 1e4 * x + c3 * x**3 == pytest.approx(35.15, rel=1e-3)
+
+
+@given(st.floats(-1, 1), st.floats(-1e6, 1e6))
+def test_it_pulls_alike_both_ways(e, c3):
+    p = structure.StiffeningParams(c3)
+    assert structure.stiffening(p, -e) == -structure.stiffening(p, e)

@@ -1,0 +1,63 @@
+"""Play: nothing in the gap, the linear spring beyond it, energy that only falls, and a sensor that lags behind."""
+
+import bench
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.plants.physics import transmission
+
+
+@settings(deadline=None)
+@given(st.floats(-1, 1), st.floats(0, 0.5), st.floats(0, 1))
+def test_dead_zone(e, half, edge):
+    d, slope = transmission.dead_zone(e, half, edge)
+    assert 0.0 <= slope <= 1.0
+    assert d * e >= 0.0
+    if abs(e) >= half * (1 + edge):
+        assert d == pytest.approx(np.sign(e) * (abs(e) - half), abs=1e-15)
+    if abs(e) < half * (1 - edge):
+        assert d == slope == 0.0
+    assert transmission.dead_zone(-e, half, edge) == (-d, slope)
+
+
+@settings(deadline=None)
+@given(st.floats(0.01, 1), st.floats(1e-3, 0.5), st.floats(0.01, 1))
+def test_its_slope_is_its_derivative(e, half, edge):
+    d = [transmission.dead_zone(x, half, edge)[0] for x in (e - 1e-7, e + 1e-7)]
+    assert (d[1] - d[0]) / 2e-7 == pytest.approx(transmission.dead_zone(e, half, edge)[1], abs=1e-3)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0])
+def test_free_ends_keep_their_speed_within_the_gap(damping):
+    term = bench.usual("transmission.backlash", "ldu", "motor", gap=1.0, damping=damping)
+    r = bench.run("ldu", [term], np.zeros((4, 1)), speeds={"motor": 50.0}, substeps=20)
+    if damping:
+        assert r.v[-1, 0] < 49.0
+    else:
+        assert r.v[-1, 0] == pytest.approx(50.0 * np.exp(-5e-8 / 1e-6 * 4e-3), rel=1e-4)
+        assert abs(r.v[-1, 1]) < 0.01 * 50.0
+
+
+def test_the_motor_turns_through_the_gap_before_the_wheel_follows():
+    gap, small = 1e-3, 0.004  # so slow that the impact does not move the carriage
+    term = bench.usual("transmission.backlash", "ldu", "motor", gap=gap, damping=1.0, edge=0.0)
+    r = bench.run("ldu", [term], np.repeat([small, -small], 900).reshape(-1, 1))
+    wound = small * 21e-3 / 4.2  # what the shaft itself gives
+    e = r.q[:, 0] - 20 * r.q[:, 1]
+    assert e[899] == pytest.approx(gap / 2 + wound, rel=0.02)
+    assert e[-1] == pytest.approx(-gap / 2 - wound, rel=0.02)
+
+
+def test_the_sensor_of_an_axis_lags_by_the_gap_after_a_reversal():
+    gap = 1e-4
+    inputs = bench.moves("axis")
+    r = bench.run("axis", [bench.usual("transmission.backlash", "axis", gap=gap)], inputs)
+    behind = r.y[:, 0] - r.q[:, 0]
+    assert np.abs(behind).max() == pytest.approx(gap / 2, rel=1e-9)
+    forwards, backwards = r.v[:, 0] > 1e-3, r.v[:, 0] < -1e-3
+    assert np.median(behind[forwards]) == pytest.approx(-gap / 2)
+    assert np.median(behind[backwards]) == pytest.approx(gap / 2)
+    steady = r.v[1:, 0] * r.v[:-1, 0] > 0
+    assert (np.diff(r.y[:, 0]) * np.sign(r.v[1:, 0]) >= 0.0)[steady].all()

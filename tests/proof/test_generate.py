@@ -1,0 +1,157 @@
+"""The generator: determinism, the bundle's format, kinds in their shares, effects that show."""
+
+import json
+from collections import Counter
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from rtctl.config.errors import UserError
+from rtctl.proof import draw, law, plants, seal
+from rtctl.proof import generate as g
+from rtctl.proof.effects import TABLE
+from rtctl.proof.unknown import UNKNOWN
+
+SECONDS = {"ivu": 12.0, "ldu": 2.4, "axis": 8.0}
+WEAK = {("ldu", "timing.jitter"): 0.5}  # a tenth of a millisecond is short: it shows in fast moves alone
+NAMES = 34  # in the table of the exchange format
+ALL = [(plant, name) for plant in g.PLANTS for name in draw.names_on(plant)]
+
+
+@pytest.fixture(scope="module")
+def machines():
+    """A short sound machine of each plant with two runs."""
+    out = {}
+    for plant in g.PLANTS:
+        rng = np.random.default_rng([3, len(plant)])
+        s = plants.BUILD[plant](rng, "rich", False, False)
+        if plant == "ldu" and len(s.sensors) == 1:
+            s.sensors.append("scale_counts")
+        n = int(SECONDS[plant] / s.Ts)
+        s.ref, s.w = s.ref[:n], s.w[:n]
+        a, b = g.simulate(s, [1]), g.simulate(s, [2])
+        g.measure_span(s, a)
+        out[plant] = s, a, g.floors(s, a, b)
+    return out
+
+
+def test_every_name_has_a_plant():
+    assert len(TABLE) == NAMES
+    assert {name for _, name in ALL} == set(TABLE)
+    assert len(UNKNOWN) == 12
+
+
+@pytest.mark.parametrize(("plant", "name"), ALL)
+def test_an_effect_of_typical_size_shows(machines, plant, name):
+    base, a, floor = machines[plant]
+    want = WEAK.get((plant, name), 2.0)
+    best = 0.0
+    for attempt in range(3):
+        for node in TABLE[name].nodes[plant]:
+            s, said = g.put(base, (draw.Part(name, node, 1.0),), [7, attempt])
+            run = g.simulate(s, [1])
+            if run is not None:
+                best = max(best, g.largest(g.visibility(s, run, a, floor)))
+            assert said[0]["node"] in said[0]["nodes_ok"]
+            if best > want:
+                return
+    assert best > want
+
+
+@pytest.mark.parametrize("name", sorted(UNKNOWN))
+def test_unknown_physics_shows(machines, name):
+    plant = next(iter(UNKNOWN[name][1]))
+    base, a, floor = machines[plant]
+    s, _ = g.put(base, (draw.Part(name, UNKNOWN[name][1][plant][0], 1.0),), [7])
+    run = g.simulate(s, [1])
+    assert run is None or g.largest(g.visibility(s, run, a, floor)) > 1.5
+
+
+def test_an_effect_leaves_the_sound_machine_alone(machines):
+    base, a, _ = machines["axis"]
+    before = base.m.copy()
+    g.put(base, (draw.Part("friction.stribeck", "carriage", 1.0),), [7])
+    assert base.m == before
+    assert np.array_equal(g.simulate(base, [1])["x"], a["x"])
+
+
+def test_kinds_come_in_their_shares():
+    kinds = Counter(draw.plan(5, i, g.PLANTS).kind for i in range(200))
+    assert kinds == {
+        "null": 20, "parameters": 20, "decoy": 10, "single": 70, "pair": 40, "triple": 10, "unknown": 30,
+    }  # fmt: skip
+
+
+def test_singles_go_through_every_name_on_every_plant():
+    met = {(p.plant, p.parts[0].name) for p in (draw.plan(5, i, g.PLANTS) for i in range(240)) if p.kind == "single"}
+    assert met == set(ALL)
+
+
+def test_a_plan_depends_on_seed_and_number_alone():
+    assert draw.plan(5, 17, g.PLANTS) == draw.plan(5, 17, g.PLANTS)
+    assert [draw.plan(5, i, g.PLANTS) for i in range(20)] != [draw.plan(6, i, g.PLANTS) for i in range(20)]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("proof")
+    g.generate(folder, 3, 11, ("axis",), heldout=True)
+    return folder
+
+
+def test_bundles_are_in_the_exchange_format(written):
+    answers = seal.open_seal(written)
+    assert sorted(answers["cases"]) == ["case-0001", "case-0002", "case-0003"]
+    for name, a in answers["cases"].items():
+        case = json.loads((written / name / "case.json").read_text())
+        t = pq.read_table(written / name / "recording.parquet")
+        assert t.column_names == ["t", "ref", "w", "u", "x"]
+        assert t.num_rows == a["seconds"] * case["sample_rate"]
+        assert set(a) >= {
+            "kind",
+            "effects",
+            "ratio",
+            "noise_floor",
+            "true_parameters",
+            "visibility",
+            "size",
+            "oracle_nrmse",
+        }
+        for key, believed in case["parameters"].items():
+            assert abs(a["true_parameters"][key] / believed - 1.0) <= case["reaches"]["parameter_tolerance"]
+        columns = {c: t[c].to_numpy() for c in t.column_names}
+        if case["controller_known"]:
+            assert np.array_equal(law.recompute(case, columns)[:, 0], columns["u"])
+        held = pq.read_table(written / f"{name}-heldout" / "recording.parquet")
+        assert not np.array_equal(held["ref"].to_numpy(), columns["ref"])
+        assert json.loads((written / f"{name}-heldout" / "case.json").read_text()) == case
+
+
+def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
+    name, answer = g.write_case(tmp_path, 11, 1, ("axis",), False)
+    assert answer == seal.open_seal(written)["cases"][name]
+    one, two = (pq.read_table(f / name / "recording.parquet") for f in (written, tmp_path))
+    assert one.equals(two)
+
+
+def test_goes_on_where_it_was_stopped(written, tmp_path):
+    g._begin(tmp_path, {"seed": 11, "plants": ["axis"], "heldout": False})
+    g.write_case(tmp_path, 11, 0, ("axis",), False)
+    before = (tmp_path / "case-0001" / "recording.parquet").stat().st_mtime_ns
+    with pytest.raises(UserError, match="interrupted run"):
+        g.generate(tmp_path, 2, 12, ("axis",))
+    g.generate(tmp_path, 2, 11, ("axis",))
+    assert (tmp_path / "case-0001" / "recording.parquet").stat().st_mtime_ns == before
+    found = seal.open_seal(tmp_path)["cases"]
+    assert found == {name: seal.open_seal(written)["cases"][name] for name in ("case-0001", "case-0002")}
+    assert not (tmp_path / g.DRAFT).exists()
+
+
+def test_wrong_requests_are_refused(written, tmp_path):
+    with pytest.raises(UserError, match="holds cases"):
+        g.generate(written, 1, 1)
+    with pytest.raises(UserError, match="not one of"):
+        g.generate(tmp_path, 1, 1, ("ivu", "boat"))
+    with pytest.raises(UserError, match="at least one"):
+        g.generate(tmp_path, 0, 1)
