@@ -19,7 +19,7 @@ The sites of a substep in their order:
               the sample, {m}.t its time. It may be called once a substep or once a tick: it keeps no memory.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,7 +41,7 @@ class Term:
     settings: type[Settings]
     build: Callable[[Any, float], Any]
     act: dict[str, str]  # site, or site:kind for one kind of plant -> line
-    nodes: dict[str, tuple[str, ...]]  # plant kind -> nodes where it can stand
+    nodes: Mapping[str, tuple[str, ...]]  # plant kind -> nodes where it can stand
     look_alikes: dict[str, str]  # rival name -> the experiment that separates the two
     typical: dict[str, tuple[float, float]] = field(default_factory=dict)  # parameter -> range; see `scale`
     scale: dict[str, str] = field(default_factory=dict)  # parameter -> what its typical range is a multiple of

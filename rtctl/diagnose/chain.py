@@ -60,13 +60,22 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
     with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
         progress("preflight")
         checked = preflight(record)
-        sim = Simulator(record)
+        sim = simulator(record)
         problem = Problem(sim)
         found = find(sim, problem, progress)
         block = max(2, round(BLOCK / (record.dt * problem.mean)))
         verdict = judge(problem, found.base, found.best, found.rivals, block)
         progress("predicting rows that were not fitted")
         return _answer(sim, other, problem, found, verdict, checked, block)._replace(seconds=time.monotonic() - began)
+
+
+def simulator(record: Record) -> Simulator:
+    """For a machine without a controller: of a command that was held and one that was sampled, the one that fits."""
+    sim = Simulator(record)
+    if record.case.controller.kind != "none":
+        return sim
+    smooth = Simulator(record, held=False)
+    return min(sim, smooth, key=lambda s: base_fit(s, Problem(s)).cost)
 
 
 def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:

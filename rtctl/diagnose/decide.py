@@ -15,13 +15,13 @@ from scipy.stats import norm
 
 from rtctl.diagnose.fit import Fit, Problem
 
-MATERIAL = 0.08  # share of the cost that a term must take off
+MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
+LOUD = 4.5  # times the noise floor: below it what no hypothesis explains may be a machine that is not quiet
 NEARLY = 0.2  # the same where the model is already near the noise
-COMPLETE = 1.35  # times the noise floor of a quiet machine: what is left may well be noise
+COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
 SOME = 0.5  # share of the excess below which not even a guess is given
-TEMPER = 0.08  # how much of a difference in cost counts, since errors are not independent
 
 
 class Verdict(NamedTuple):
@@ -66,7 +66,25 @@ def p_value(best: Fit, rival: Fit, block: int) -> float:
 
 
 def probabilities(fits: list[Fit]) -> np.ndarray:
-    """Tempered weights of rival models, by their cost and their number of parameters."""
-    cost = np.array([f.cost + 2.0 * len(f.x) for f in fits])
-    w = np.exp(-TEMPER * (cost - cost.min()))
+    """Weights of rival models by the likelihood of their errors, of which only every `memory`-th counts."""
+    best = min(fits, key=lambda f: f.merit)
+    count = len(best.r) / memory(best.r)
+    log = np.array([0.5 * count * np.log(f.merit / best.merit) for f in fits])
+    w = np.exp(-np.minimum(log, 700.0))
     return w / w.sum()
+
+
+def memory(r: np.ndarray, most: int = 500) -> float:
+    """Errors that count as one: 1 + 2 sum of the autocorrelation up to where it is lost.
+
+    Source: Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992).
+    """
+    e = r - r.mean()
+    power = float(e @ e) or 1.0
+    total = 1.0
+    for lag in range(1, min(most, len(e) // 4)):
+        rho = float(e[lag:] @ e[:-lag]) / power
+        if rho < 0.05:
+            break
+        total += 2.0 * rho
+    return total

@@ -10,6 +10,7 @@ prediction error in closed loop.
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.space import Space
 
 FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # of SIGMA, on quiet machines
-TOLL = 0.01  # share of the cost that a further number of a term must take off
+TOLL = 0.08  # share of the cost that a further number of a term must take off
 FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
 THREADS = 2
 TOGETHER = 100.0  # errors that count as one
@@ -144,7 +145,7 @@ def jacobian(
         return (problem.residual(space.model(moved)) - r) / step
 
     wanted = range(len(x)) if columns is None else columns
-    found = parallel([lambda i=i: column(i) for i in wanted])
+    found = parallel([partial(column, i) for i in wanted])
     return np.stack(found, axis=1) if found else np.zeros((len(r), 0))
 
 

@@ -23,7 +23,7 @@ class Size(NamedTuple):
 
     name: str
     measure: str
-    share: float
+    share: float | tuple[float, ...]  # several are several starts
     signed: bool = False
     most: float = np.inf  # in units of share times measure
     least: float = -np.inf
@@ -42,11 +42,11 @@ class Shape(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """A limit: without effect while it is far off; `start` in units of its measure."""
+    """A limit: without effect while it is far off; `starts` in units of its measure."""
 
     name: str
     measure: str
-    start: float
+    starts: tuple[float, ...]
 
 
 class Turn(NamedTuple):
@@ -59,10 +59,10 @@ class Turn(NamedTuple):
 
 
 class At(NamedTuple):
-    """A place along the node's travel, started at `count` of them."""
+    """A place along the node's travel, started at `places` of them."""
 
     name: str
-    count: int
+    places: int
 
 
 class Hint(NamedTuple):
@@ -90,8 +90,8 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.presliding": (Size("z_s", "span", 1e-3, finest=1.0), Choice("form", ("dahl", "lugre"))),
     "friction.asymmetry": (Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
     "friction.load": (Size("mu", "one", 0.05, signed=True),),
-    "transmission.backlash": (Size("gap", "twist", 0.3),),
-    "transmission.slip": (Limit("F_max", "force", 1.0),),
+    "transmission.backlash": (Size("gap", "twist", (0.3, 5.0, 60.0)),),
+    "transmission.slip": (Limit("F_max", "contact", (0.4, 1.0, 2.5)),),
     "transmission.creep": (Size("kappa", "compliance", 1e-3),),
     "structure.resonance": (
         Size("mass", "inertia", 0.1), Shape("f_Hz", "hertz", (3.0, 8.0, 20.0, 40.0, 70.0, 110.0, 160.0, 220.0), 1.6),
@@ -108,7 +108,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "drive.offset": (Size("offset", "volts", 0.05, signed=True),),
     "drive.deadband": (Size("band", "volts", 0.1), Choice("form", ("shift", "cut", "floor"))),
     "drive.gain_asymmetry": (Size("a", "one", 0.1, signed=True),),
-    "drive.saturation": (Limit("limit", "peak", 0.7),),
+    "drive.saturation": (Limit("limit", "peak", (0.5, 0.8)),),
     "drive.lag": (Size("tau", "tick", 0.5), Choice("order", (1, 2))),
     "drive.supply_sag": (Size("k", "per_volt", 0.05), Choice("form", ("current", "power"))),
     "drive.thermal": (
@@ -165,9 +165,11 @@ def hypotheses(
             and (not only or name in only)
         ):
             for node in term.nodes.get(record.plant, ()):
-                if (node == "sensor" and name in ALONE) or (
-                    record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ())
-                ):
+                if (
+                    (node == "sensor" and name in ALONE)
+                    or (record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ()))
+                    or (name == "friction.stribeck" and not measures.dry(node))
+                ):  # falls to what the base has
                     continue
                 out += _starts(name, node, SEARCH[name], measures)
     return out
@@ -190,6 +192,12 @@ class Measures:
         self, record: Record, base: dict[str, float], scales: dict[str, Scales], hints: dict[str, list[float]]
     ):
         self.record, self.base, self.scales, self.hints = record, base, scales, hints
+        self.term = ""
+
+    def most(self, parameter: str) -> float:
+        """The highest value that the term's settings allow."""
+        bounds = TERMS[self.term].settings.model_fields[parameter].metadata
+        return float(min((b.le for b in bounds if hasattr(b, "le")), default=np.inf))
 
     def scale(self, node: str) -> Scales:
         """Of the node, or of the main node for a drive or the loop."""
@@ -208,6 +216,7 @@ class Measures:
             "low": s.low,
             "drag": s.force / s.speed,
             "stiff": s.force / s.span,
+            "contact": self.contact(node),
             "twist": s.force / self.stiffness(node),
             "cubic": self.stiffness(node) ** 3 / s.force**2,
             "stiffness": self.stiffness(node),
@@ -233,6 +242,15 @@ class Measures:
         if self.record.plant == "ldu" and node == "capstan":
             return self.base["F_c"] * self.base["R_c"]
         return self.base.get("F_c" if self.record.plant == "axis" else name, 0.0)
+
+    def contact(self, node: str) -> float:
+        """What a friction contact at the node carries, N (Nm of the motor at a wheel): what stands beyond it."""
+        b, s = self.base, self.scale(node)
+        if self.record.plant == "ivu":
+            return (b["tau_Fc"] + b["J_c"] * s.force / self.inertia("capstan")) / b["R_c"]
+        if node == "capstan":
+            return b["F_c"] + b["M"] * self.scale("carriage").force / self.inertia("carriage")
+        return s.force / b["N"] if node == "wheel" else s.force
 
     def inertia(self, node: str) -> float:
         """Inertia or mass that moves with a node."""
@@ -263,6 +281,7 @@ class Measures:
 
 def _starts(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[Hypothesis]:
     """One hypothesis for each combination of starts."""
+    m.term = term
     axes: list[list[tuple[tuple[Coordinate, ...], dict]]] = [list(_options(part, node, m)) for part in parts]
     out = []
     for combination in product(*axes):
@@ -274,11 +293,12 @@ def _starts(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[
 
 def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordinate, ...], dict]]:
     if isinstance(part, Size):
-        scale = part.share * m.of(part.measure, node)
-        least = part.least if part.signed else part.finest * m.of("grain", node) / scale
         offset = m.dry(node) if part.offset == "dry" else 0.0
-        yield (Coordinate(part.name, SIZE, scale, least, part.most / part.share if part.measure == "one" else part.most,
-                          offset=offset),), {}  # fmt: skip
+        for share in part.share if isinstance(part.share, tuple) else (part.share,):
+            scale = min(share * m.of(part.measure, node), 0.5 * m.most(part.name))
+            least = part.least if part.signed else part.finest * m.of("grain", node) / scale
+            most = part.most / share if part.measure == "one" else part.most
+            yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset),), {}
     elif isinstance(part, Shape):
         measure = m.of(part.measure, node)
         low, high = min(part.starts) * measure / part.reach, max(part.starts) * measure * part.reach
@@ -289,7 +309,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             else:
                 yield (Coordinate(part.name, SHAPE, value, np.log(low / value), np.log(high / value)),), {}
     elif isinstance(part, Limit):
-        yield (Coordinate(part.name, INVERSE, part.start * m.of(part.measure, node), 0.0),), {}
+        for start in part.starts:
+            yield (Coordinate(part.name, INVERSE, start * m.of(part.measure, node), 0.0),), {}
     elif isinstance(part, Turn):
         scale = part.share * m.of(part.measure, node)
         name = f"{part.amplitude}|{part.phase}"
@@ -304,9 +325,9 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
                 yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach),), {}
     elif isinstance(part, At):
         s = m.scale(node)
-        for k in range(part.count):
-            middle = s.low + s.span * (k + 0.5) / part.count
-            reach = s.span / part.count
+        for k in range(part.places):
+            middle = s.low + s.span * (k + 0.5) / part.places
+            reach = s.span / part.places
             yield (Coordinate(part.name, PLACE, reach, -1.5, 1.5, offset=middle),), {}
     else:
         for value in part.values:

@@ -173,13 +173,12 @@ def roughly(problem: Problem, parent: Fit, score: Score) -> Fit:
 def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:
     """Take out, one by one, every term without which the model is as good."""
     while len(found.space.hypotheses) > 1:
-        for index in range(len(found.space.hypotheses)):
-            less = fit(problem, found.space.without(index), drop(found, index), rounds=10)
-            if not worth(less, found):
-                found = less
-                break
-        else:
+        indices = range(len(found.space.hypotheses))
+        trials = [fit(problem, found.space.without(i), drop(found, i), rounds=10) for i in indices]
+        less = min(trials, key=lambda f: f.merit)
+        if worth(less, found):
             return found
+        found = less
     return found
 
 

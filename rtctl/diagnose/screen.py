@@ -7,6 +7,7 @@ bounded least-squares problem in both, so that what a wrong parameter explains a
 Source: score test (Rao 1948) with nuisance parameters projected out; secant steps for terms that are not smooth.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ def screen(problem: Problem, fitted: Fit, candidates: list[Hypothesis]) -> list[
     g = fitted.J.T @ r + weight * x
     H = fitted.J.T @ fitted.J + np.diag(weight)
     tries = [(h, i) for h in candidates for i in h.sizes]
-    columns = parallel([lambda h=h, i=i: _secant(problem, space, x, r, h, i) for h, i in tries])
+    columns = parallel([partial(_secant, problem, space, x, r, h, i) for h, i in tries])
     scores, at = [], 0
     for h in candidates:
         count = len(h.sizes)

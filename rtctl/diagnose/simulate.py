@@ -35,7 +35,14 @@ CHANNELS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("
 class Simulator:
     """A recording, ready to be simulated by models; one call is one run, and calls may go on in several threads."""
 
-    def __init__(self, record: Record, finer: int = 1, follow: float | None = None, lead: float | None = None):
+    def __init__(
+        self,
+        record: Record,
+        finer: int = 1,
+        follow: float | None = None,
+        lead: float | None = None,
+        held: bool = True,
+    ):
         self.record = record
         self.case: Case = record.case
         self.kernel = kernel.kernel(record.plant)
@@ -45,7 +52,8 @@ class Simulator:
         self.channels = channels(record)
         self.half = 0.5 if record.plant != "axis" else 0.0
         self.seen = np.ascontiguousarray(record.y[self.channels[0]] + self.half)
-        self.volts = np.ascontiguousarray(record.u.reshape(len(record.t), -1))
+        volts = record.u.reshape(len(record.t), -1)
+        self.volts = np.ascontiguousarray(volts if held else half_a_tick_on(volts))
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
         self.law = law_params(record)
 
@@ -62,7 +70,7 @@ class Simulator:
         """
         k = self.kernel
         n = len(self.seen) if n is None else n
-        stiff = any(t.term.startswith(STIFF) for t in model.terms)
+        stiff = any(str(getattr(t, "term", "")).startswith(STIFF) for t in model.terms)
         substeps = self.substeps * (FINER[self.record.plant] if stiff else 1)
         h = self.record.dt / substeps
         params = plant_params(model, self.case, h)
@@ -103,6 +111,15 @@ class Simulator:
         j["P"], j["D"] = follow**2 / rigid, 1.4 * follow / rigid
         j["a"] = -np.expm1(-10 * follow * self.record.dt)
         return job
+
+
+def half_a_tick_on(volts: np.ndarray) -> np.ndarray:
+    """The mean of a smooth command (n, drives) over the tick that begins with each sample, to first order.
+
+    A command that was sampled, and not written by a DAC that holds it, goes on changing in between.
+    """
+    turn = np.exp(1j * np.pi * np.fft.rfftfreq(len(volts)))[:, None]
+    return np.fft.irfft(np.fft.rfft(volts, axis=0) * turn, len(volts), axis=0)
 
 
 _dtypes: dict[type, np.dtype] = {}

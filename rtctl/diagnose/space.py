@@ -49,7 +49,7 @@ class Hypothesis(NamedTuple):
         """Indices of the coordinates that are zero where the effect is."""
         return [i for i, c in enumerate(self.coordinates) if c.kind in (SIZE, INVERSE, COSINE, SINE)]
 
-    def values(self, x: Sequence[float]) -> dict[str, float]:
+    def values(self, x: Sequence[float] | np.ndarray) -> dict[str, float]:
         """SI values of the term's parameters at x."""
         out: dict[str, float] = {}
         for i, c in enumerate(self.coordinates):
@@ -67,7 +67,7 @@ class Hypothesis(NamedTuple):
                 out[c.name] = c.offset + c.scale * float(x[i])
         return out
 
-    def settings(self, x: Sequence[float]) -> Settings:
+    def settings(self, x: Sequence[float] | np.ndarray) -> Settings:
         """The entry of a `physics:` list."""
         values = {**self.fixed, **self.values(x)}
         return TERMS[self.term].settings.model_construct(

@@ -64,8 +64,8 @@ def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Inte
                 v, v * float(np.exp(-min(half, 5))), v * float(np.exp(min(half, 5))), parameter_unit(kind, h, c.name)
             )
         elif c.kind == INVERSE:
-            ends = [c.scale / max(x[i] + s * half, 1e-9) for s in (1, -1)]
-            out[c.name] = Interval(values[c.name], *ends, parameter_unit(kind, h, c.name))
+            least, most = (c.scale / max(x[i] + s * half, 1e-9) for s in (1, -1))
+            out[c.name] = Interval(values[c.name], least, most, parameter_unit(kind, h, c.name))
         elif c.kind in ("size", PLACE):
             v, w = values[c.name], abs(c.scale) * half
             out[c.name] = Interval(v, v - w, v + w, parameter_unit(kind, h, c.name))

@@ -1,7 +1,7 @@
 """Turns what the search found into a verdict: named, ambiguous, unnamed or nothing, each name with its confidence.
 
 A name stands when the model with it explains what there was to explain and no other name does nearly as well in its
-place. How much of a difference in cost counts is tempered, since errors of neighbouring ticks go together.
+place, where errors of neighbouring ticks that go together count as one.
 """
 
 from collections.abc import Sequence
@@ -21,15 +21,15 @@ MOST = 3  # names in an answer
 
 
 class Alternative(NamedTuple):
-    """A fit in which hypothesis `index` stands in the place of one of the best model's."""
+    """A fit in which hypothesis `at` stands in the place of one of the best model's."""
 
     fit: Fit
-    index: int
+    at: int
 
     @property
     def hypothesis(self) -> Hypothesis:
         """The one that stands there."""
-        return self.fit.space.hypotheses[self.index]
+        return self.fit.space.hypotheses[self.at]
 
 
 class Verdict(NamedTuple):
@@ -41,11 +41,12 @@ class Verdict(NamedTuple):
 def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alternative]], block: int) -> Verdict:
     """The verdict on `best`; `rivals` holds for each of its hypotheses the fits with another one in its place."""
     if not best.space.hypotheses:
-        return Verdict(NOTHING, (), 0.0)
+        return Verdict(UNNAMED if base.rms > decide.LOUD * problem.floor else NOTHING, (), 0.0)
     share = decide.explained(problem, base, best)
     whole = decide.complete(problem, best) and share > decide.MOSTLY
     if not whole and share < decide.ENOUGH:
-        return Verdict(UNNAMED, (), share)
+        loud = base.rms > decide.LOUD * problem.floor
+        return Verdict(UNNAMED if loud else NOTHING, (), share)
     trust = 0.98 if whole else 0.6 + 0.35 * share
     own, others = [], []
     doubt = False
@@ -82,5 +83,5 @@ def _effect(place: Alternative, weight: float, best: Fit, rivals: Sequence[Alter
         for r in rivals
         if r.hypothesis.term != h.term
     )
-    intervals = effect_intervals(place.fit, place.index, covariance(place.fit, block))
+    intervals = effect_intervals(place.fit, place.at, covariance(place.fit, block))
     return Effect(h.term, h.node, min(weight, 0.99), intervals, looks)

@@ -107,8 +107,8 @@ def sound(p: draw.Plan, seed: list[int]) -> tuple[Setup, Run, Run, int] | None:
         s.sensors.append("scale_counts")
         s.case["sensors"]["scale_m_per_count"] = 5e-7
     if p.decoy == "noise_colour":
-        s.hidden.colour = float(rng.uniform(0.9, 0.99))
-        s.hidden.torque_sd = s.hidden.torque_sd * 6.0
+        s.hidden.colour = float(rng.uniform(0.8, 0.97))
+        s.hidden.torque_sd = s.hidden.torque_sd * 2.0
     for lowered in range(4):
         a, b = simulate(s, [*seed, 1]), simulate(s, [*seed, 2])
         if healthy(s, a) and b is not None:

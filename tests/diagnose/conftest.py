@@ -1,7 +1,7 @@
-"""What tests of the diagnosis share: recordings of an axis, made by the simulator itself and cut to their resolution."""
+"""What tests of the diagnosis share: recordings of an axis, made by the simulator itself and cut into its steps."""
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -163,7 +163,11 @@ def searched() -> Callable[[Axis], tuple[Problem, Fit, Search]]:
             problem = Problem(made.sim)
             base = base_fit(made.sim, problem)
             asked = hypotheses(made.record, base.model.base, only=RIVALS)
-            done[id(made)] = problem, base, search(problem, base, asked, lambda f: complete(problem, f), worth)
+            done[id(made)] = (
+                problem,
+                base,
+                search(problem, base, asked, partial(complete, problem), partial(worth, problem)),
+            )
         return done[id(made)]
 
     return make

@@ -37,9 +37,8 @@ def test_fitting_again_from_there_gains_next_to_nothing(tilted, searched):
 
 def test_where_nothing_may_move_the_owner_is_taken_at_his_word(plain):
     case = plain.record.case
-    exact = plain.record._replace(
-        case=case._replace(reaches=case.reaches.model_copy(update={"parameter_tolerance": 0.0}))
-    )
+    certain = case.reaches.model_copy(update={"parameter_tolerance": 0.0})
+    exact = plain.record._replace(case=case._replace(reaches=certain))
     sim = Simulator(exact)
     found = base_fit(sim, Problem(sim))
     assert found.x.shape == (0,)

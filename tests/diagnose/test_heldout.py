@@ -41,7 +41,7 @@ def test_a_model_that_runs_away_predicts_nothing(plain):
 
 def test_a_fit_on_the_first_rows_does_not_see_the_last(tilted, searched):
     """It comes out the same when the last rows are something else altogether."""
-    problem, base, looked = searched(tilted)
+    problem, _, looked = searched(tilted)
     found = looked.rounds[0][0]
     one = refit(tilted.sim, problem, found, 6000)
     y = tilted.record.y["x"].copy()

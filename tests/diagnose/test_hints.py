@@ -11,7 +11,7 @@ from rtctl.diagnose.hints import MOST, ORDERS, hints, jumps, observe, peaks, spe
 class Told:
     """As much of a simulator as `jumps` looks at."""
 
-    class record:  # noqa: N801
+    class record:
         t = np.arange(4000) / 1000.0 + 5.0
 
 

@@ -1,5 +1,7 @@
 """The search: single effects, a pair, and what is taken out again."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -19,9 +21,9 @@ def best(problem, base, looked):
     """As the chain takes it: another term has to be worth it."""
     found = base
     for level in looked.rounds:
-        if worth(found, level[0]):
+        if worth(problem, found, level[0]):
             found = level[0]
-    return eliminate(problem, found, worth) if len(found.space.hypotheses) > 1 else found
+    return eliminate(problem, found, partial(worth, problem)) if len(found.space.hypotheses) > 1 else found
 
 
 def test_asymmetric_friction_is_found_with_its_size(tilted, searched):
@@ -62,13 +64,17 @@ def test_every_combination_that_was_fitted_is_told_best_first(tilted, searched):
     assert looked.scores
 
 
-def test_a_useless_term_is_taken_out_and_the_useful_one_stays(tilted, searched):
-    problem, base, looked = searched(tilted)
+@pytest.mark.parametrize("place", ["before", "behind"])
+def test_a_useless_term_is_taken_out_and_the_useful_one_stays(tilted, searched, place):
+    problem, _, looked = searched(tilted)
     found = looked.rounds[0][0]
-    useless = Hypothesis("drive.offset", "drive", (Coordinate("offset", SIZE, 0.05),))
-    both = found.space.add(useless)
-    full = fit(problem, both, np.append(found.x, 0.0))
-    left = eliminate(problem, full, worth)
+    useless = Hypothesis("load.spring", "carriage", (Coordinate("k", SIZE, 20.0),))
+    n = found.space.nb
+    if place == "behind":
+        both, x = found.space.add(useless), np.append(found.x, 0.0)
+    else:
+        both, x = found.space._replace(hypotheses=(useless, *found.space.hypotheses)), np.insert(found.x, n, 0.0)
+    left = eliminate(problem, fit(problem, both, x), partial(worth, problem))
     assert names(left) == names(found)
     assert left.merit < 1.02 * found.merit
 

@@ -1,6 +1,6 @@
 """Practice bundles with known answers, which lie beside the project where they are there at all.
 
-RTCTL_PROOF=full diagnoses all of them; otherwise three, of which the largest is cut short and asked a few questions.
+RTCTL_PROOF=full diagnoses all of them; otherwise three, two cut short, of which one is asked a few questions only.
 """
 
 import json
@@ -44,7 +44,10 @@ def answers(practice: Path) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def some(practice: Path) -> dict[str, Any]:
     """Three diagnoses."""
-    made = {case: written(chain.diagnose(practice / case)) for case in (NULL, SINGLE)}
+    made = {
+        NULL: written(chain.diagnose_record(first(load_record(practice / NULL), 10.0))),
+        SINGLE: written(chain.diagnose(practice / SINGLE)),
+    }
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chain, "hypotheses", partial(hypotheses, only=PLAIN))
         made[DRIVE] = written(chain.diagnose_record(first(load_record(practice / DRIVE), 4.0)))

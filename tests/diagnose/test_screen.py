@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.decide import MATERIAL
 from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.screen import screen
@@ -57,7 +56,7 @@ def test_what_equals_a_parameter_cannot_be_told_from_it(plain, scored):
     same = {s.hypothesis.term: s for s in scores}
     for term in ("friction.viscous", "friction.coulomb"):
         assert same[term].overlap == pytest.approx(1.0, abs=0.02), term
-        assert same[term].gain < MATERIAL * base.cost  # free of what the owner says of the parameter
+        assert same[term].gain < 0.1 * base.cost  # what is left: it is free of what the owner says of the parameter
     assert same["load.spring"].overlap < 0.5
     assert same["friction.asymmetry"].overlap < 0.5
 
@@ -90,7 +89,7 @@ def test_without_candidates_there_are_no_scores(tilted, searched):
 
 
 def test_one_that_runs_away_is_left_out_and_a_limit_is_tried_from_far(plain, searched):
-    problem, base, _ = searched(plain)
+    _, base, _ = searched(plain)
     away = Hypothesis("load.spring", "carriage", (Coordinate("k", SIZE, -1e12),))
     limit = Hypothesis("drive.saturation", "drive", (Coordinate("limit", INVERSE, 2.0, 0.0),))
     scores = screen(Problem(plain.sim), base, [away, limit])
