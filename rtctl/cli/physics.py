@@ -7,6 +7,18 @@ import typer
 
 app = typer.Typer(add_completion=False)
 WIDTH = 100
+SCALES = {  # what a typical size is a multiple of
+    "dry": "the base model's dry friction",
+    "force": "the force of the drive",
+    "speed": "the usual speed",
+    "travel": "the travel",
+    "contact": "what the contact carries",
+    "stiffness": "the spring's stiffness",
+    "inertia": "the inertia that is there",
+    "force/speed": "force over speed",
+    "force/travel": "force over travel",
+    "stiffness/stretch^2": "the stiffness over the stretch squared",
+}
 
 
 @app.command()
@@ -48,7 +60,7 @@ def explain(term: Any) -> list[str]:
     ]
     for name, field in term.settings.model_fields.items():
         if name not in ("term", "node"):
-            lines += _item(name, _parameter(field, term.typical.get(name)))
+            lines += _item(name, _parameter(field, term.typical.get(name), term.scale.get(name)))
     lines += ["", "  nodes"]
     for plant, nodes in term.nodes.items():
         lines += _item(plant, ", ".join(nodes))
@@ -59,16 +71,19 @@ def explain(term: Any) -> list[str]:
     return lines
 
 
-def _parameter(field: Any, typical: tuple[float, float] | None) -> str:
-    """Help, unit, default and the range met in practice of one parameter."""
+def _parameter(field: Any, typical: tuple[float, float] | None, scale: str | None) -> str:
+    """Help, unit, default and the range met in practice of one parameter, as a multiple of its scale."""
     from typing import get_args
 
     unit = (field.json_schema_extra or {}).get("unit", "")
     words = field.description or " | ".join(map(str, get_args(field.annotation)))
-    met = f"; {typical[0]:g} to {typical[1]:g} times the base model's is typical" if typical else ""
+    of = f" times {SCALES.get(scale, scale)}" if scale else ""
+    met = f"; {typical[0]:g} to {typical[1]:g}{of} is typical" if typical else ""
     default = "" if field.is_required() else f"; {field.default} if absent"
     return words + (f" [{unit}]" if unit else "") + met + default
 
 
 def _item(name: str, text: str) -> list[str]:
-    return textwrap.wrap(f"{name:20} {text}", WIDTH, initial_indent="    ", subsequent_indent=" " * 25)
+    return textwrap.wrap(
+        f"{name:20} {text}", WIDTH, initial_indent="    ", subsequent_indent=" " * 25, break_on_hyphens=False
+    )

@@ -294,10 +294,10 @@ def _starts(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[
 def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordinate, ...], dict]]:
     if isinstance(part, Size):
         offset = m.dry(node) if part.offset == "dry" else 0.0
-        for share in part.share if isinstance(part.share, tuple) else (part.share,):
-            scale = min(share * m.of(part.measure, node), 0.5 * m.most(part.name))
+        shares = part.share if isinstance(part.share, tuple) else (part.share,)
+        for scale in dict.fromkeys(min(x * m.of(part.measure, node), 0.5 * m.most(part.name)) for x in shares):
             least = part.least if part.signed else part.finest * m.of("grain", node) / scale
-            most = part.most / share if part.measure == "one" else part.most
+            most = part.most / scale if part.measure == "one" else part.most
             yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset),), {}
     elif isinstance(part, Shape):
         measure = m.of(part.measure, node)
