@@ -8,8 +8,6 @@ machine's memory, since errors of neighbouring ticks are not independent.
 Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Econometrica 59 (1991).
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.stats import norm
 
@@ -21,15 +19,6 @@ NEARLY = 0.2  # the same where the model is already near the noise
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
-SOME = 0.5  # share of the excess below which not even a guess is given
-
-
-class Verdict(NamedTuple):
-    """How the best model stands."""
-
-    explained: float  # share of the excess over the noise, 0 to 1
-    complete: bool  # down to the noise
-    there: bool  # beyond parameters and noise
 
 
 def worth(problem: Problem, before: Fit, after: Fit) -> bool:

@@ -24,22 +24,10 @@ def nrmse(sim: Simulator, model: Model, rows: slice) -> float:
     if not np.isfinite(error).all():
         return 1e3
     spread = float(np.std(y)) or 1.0
-    return min(float(np.sqrt(np.mean((error - _start(y - out, rows)) ** 2))) / spread, 1e3)
-
-
-def _start(error: np.ndarray, rows: slice) -> float:
-    """No offset is taken out of a free run."""
-    return 0.0
+    return min(float(np.sqrt(np.mean(error**2))) / spread, 1e3)
 
 
 def refit(sim: Simulator, problem: Problem, fitted: Fit, stop: int) -> Fit:
     """The same model fitted anew on the rows before `stop` alone."""
     first = Problem(sim, stop=stop, channels=problem.channels, mean=problem.mean)
     return fit(first, fitted.space, fitted.x, rounds=5)
-
-
-def whole(sim: Simulator, fitted: Fit) -> Fit:
-    """A fit's model on another recording, without fitting."""
-    problem = Problem(sim)
-    r = problem.residual(fitted.model)
-    return Fit(fitted.space, fitted.x, r, np.zeros((len(r), len(fitted.x))), 0.5 * float(r @ r))
