@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rtctl.diagnose.case import NoLaw
-from rtctl.diagnose.fit import Problem
-from rtctl.diagnose.heldout import mode_of, nrmse, refit, whole
+from rtctl.diagnose.heldout import mode_of, nrmse, refit
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.simulate import Simulator
 
@@ -63,12 +62,3 @@ def test_what_was_found_predicts_better_than_the_base(tilted, searched):
         for f in (base, looked.rounds[0][0])
     )
     assert after < 0.2 * before
-
-
-def test_on_another_recording_nothing_is_fitted(plain, tilted, searched):
-    _, _, looked = searched(tilted)
-    found = looked.rounds[0][0]
-    other = whole(plain.sim, found)
-    np.testing.assert_array_equal(other.x, found.x)
-    assert other.rms > found.rms  # that axis has no such friction
-    np.testing.assert_array_equal(other.r, Problem(plain.sim).residual(found.model))
