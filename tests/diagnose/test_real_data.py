@@ -104,7 +104,6 @@ def test_the_stiffening_spring_of_an_oscillator_beats_its_rivals(silverbox):
     assert spring in max(gains, key=lambda names: gains[names])
 
 
-@pytest.mark.xfail(reason="its command was sampled behind a filter and is taken for one that is held", strict=False)
 def test_it_is_named(silverbox):
     assert silverbox.verdict in ("named", "ambiguous")
     first = next(e for e in silverbox.effects if e.name == "structure.stiffening")
