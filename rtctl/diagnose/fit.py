@@ -73,7 +73,6 @@ class Problem:
         self.channels = list(channels if channels is not None else main_channels(sim))
         self.seen = np.stack([sim.record.y[sim.channels[c]] + sim.half for c in self.channels], axis=1)
         self.sigma = np.array([_sigma(sim, c) for c in self.channels])
-        self.weight: Callable[[np.ndarray], np.ndarray] | None = None
         self.n = len(self.seen) if stop is None else stop
 
     @property
@@ -96,10 +95,8 @@ class Problem:
         return e
 
     def residual(self, model: Model) -> np.ndarray:
-        """The same as one row of numbers, whitened where a filter is set; 1e6 where the model runs away."""
+        """The same as one row of numbers; 1e6 where the model runs away."""
         e = np.nan_to_num(self.error(model), nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)
-        if self.weight is not None:
-            e = self.weight(e)
         return e.T.ravel()
 
 

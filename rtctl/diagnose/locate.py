@@ -34,8 +34,7 @@ def where(sim: Simulator, problem: Problem, error: np.ndarray, axis: str) -> str
     v = np.gradient(x, sim.record.dt)
     u = sim.record.u[:, 0]
     values = {"velocity": v, "position": x, "angle": x, "command": u, "time": sim.record.t}.get(axis, sim.record.t)
-    rows = values[problem.rows][: len(error) * problem.mean]
-    rows = rows[: len(error) * problem.mean].reshape(-1, problem.mean).mean(axis=1)[: len(error)]
+    rows = values[problem.rows][: len(error) * problem.mean].reshape(-1, problem.mean).mean(axis=1)
     edges = np.quantile(rows, np.linspace(0, 1, 9))
     index = np.clip(np.searchsorted(edges, rows, side="right") - 1, 0, 7)
     power = np.array([np.mean(error[index == k] ** 2) if (index == k).any() else 0.0 for k in range(8)])

@@ -25,7 +25,6 @@ FITTED = {  # what a fit may move, in the order of the Jacobian's columns; the r
     "axis": ("M", "K", "F_v", "F_c", "k"),
 }  # fmt: skip
 KNOWN = 1e-3  # a tolerance below this is no freedom
-UNITS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts", "scale_counts")}
 
 
 class Model(NamedTuple):
