@@ -192,7 +192,7 @@ OFFSET = Term(
     act={"command": "{m}.volts[{c}] = drive.offset({p}, {m}.volts[{c}])"},
     nodes=DRIVES,
     look_alikes={
-        "friction.asymmetry": "stop slowly from both sides: an offset pushes at standstill, friction does not",
+        "friction.asymmetry": "at two places or loads of different friction: an offset stays, asymmetry grows with it",
         "drive.gain_asymmetry": "command at one, two and three times the size: an offset does not grow with it",
         "drive.deadband": "commands of both signs: an offset shifts both the same way, a dead band towards zero",
         "load.spring": "the same short move at both ends of the travel: an offset is the same everywhere",

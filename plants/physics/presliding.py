@@ -3,8 +3,8 @@
     w' = v / z_s (1 - sign(v) w),   F = -F_C (w + tau_s w'),   w in -1 .. 1
 
 w is the deflection of the bristles over z_s, the travel after which they slide. tau_s = 0 is Dahl's model; LuGre's
-bristle damping sigma_1 = F_C tau_s / z_s keeps the bristles from ringing (its Stribeck part is friction.stribeck before
-this term, which raises F_C near standstill). The bristle stiffness is sigma_0 = F_C / z_s.
+bristle damping sigma_1 = F_C tau_s / z_s keeps the bristles from ringing, and its Stribeck part raises F_C near
+standstill to F_C (1 + rise exp(-(v / v_s)^2)). The bristle stiffness is sigma_0 = F_C / z_s.
 
 It replaces the node's dry friction, F_C being the limit that the node has when this term is reached: in a physics
 list it stands after the terms that add dry friction. With z_s = 0 it leaves the dry friction as it is, and z_s -> 0
@@ -35,11 +35,15 @@ class PreslidingSettings(Settings):
     z_s: float = quantity(unit="", ge=0, le=1.0, help="travel on the bristles before it slides, rad or m by node")
     form: Literal["dahl", "lugre"] = "dahl"
     tau_s: float = quantity(3e-3, unit="s", ge=0, le=1.0, help="damping of the bristles over their stiffness; lugre")
+    rise: float = quantity(0.0, unit="", ge=0, le=10, help="share by which it is stiffer to start than to keep; lugre")
+    v_s: float = quantity(1.0, unit="", gt=0, le=1e3, help="Stribeck speed of that, rad/s or m/s by node")
 
 
 class PreslidingParams(NamedTuple):
     z_s: float
     tau_s: float
+    rise: float
+    v_s: float
 
 
 PRESLIDING_STATE = state(w=float, q=float, F=float)
@@ -47,7 +51,10 @@ PRESLIDING_STATE = state(w=float, q=float, F=float)
 
 def build_presliding(settings: PreslidingSettings, h: float) -> PreslidingParams:
     """Nothing to discretise: the exact step depends on the speed."""
-    return PreslidingParams(settings.z_s, settings.tau_s if settings.form == "lugre" else 0.0)
+    lugre = settings.form == "lugre"
+    return PreslidingParams(
+        settings.z_s, settings.tau_s if lugre else 0.0, settings.rise if lugre else 0.0, settings.v_s
+    )
 
 
 @tick
@@ -60,6 +67,8 @@ def replace(p, s, m, i, r):
     if z <= 0.0:
         return
     F_C = max(m.dry[i], 0.0)
+    if p.rise != 0.0:
+        F_C *= 1.0 + p.rise * math.exp(-((r * m.vm[i] / p.v_s) ** 2))
     m.dry[i] = 0.0
     s.F = bristles(s.w, s.F, F_C, z, p.tau_s, m.x[nq + i], m.vm[i], m.Gamma_T[nu + i, nq + i], m.h)
     m.f[i] += s.F

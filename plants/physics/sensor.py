@@ -16,19 +16,19 @@ from pydantic import model_validator
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.physics.term import Term
 
-MOST = 16  # jumps
+MOST = 48  # jumps
 READINGS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)}
 WAYS = {"forward": 1, "backward": -1}
 
 
 class MissedCountsSettings(Settings):
-    """size (and those of `more`) and each are the sizes; rad or m as the sensor reads. A loss forwards is negative."""
+    """size and each are the sizes; rad or m as the sensor reads. A loss forwards is negative."""
 
     term: Literal["sensor.missed_counts"] = "sensor.missed_counts"
     node: str
     at: float = quantity(0.0, unit="s", ge=0, le=1e9, help="time of the jump")
     size: float = quantity(0.0, unit="", ge=-100, le=100, help="jump of the reading, rad or m")
-    more: tuple[tuple[float, float], ...] = ()  # time and size of further jumps
+    more: tuple[tuple[float, float], ...] = ()  # time of each further jump, and its size over that of the first
     over: float = quantity(1e-3, unit="s", gt=0, le=10, help="time that a jump takes")
     each: float = quantity(0.0, unit="", ge=-10, le=10, help="jump at each passage of the mark, rad or m")
     way: Literal["forward", "backward"] = "forward"
@@ -60,9 +60,9 @@ MISSED_COUNTS_STATE = state(marks=float, passed=float)
 def build_missed_counts(settings: MissedCountsSettings, h: float) -> MissedCountsParams:
     """Jumps as arrays of fixed length."""
     at, size = np.zeros(MOST), np.zeros(MOST)
-    jumps = ((settings.at, settings.size), *settings.more)[:MOST]
+    jumps = ((settings.at, 1.0), *settings.more)[:MOST]
     for k, (when, what) in enumerate(jumps):
-        at[k], size[k] = when, what
+        at[k], size[k] = when, what * settings.size
     start = math.floor(-settings.mark / settings.turn)
     return MissedCountsParams(
         at,
@@ -157,7 +157,7 @@ X = {"": "{r} * {m}.x[{i}]", ":ivu": "{m}.x[ivu.CAPSTAN]"}  # position at the se
 MISSED_COUNTS = Term(
     name="sensor.missed_counts",
     words="counts get lost: the reading jumps and the jump stays",
-    equation="y = x + sum of size_k after at_k, or x + each times the passages of a mark",
+    equation="y = x + size times the sum of share_k after at_k, or x + each times the passages of a mark",
     source="Heidenhain 2023; thesis 7.1.1",
     settings=MissedCountsSettings,
     build=build_missed_counts,

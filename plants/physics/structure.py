@@ -9,8 +9,9 @@ Over a substep the node moves at its middle speed, the mass relative to it is th
 the force on the node is minus the momentum that the mass took, so that momentum is kept to rounding. Second order;
 stable while 2 pi f_Hz h stays below 0.7 with a mass as large as the node's own.
 
-Source: Den Hartog, Mechanical vibrations (1956), ch. 3; Kovacic & Brennan, The Duffing equation (2011), ch. 1; thesis
-12.3, for the print heads' resonances between 50 and 220 Hz.
+Source: Den Hartog, Mechanical vibrations (1956), ch. 3; Kovacic & Brennan, The Duffing equation (2011), ch. 1;
+Elliott, Ghandchi Tehrani & Langley, Nonlinear damping and quasi-linear modelling, Phil. Trans. R. Soc. A 373 (2015);
+thesis 12.3, for the print heads' resonances between 50 and 220 Hz.
 """
 
 import math
@@ -67,28 +68,36 @@ def resonance(p, s, x, v):
 
 
 class StiffeningSettings(Settings):
-    """c3 is the size."""
+    """c3 is the size. With c2 the spring is stiffer one way than the other, with b2 it loses more where it bends."""
 
     term: Literal["structure.stiffening"] = "structure.stiffening"
     node: str
     c3: float = quantity(
         unit="", ge=-1e15, le=1e15, help="cubic stiffness, N/m^3 or Nm/rad^3 by link; negative softens"
     )
+    c2: float = quantity(
+        0.0, unit="", ge=-1e12, le=1e12, help="quadratic stiffness, N/m^2 or Nm/rad^2 by link; 0: both ways are alike"
+    )
+    b2: float = quantity(
+        0.0, unit="", ge=0, le=1e12, help="damping that grows with the bend squared, Ns/m^3 or Nms/rad^3 by link"
+    )
 
 
 class StiffeningParams(NamedTuple):
     c3: float
+    c2: float
+    b2: float
 
 
 def build_stiffening(settings: StiffeningSettings, h: float) -> StiffeningParams:
     """Nothing to discretise; stable while h sqrt(3 c3 e^2 / mass) stays below one."""
-    return StiffeningParams(settings.c3)
+    return StiffeningParams(settings.c3, settings.c2, settings.b2)
 
 
 @tick
-def stiffening(p, e):
-    """Pull at elongation `e` beside the linear spring."""
-    return p.c3 * e * e * e
+def stiffening(p, e, v):
+    """Pull at elongation `e` and its rate `v` beside the linear spring and damper."""
+    return (p.c2 + p.c3 * e + p.b2 * v) * e * e
 
 
 RESONANCE = Term(
@@ -114,11 +123,14 @@ RESONANCE = Term(
 STIFFENING = Term(
     name="structure.stiffening",
     words="a spring that grows stiffer the further it bends",
-    equation="T = c e + c3 e^3",
-    source="Kovacic & Brennan 2011",
+    equation="T = c e + k e' + c2 e^2 + c3 e^3 + b2 e^2 e'",
+    source="Kovacic & Brennan 2011; Elliott, Ghandchi Tehrani & Langley 2015",
     settings=StiffeningSettings,
     build=build_stiffening,
-    act={"force": "linear.pull({m}, {l}, structure.stiffening({p}, linear.stretch({m}, {l})))"},
+    act={
+        "force": "linear.pull({m}, {l}, structure.stiffening({p}, linear.stretch({m}, {l}), "
+        "linear.stretch_rate({m}, {l})))"
+    },
     nodes={
         "ivu": ("tape1", "tape2", "motor1", "motor2"),
         "ldu": ("wheel", "capstan"),

@@ -79,21 +79,23 @@ class SlackSettings(Settings):
     term: Literal["tape.slack"] = "tape.slack"
     node: str
     share: float = quantity(1.0, unit="", ge=0, le=1, help="of the push that is missing; 1: the tape cannot push")
+    other: float = quantity(1.0, unit="", ge=0, le=1, help="share of that on the other side of the capstan: one tape")
 
 
 class SlackParams(NamedTuple):
     share: float
+    other: float
 
 
 def build_slack(settings: SlackSettings, h: float) -> SlackParams:
     """Nothing to discretise."""
-    return SlackParams(settings.share)
+    return SlackParams(settings.share, settings.share * settings.other)
 
 
 @tick
-def slack(p, T):
+def slack(share, T):
     """Pull that takes away the push of a tape whose model has the tension `T`, N."""
-    return p.share * max(-T, 0.0)
+    return share * max(-T, 0.0)
 
 
 VISCOELASTIC = Term(
@@ -126,7 +128,10 @@ SLACK = Term(
     source="Shelton 1986",
     settings=SlackSettings,
     build=build_slack,
-    act={"force": "linear.pull({m}, {l}, tape.slack({p}, linear.tension({m}, {l})))"},
+    act={
+        "force": "linear.pull({m}, {l}, tape.slack({p}.share, linear.tension({m}, {l})))\n"
+        "linear.pull({m}, 1 - {l}, tape.slack({p}.other, linear.tension({m}, 1 - {l})))"
+    },
     nodes=TAPES,
     look_alikes={
         "transmission.backlash": "the same moves at a higher tension: the tape stays taut, play stays",

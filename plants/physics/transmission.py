@@ -27,7 +27,7 @@ class BacklashSettings(Settings):
     node: str
     gap: float = quantity(unit="", ge=0, le=1.0, help="total play, rad of the link's first end (m at an axis)")
     damping: float = quantity(0.0, unit="", ge=0, le=1, help="share of the link's damping that also acts in the gap")
-    edge: float = quantity(0.2, unit="", ge=0, le=1, help="share of half the gap over which its edge is rounded")
+    edge: float = quantity(0.05, unit="", ge=0, le=1, help="share of half the gap over which its edge is rounded")
 
 
 class BacklashParams(NamedTuple):

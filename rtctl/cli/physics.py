@@ -1,6 +1,8 @@
 """`rtctl physics`: the terms of physics that a plant's `physics:` list can hold."""
 
+import sys
 import textwrap
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -24,19 +26,25 @@ SCALES = {  # what a typical size is a multiple of
 @app.command()
 def physics(
     term: Annotated[str | None, typer.Argument(metavar="[TERM]", help="Explain this one.")] = None,
+    plot: Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the term here as well.")] = None,
 ) -> None:
-    """List the terms of physics, or explain one: equation, parameters, where it can stand, what it is mistaken for.
+    """List the terms of physics, or explain one: equation, parameters, where it can stand, what it is mistaken for, and
+    its curve as it comes out of its compiled code.
 
     Examples:
 
       rtctl physics
 
       rtctl physics friction.stribeck
+
+      rtctl physics friction.stribeck --plot stribeck.png
     """
     from rtctl.config.errors import UserError, nearest
     from rtctl.plants.physics import TERMS
 
     if term is None:
+        if plot is not None:
+            raise UserError("--plot draws one term; say which: rtctl physics TERM --plot FILE.png")
         width = max(map(len, TERMS)) + 2
         for name, entry in TERMS.items():
             typer.echo(f"{name:{width}}{entry.words}")
@@ -44,7 +52,27 @@ def physics(
     if term not in TERMS:
         near = nearest(term, TERMS) or next((name for name in TERMS if name.rpartition(".")[2] == term), None)
         raise UserError(f"no term '{term}'; " + (f"did you mean '{near}'?" if near else "`rtctl physics` lists them"))
+    if plot is not None and plot.suffix.lower() != ".png":
+        raise UserError(f"--plot {plot}: the picture is a PNG; name it {plot.with_suffix('.png')}")
     typer.echo("\n".join(explain(TERMS[term])))
+    from rtctl.cli import portrait as show
+    from rtctl.plants.physics.portrait import portrait
+
+    curve = portrait(TERMS[term])
+    typer.echo(
+        "\n".join(["", f"  {show.sizes(curve)}; in sparse dots: without it", "", *show.lines(curve, speaks_braille())])
+    )
+    if plot is not None:
+        show.picture(curve, plot)
+
+
+def speaks_braille() -> bool:
+    """Whether the terminal, or what stands in its place, takes the characters that dots are drawn with."""
+    try:
+        "\u28ff".encode(sys.stdout.encoding or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True
 
 
 def explain(term: Any) -> list[str]:

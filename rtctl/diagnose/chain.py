@@ -1,10 +1,8 @@
 """The whole diagnosis, stage by stage: preflight, base fit, hints, search, verdict, prediction, answer."""
 
 import time
-from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -12,37 +10,22 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, Diagnosis, Evidence, Interval
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, Diagnosis, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
-from rtctl.diagnose.fit import Fit, Problem
-from rtctl.diagnose.hints import hints
-from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.find import Found, Progress, find, quiet
+from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.name import Search, eliminate, enrich, names, polish, rivals, search
+from rtctl.diagnose.name import names
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.simulate import Simulator
-from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
-from rtctl.diagnose.verdict import Alternative, Verdict, judge
+from rtctl.diagnose.verdict import Verdict, judge, with_jitter
+from rtctl.plants.physics.timing import JitterSettings
 
 HELDOUT = 0.25  # share of a record, at its end, that the prediction is judged on
 BLOCK = 1.0  # s, longer than any machine here remembers
-NEAR = 3.0  # times the best cost: a rival this near is fitted to the bottom
-Progress = Callable[[str], None]
-
-
-class Found(NamedTuple):
-    """What the search came to."""
-
-    base: Fit
-    best: Fit
-    search: Search
-    rivals: tuple[tuple[Alternative, ...], ...]  # for each hypothesis of the best, fits with another in its place
-
-
-def quiet(text: str) -> None:
-    """Say nothing."""
 
 
 def diagnose(folder: Path | str, other: Path | str | None = None, progress: Progress = quiet) -> Diagnosis:
@@ -63,8 +46,10 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         sim = simulator(record)
         problem = Problem(sim)
         found = find(sim, problem, progress)
+        problem = found.problem
         block = max(2, round(BLOCK / (record.dt * problem.mean)))
         verdict = judge(problem, found.base, found.best, found.rivals, block)
+        verdict = verdict if found.jitter is None else with_jitter(verdict, found.jitter)
         progress("predicting rows that were not fitted")
         return _answer(sim, other, problem, found, verdict, checked, block)._replace(seconds=time.monotonic() - began)
 
@@ -76,56 +61,6 @@ def simulator(record: Record) -> Simulator:
         return sim
     smooth = Simulator(record, held=False)
     return min(sim, smooth, key=lambda s: base_fit(s, Problem(s)).cost)
-
-
-def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:
-    """Base fit, search, and the rivals of what it found."""
-    progress("fitting the owner's parameters")
-    base = base_fit(sim, problem)
-    error = sim.seen - sim.run(base.model)[:, 0]
-    candidates = hypotheses(sim.record, base.model.base, hints(sim, base.model, error))
-    worth = partial(decide.worth, problem)
-    looked = search(problem, base, candidates, partial(decide.complete, problem), worth, progress)
-    best = base
-    for level in looked.rounds:
-        if worth(best, level[0]):
-            best = level[0]
-    if len(best.space.hypotheses) > 1:
-        best = polish(problem, eliminate(problem, best, worth))
-    if not decide.complete(problem, best):
-        best = enrich(problem, best, worth)
-    near = replacements(problem, best, looked, candidates, progress)
-    ahead = min((place.fit for places in near for place in places), key=lambda f: f.merit, default=best)
-    if ahead.merit < best.merit:  # a rival came out ahead once it was fitted to the bottom
-        best = ahead
-        near = replacements(problem, best, looked, candidates, progress)
-    return Found(base, best, looked, near)
-
-
-def replacements(
-    problem: Problem, best: Fit, looked: Search, candidates: Sequence[Hypothesis], progress: Progress
-) -> tuple[tuple[Alternative, ...], ...]:
-    """For each hypothesis of the best model, fits with another one in its place, nearest first."""
-    out = []
-    for h in best.space.hypotheses:
-        progress(f"look-alikes of {h.name}")
-        rest = set(names(best)) - {h.name}
-        tried = [f for f in looked.fits if len(f.space.hypotheses) == len(rest) + 1 and rest < set(names(f))]
-        if rest:
-            tried += rivals(problem, best, best.space.hypotheses.index(h), candidates)
-        nearest: dict[tuple[str, ...], Fit] = {}
-        for f in sorted(tried, key=lambda f: f.merit):
-            if names(f) != names(best):
-                nearest.setdefault(names(f), f)
-        fits = [polish(problem, f) if f.cost < NEAR * best.cost else f for f in list(nearest.values())[:5]]
-        places = [Alternative(f, _other(f, rest)) for f in sorted(fits, key=lambda f: f.merit)]
-        out.append(tuple(places))
-    return tuple(out)
-
-
-def _other(fitted: Fit, rest: set[str]) -> int:
-    """Index of the hypothesis that is not among the rest."""
-    return next(i for i, h in enumerate(fitted.space.hypotheses) if h.name not in rest)
 
 
 def _answer(
@@ -149,16 +84,17 @@ def _answer(
         before, after = base.model, taken.model
     errors = [heldout.nrmse(judge_sim, model, rows) for model in (before, after)]
     floor = problem.floor * float(problem.sigma[0]) / (float(np.std(judge_sim.seen)) or 1.0)
+    runs = heldout.free_fit(sim, taken).model
     return Diagnosis(
         record=record,
         preflight=checked,
         verdict=verdict.verdict,
         effects=verdict.effects,
-        located=None if verdict.verdict == NOTHING else locate.located(sim, problem, base, best, found.search),
+        located=None if verdict.verdict == NOTHING else where(sim, found),
         parameters=parameter_intervals(taken, covariance(taken, block)),
         owner=owner_model(record.case, record),
         before=base.model,
-        after=taken.model,
+        after=runs if found.jitter is None else runs.add(ticks(found.jitter, record.dt)),
         heldout_before=errors[0],
         heldout_after=errors[1],
         noise_floor=min(floor, errors[1]),
@@ -170,6 +106,17 @@ def _answer(
         fit_rows=(problem.rows.start or 0, cut),
         seconds=0.0,
     )
+
+
+def where(sim: Simulator, found: Found) -> Located:
+    """Where recording and simulation part."""
+    ticks = found.jitter is not None
+    return locate.located(sim, found.problem, found.base, found.best, found.search, ticks)
+
+
+def ticks(found: Jitter, dt: float) -> JitterSettings:
+    """The entry of a `physics:` list for it."""
+    return JitterSettings(node="loop", sigma=min(found.sigma, 0.01), rate=1.0 / dt)
 
 
 def _experiment(sim: Simulator, found: Found) -> dict[str, Any] | None:

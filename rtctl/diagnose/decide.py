@@ -12,30 +12,58 @@ import numpy as np
 from scipy.stats import norm
 
 from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.stretches import loudness
 
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
 LOUD = 4.5  # times the noise floor: below it what no hypothesis explains may be a machine that is not quiet
 NEARLY = 0.2  # the same where the model is already near the noise
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
+FORM = 0.04  # of what a term does: what the form of its law may miss
+HISS = 12.0  # times the noise floor: random forces that a quiet machine may have
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
 
 
-def worth(problem: Problem, before: Fit, after: Fit) -> bool:
+def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     """Whether a further term took enough off.
 
-    Below the floor there is nothing to take, and near it a term must take more: what is left there is the cut into
-    counts, which a lucky term may follow for a while.
+    Below the floor there is nothing to take, and where what is left may be noise a term must take more: a lucky one may
+    follow that for a while.
     """
-    if before.rms < problem.floor:
+    weights = discount(problem, base, before)
+    if rms(weights * before.r) < problem.floor:
         return False
-    share = NEARLY if complete(problem, before) else MATERIAL
-    return after.merit < (1.0 - share) * before.merit
+    share = NEARLY if complete(problem, base, before) else MATERIAL
+    return merit(after, weights) < (1.0 - share) * merit(before, weights)
 
 
-def complete(problem: Problem, fitted: Fit) -> bool:
-    """Whether what is left is noise."""
-    return fitted.rms < COMPLETE * problem.floor
+def rms(r: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(r**2)))
+
+
+def merit(fitted: Fit, weights: np.ndarray) -> float:
+    """As `Fit.merit`, of weighed errors."""
+    less = 0.5 * float(np.sum((1.0 - weights**2) * fitted.r**2))
+    return (fitted.cost - less) * fitted.merit / fitted.cost
+
+
+def discount(problem: Problem, base: Fit, fitted: Fit) -> np.ndarray:
+    """Weights (n,) of errors where the terms of `fitted` do much: no law is the machine's own to the last per cent,
+    and what its form misses asks for no second effect."""
+    return 1.0 / np.sqrt(1.0 + (FORM * loudness(base.r - fitted.r) / problem.floor) ** 2)
+
+
+def complete(problem: Problem, base: Fit, fitted: Fit) -> bool:
+    """Whether what is left is noise: of the sensor, or of random forces on the machine."""
+    left = rms(discount(problem, base, fitted) * fitted.r)
+    return left < COMPLETE * problem.floor or (left < HISS * problem.floor and problem.hiss(fitted.r))
+
+
+def enough(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether the terms of `after` explain so much that they may be named."""
+    share = explained(problem, before, after)
+    return share > (MOSTLY if complete(problem, before, after) else ENOUGH)
 
 
 def explained(problem: Problem, before: Fit, after: Fit) -> float:

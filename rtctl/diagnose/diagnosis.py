@@ -33,6 +33,7 @@ class Effect(NamedTuple):
     confidence: float
     parameters: dict[str, Interval]
     look_alikes: tuple[Rival, ...]
+    instead_of: str | None = None  # term:node of the effect before it whose place it would take; None: it stands itself
 
 
 class Located(NamedTuple):

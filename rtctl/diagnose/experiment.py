@@ -9,20 +9,20 @@ Source: Atkinson & Fedorov, The design of experiments for discriminating between
 
 from collections.abc import Sequence
 from itertools import combinations
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.errors import NoAnswer
 from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.kernel import CLOSED, TRACK
 from rtctl.diagnose.law import LawParams
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.motions import MENU, Limits, Motion
+from rtctl.diagnose.numbers import nice
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SHARE, Simulator, resolution
-from rtctl.diagnose.words import nice
+from rtctl.diagnose.words import at
 
 FILE = "experiment.yaml"
 EASE = (1.0, 0.6, 0.35, 0.2)  # of speed and size, until the command stays within its limit
@@ -57,8 +57,9 @@ class Experiment(NamedTuple):
     @property
     def why(self) -> str:
         """What it is for, in a sentence."""
-        names = " from ".join(self.rivals) if len(self.rivals) == 2 else " and ".join(self.rivals) + " from each other"
-        return f"It tells {names}: they are {nice(self.distance[self.name])} times the noise apart."
+        names = called(self.rivals)
+        told = " from ".join(names) if len(names) == 2 else f"{', '.join(names[:-1])} and {names[-1]} from each other"
+        return f"It tells {told}: what they predict is {nice(self.distance[self.name])} times the noise apart."
 
     def as_dict(self) -> dict[str, Any]:
         """As in diagnosis.json."""
@@ -84,32 +85,6 @@ class Experiment(NamedTuple):
             "limits": {"travel": [limits.low, limits.high], "speed": limits.speed, "command": limits.command},
             "file": FILE,
         }
-
-    def write(self, folder: Path | str) -> Path:
-        """Write experiment.yaml, which `rtctl run CONFIG --reference experiment.yaml` plays. Raises UserError."""
-        path, limits = Path(folder) / FILE, self.limits
-        said = self.as_dict()
-        low, high = (nice(x, limits.unit) for x in (limits.low, limits.high))
-        head = [
-            "The experiment to run next.",
-            self.words,
-            self.why,
-            f"Put the machine where the recording began, with room from {low} to {high} around it, and run",
-            f"    rtctl run CONFIG --reference {FILE} --for {said['seconds']:g}s",
-            "then diagnose that recording. Expected distance between the rivals, over the noise:",
-            *(f"    {name:18} {value:.3g}" for name, value in by_distance(self.distance)),
-            *(f"    {name:18} left out: {reason}" for name, reason in self.refused.items()),
-        ]
-        body = [] if self.motion.repeat is None else [f"repeat: {said['reference']['repeat']:.9g} s"]
-        body += ["relative: true", f"knots:  # s, {limits.unit}"]
-        body += [f"  - [{t:.9g}, {r:.9g}]" for t, r in said["reference"]["knots"]]
-        text = "\n".join([*(f"# {line}" for line in head), *body]) + "\n"
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise UserError(f"{path} cannot be written: {error.strerror}") from None
-        return path
 
 
 class Outcome(NamedTuple):
@@ -157,15 +132,18 @@ def design(record: Record, rivals: Sequence[Model], sim: Simulator | None = None
     return Experiment(motions[best], limits, labels, worst, pairs, refused)
 
 
-def by_distance(distance: dict[str, float]) -> list[tuple[str, float]]:
-    """Motions and their distances, the largest first."""
-    return sorted(distance.items(), key=lambda item: -item[1])
-
-
 def names_of(rivals: Sequence[Model]) -> tuple[str, ...]:
     """Each rival by its terms, as term:node; numbered where two are alike."""
     plain = [" + ".join(f"{t.term}:{t.node}" for t in model.terms) or "nothing" for model in rivals]  # type: ignore[attr-defined]
     return tuple(f"{n} ({plain[:i].count(n) + 1})" if plain.count(n) > 1 else n for i, n in enumerate(plain))
+
+
+def called(rivals: Sequence[str]) -> list[str]:
+    """Rivals, each as `names_of` has it, as a person calls them: what they have in common is left out."""
+    parts = [rival.split(" + ") for rival in rivals]
+    common = set(parts[0]).intersection(*parts[1:])
+    names = [" with ".join(at(entry) for entry in part if entry not in common) or "no more" for part in parts]
+    return names if len(set(names)) == len(names) else list(rivals)
 
 
 def limits_of(sim: Simulator) -> Limits:

@@ -4,6 +4,7 @@ Of a recording by our own daemon, its config is taken and `plant.parameters` and
 other one, the config is made from its case (see `carry`).
 """
 
+import math
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from rtctl.diagnose.carry import carried, digits
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.record import Record
+from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import TERMS
@@ -54,6 +56,25 @@ def write_model(model: Model, record: Record, path: Path | str, config: dict[str
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None
     return path
+
+
+def write_turn(found: Turn, path: Path | str) -> Path:
+    """The torque over one turn as a table with a head: angle in rad, torque and half its 95 % band in Nm, visits.
+
+    Places where the axis never was have no torque. Raises UserError where the file cannot be written.
+    """
+    path = Path(path)
+    rows = zip(found.angle, found.torque, found.band, found.visits, strict=True)
+    text = "".join(f"{a:.6f},{_number(y)},{_number(half)},{n}\n" for a, y, half, n in rows)
+    try:
+        path.write_text("angle_rad,torque_Nm,band_Nm,visits\n" + text, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror}") from None
+    return path
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}" if math.isfinite(value) else ""
 
 
 def read_model(path: Path | str, record: Record) -> Model:

@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import welch
 from scipy.stats import chi2
 
-from rtctl.diagnose import words
+from rtctl.diagnose import turn, words
 from rtctl.diagnose.diagnosis import Diagnosis
 from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.heldout import mode_of
@@ -200,6 +200,30 @@ def polar_map(d: Diagnosis, sim: Simulator) -> Figure | None:
         ax.spines["polar"].set_visible(False)
         label(ax, title=f"{what} around {words.node_words(node)}, {shown}")
         legend(ax, loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    return figure
+
+
+def turn_map(d: Diagnosis, sim: Simulator | None = None) -> Figure | None:
+    """What the axis meets over one turn, with its band, and its strongest orders; None where it does not turn."""
+    found = turn.of_diagnosis(d)
+    if found is None:
+        return None
+    scale, unit = prefixed(found.torque, "Nm")
+    figure, (top, low) = new(4.8, 2, 1, height_ratios=(1.5, 1))
+    degrees = np.degrees(found.angle)
+    y, half = scale * found.torque, scale * found.band
+    top.fill_between(degrees, y - half, y + half, color=NOISE, alpha=0.35, lw=0, label="95 %")
+    often = int(np.median(found.visits))
+    top.plot(degrees, y, color=AFTER, lw=1.2, label="one visit" if often < 2 else f"mean of {often} visits")
+    top.set_xticks(range(0, 361, 45))
+    label(top, "angle, degrees", f"missing torque, {unit}")
+    legend(top, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    low.bar([o.order for o in found.orders], [scale * o.amplitude for o in found.orders], width=0.6, color=BEFORE)
+    for o in found.orders[:3]:
+        low.annotate(f"{o.order:g}", (o.order, scale * o.amplitude), ha="center", va="bottom", fontsize=8.5, color=INK)
+    low.set_xlim(0, turn.FINEST)
+    low.margins(y=0.15)
+    label(low, "times a turn", f"amplitude, {unit}")
     return figure
 
 

@@ -10,11 +10,13 @@ prediction error in closed loop.
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.hiss import is_hiss
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.simulate import Simulator, resolution
@@ -24,6 +26,7 @@ FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # 
 TOLL = 0.08  # share of the cost that a further number of a term must take off
 FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
 THREADS = 2
+IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
 TOGETHER = 100.0  # errors that count as one
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
 FORGET = 8.0  # over the bandwidth of the correction
@@ -52,7 +55,7 @@ class Fit(NamedTuple):
     @property
     def merit(self) -> float:
         """Cost with a toll for each number of the terms: a further one must take off a share of what there is."""
-        return self.cost * (1.0 + TOLL * (len(self.x) - self.space.nb))
+        return self.cost * (1.0 + TOLL * sum(max(len(h.coordinates), 1) for h in self.space.hypotheses))
 
     def bound(self) -> list[str]:
         """Unknowns that ended at a bound."""
@@ -71,9 +74,17 @@ class Problem:
         self.rows = slice(settled(sim), stop)
         self.mean = max(1, round(MEAN / sim.record.dt)) if mean is None else mean  # ticks averaged into one error
         self.channels = list(channels if channels is not None else main_channels(sim))
-        self.seen = np.stack([sim.record.y[sim.channels[c]] + sim.half for c in self.channels], axis=1)
+        seen = np.stack([sim.record.y[sim.channels[c]] + sim.half for c in self.channels], axis=1)
+        self.target = means(seen[self.rows], self.mean)
         self.sigma = np.array([_sigma(sim, c) for c in self.channels])
-        self.n = len(self.seen) if stop is None else stop
+        self.n = len(seen) if stop is None else stop
+        self.weights = np.ones(1)
+
+    def weighed(self, weights: np.ndarray) -> "Problem":
+        """The same with a further weight for each error."""
+        other = copy(self)
+        other.weights = self.weights * weights
+        return other
 
     @property
     def floor(self) -> float:
@@ -84,20 +95,33 @@ class Problem:
         mean = 0.62 if self.mean > 1 else 1.0
         return float(np.sqrt(np.mean((np.array(share) * mean) ** 2)))
 
-    def error(self, model: Model) -> np.ndarray:
+    def error(self, model: Model, coarse: bool = False) -> np.ndarray:
         """Readings less simulation by their noise (rows, channels), without a constant offset of a second sensor."""
-        out = self.sim.run(model, TRACK, self.n)[:, self.channels]
-        e = ((self.seen[: self.n] - out) / self.sigma)[self.rows]
+        out = self.sim.run(model, TRACK, self.n, coarse)[:, self.channels][self.rows]
+        e = (self.target - means(out, self.mean)) / self.sigma
         e[:, 1:] -= e[:, 1:].mean(axis=0)
-        if self.mean > 1:
-            keep = len(e) // self.mean * self.mean
-            e = e[:keep].reshape(-1, self.mean, e.shape[1]).mean(axis=1)
         return e
 
-    def residual(self, model: Model) -> np.ndarray:
+    def residual(self, model: Model, coarse: bool = False) -> np.ndarray:
         """The same as one row of numbers; 1e6 where the model runs away."""
-        e = np.nan_to_num(self.error(model), nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)
-        return e.T.ravel()
+        e = np.nan_to_num(self.error(model, coarse), nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)
+        return e.T.ravel() * self.weights
+
+    def hiss(self, r: np.ndarray) -> bool:
+        """Whether the errors r of a fit are what random forces leave."""
+        main = r[: len(r) // len(self.channels)]
+        return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.floor)
+
+
+def means(x: np.ndarray, count: int) -> np.ndarray:
+    """Means over `count` rows each, the rest left out."""
+    if count == 1:
+        return x
+    keep = len(x) // count * count
+    out = x[0:keep:count].copy()
+    for k in range(1, count):
+        out += x[k:keep:count]
+    return out / count
 
 
 def settled(sim: Simulator) -> int:
@@ -130,20 +154,32 @@ def parallel(jobs: Sequence[Callable[[], np.ndarray]]) -> list[np.ndarray]:
 
 
 def jacobian(
-    problem: Problem, space: Space, x: np.ndarray, r: np.ndarray, columns: Sequence[int] | None = None
+    problem: Problem, space: Space, x: np.ndarray, columns: Sequence[int] | None = None, old: np.ndarray | None = None
 ) -> np.ndarray:
-    """Forward differences (rows, columns) of the residual by x, away from the upper bound."""
+    """Forward differences (rows, columns) of the residual by x, away from the upper bound.
+
+    `columns` are those asked for; with `old`, columns that hardly matter are taken from there.
+    """
     high, steps = space.bounds()[1], space.steps()
+    wanted = list(range(len(x))) if columns is None else list(columns)
+    if old is not None:
+        moved = np.linalg.norm(old[:, : space.nb], axis=0) * space.reach()
+        wanted = [i for i in wanted if i >= space.nb or moved[i] > IDLE * np.sqrt(len(old))]
+    start = problem.residual(space.model(x), coarse=True)
 
     def column(i: int) -> np.ndarray:
         step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
         moved = x.copy()
         moved[i] += step
-        return (problem.residual(space.model(moved)) - r) / step
+        return (problem.residual(space.model(moved), coarse=True) - start) / step
 
-    wanted = range(len(x)) if columns is None else columns
     found = parallel([partial(column, i) for i in wanted])
-    return np.stack(found, axis=1) if found else np.zeros((len(r), 0))
+    if old is None:
+        return np.stack(found, axis=1) if found else np.zeros((len(start), 0))
+    J = old.copy()
+    for i, values in zip(wanted, found, strict=True):
+        J[:, i] = values
+    return J
 
 
 def fit(
@@ -159,12 +195,12 @@ def fit(
     """Least squares from `x`.
 
     Between full Jacobians the last one is kept up to date by Broyden's formula, which costs nothing; a guess `J` saves
-    the first. Stops when a round gains less than `enough` of the cost with a fresh Jacobian (`rough`: with any), or
-    where `give_up(cost)` says so. Source: Broyden, Math. Comp. 19 (1965).
+    the first. Stops when a round gains less than `enough` of the cost with a fresh Jacobian (`rough`: with any, in
+    coarse simulations), or where `give_up(cost)` says so. Source: Broyden, Math. Comp. 19 (1965).
     """
     low, high = space.bounds()
     x = np.clip(space.start() if x is None else np.array(x, float), low, high)
-    r = problem.residual(space.model(x))
+    r = problem.residual(space.model(x), rough)
     weight = space.prior() * trust(r)
 
     def total(r: np.ndarray, x: np.ndarray) -> float:
@@ -172,7 +208,7 @@ def fit(
 
     cost = total(r, x)
     damping, fresh = 1e-4, J is None
-    J = jacobian(problem, space, x, r) if J is None else J
+    J = jacobian(problem, space, x) if J is None else J
     for _ in range(rounds):
         g = J.T @ r + weight * x
         H = J.T @ J + np.diag(weight)
@@ -181,7 +217,7 @@ def fit(
             dx = bounded_step(H, g, x, low, high, damping)
             if not np.abs(dx).max(initial=0.0) > 1e-9:
                 break
-            trial = problem.residual(space.model(x + dx))
+            trial = problem.residual(space.model(x + dx), rough)
             new = total(trial, x + dx)
             if new < cost:
                 gained = True
@@ -190,7 +226,7 @@ def fit(
         if not gained:
             if fresh or rough:
                 break
-            J, fresh, damping = jacobian(problem, space, x, r), True, 1e-4
+            J, fresh, damping = jacobian(problem, space, x, old=J), True, 1e-4
             continue
         share = (cost - new) / max(cost, 1e-30)
         hoped = -(g @ dx + 0.5 * dx @ H @ dx)
@@ -205,9 +241,13 @@ def fit(
         if share < enough and (fresh or rough):
             break
         if not honest or share < enough:
-            J, fresh = jacobian(problem, space, x, r), True
+            J, fresh = jacobian(problem, space, x, old=J), True
         else:
             fresh = False
+    if rough:
+        r = problem.residual(space.model(x))
+        weight = space.prior() * trust(r)
+        cost = total(r, x)
     return Fit(space, x, r, J, cost)
 
 

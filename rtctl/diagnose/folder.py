@@ -23,6 +23,7 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
 
 RESULT, MODEL, EXPERIMENT = "diagnosis.json", "model.yaml", "experiment.yaml"
+TURN = "torque_over_turn.csv"  # of an axis that turns
 FOLDER = "diagnosis"  # in the bundle, where nobody says otherwise
 SECOND = "-heldout"  # a bundle of this name beside another is a second recording of the same machine
 ALONE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -66,11 +67,12 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
     not be made: the verdict stands without them. Raises UserError where the disk does not take them.
     """
     from rtctl.diagnose.diagnosis import as_json
-    from rtctl.diagnose.export import write_model
+    from rtctl.diagnose.export import write_model, write_turn
     from rtctl.diagnose.repair import experiment_yaml
+    from rtctl.diagnose.turn import of_diagnosis
 
     faults: list[str] = []
-    _fresh(folder, (RESULT, MODEL, EXPERIMENT, "report.html"))
+    _fresh(folder, (RESULT, MODEL, EXPERIMENT, TURN, "report.html"))
     try:
         _put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config))
     except UserError as error:
@@ -78,6 +80,9 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
     if d.experiment is not None:
         text = experiment_yaml(d, config)
         _put(folder / EXPERIMENT, lambda path: path.write_text(text, encoding="utf-8"))
+    turn = of_diagnosis(d)
+    if turn is not None:
+        _put(folder / TURN, lambda path: write_turn(turn, path))
     if report:
         try:
             from rtctl.diagnose import report as page

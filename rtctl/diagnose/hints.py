@@ -12,10 +12,16 @@ import numpy as np
 
 from rtctl.diagnose.fit import settled
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.simulate import TRACK, Simulator, per_unit
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.simulate import TRACK, Simulator, per_unit, resolution
 
 FAST = {"ivu": 8.0, "ldu": 2.0, "axis": 4.0}  # times the tracking bandwidth: how quickly the observer follows
 MOST = 4  # hints of a kind
+JUMPS = 47
+AROUND = 8  # ticks that a jump is compared with
+SENSORS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)}
+CALM = {"ivu": 0.02, "ldu": 2e-3}  # s, over which an acceleration is taken
+SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)])
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 
@@ -29,10 +35,11 @@ def observe(sim: Simulator, model: Model) -> tuple[np.ndarray, np.ndarray]:
     return out, push
 
 
-def hints(sim: Simulator, model: Model, error: np.ndarray) -> dict[str, list[float]]:
-    """Suggestions by kind (and node): order, wavelength, spot, jump. `error` (n,) is the model's at the main sensor."""
+def hints(sim: Simulator, model: Model) -> dict[str, list]:
+    """Suggestions by kind (and node): order, wavelength, spot, grip, and jump (time, size) of each sensor."""
     record = sim.record
     start = settled(sim)
+    read = sim.run(model)
     _, push = observe(sim, model)
     x = (record.y[sim.channels[0]] / per_unit(record.case)[0])[start:]
     d = push[start:]
@@ -44,7 +51,7 @@ def hints(sim: Simulator, model: Model, error: np.ndarray) -> dict[str, list[flo
         ratios = {":motor1": base["R_c"] / base["R1"], ":motor2": -base["R_c"] / base["R2"]}
     elif record.plant == "ldu":
         ratios = {":motor": base["N"], ":wheel": 1.0}
-    found: dict[str, list[float]] = {}
+    found: dict[str, list] = grips(record, base, read[:, 0])
     for node, ratio in ratios.items():
         found["order" + node] = peaks(ORDERS, spectrum(x * ratio, d, ORDERS), MOST)
     if record.plant != "ivu":
@@ -56,8 +63,32 @@ def hints(sim: Simulator, model: Model, error: np.ndarray) -> dict[str, list[flo
         waves = span * np.geomspace(0.1, 2.0, WAVES)
         found["wavelength"] = peaks(waves, spectrum(way, target, 2 * np.pi / waves), MOST)
         found["spot"] = spots(way, target, MOST)
-    found["jump"] = jumps(sim, error)
+    for channel, sensor in enumerate(SENSORS[record.plant]):
+        if channel < len(sim.channels):
+            error = record.y[sim.channels[channel]] - read[:, channel]
+            unit = per_unit(record.case)[channel]
+            count = 1.0 if record.plant != "axis" else resolution(record) * unit
+            found[f"jump:{sensor}"] = [
+                (float(record.t[k] - record.t[0]), size / unit) for k, size in jumps(error, count)
+            ]
     return found
+
+
+def grips(record: Record, base: dict[str, float], read: np.ndarray) -> dict[str, list]:
+    """Limits at which a contact would slip for some share of the time, from the simulated reading (n,)."""
+    if record.plant == "axis":
+        return {}
+    w = max(1, round(CALM[record.plant] / record.dt))
+    x = read / per_unit(record.case)[0]
+    v = (x[2 * w :] - x[: -2 * w]) / (2 * w * record.dt)
+    a = (x[2 * w :] - 2 * x[w:-w] + x[: -2 * w]) / (w * record.dt) ** 2
+    if record.plant == "ivu":
+        carried = {"capstan": (base["J_c"] * a + base["tau_Fc"] * np.sign(v)) / base["R_c"]}
+    else:
+        R, N = base["R_c"], base["N"]
+        force = base["M"] * R * a + base["F_c"] * np.sign(v) + base["B_c"] * R * v
+        carried = {"capstan": force, "wheel": (force * R + (base["J_t"] + base["J_c"] + base["J_e"]) * a) / N}
+    return {f"grip:{node}": [float(f) for f in np.quantile(np.abs(F), SLIPPING)] for node, F in carried.items()}
 
 
 def _second(sim: Simulator, model: Model, start: int) -> np.ndarray:
@@ -101,15 +132,20 @@ def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 60) -> lis
     return [float(0.5 * (edges[i] + edges[i + 1])) for i in np.argsort(-off)[:most]]
 
 
-def jumps(sim: Simulator, error: np.ndarray) -> list[float]:
-    """Times (s) of sudden steps of the error that do not come back at once, largest first."""
+def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:
+    """Rows and sizes of sudden steps of the error (n,) that do not come back at once, the largest first.
+
+    `count` is the sensor's step in the error's unit. A jump takes one tick: it stands out of the ticks around it, which
+    a vibration or a reversal that the model misses does not.
+    """
     step = np.diff(error)
-    quiet = 1.4826 * np.median(np.abs(step - np.median(step))) + 0.3
-    far = np.flatnonzero(np.abs(step) > 6 * quiet)
-    stays = [
-        k
-        for k in far
-        if 3 < k < len(error) - 4 and abs(np.median(error[k + 1 : k + 4]) - np.median(error[k - 2 : k + 1])) > 4 * quiet
-    ]
-    best = sorted(stays, key=lambda k: -abs(step[k]))[:MOST]
-    return [float(sim.record.t[k + 1] - sim.record.t[0]) for k in best]
+    quiet = 1.4826 * float(np.median(np.abs(step - np.median(step)))) + 0.3 * count
+    found = []
+    for k in np.flatnonzero(np.abs(step) > max(6 * quiet, 2.5 * count)):
+        if not AROUND < k < len(step) - AROUND:
+            continue
+        near = np.abs(np.delete(step[k - AROUND : k + AROUND + 1], AROUND))
+        size = float(np.median(error[k + 1 : k + 4]) - np.median(error[k - 2 : k + 1]))
+        if abs(step[k]) > 4 * np.median(near) and abs(step[k]) > 2 * near.max() and abs(size) > 0.6 * abs(step[k]):
+            found.append((int(k) + 1, size))
+    return sorted(found, key=lambda jump: -abs(jump[1]))[:JUMPS]

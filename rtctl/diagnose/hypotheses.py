@@ -7,7 +7,7 @@ its rms speed, its span, the rms force of its drive.
 
 from collections.abc import Iterable
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,8 +45,8 @@ class Limit(NamedTuple):
     """A limit: without effect while it is far off; `starts` in units of its measure."""
 
     name: str
-    measure: str
-    starts: tuple[float, ...]
+    measure: str  # or a kind of hint, where there are no starts
+    starts: tuple[float, ...] = ()
 
 
 class Turn(NamedTuple):
@@ -74,6 +74,12 @@ class Hint(NamedTuple):
     place: bool = False
 
 
+class Jumps(NamedTuple):
+    """The size of the largest of the jumps that the record shows; the others keep their share of it."""
+
+    name: str
+
+
 class Choice(NamedTuple):
     """A setting that is not fitted: words, or numbers in units of a measure."""
 
@@ -82,19 +88,22 @@ class Choice(NamedTuple):
     measure: str = ""
 
 
-Part = Size | Limit | Shape | Turn | At | Hint | Choice
+Part = Size | Limit | Shape | Turn | At | Hint | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.coulomb": (Size("F_C", "force", 0.1, signed=True),),
     "friction.viscous": (Size("B", "drag", 0.1, signed=True),),
-    "friction.stribeck": (Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.05, 0.2, 0.7))),
+    "friction.stribeck": (
+        Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.004, 0.02, 0.08, 0.3, 0.9), 5.0),
+    ),
     "friction.presliding": (Size("z_s", "span", 1e-3, finest=1.0), Choice("form", ("dahl", "lugre"))),
     "friction.asymmetry": (Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
     "friction.load": (Size("mu", "one", 0.05, signed=True),),
-    "transmission.backlash": (Size("gap", "twist", (0.3, 5.0, 60.0)),),
-    "transmission.slip": (Limit("F_max", "contact", (0.4, 1.0, 2.5)),),
+    "transmission.backlash": (Size("gap", "twist", (0.3, 5.0, 60.0)), Choice("damping", (0.0, 1.0))),
+    "transmission.slip": (Limit("F_max", "grip"),),
     "transmission.creep": (Size("kappa", "compliance", 1e-3),),
     "structure.resonance": (
-        Size("mass", "inertia", 0.1), Shape("f_Hz", "hertz", (3.0, 8.0, 20.0, 40.0, 70.0, 110.0, 160.0, 220.0), 1.6),
+        Size("mass", "inertia", 0.1),
+        Shape("f_Hz", "hertz", (3.0, 6.0, 11.0, 19.0, 30.0, 43.0, 60.0, 85.0, 120.0, 165.0, 225.0), 1.4),
         Shape("zeta", "one", (0.02,), 30.0),
     ),
     "structure.stiffening": (Size("c3", "cubic", 0.2, signed=True),),
@@ -124,11 +133,11 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "guide.dirt": (
         Size("A", "one", 1e-5, signed=True), Hint("at", "spot", 0.05, True), Shape("width", "span", (0.02,), 10.0),
     ),
-    "sensor.missed_counts": (Size("size", "counts", 4.0, signed=True), Hint("at", "jump", 1e-3, True)),
-    "sensor.rectified": (Size("share", "one", 0.5, most=1.0),),
+    "sensor.missed_counts": (Jumps("size"),),
+    "sensor.rectified": (Choice("share", (1.0,)),),
     "sensor.scale": (Size("relative", "one", 1e-3, signed=True),),
     "geometry.radius_change": (Size("d", "one", 1e-4, signed=True),),
-    "tape.slack": (Size("share", "one", 1.0, most=1.0),),
+    "tape.slack": (Choice("share", (1.0,)), Choice("other", (1.0, 0.0))),
 }  # fmt: skip
 
 
@@ -139,9 +148,18 @@ EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, t
     "ripple.capstan": (Turn("a2", "phi2", "one", 3e-6), Turn("a3", "phi3", "one", 3e-6)),
     "tape.viscoelastic": (Size("c_branch2", "stiffness", 0.2), Shape("tau2", "seconds", (0.5,), 60.0)),
     "friction.asymmetry": (Size("B_a", "drag", 0.05, signed=True),),
-    "transmission.backlash": (Size("damping", "one", 0.5, most=1.0),),
+    "friction.presliding": (
+        Size("rise", "one", 0.1, most=3.0), Shape("v_s", "speed", (0.1,), 50.0),
+        Shape("tau_s", "seconds", (3e-3,), 300.0), Choice("form", ("lugre",)),
+    ),
     "drive.lag": (Shape("zeta", "one", (0.7,), 20.0),),
+    "structure.stiffening": (Size("c2", "square", 0.05, signed=True), Size("b2", "swell", 0.05)),
+}  # fmt: skip
+FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in its other values once the term stands
+    "friction.stribeck": ("form", ("gaussian", "exponential", "tustin")),
+    "transmission.backlash": ("damping", (0.0, 1.0)),
 }
+HINTED = tuple(name for name, parts in SEARCH.items() if any(isinstance(part, Hint | Jumps) for part in parts))
 
 
 ALONE = ("sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt")  # asks for a second sensor
@@ -149,7 +167,7 @@ TURNING = {"axis": ("load.imbalance", "ripple.cogging", "ripple.encoder")}  # as
 
 
 def hypotheses(
-    record: Record, base: dict[str, float], hints: dict[str, list[float]] | None = None, only: Iterable[str] = ()
+    record: Record, base: dict[str, float], hints: dict[str, list] | None = None, only: Iterable[str] = ()
 ) -> list[Hypothesis]:
     """All of them for this plant, one for each start; `only` restricts to terms by name.
 
@@ -181,16 +199,25 @@ def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis 
     if parts is None:
         return None
     measures = Measures(record, base, node_scales(record, base), {})
-    more = _starts(h.term, h.node, parts, measures)[0].coordinates
-    return h._replace(coordinates=(*h.coordinates, *more))
+    if len(h.coordinates) > sum(
+        2 if isinstance(part, Turn) else 1 for part in SEARCH[h.term] if not isinstance(part, Choice)
+    ):
+        return None  # it has them already
+    more = _starts(h.term, h.node, parts, measures)[0]
+    return h._replace(coordinates=(*h.coordinates, *more.coordinates), fixed={**h.fixed, **more.fixed})
+
+
+def forms(h: Hypothesis) -> list[Hypothesis]:
+    """The same hypothesis in each of its other forms."""
+    name, values = FORMS.get(h.term, ("", ()))
+    default = TERMS[h.term].settings.model_fields[name].default if name else None
+    return [h._replace(fixed={**h.fixed, name: v}) for v in values if v != h.fixed.get(name, default)]
 
 
 class Measures:
     """What a size or a shape is measured by, at a node."""
 
-    def __init__(
-        self, record: Record, base: dict[str, float], scales: dict[str, Scales], hints: dict[str, list[float]]
-    ):
+    def __init__(self, record: Record, base: dict[str, float], scales: dict[str, Scales], hints: dict[str, list]):
         self.record, self.base, self.scales, self.hints = record, base, scales, hints
         self.term = ""
 
@@ -219,6 +246,8 @@ class Measures:
             "contact": self.contact(node),
             "twist": s.force / self.stiffness(node),
             "cubic": self.stiffness(node) ** 3 / s.force**2,
+            "square": self.stiffness(node) ** 2 / s.force,
+            "swell": s.force / (s.speed * s.span**2),
             "stiffness": self.stiffness(node),
             "compliance": 1.0 / s.force,
             "inertia": self.inertia(node),
@@ -295,7 +324,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
     if isinstance(part, Size):
         offset = m.dry(node) if part.offset == "dry" else 0.0
         shares = part.share if isinstance(part.share, tuple) else (part.share,)
-        for scale in dict.fromkeys(min(x * m.of(part.measure, node), 0.5 * m.most(part.name)) for x in shares):
+        top = part.most if part.most < np.inf else 0.5 * m.most(part.name)
+        for scale in dict.fromkeys(min(x * m.of(part.measure, node), top) for x in shares):
             least = part.least if part.signed else part.finest * m.of("grain", node) / scale
             most = part.most / scale if part.measure == "one" else part.most
             yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset),), {}
@@ -309,8 +339,9 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             else:
                 yield (Coordinate(part.name, SHAPE, value, np.log(low / value), np.log(high / value)),), {}
     elif isinstance(part, Limit):
-        for start in part.starts:
-            yield (Coordinate(part.name, INVERSE, start * m.of(part.measure, node), 0.0),), {}
+        limits = [start * m.of(part.measure, node) for start in part.starts]
+        for limit in limits or m.hints.get(f"{part.measure}:{node}", []):
+            yield (Coordinate(part.name, INVERSE, limit, 0.0),), {}
     elif isinstance(part, Turn):
         scale = part.share * m.of(part.measure, node)
         name = f"{part.amplitude}|{part.phase}"
@@ -323,6 +354,12 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=value),), {}
             else:
                 yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach),), {}
+    elif isinstance(part, Jumps):
+        jumps = m.hints.get(f"jump:{node}", [])
+        if jumps:
+            at, first = jumps[0]
+            more = tuple((when, size / first) for when, size in jumps[1:])
+            yield (Coordinate(part.name, SIZE, abs(first)),), {"at": at, "more": more}
     elif isinstance(part, At):
         s = m.scale(node)
         for k in range(part.places):

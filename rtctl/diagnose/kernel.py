@@ -89,34 +89,45 @@ def run(jobs, ps, ss, q, z, laws, law_states, lead, ref, w, volts, seen, out, wr
     {kind}.start(p, s)
     m = s.m
     n, drives = volts.shape
-    for k in range(-lead, n):
+    stride = job.stride
+    for k in range(-(lead // stride) * stride, n + stride - 1, stride):
         if k == 0:  # counters and the clock start at zero here
             m.t = 0.0
             look(job, p, s, q, z)
             for c in range(m.y.shape[0]):
                 job.zero[c] = job.y[c]
         look(job, p, s, q, z)
+        at = min(k, n - 1)
         job.correction = 0.0
         if k < 0 or job.mode == 1:  # at first it is held where it will start
-            e = ((seen[k] if k >= 0 else 0.0) - (job.y[0] - job.zero[0])) / job.per_unit[0]
-            if k == -lead or k == 0:
+            e = ((seen[at] if k >= 0 else 0.0) - (job.y[0] - job.zero[0])) / job.per_unit[0]
+            if k < stride - lead or k == 0:
                 job.e = e
             job.d += job.a * ((e - job.e) * job.rate - job.d)
             job.e = e
             job.correction = job.P * e + job.D * job.d
         if k >= 0:
             for c in range(m.y.shape[0]):
-                out[k, c] = job.y[c] - job.zero[c]
-            push[k] = job.correction
+                y = job.y[c] - job.zero[c]
+                for back in range(min(stride - 1, k)):  # rows in between lie on a line
+                    if k - back - 1 < n:
+                        out[k - back - 1, c] = y + (job.before[c] - y) * (back + 1) / stride
+                if k < n:
+                    out[k, c] = y
+                job.before[c] = y
+            push[at] = job.correction
             if job.mode == 2:
                 law.step(the_law, law_state, ref[k], w[k], out[k, 0] - job.half, written[k])
         for i in range(job.substeps):
-            at = max((k * job.substeps + i - job.delay) // job.substeps, 0)
             for c in range(drives):
-                m.volts[c] = written[at, c] if job.mode == 2 and k >= 0 else volts[at, c]
+                m.volts[c] = 0.0
+            for tick in range(stride):
+                at = min(max(k + tick + (i - job.delay) // job.substeps, 0), n - 1)
+                for c in range(drives):
+                    m.volts[c] += (written[at, c] if job.mode == 2 and k >= 0 else volts[at, c]) / stride
             substep(job, p, s, q, z)
-        if not (abs(out[k if k > 0 else 0, 0]) < 1e12):
-            return k
+        if not (abs(job.y[0]) < 1e12):
+            return max(k, 0)
     return n
 '''
 
@@ -148,6 +159,7 @@ def job_dtype(ny: int, nu: int) -> np.dtype:
     return state(
         mode=int,
         substeps=int,
+        stride=int,  # ticks a substep, where it is longer than one
         delay=int,  # substeps from a write until it acts
         rate=float,  # Hz
         half=float,  # counts between the true position and what a counter shows, on average
@@ -165,6 +177,7 @@ def job_dtype(ny: int, nu: int) -> np.dtype:
         y=(float, ny),
         y_last=(float, ny),
         way=(float, ny),
+        before=(float, ny),
         zero=(float, ny),
     )
 

@@ -9,8 +9,8 @@ from rtctl.diagnose.simulate import Simulator, per_unit
 from rtctl.plants.physics import TERMS
 
 
-def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Search) -> Located:
-    """Of the fitted base's error."""
+def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Search, ticks: bool = False) -> Located:
+    """Of the fitted base's error; `ticks`: they come off their times, and no hypothesis may be needed beside that."""
     n = len(base.r) // len(problem.channels)
     error = base.r.reshape(len(problem.channels), n)
     worst = int(np.argmax(np.mean(error**2, axis=1)))
@@ -19,6 +19,8 @@ def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Sear
     first = sim.record.dt * (problem.rows.start or 0)
     loud = np.flatnonzero(np.abs(error[worst]) > 4 * problem.floor)
     since = float(first + step * loud[0]) if len(loud) else 0.0
+    if ticks and not best.space.hypotheses:
+        return Located(channel, "loop", "time", "at every tick, the more the faster it moves", first, 1.0)
     top = best if best.space.hypotheses else looked.fits[0] if looked.fits else None
     if top is None or not top.space.hypotheses:
         return Located(channel, "loop", "time", "everywhere", since, 0.0)

@@ -11,14 +11,18 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
-from rtctl.diagnose.hypotheses import richer
+from rtctl.diagnose.hypotheses import HINTED, forms, richer
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
+from rtctl.diagnose.stretches import loudness, usual
 
 BEAM = (3, 2, 2)  # models that the next round builds on
 LIKELY = (14, 9, 7)  # rough fits a model of the beam, by round
 FULL = (5, 4, 3)  # full fits a round
 FAR = 0.4  # of the base's cost: where two terms leave more, no third will do
+SURE = 2  # hypotheses a model of the beam that are fitted in full whatever their rough fit says
+CALMER = 0.8  # of the usual error: parameters that fit the quiet stretches this much better are a start of their own
+ROBUST = 3  # rounds of weights
 STARTS = 3  # of one hypothesis that later rounds try
 QUICK = 8  # rough fits where the model is already down to the noise
 MOST = 3  # terms at once
@@ -46,21 +50,29 @@ def names(fitted: Fit) -> tuple[str, ...]:
 def search(
     problem: Problem,
     base: Fit,
-    candidates: Sequence[Hypothesis],
+    propose: Callable[[Fit], Sequence[Hypothesis]],
     enough: Callable[[Fit], bool],
     worth: Callable[[Fit, Fit], bool],
     progress: Callable[[str], None] = lambda text: None,
 ) -> Search:
     """Grow models until a further term does not earn its place by `worth(before, after)`.
 
+    `propose(model)` lists hypotheses with the starts that the record suggests once it is seen through that model.
     Where a model is `enough`, down to the noise, one quick round looks for what may still hide beside it.
     """
     beam, sure = [base], enough(base)
     rounds: list[tuple[Fit, ...]] = []
     first: tuple[Score, ...] = ()
+    away: Fit | None = None
+    candidates = list(propose(base))
     for level in range(MOST):
+        if level > 0:
+            candidates = with_new_starts(candidates, propose(beam[0]))
         rough: dict[tuple[str, ...], Fit] = {}
-        for parent in [*beam, at_owner(problem, base)] if level == 0 and not sure else beam:
+        likely: list[Fit] = []
+        if level == 0 and not sure:
+            away = elsewhere(problem, base)
+        for parent in [*beam, away] if level == 0 and away is not None else beam:
             taken = set(names(parent))
             progress(
                 f"screening {len(candidates)} hypotheses" + (f" beside {' and '.join(sorted(taken))}" * bool(taken))
@@ -69,24 +81,33 @@ def search(
             if level == 0 and not first:
                 first = tuple(scores)
                 candidates = best_starts(scores)
-            for score in shortlist(scores, QUICK if sure else LIKELY[level]):
+            for rank, score in enumerate(shortlist(scores, QUICK if sure else LIKELY[level])):
                 trial = roughly(problem, parent, score)
                 key = names(trial)
+                if (
+                    level == 0 and rank < SURE and not sure
+                ):  # what the first look puts ahead is fitted in full, however rough it looks
+                    likely.append(trial)
                 if key not in rough or trial.cost < rough[key].cost:
                     rough[key] = trial
         ranked = sorted(rough.values(), key=lambda f: f.merit)[: 2 if sure else FULL[level]]
         if not ranked:
             break
         progress("fitting " + ", ".join(" + ".join(names(f)) for f in ranked[:3]))
-        best = ranked[0].cost
-        full = []
+        ranked += [trial for trial in likely if not any(trial is f for f in ranked)]
+        best = min(f.cost for f in ranked)
+        full_by_name: dict[tuple[str, ...], Fit] = {}
         for trial in ranked:
-            fitted = from_both(problem, trial, best)
+            fitted = from_both(problem, trial, best, None if away is None else away.x)
             best = min(best, fitted.cost)
-            full.append(fitted)
+            key = names(fitted)
+            if key not in full_by_name or fitted.cost < full_by_name[key].cost:
+                full_by_name[key] = fitted
+        full = list(full_by_name.values())
         full.sort(key=lambda f: f.merit)
         wide = BEAM[level]
         full = [polish(problem, f) if f.cost < 6 * full[0].cost else f for f in full[:wide]] + full[wide:]
+        full = [f if enough(f) else enrich(problem, f, worth) for f in full[:wide]] + full[wide:]
         full.sort(key=lambda f: f.merit)
         rounds.append(tuple(full))
         if not worth(beam[0], full[0]) or (level == 1 and full[0].cost > FAR * base.cost):
@@ -96,22 +117,49 @@ def search(
     return Search(base, tuple(rounds), first)
 
 
-def at_owner(problem: Problem, fitted: Fit) -> Fit:
-    """The same terms with the owner's parameters: where a fit without the right term has run into its bounds, the
-    owner is nearer to the truth."""
-    x = fitted.x.copy()
-    x[: fitted.space.nb] = 0.0
-    r = problem.residual(fitted.space.model(x))
-    J = jacobian(problem, fitted.space, x, r)
-    return Fit(fitted.space, x, r, J, 0.5 * float(r @ r))
+def elsewhere(problem: Problem, base: Fit) -> Fit:
+    """The base model with other parameters, nearer to the truth where what is missing has pulled them away.
+
+    Those that fit the quiet stretches of the record if they fit them clearly better; else the owner's.
+    """
+    calm = calm_fit(problem, base)
+    x = (
+        calm.x
+        if usual(calm.r) < CALMER * usual(base.r)
+        else np.where(np.arange(len(base.x)) < base.space.nb, 0.0, base.x)
+    )
+    return Fit(base.space, x, *at(problem, base.space, x))
 
 
-def from_both(problem: Problem, trial: Fit, best: float) -> Fit:
-    """The better of two full fits: from where the trial stands, and from the owner's parameters."""
+def at(problem: Problem, space: Space, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Residual, Jacobian and cost there."""
+    r = problem.residual(space.model(x))
+    return r, jacobian(problem, space, x), 0.5 * float(r @ r)
+
+
+def calm_fit(problem: Problem, fitted: Fit) -> Fit:
+    """A fit in which loud stretches count for little, so that an effect at some moments pulls at nothing else.
+
+    Source: Holland & Welsch, Robust regression by iteratively reweighted least squares (1977), Cauchy weights, here of
+    the rms of a stretch.
+    """
+    J = fitted.J
+    for _ in range(ROBUST):
+        loud = loudness(fitted.r)
+        calm = problem.weighed(1.0 / np.sqrt(1.0 + (loud / (2.0 * usual(fitted.r))) ** 2))
+        x = fitted.x
+        found = fit(calm, fitted.space, x, rounds=4, J=J * (calm.weights / problem.weights)[:, None])
+        J = found.J / (calm.weights / problem.weights)[:, None]
+        fitted = Fit(fitted.space, found.x, problem.residual(fitted.space.model(found.x)), J, found.cost)
+    return fitted
+
+
+def from_both(problem: Problem, trial: Fit, best: float, other: np.ndarray | None = None) -> Fit:
+    """The better of two full fits: from where the trial stands, and from other plant parameters, else the owner's."""
     one = fit(problem, trial.space, trial.x, rounds=16, J=trial.J, give_up=Hopeless(best))
     x = trial.x.copy()
-    x[: trial.space.nb] = 0.0
-    two = fit(problem, trial.space, x, rounds=16, give_up=Hopeless(min(best, one.cost)))
+    x[: trial.space.nb] = 0.0 if other is None else other[: trial.space.nb]
+    two = fit(problem, trial.space, x, rounds=16, J=trial.J, give_up=Hopeless(min(best, one.cost)))
     return one if one.cost <= two.cost else two
 
 
@@ -125,6 +173,22 @@ def best_starts(scores: Sequence[Score]) -> list[Hypothesis]:
         if count[name] <= STARTS:
             out.append(score.hypothesis)
     return out
+
+
+def with_new_starts(candidates: Sequence[Hypothesis], proposed: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The candidates, and those proposed that are none of them but of whom a like one was never screened away."""
+    known = {
+        (h.name, tuple(c.scale for c in h.coordinates), tuple(c.offset for c in h.coordinates)) for h in candidates
+    }
+    new = [h for h in proposed if h.term in HINTED]
+    return [
+        *candidates,
+        *(
+            h
+            for h in new
+            if (h.name, tuple(c.scale for c in h.coordinates), tuple(c.offset for c in h.coordinates)) not in known
+        ),
+    ]
 
 
 class Hopeless:
@@ -141,7 +205,7 @@ class Hopeless:
 
 def polish(problem: Problem, fitted: Fit, rounds: int = 6) -> Fit:
     """Full rounds with a fresh Jacobian each, to the bottom."""
-    return fit(problem, fitted.space, fitted.x, rounds=rounds, enough=2e-4)
+    return fit(problem, fitted.space, fitted.x, rounds=rounds, enough=2e-4, J=fitted.J)
 
 
 def shortlist(scores: Sequence[Score], count: int) -> list[Score]:
@@ -159,14 +223,17 @@ def shortlist(scores: Sequence[Score], count: int) -> list[Score]:
 
 
 def roughly(problem: Problem, parent: Fit, score: Score) -> Fit:
-    """A few cheap rounds: the parent's Jacobian for the plant's parameters, new columns for the hypothesis."""
+    """A few cheap rounds: the parent's Jacobian for what it has, new columns for the hypothesis.
+
+    They begin where the score has moved the parent's parameters to or where they were, whichever is better.
+    """
     space: Space = parent.space.add(score.hypothesis)
     old = parent.J.shape[1]
-    low, high = space.bounds()
-    x = np.clip(score.x, low, high)
-    r = problem.residual(space.model(x))
-    new = jacobian(problem, space, x, r, range(old, len(x)))
-    J = np.concatenate([parent.J, new], axis=1)
+    starts = [np.clip(score.x, *space.bounds())]
+    starts.append(np.concatenate([parent.x, starts[0][old:]]))
+    costs = [float(np.sum(problem.residual(space.model(x), coarse=True) ** 2)) for x in starts]
+    x = starts[int(np.argmin(costs))]
+    J = np.concatenate([parent.J, jacobian(problem, space, x, range(old, len(x)))], axis=1)
     return fit(problem, space, x, rounds=ROUGH, J=J, rough=True)
 
 
@@ -174,7 +241,7 @@ def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -
     """Take out, one by one, every term without which the model is as good."""
     while len(found.space.hypotheses) > 1:
         indices = range(len(found.space.hypotheses))
-        trials = [fit(problem, found.space.without(i), drop(found, i), rounds=10) for i in indices]
+        trials = [dropped(problem, found, i, 10) for i in indices]
         less = min(trials, key=lambda f: f.merit)
         if worth(less, found):
             return found
@@ -182,34 +249,48 @@ def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -
     return found
 
 
+def dropped(problem: Problem, found: Fit, index: int, rounds: int) -> Fit:
+    """The model fitted without one of its hypotheses."""
+    J = np.delete(found.J, found.space.columns(index), axis=1)
+    return fit(problem, found.space.without(index), drop(found, index), rounds=rounds, J=J)
+
+
 def drop(found: Fit, index: int) -> np.ndarray:
     """x without the coordinates of one hypothesis."""
-    parts = found.space.parts(found.x)
-    return np.concatenate([found.x[: found.space.nb], *parts[:index], *parts[index + 1 :]])
+    return np.delete(found.x, found.space.columns(index))
 
 
-def rivals(problem: Problem, found: Fit, index: int, candidates: Sequence[Hypothesis], most: int = 5) -> list[Fit]:
+def rivals(problem: Problem, found: Fit, index: int, candidates: Sequence[Hypothesis], most: int = 3) -> list[Fit]:
     """Full fits in which term `index` is replaced by each of the most likely others."""
-    rest = fit(problem, found.space.without(index), drop(found, index), rounds=4)
+    rest = dropped(problem, found, index, 4)
     taken = {h.name for h in found.space.hypotheses}
-    scores = shortlist(screen(problem, rest, [h for h in candidates if h.name not in taken]), 10)
+    scores = shortlist(screen(problem, rest, [h for h in candidates if h.name not in taken]), 8)
     rough = sorted((roughly(problem, rest, score) for score in scores), key=lambda f: f.merit)
-    best = [from_both(problem, f, found.cost) for f in rough[:most]]
+    best = [fit(problem, f.space, f.x, rounds=16, J=f.J, give_up=Hopeless(found.cost)) for f in rough[:most]]
     return sorted(best, key=lambda f: f.merit)
 
 
 def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:
-    """Give each term its richer form (further harmonics, a second branch) where that takes enough off."""
+    """Give each term another form of the same, or a richer one (harmonics, a second branch), where that is better."""
     for index, h in enumerate(found.space.hypotheses):
-        more = richer(problem.sim.record, found.model.base, h)
+        for form in forms(h):
+            other = fit(problem, exchanged(found, index, form), found.x, rounds=10, J=found.J)
+            if other.merit < found.merit:
+                found = other
+        more = richer(problem.sim.record, found.model.base, found.space.hypotheses[index])
         if more is None:
             continue
-        hypotheses = list(found.space.hypotheses)
-        hypotheses[index] = more
-        space = found.space._replace(hypotheses=tuple(hypotheses))
+        space = exchanged(found, index, more)
         parts = found.space.parts(found.x)
         parts[index] = np.concatenate([parts[index], more.start()[len(h.coordinates) :]])
-        fitted = fit(problem, space, np.concatenate([found.x[: space.nb], *parts]), rounds=10)
+        fitted = fit(problem, space, np.concatenate([found.x[: space.nb], *parts]), rounds=12)
         if worth(found, fitted):
             found = fitted
     return found
+
+
+def exchanged(found: Fit, index: int, h: Hypothesis) -> Space:
+    """The space with hypothesis `index` replaced."""
+    hypotheses = list(found.space.hypotheses)
+    hypotheses[index] = h
+    return found.space._replace(hypotheses=tuple(hypotheses))

@@ -191,7 +191,9 @@ def band(signal: np.ndarray, dt: float) -> tuple[float, float] | None:
 
 
 def _clock(record: Record, findings: list[str], numbers: dict[str, Any]) -> None:
-    d = np.diff(record.t)
+    uneven = record.case.sample_rate is None
+    rows = np.asarray(record.columns["t"], float) if uneven and "t" in record.columns else record.t
+    d = np.diff(rows)
     median = float(np.median(d))
     jitter = 1.4826 * float(np.median(np.abs(d - median))) / median
     limit = 1.5 * record.dt if record.case.sample_rate is not None else 5.0 * median
@@ -208,10 +210,16 @@ def _clock(record: Record, findings: list[str], numbers: dict[str, Any]) -> None
     if len(gaps):
         k = int(gaps[0])
         findings.append(
-            f"The clock has {len(gaps)} gaps, {lost} rows are missing; the first after row {k} at {record.t[k]:.3f} s."
+            f"The clock has {len(gaps)} gaps, {lost} rows are missing; the first after row {k} at {rows[k]:.3f} s."
         )
     if jitter > 0.01:
         findings.append(f"The clock is uneven: ticks differ from {1e3 * median:.4g} ms by {100 * jitter:.2g} %.")
+    if uneven:
+        numbers["clock"]["rows_even"] = len(record.t)
+        findings.append(
+            f"Its {len(rows)} rows, {1e3 * d.min():.3g} to {1e3 * d.max():.3g} ms apart, were laid onto "
+            f"{len(record.t)} rows {1e3 * record.dt:.4g} ms apart."
+        )
 
 
 def _counters(record: Record, findings: list[str], numbers: dict[str, Any]) -> None:

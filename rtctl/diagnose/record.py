@@ -36,7 +36,7 @@ class Record(NamedTuple):
     w: np.ndarray  # (n,) V
     u: np.ndarray  # (n, nu) V, or what `case.drive.unit` says
     y: dict[str, np.ndarray]  # name -> (n,) in the sensor's own unit; counters without their wraps
-    columns: dict[str, np.ndarray]  # as they stand in the file
+    columns: dict[str, np.ndarray]  # as they stand in the file, `t` at its own uneven times
 
     @property
     def closed_loop(self) -> bool:
@@ -135,6 +135,12 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
             y[name] = unwrap(values)[0]
         else:
             y[name] = unwrap_turns(values) if case.sensors.unit == "rad" else values
+    if case.sample_rate is None:
+        even = even_clock(t, dt)
+        y = {name: _laid(even, t, values, whole=_is_counter(name)) for name, values in y.items()}
+        ref, w = _laid(even, t, ref), _laid(even, t, w)
+        u = np.column_stack([_laid(even, t, values) for values in u.T])
+        t = even
     _supports(path, t, u, y, case, warnings)
     record = Record(case.plant, case, t, dt, ref, w, u, y, columns)
     agreement = law_agreement(record)
@@ -142,6 +148,17 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
         warnings.append(f"{path.parent}: {_disagrees(case, agreement)}; the recorded command is taken as the input")
         case = case._replace(controller_known=False)
     return record._replace(case=case._replace(warnings=tuple(warnings)))
+
+
+def even_clock(t: np.ndarray, dt: float) -> np.ndarray:
+    """Times (m,) s, `dt` apart, from the first to the last of the uneven times `t` (n,)."""
+    return t[0] + dt * np.arange(int((t[-1] - t[0]) / dt + 1e-9) + 1)
+
+
+def _laid(even: np.ndarray, t: np.ndarray, values: np.ndarray, whole: bool = False) -> np.ndarray:
+    """Readings (n,) at times `t` on the line between neighbours at times `even`; a counter stays `whole`."""
+    line = np.interp(even, t, values)
+    return np.round(line) if whole else line
 
 
 def split(record: Record, heldout: float = 0.25) -> tuple[slice, slice]:

@@ -4,6 +4,8 @@ separates them and diagnose again, write the model.
 What is recorded is an ordinary run (`rtctl run`), so the bundles are there to be looked at and diagnosed again.
 """
 
+import math
+import re
 import textwrap
 from collections.abc import Callable
 from itertools import pairwise
@@ -14,11 +16,13 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path, to_yaml
 from rtctl.diagnose.diagnosis import AMBIGUOUS, Diagnosis
 from rtctl.diagnose.folder import EXPERIMENT
+from rtctl.diagnose.numbers import span
 from rtctl.diagnose.ordinary import USE
 
 LENGTH = {"ivu": 25.0, "ldu": 10.0, "axis": 25.0}  # s, of a recording
 RECORDING, SECOND = "recording", "experiment"  # bundles in the folder of a repair
 WIDTH = 110
+PAIR = re.compile(r"- - (\S+)\n +- (\S+)$(?!\n +- [^-])", re.M)  # a knot over two lines
 PLAYED = ("reference", "excitation")  # keys of a config that say what a machine is made to do
 NEGLIGIBLE = 1e-4  # share of a value below which it has not changed
 LEGS = (  # (share of the travel, share of the speed): far and fast, and at a crawl where friction shows itself
@@ -154,27 +158,54 @@ def experiment_yaml(d: Diagnosis, config: dict[str, Any] | None = None) -> str:
     data = config if config is not None else to_config(d.owner, d.record)
     settings = kind.model_validate(fill(Shape(kind, model=kind), _plain(data)))
     settings, seconds = _played(settings, d.experiment, d.record.dt * len(d.record.t))
-    return _head(d, seconds, config is not None) + to_yaml(settings)
+    if config is None:  # all of it is emulated, and needs no clock to be right
+        settings = set_path(settings, "loop.mode", "fused")
+    return _head(d, seconds, config is not None) + PAIR.sub(r"- [\1, \2]", to_yaml(settings))
 
 
 def _head(d: Diagnosis, seconds: float, own: bool) -> str:
     """Comment lines on top of an experiment's file: what it does, what for, and how to run it."""
     assert d.experiment is not None
-    why = d.experiment.get("why")
+    given = d.experiment.get("why")
+    why: dict[str, Any] = given if isinstance(given, dict) else {"words": given}
     told = [
-        d.experiment.get("words") or "The experiment to run next.",
-        (why.get("words") if isinstance(why, dict) else why)
-        or f"It tells {' from '.join(dict.fromkeys(e.name for e in d.effects))}.",
-        f"Put the machine where the recording began, run `rtctl run {EXPERIMENT} --for {seconds:.4g}s` and diagnose "
-        "that recording.",
+        f"The experiment to run next. {d.experiment.get('words') or ''}",
+        why.get("words") or f"It tells {' from '.join(dict.fromkeys(e.name for e in d.effects))}.",
+        f"Put the machine where the recording began{room(d.experiment)}, run `{command(seconds)}` and diagnose that "
+        "recording.",
     ]
     if not own:
         told.append(
             "The recording is not ours, so what is here beside the reference is a stand-in for its controller: play "
             "the reference on your own."
         )
-    lines = [line for words in told for line in textwrap.wrap(" ".join(str(words).split()), WIDTH)]
+    lines = [line for words in told for line in wrapped(" ".join(str(words).split()))]
+    distances = sorted(why.get("distance", {}).items(), key=lambda item: -item[1])
+    if distances:
+        lines.append("Expected distance between the rivals, over the noise, of all motions that were tried:")
+        lines += [f"    {name:18} {value:.3g}" for name, value in distances]
+        lines += [f"    {name:18} left out: {reason}" for name, reason in why.get("refused", {}).items()]
     return "".join(f"# {line}\n" for line in lines)
+
+
+def wrapped(text: str) -> list[str]:
+    """Lines of a comment; what stands in backticks is not broken, so that it can be copied."""
+    kept = re.sub("`[^`]*`", lambda found: found[0].replace(" ", "\0"), text)
+    return [line.replace("\0", " ") for line in textwrap.wrap(kept, WIDTH, break_on_hyphens=False)]
+
+
+def command(seconds: float) -> str:
+    """What runs an experiment of this length."""
+    return f"rtctl run {EXPERIMENT} --for {math.ceil(seconds)}s"
+
+
+def room(experiment: dict[str, Any]) -> str:
+    """How much of it the machine needs, in words; "" where the experiment does not say."""
+    travel = experiment.get("limits", {}).get("travel")
+    if travel is None:
+        return ""
+    unit = (experiment.get("reference") or {}).get("unit", "")
+    return f", with room of {span(float(travel[0]), float(travel[1]), unit)} around it"
 
 
 def _plain(value: Any) -> Any:

@@ -17,13 +17,14 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from rtctl.diagnose import figures, words
+from rtctl.diagnose import figures, numbers, repair, words
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Interval
 from rtctl.diagnose.model import FITTED
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
 NAME = "report.html"
+MOTION_ALT = "The motion of the next experiment over its time, from where the recording began."
 COLOR = {NAMED: "green", AMBIGUOUS: "yellow", UNNAMED: "magenta", NOTHING: "cyan"}
 PLANT = {"ivu": "a two-reel tape unit", "ldu": "a linear drive unit", "axis": "an axis"}
 Draw = Callable[[Diagnosis, Simulator], Figure | None]
@@ -33,6 +34,8 @@ PICTURES: dict[str, tuple[Draw, str]] = {
     "missing": (figures.missing_force, "What it took to keep the simulation on the recorded track, by the axis where "
                 "the effect lives: medians with their 95 % bands, and what the new model gives instead."),
     "polar": (figures.polar_map, "The same around one turn; the middle ring is zero."),
+    "turn": (figures.turn_map, "Torque that the model lacks over one turn, with its 95 % band, and what repeats how "
+             "often in it; the table is torque_over_turn.csv."),
     "where": (figures.where_map, "Rms error on the recorded track of each sensor in each regime. A value near 1 or "
               "below is what the sensor resolves."),
     "evidence": (figures.evidence_bars, "What each hypothesis explains of the error beyond noise. Left of the dashed "
@@ -66,7 +69,7 @@ def html(d: Diagnosis) -> str:
     r = d.record
     return env.get_template("report.html.j2").render(
         d=d,
-        title=f"{PLANT[r.plant]}, {r.t[-1] - r.t[0]:.4g} s at {words.nice(1 / r.dt, 'Hz', 3)}",
+        title=f"{PLANT[r.plant]}, {r.t[-1] - r.t[0]:.4g} s at {numbers.nice(1 / r.dt, 'Hz', 3)}",
         verdict=words.verdict_sentences(d),
         summary=summary(d),
         effects=effect_rows(d),
@@ -98,7 +101,7 @@ def alt_text(d: Diagnosis, name: str, caption: str) -> str:
         return f"{caption} The error {words.falls(d)}."
     if name == "evidence" and d.evidence:
         best = max(d.evidence, key=lambda e: e.gain)
-        return f"{caption} The most, {words.percent(best.gain)}: {' and '.join(map(words.entry_noun, best.names))}."
+        return f"{caption} The most, {numbers.percent(best.gain)}: {' and '.join(map(words.entry_noun, best.names))}."
     return caption
 
 
@@ -124,7 +127,7 @@ def interval(v: Interval, unit: str) -> tuple[str, str]:
     scale, shown = figures.prefixed(np.array([v.value]), unit)
     width = max(v.high - v.low, 1e-30)
     digits = int(np.clip(np.ceil(np.log10(max(abs(v.value), width) / width)) + 1, 2, 6)) if np.isfinite(width) else 2
-    value, low, high = (words.figures(x * scale, digits) if np.isfinite(x) else "-" for x in (v.value, v.low, v.high))
+    value, low, high = (numbers.figures(x * scale, digits) if np.isfinite(x) else "-" for x in (v.value, v.low, v.high))
     return f"{value} {shown}".rstrip(), f"{low} to {high}"
 
 
@@ -170,11 +173,14 @@ def rival_rows(d: Diagnosis) -> list[tuple[str, ...]]:
 
 
 def summary(d: Diagnosis) -> str:
-    """Held-out figures and noise in one line."""
-    parts = [f"nrmse on the part that was not fitted {d.heldout_before:.3g} before"]
-    if d.after.terms:
-        parts.append(f"{d.heldout_after:.3g} after")
-    return ", ".join(parts) + f"; noise leaves {d.noise_floor:.2g}."
+    """Held-out figures and noise in one line, as a person reads them and as shares of the signal (nrmse)."""
+    given = [d.heldout_before, d.heldout_after, d.noise_floor]
+    if not d.after.terms:
+        del given[1]
+    sizes = [numbers.nice(words.heldout_error(d, x), words.main_unit(d)) for x in given]
+    change = f"{sizes[0]} before, {sizes[1]} after" if len(given) == 3 else sizes[0]
+    shares = ", ".join(f"{x:.3g}" for x in given)
+    return f"Error on the part that was not fitted: {change}, where noise leaves {sizes[-1]} (nrmse {shares})."
 
 
 def located(d: Diagnosis) -> str:
@@ -182,8 +188,12 @@ def located(d: Diagnosis) -> str:
     at = d.located
     if at is None:
         return ""
-    where = f"{words.channel_words(at.channel)}, {words.node_words(at.node)}: {at.where}"
-    return f"{where} (by {at.axis}), since {words.nice(at.since_s, 's', 3)}, {words.percent(at.share)} of the error."
+    shown = words.channel_words(at.channel)
+    since = f" from {numbers.nice(at.since_s, 's', 3)} on" if at.since_s > 0 else ""
+    return (
+        f"{shown[:1].upper()}{shown[1:]} shows it{since}. Of the error {numbers.percent(at.share)} comes from "
+        f"{words.node_words(at.node)}; {words.goes(at)}."
+    )
 
 
 def cannot_lines(d: Diagnosis) -> list[str]:
@@ -195,13 +205,48 @@ def cannot_lines(d: Diagnosis) -> list[str]:
     return [words.sentence(f"{name}:{found[0]}", *found[1:]) for name, found in nodes.items()]
 
 
-def experiment(d: Diagnosis) -> dict[str, str] | None:
-    """What to run next, in words and as a campaign file."""
+def experiment(d: Diagnosis) -> dict[str, Any] | None:
+    """What to run next: in words, what for, how, a picture of the motion, and how far each motion gets."""
     if d.experiment is None and d.verdict != AMBIGUOUS:
         return None
-    text = yaml.safe_dump(plain(d.experiment), sort_keys=False) if d.experiment else ""
-    told = words.separating(d) if d.effects else "run this, then diagnose again"
-    return {"words": f"{told[0].upper()}{told[1:]}.", "text": text}
+    given = d.experiment or {}
+    said = given.get("why")
+    why: dict[str, Any] = said if isinstance(said, dict) else {"words": said}
+    told = words.plan(d) if d.effects or given.get("words") else "run this, then diagnose again"
+    known = bool(given.get("words"))
+    tell = words.separating(d) if known and d.effects else ""
+    drawn = motion(given)
+    tried = sorted(why.get("distance", {}).items(), key=lambda item: -item[1])
+    return {
+        "words": f"{told[:1].upper()}{told[1:]}.",
+        "why": why.get("words") or "",
+        "tell": f"How they differ: {tell}." if tell else "",
+        "where": f"Put the machine where the recording began{repair.room(given)}, and run the file beside this report:",
+        "run": repair.command(float(given["seconds"])) if "seconds" in given else "",
+        "picture": svg(drawn, "motion", MOTION_ALT) if drawn else "",
+        "tried": [
+            *((name.replace("_", " "), f"{value:.2g}") for name, value in tried),
+            *((name.replace("_", " "), f"left out: {reason}") for name, reason in why.get("refused", {}).items()),
+        ],
+        "text": "" if known or not given else yaml.safe_dump(plain(given), sort_keys=False),
+    }
+
+
+def motion(given: dict[str, Any]) -> Figure | None:
+    """The reference of an experiment over its time; None where it has none."""
+    reference = given.get("reference") or {}
+    knots = np.array(reference.get("knots") or np.zeros((0, 2)), float)
+    if len(knots) < 2:
+        return None
+    scale, unit = figures.prefixed(knots[:, 1], str(reference.get("unit", "")))
+    figure = Figure(figsize=(7.2, 1.9), layout="constrained")
+    axes = figure.add_subplot()
+    figures.style(axes)
+    axes.plot(knots[:, 0], scale * knots[:, 1], color=figures.AFTER, linewidth=1.0)
+    repeat = reference.get("repeat")
+    again = f", again every {numbers.nice(float(repeat), 's')}" if repeat else ""
+    figures.label(axes, f"time, s{again}", f"reference, {unit}")
+    return figure
 
 
 def plain(value: Any) -> Any:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.fit import Fit, Problem, bounded_step, parallel, trust
-from rtctl.diagnose.space import INVERSE, Hypothesis, Space
+from rtctl.diagnose.space import INVERSE, Hypothesis
 
 TRIES = 3
 TOO_FAR = 2.0  # times the residual: a step that changes more says little about what is missing
@@ -27,60 +27,93 @@ class Score(NamedTuple):
     power: float  # of the direction beside the base's: cost gained is half of it times the square of the size
 
 
+class Ground(NamedTuple):
+    """The model that hypotheses are tried on, linear about its x."""
+
+    fitted: Fit
+    weight: np.ndarray  # of the prior
+    H: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
 def screen(problem: Problem, fitted: Fit, candidates: list[Hypothesis]) -> list[Score]:
     """Scores of all candidates, best first; several seeds of one term and node are candidates of their own."""
-    space, x, r = fitted.space, fitted.x, fitted.r
-    low, high = space.bounds()
-    weight = space.prior() * trust(r)
-    g = fitted.J.T @ r + weight * x
-    H = fitted.J.T @ fitted.J + np.diag(weight)
-    tries = [(h, i) for h in candidates for i in h.sizes]
-    columns = parallel([partial(_secant, problem, space, x, r, h, i) for h, i in tries])
+    weight = fitted.space.prior() * trust(fitted.r)
+    ground = Ground(fitted, weight, fitted.J.T @ fitted.J + np.diag(weight), *fitted.space.bounds())
+    start = problem.residual(fitted.model, coarse=True)
+    tries = [(h, i) for h in candidates for i in h.sizes or [0]]
+    steps: list[float] = [1.0] * len(tries)
+    changes = parallel([partial(_change, problem, fitted, start, h, i, steps, k) for k, (h, i) in enumerate(tries)])
     scores, at = [], 0
     for h in candidates:
-        count = len(h.sizes)
-        C = np.stack(columns[at : at + count], axis=1) if count else np.zeros((len(r), 0))
-        at += count
-        if count and np.isfinite(C).all() and np.abs(C).max() < 1e5:
-            scores.append(_score(h, C, fitted, g, H, low, high))
-    return sorted(scores, key=lambda s: -s.gain)
+        end = at + max(len(h.sizes), 1)
+        C, step = np.stack(changes[at:end], axis=1), np.array(steps[at:end])
+        at = end
+        if np.isfinite(C).all() and np.abs(C / step).max() < 1e5:
+            score = _line(ground, h, C / step) if h.sizes else Score(h, -np.inf, fitted.x, 0.0, 0.0)
+            scores.append(max(score, _there(ground, score, C[:, 0], step[0]), key=_gain) if len(step) == 1 else score)
+    return sorted(scores, key=_gain, reverse=True)
 
 
-def _secant(problem: Problem, space: Space, x: np.ndarray, r: np.ndarray, h: Hypothesis, i: int) -> np.ndarray:
-    """Change of the residual by one unit of size `i`, from a step that moves the residual by about its own size."""
-    c = h.coordinates[i]
-    step = 1.0 if c.high >= 1.0 else -1.0
-    own = float(np.linalg.norm(r))
+def _gain(score: Score) -> float:
+    return score.gain
+
+
+def _change(
+    problem: Problem, fitted: Fit, r: np.ndarray, h: Hypothesis, i: int, steps: list[float], k: int
+) -> np.ndarray:
+    """Change of the residual by a step of size `i` that moves the residual by about its own size; steps[k] tells it.
+
+    A hypothesis without a size is there or is not: its step is to be there.
+    """
+    space, own = fitted.space.add(h), float(np.linalg.norm(r))
+    step = 1.0 if not h.sizes or h.coordinates[i].high >= 1.0 else -1.0
     for _ in range(TRIES):
         start = h.start()
-        start[i] += step
-        change = problem.residual(space.add(h).model(np.concatenate([x, start]))) - r
+        if h.sizes:
+            start[i] += step
+        change = problem.residual(space.model(np.concatenate([fitted.x, start])), coarse=True) - r
         size = float(np.linalg.norm(change))
-        if size <= TOO_FAR * own or c.kind == INVERSE:
+        if size <= TOO_FAR * own or not h.sizes or h.coordinates[i].kind == INVERSE:
             break
         step *= max(0.5 * own / size, 1e-3)
-    return change / step
+    steps[k] = step
+    return change
 
 
-def _score(
-    h: Hypothesis, C: np.ndarray, fitted: Fit, g: np.ndarray, H: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> Score:
-    n, k = len(g), C.shape[1]
+def _line(ground: Ground, h: Hypothesis, C: np.ndarray) -> Score:
+    """The best that a straight line along the directions C (rows, sizes) promises."""
+    fitted = ground.fitted
+    n, k = len(fitted.x), C.shape[1]
     cross = fitted.J.T @ C
-    full = np.block([[H, cross], [cross.T, C.T @ C]])
-    slope = np.concatenate([g, C.T @ fitted.r])
+    full = np.block([[ground.H, cross], [cross.T, C.T @ C]])
+    slope = np.concatenate([fitted.J.T @ fitted.r + ground.weight * fitted.x, C.T @ fitted.r])
     sizes = [h.coordinates[i] for i in h.sizes]
     x = np.concatenate([fitted.x, np.zeros(k)])
-    lows = np.concatenate([low, [c.low for c in sizes]])
-    highs = np.concatenate([high, [c.high for c in sizes]])
+    lows = np.concatenate([ground.low, [c.low for c in sizes]])
+    highs = np.concatenate([ground.high, [c.high for c in sizes]])
     dx = bounded_step(full, slope, x, lows, highs, 1e-9)
     gain = -(slope @ dx + 0.5 * dx @ full @ dx)
     start = h.start()
     for i, value in zip(h.sizes, dx[n:], strict=True):
         start[i] += value
-    alone = np.linalg.lstsq(H, cross, rcond=1e-10)[0]
+    alone = np.linalg.lstsq(ground.H, cross, rcond=1e-10)[0]
     left = np.trace(C.T @ C - cross.T @ alone) / max(np.trace(C.T @ C), 1e-300)
-    power = float(C[:, 0] @ C[:, 0] - cross[:, 0] @ alone[:, 0]) if k else 0.0
+    power = float(C[:, 0] @ C[:, 0] - cross[:, 0] @ alone[:, 0])
     return Score(
         h, float(gain), np.concatenate([fitted.x + dx[:n], start]), float(1.0 - np.clip(left, 0.0, 1.0)), power
     )
+
+
+def _there(ground: Ground, score: Score, change: np.ndarray, step: float) -> Score:
+    """The score where the step ended, and not where a line predicts the best: slack, slip and play set in at once."""
+    fitted, h = ground.fitted, score.hypothesis
+    r = fitted.r + change
+    slope = fitted.J.T @ r + ground.weight * fitted.x
+    dx = bounded_step(ground.H, slope, fitted.x, ground.low, ground.high, 1e-9)
+    x, left = fitted.x + dx, r + fitted.J @ dx
+    start = h.start()
+    start[h.sizes[:1]] += step
+    cost = 0.5 * float(left @ left + ground.weight @ x**2)
+    return score._replace(gain=fitted.cost - cost, x=np.concatenate([x, start]))

@@ -22,9 +22,11 @@ from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import ordered
 from rtctl.plants.physics.place import PLANTS
 
+FASTEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
 MODES = {"open": OPEN, "track": TRACK, "closed": CLOSED}
 SUBSTEP = {"ivu": 1e-3, "ldu": 100e-6, "axis": 0.25e-3}  # s, at most: the linear part is exact at any
 STIFF = ("transmission.", "tape.", "structure.")  # terms that alter a spring need shorter ones
+COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
 FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
 LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
@@ -57,29 +59,35 @@ class Simulator:
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
         self.law = law_params(record)
 
-    def run(self, model: Model, mode: int = TRACK, n: int | None = None) -> np.ndarray:
+    def run(self, model: Model, mode: int = TRACK, n: int | None = None, coarse: bool = False) -> np.ndarray:
         """Readings (n, sensors) in the sensors' units; nan from the tick on at which the model ran away."""
-        return self.everything(model, mode, n)[0]
+        return self.everything(model, mode, n, coarse=coarse)[0]
 
     def everything(
-        self, model: Model, mode: int = TRACK, n: int | None = None, follow: float | None = None
+        self, model: Model, mode: int = TRACK, n: int | None = None, follow: float | None = None, coarse: bool = False
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Readings, the volts that the law wrote (CLOSED) and the correction (n,) that kept the model on track (TRACK).
 
-        The correction is in the unit of the linear machine's input; `follow` is its bandwidth in rad/s.
+        The correction is in the unit of the linear machine's input; `follow` is its bandwidth in rad/s. `coarse` takes
+        twice the step in half the time: good for differences, not for verdicts.
         """
         k = self.kernel
         n = len(self.seen) if n is None else n
         stiff = any(str(getattr(t, "term", "")).startswith(STIFF) for t in model.terms)
         substeps = self.substeps * (FINER[self.record.plant] if stiff else 1)
-        h = self.record.dt / substeps
+        stride = 1
+        if coarse and self.record.dt < COARSE:
+            substeps, stride = 1, 2
+        elif coarse:
+            substeps = (substeps + 1) // 2
+        h = self.record.dt * stride / substeps
         params = plant_params(model, self.case, h)
         p = np.zeros(1, _dtype(params))
         fill_record(p[0], params)
         slots = np.zeros(max(len(model.terms), 1), k.slot)
         for slot, settings in zip(slots, ordered(list(model.terms)), strict=False):
             kernel.fill_slot(k, slot, settings, params)
-        job = self._job(params, mode, self.follow if follow is None else follow, substeps)
+        job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
         laws = np.zeros(1, record_dtype(self.law))
         fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))
@@ -93,11 +101,12 @@ class Simulator:
         out[max(done, 0) :] = np.nan
         return out, written, push
 
-    def _job(self, params: Any, mode: int, follow: float, substeps: int) -> np.ndarray:
+    def _job(self, params: Any, mode: int, follow: float, substeps: int, stride: int) -> np.ndarray:
         case, plant = self.case, self.record.plant
         job = np.zeros(1, self.kernel.job)
         j = job[0]
-        j["mode"], j["substeps"], j["rate"], j["half"] = mode, substeps, 1.0 / self.record.dt, self.half
+        j["mode"], j["substeps"], j["rate"], j["half"] = mode, substeps, 1.0 / (stride * self.record.dt), self.half
+        j["stride"] = stride
         late = case.delay_samples * self.record.dt
         if plant == "axis" and case.drive.bandwidth_hz:  # its plant has no driver: what that holds back is a delay
             late += 2 * (case.drive.damping or DAMPING) / (2 * np.pi * case.drive.bandwidth_hz)
@@ -109,17 +118,20 @@ class Simulator:
         j["share"] = SHARE[plant]
         rigid = rigid_gain(params, plant)
         j["P"], j["D"] = follow**2 / rigid, 1.4 * follow / rigid
-        j["a"] = -np.expm1(-10 * follow * self.record.dt)
+        j["a"] = -np.expm1(-10 * follow * stride * self.record.dt)
         return job
 
 
 def half_a_tick_on(volts: np.ndarray) -> np.ndarray:
-    """The mean of a smooth command (n, drives) over the tick that begins with each sample, to first order.
+    """The command (n, drives) that, held over each tick, moves a mass at the ticks as the smooth one does.
 
-    A command that was sampled, and not written by a DAC that holds it, goes on changing in between.
+    A command that was sampled, and not written by a DAC that holds it, goes on changing in between. With f in cycles
+    a tick, 1 / (j w)^2 over the double integrator with a hold is sinc(f)^2 / cos(pi f) and half a tick of lead. Source:
+    Astrom, Hagander & Sternby, Zeros of sampled systems, Automatica 20 (1984).
     """
-    turn = np.exp(1j * np.pi * np.fft.rfftfreq(len(volts)))[:, None]
-    return np.fft.irfft(np.fft.rfft(volts, axis=0) * turn, len(volts), axis=0)
+    f = np.fft.rfftfreq(len(volts))
+    turn = np.sinc(f) ** 2 / np.maximum(np.cos(np.pi * f), FASTEST) * np.exp(1j * np.pi * f)
+    return np.fft.irfft(np.fft.rfft(volts, axis=0) * turn[:, None], len(volts), axis=0)
 
 
 _dtypes: dict[type, np.dtype] = {}

@@ -120,6 +120,11 @@ class Space(NamedTuple):
             at += len(hypothesis.coordinates)
         return out
 
+    def columns(self, index: int) -> np.ndarray:
+        """Where in x the coordinates of one hypothesis stand."""
+        at = self.nb + sum(len(h.coordinates) for h in self.hypotheses[:index])
+        return np.arange(at, at + len(self.hypotheses[index].coordinates))
+
     def labels(self) -> list[str]:
         """A name for each coordinate."""
         return [*self.names, *(f"{h.name}.{c.name}" for h in self.hypotheses for c in h.coordinates)]
@@ -139,6 +144,10 @@ class Space(NamedTuple):
             low += [c.low for c in h.coordinates]
             high += [c.high for c in h.coordinates]
         return np.array(low, float), np.array(high, float)
+
+    def reach(self) -> np.ndarray:
+        """How far each plant parameter may go, in logarithm."""
+        return np.array([min(self.tolerance(name), WIDE) for name in self.names])
 
     def prior(self) -> np.ndarray:
         """Weight of x^2 in the cost: the owner's values count for what they are worth, an effect is free."""

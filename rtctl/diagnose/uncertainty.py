@@ -1,6 +1,8 @@
 """How sure the numbers are: intervals from the Jacobian, with errors that go together for a while.
 
-cov = (J'J + P)^-1 (B + P) (J'J + P)^-1 with P the prior's weight and B the sum over blocks of J'r r'J within a block.
+cov = A^-1 (B + P C P) A^-1,  A = J'J + P, with P the weight that the owner's values have in the fit, C what they may be
+off by (evenly within their tolerance) and B the sum over blocks of J'r r'J within a block: the errors' share and the
+share of owner's values that are wrong.
 
 Source: White, Econometrica 48 (1980) for the sandwich; Kunsch, Annals of Statistics 17 (1989) for blocks.
 """
@@ -10,15 +12,17 @@ import numpy as np
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
-from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, Hypothesis
+from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, Hypothesis
 from rtctl.diagnose.words import unit_at
 
 Z90 = 1.645
+EVEN = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within one either way
 
 
 def covariance(fitted: Fit, block: int) -> np.ndarray:
     """Covariance of x (n, n)."""
-    prior = fitted.space.prior() * trust(fitted.r)
+    weight = trust(fitted.r)
+    prior = fitted.space.prior() * weight
     n = len(fitted.r) // block * block
     if n < 2 * block:
         n, block = len(fitted.r), 1
@@ -29,7 +33,7 @@ def covariance(fitted: Fit, block: int) -> np.ndarray:
     white = fitted.J.T @ fitted.J * float(np.mean(fitted.r**2))
     meat = scores.T @ scores
     meat = np.where(np.eye(len(d), dtype=bool), np.maximum(meat, white), meat)
-    return inverse @ (meat + np.diag(prior)) @ inverse
+    return inverse @ (meat + np.diag(prior * weight * EVEN**2 / PRIOR**2)) @ inverse
 
 
 def parameter_intervals(fitted: Fit, cov: np.ndarray) -> dict[str, Interval]:

@@ -10,13 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose import decide
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Rival
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
 from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.jitter import Jitter, interval
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals
 
 SURE = 0.7  # weight of a name among its rivals
 POSSIBLE = 0.05  # weight from which a rival is mentioned
+JITTER = 0.95  # confidence in a jitter, whose sign nothing else gives
 MOST = 3  # names in an answer
 
 
@@ -40,12 +42,12 @@ class Verdict(NamedTuple):
 
 def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alternative]], block: int) -> Verdict:
     """The verdict on `best`; `rivals` holds for each of its hypotheses the fits with another one in its place."""
+    loud = base.rms > decide.LOUD * problem.floor and not decide.complete(problem, base, base)
     if not best.space.hypotheses:
-        return Verdict(UNNAMED if base.rms > decide.LOUD * problem.floor else NOTHING, (), 0.0)
+        return Verdict(UNNAMED if loud else NOTHING, (), 0.0)
     share = decide.explained(problem, base, best)
-    whole = decide.complete(problem, best) and share > decide.MOSTLY
-    if not whole and share < decide.ENOUGH:
-        loud = base.rms > decide.LOUD * problem.floor
+    whole = decide.complete(problem, base, best)
+    if not decide.enough(problem, base, best):
         return Verdict(UNNAMED if loud else NOTHING, (), share)
     trust = 0.98 if whole else 0.6 + 0.35 * share
     own, others = [], []
@@ -61,11 +63,29 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
             for name, weight in sorted(names.items(), key=lambda item: -item[1]):
                 if name != term and weight > POSSIBLE:
                     place = next(p for p in places if p.hypothesis.term == name)
-                    others.append(_effect(place, weight * trust, best, (), block))
+                    rival = _effect(place, weight * trust, best, (), block)
+                    others.append(rival._replace(instead_of=places[0].hypothesis.name))
     if not doubt:
         return Verdict(NAMED, tuple(own), share)
     new = [e for e in others if e.name not in {o.name for o in own}]
     return Verdict(AMBIGUOUS, tuple([*own, *new][:MOST]), share)
+
+
+def with_jitter(verdict: Verdict, found: Jitter) -> Verdict:
+    """The verdict with the jitter of the ticks beside it, which shows in the noise and stands for itself."""
+    low, high = interval(found)
+    effect = Effect("timing.jitter", "loop", JITTER, {"sigma": Interval(found.sigma, low, high, "s")}, ())
+    if verdict.verdict == NOTHING:
+        return Verdict(NAMED, (effect,), verdict.explained)
+    if verdict.verdict == UNNAMED:
+        return verdict
+    return verdict._replace(effects=(*verdict.effects, effect)[:MOST])
+
+
+def standing(best: Fit, index: int, rivals: Sequence[Alternative]) -> float:
+    """Weight of the name of one hypothesis of the best model among those that could stand in its place."""
+    places = [Alternative(best, index), *rivals]
+    return weigh(places, decide.probabilities([p.fit for p in places]))[places[0].hypothesis.term]
 
 
 def weigh(places: Sequence[Alternative], weights: np.ndarray) -> dict[str, float]:

@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, UNNAMED, Diagnosis, Effect, Interval
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, UNNAMED, Diagnosis, Effect, Interval, Located
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.numbers import PREFIXES as PREFIXES  # for those who draw with words
+from rtctl.diagnose.numbers import both, nice, percent
+from rtctl.diagnose.numbers import figures as figures
+from rtctl.diagnose.numbers import prefix as prefix
 from rtctl.diagnose.phrases import PHRASES
 from rtctl.plants.physics import TERMS
 
-PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}
-PREFIXED = ("Nm", "N", "V", "s", "Hz", "m", "rad", "A", "m/s", "rad/s", "N/m", "Nm/rad", "Nms/rad", "Ns/m")
-LARGE = ("N/m", "Nm/rad", "Hz")  # of which kilo is in use
+LIKELY = 0.5  # confidence below which an effect without a rival is no more than possible
 MOST_HIDDEN = 4  # smallest sizes named in a verdict of nothing, these first
 HIDDEN_FIRST = "friction.coulomb", "friction.stribeck", "drive.deadband", "transmission.backlash", "ripple.cogging"
 
@@ -38,50 +40,6 @@ BY_NODE = {
 AMPLITUDES = {"load.imbalance": "force", "ripple.cogging": "force", "ripple.encoder": "way"}
 SPECIAL = {"f_Hz": "Hz", "transmission.creep.kappa": "1/N", "transmission.slip.F_max": "N", "drive.supply_sag.k": "1/V",
            "sensor.missed_counts.at": "s"}  # fmt: skip
-
-
-def nice(value: float, unit: str = "", digits: int = 2) -> str:
-    """A number as a person writes it, with a prefix that fits: nice(0.0031, "Nm") is "3.1 mNm"."""
-    if not math.isfinite(value):
-        return "any size" if value > 0 else "unknown"
-    power = prefix(value, unit, digits)
-    return f"{figures(value / 10.0**power, digits)} {PREFIXES[power]}{unit}".rstrip()
-
-
-def prefix(value: float, unit: str, digits: int = 2) -> int:
-    """Power of ten of the prefix that fits a size; 0 for units that take none."""
-    if unit not in PREFIXED or value == 0 or not math.isfinite(value):
-        return 0
-    rounded = float(f"{abs(value):.{max(digits, 2) - 1}e}")
-    power = 3 * math.floor(math.log10(rounded) / 3 + 1e-12)
-    if unit in ("rad/s", "Hz", "m/s") and rounded >= 0.1:  # nobody says 300 mHz
-        power = max(power, 0)
-    return min(max(power, -9), 6 if unit in LARGE else 0)
-
-
-def figures(x: float, digits: int) -> str:
-    """`digits` figures, none of them lost, and no exponent within reason."""
-    if x == 0:
-        return "0"
-    x = float(f"{x:.{digits - 1}e}")
-    size = math.floor(math.log10(abs(x)) + 1e-12)
-    if not -4 <= size <= 6:
-        return f"{x:.{digits - 1}e}"
-    return f"{x:.{max(digits - 1 - size, 0)}f}"
-
-
-def both(a: float, b: float, unit: str = "") -> tuple[str, str]:
-    """Two sizes with as many figures as it takes to see them differ."""
-    for digits in (2, 3, 4):
-        one, two = nice(a, unit, digits), nice(b, unit, digits)
-        if one != two:
-            break
-    return one, two
-
-
-def percent(share: float) -> str:
-    """A share, as "3.4 %"."""
-    return f"{figures(100 * share, 2)} %"
 
 
 def node_words(node: str) -> str:
@@ -247,6 +205,12 @@ def entry_noun(entry: str) -> str:
     return noun(name, node)
 
 
+def at(entry: str) -> str:
+    """The same as part of a sentence: "sticking at motor 1"."""
+    name, _, node = entry.partition(":")
+    return f"{noun(name)} at {node_words(node)}" if name in PHRASES and node else entry
+
+
 def sentence(entry: str, *more: str) -> str:
     """Why a hypothesis "name:node" cannot be tested, and at `more` nodes: what a record would have to hold."""
     name, _, node = entry.partition(":")
@@ -291,13 +255,7 @@ def verdict_sentences(d: Diagnosis) -> str:
         rest = "that" if len(clauses) == 1 else "them"
         second = f"With {rest} in the model the error on the part that was not fitted {falls(d)}."
     elif d.verdict == AMBIGUOUS and d.effects:
-        choices = [f"{h} ({t})" for h, t in (effect_clause(e, d.after) for e in d.effects)]
-        first = (
-            f"either {_join(choices, 'or')}: this record cannot tell."
-            if len(choices) > 1
-            else f"perhaps {choices[0]}: this record cannot tell."
-        )
-        second = f"Run this next: {separating(d)}."
+        first, second = _ambiguous(d), f"Run this next: {plan(d)}."
     elif d.verdict == UNNAMED or d.effects:
         first, second = _unnamed(d)
     else:
@@ -305,17 +263,46 @@ def verdict_sentences(d: Diagnosis) -> str:
     return f"{first[0].upper()}{first[1:]} {second}"
 
 
+def _ambiguous(d: Diagnosis) -> str:
+    """What is sure, and what may stand for what: each rival beside the effect whose place it would take."""
+    own = [e for e in d.effects if e.instead_of is None]
+    groups = [[e, *(r for r in d.effects if r.instead_of == f"{e.name}:{e.node}")] for e in own]
+    least = min(own, key=lambda e: e.confidence) if all(len(group) == 1 for group in groups) else None
+    sure, doubtful = [], []
+    for group in groups:
+        clauses = [f"{h} ({t})" for h, t in (effect_clause(e, d.after) for e in group)]
+        if len(group) > 1:
+            doubtful.append(f"either {_join(clauses, 'or')}")
+        elif group[0] is least or group[0].confidence < LIKELY:
+            doubtful.append(f"perhaps {clauses[0]}")
+        else:
+            sure.append(clauses[0])
+    first = f"{_join(sure, 'and')}, which is sure. Beside that " if sure else ""
+    return f"{first}{_join(doubtful, 'and')}: this record cannot tell."
+
+
+def plan(d: Diagnosis) -> str:
+    """The experiment to run next, in words: the one that was designed, or else what tells such rivals apart."""
+    told = str((d.experiment or {}).get("words") or "").rstrip(".")
+    return told[:1].lower() + told[1:] if told else separating(d)
+
+
 def separating(d: Diagnosis) -> str:
-    """What tells the rivals apart, in words."""
-    for a in d.effects:
-        for rival in [b.name for b in d.effects] + [b.name for b in a.look_alikes]:
-            if a.name in TERMS and rival in TERMS[a.name].look_alikes:
-                return TERMS[a.name].look_alikes[rival].rstrip(".")
-    names = {e.name for e in d.effects}
+    """What tells the rivals apart, in words: those that would take each other's place, where that is known."""
+    pairs = [(e.instead_of.partition(":")[0], e.name) for e in d.effects if e.instead_of is not None]
+    pairs = pairs or [(e.name, other) for e in d.effects for other in _others(d, e)]
+    for one, other in [*pairs, *((b, a) for a, b in pairs)]:
+        if one in TERMS and other in TERMS[one].look_alikes:
+            return TERMS[one].look_alikes[other].rstrip(".")
+    names = {name for pair in pairs for name in pair} or {e.name for e in d.effects}
     if len(names) == 1:
         return "drive one motor alone, then the other, so that only one of the places is loaded"
     needs = [PHRASES[n].need for n in sorted(names) if n in PHRASES]
     return "a record with " + _join(list(dict.fromkeys(needs)), "and") if needs else "a longer record with richer moves"
+
+
+def _others(d: Diagnosis, effect: Effect) -> list[str]:
+    return [e.name for e in d.effects if e is not effect] + [r.name for r in effect.look_alikes]
 
 
 def _unnamed(d: Diagnosis) -> tuple[str, str]:
@@ -327,12 +314,18 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
         return "Something is missing that no known effect explains.", f"It has no clear place: {amount}."
     at = node_words(d.located.node)
     since = f", from {nice(d.located.since_s, 's', 3)} on" if d.located.since_s > 0 else ""
-    kind = f"it goes with {d.located.axis}, {d.located.where}{since}"
+    kind = f"{goes(d.located)}{since}"
     share = f"{percent(d.located.share)} of the error lies there"
     return (
         f"Something is missing at {at} that no known effect explains: {kind}.",
         f"{_capital(channel_words(d.located.channel))} shows it, {share}; {amount}.",
     )
+
+
+def goes(located: Located) -> str:
+    """What an error goes with: "it goes with velocity, -0.1 to 0.1"."""
+    there = located.where.removeprefix(f"{located.axis} ")
+    return f"it goes with {located.axis}, {there}" if there else f"it goes with {located.axis}"
 
 
 def _nothing(d: Diagnosis) -> tuple[str, str]:

@@ -1,6 +1,24 @@
+import subprocess
+import sys
+
+import numpy as np
 import pytest
 
 from rtctl.plants.physics import TERMS
+from rtctl.plants.physics.portrait import Curve
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Curves that need no compiling; tests/plants/physics/test_portrait.py draws the true ones."""
+
+    def draw(term):
+        x = np.linspace(0.0, 1.0, 200)
+        kind, nodes = next(iter(term.nodes.items()))
+        settings = term.settings.model_construct(term=term.name, node=nodes[0])
+        return Curve(x, np.sin(9 * x), 0 * x, "speed, m/s", "drag, N", settings, kind)
+
+    monkeypatch.setattr("rtctl.plants.physics.portrait.portrait", draw)
 
 
 def test_lists_every_term(rtctl):
@@ -10,7 +28,7 @@ def test_lists_every_term(rtctl):
 
 
 @pytest.mark.parametrize("name", TERMS)
-def test_explains_a_term(rtctl, name):
+def test_explains_a_term(rtctl, quick, name):
     code, out, _ = rtctl("physics", name)
     term, said = TERMS[name], " ".join(out.split())
     assert code == 0
@@ -18,6 +36,7 @@ def test_explains_a_term(rtctl, name):
         assert " ".join(text.split()) in said
     for parameter in set(term.settings.model_fields) - {"term", "node"}:
         assert f"{parameter} " in out
+    assert "drag, N" in out and "speed, m/s" in out and "drawn at" in out
 
 
 @pytest.mark.parametrize("wrong", ["friction.stribek", "stribeck"])
@@ -25,3 +44,34 @@ def test_an_unknown_term(rtctl, wrong):
     code, out, err = rtctl("physics", wrong)
     assert (code, out) == (2, "")
     assert "did you mean 'friction.stribeck'?" in err
+
+
+def test_the_curve_is_the_terms_own(rtctl, tmp_path):
+    path = tmp_path / "dead.png"
+    code, out, _ = rtctl("physics", "drive.deadband", "--plot", path)
+    assert code == 0
+    assert "at the motor, V" in out and "command, V" in out and "with band 0.063" in out
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_terminal_without_braille_gets_plain_characters():
+    code = "import sys; from rtctl.cli.main import main; sys.exit(main(['physics', 'drive.offset']))"
+    ascii_only = {"PYTHONIOENCODING": "ascii", "PATH": "/usr/bin:/bin"}
+    done = subprocess.run([sys.executable, "-c", code], env=ascii_only, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "*" in done.stdout and done.stdout.isascii()
+
+
+@pytest.mark.parametrize(
+    "arguments, said", [(["--plot", "x.png"], "say which"), (["drive.lag", "--plot", "x.pdf"], "name it x.png")]
+)
+def test_a_picture_of_nothing_or_of_another_kind(rtctl, arguments, said):
+    code, out, err = rtctl("physics", *arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_the_list_loads_nothing_heavy():
+    code = "import sys; from rtctl.cli.main import main; main(['physics']); print('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False"

@@ -167,7 +167,7 @@ def searched() -> Callable[[Axis], tuple[Problem, Fit, Search]]:
             done[id(made)] = (
                 problem,
                 base,
-                search(problem, base, asked, partial(complete, problem), partial(worth, problem)),
+                search(problem, base, lambda _: asked, partial(complete, problem, base), partial(worth, problem, base)),
             )
         return done[id(made)]
 

@@ -12,14 +12,14 @@ from rtctl.diagnose.simulate import Simulator
 def test_wrong_values_alone_are_explained_down_to_the_noise(plain, searched):
     problem, base, _ = searched(plain)
     assert base.space.hypotheses == ()
-    assert complete(problem, base)
+    assert complete(problem, base, base)
     assert base.space.owner.base["M"] == 95.0
     assert base.model.base["M"] / base.model.base["K"] == pytest.approx(100.0 / 35.0, rel=5e-3)
 
 
 def test_missing_physics_is_not(tilted, searched):
     problem, base, _ = searched(tilted)
-    assert not complete(problem, base)
+    assert not complete(problem, base, base)
     assert base.rms > 3 * problem.floor
 
 

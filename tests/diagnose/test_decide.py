@@ -15,8 +15,8 @@ from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
 class Floor:
     """As much of a Problem as the judge looks at."""
 
-    def __init__(self, floor):
-        self.floor = floor
+    def __init__(self, floor, hiss=False):
+        self.floor, self.hiss = floor, lambda r: hiss
 
 
 def made(r, terms=0, x=None):
@@ -51,32 +51,47 @@ def test_down_to_the_floor_all_is_explained_and_with_nothing_gained_nothing(befo
 
 def test_a_term_is_worth_it_where_it_takes_a_material_share_off():
     noise, before = Floor(0.5), made(np.full(1000, 2.0))
-    assert worth(noise, before, made(np.full(1000, 1.0), 1))  # type: ignore[arg-type]
-    assert not worth(noise, before, made(np.full(1000, 1.99), 1))  # type: ignore[arg-type]
-    assert not worth(noise, before, before)  # type: ignore[arg-type]
-    assert not worth(noise, before, made(np.full(1000, 3.0), 1))  # type: ignore[arg-type]
+    assert worth(noise, before, before, made(np.full(1000, 1.0), 1))  # type: ignore[arg-type]
+    assert not worth(noise, before, before, made(np.full(1000, 1.99), 1))  # type: ignore[arg-type]
+    assert not worth(noise, before, before, before)  # type: ignore[arg-type]
+    assert not worth(noise, before, before, made(np.full(1000, 3.0), 1))  # type: ignore[arg-type]
 
 
 def test_what_many_numbers_gain_is_less_worth_than_what_one_does():
     noise, before, r = Floor(0.5), made(np.full(1000, 2.0)), np.full(1000, 1.7)
-    assert worth(noise, before, made(r, 1))  # type: ignore[arg-type]
-    assert not worth(noise, before, made(r, 40))  # type: ignore[arg-type]
+    assert worth(noise, before, before, made(r, 1))  # type: ignore[arg-type]
+    assert not worth(noise, before, before, made(r, 40))  # type: ignore[arg-type]
 
 
 def test_below_the_noise_there_is_nothing_to_take():
-    assert not worth(Floor(1.0), made(np.full(1000, 0.9)), made(np.full(1000, 0.1), 1))  # type: ignore[arg-type]
+    quiet = made(np.full(1000, 0.9))
+    assert not worth(Floor(1.0), quiet, quiet, made(np.full(1000, 0.1), 1))  # type: ignore[arg-type]
 
 
 def test_near_the_noise_a_term_must_take_more():
-    before, r = 1.1, 1.1 * np.sqrt(0.87)
-    assert not worth(Floor(1.0), made(np.full(1000, before)), made(np.full(1000, r), 1))  # type: ignore[arg-type]
-    assert worth(Floor(0.1), made(np.full(1000, before)), made(np.full(1000, r), 1))  # type: ignore[arg-type]
+    before, after = made(np.full(1000, 1.1)), made(np.full(1000, 1.1 * np.sqrt(0.87)), 1)
+    assert not worth(Floor(1.0), before, before, after)  # type: ignore[arg-type]
+    assert worth(Floor(0.1), before, before, after)  # type: ignore[arg-type]
+
+
+def test_what_the_form_of_a_law_misses_asks_for_no_second_term():
+    """A term takes 300 off a stretch and leaves 6 there: its law is not the machine's own to the last per cent."""
+    r = np.full(4000, 1.0)
+    loud, left, better = r.copy(), r.copy(), r.copy()
+    loud[:200], left[:200], better[:200] = 300.0, 6.0, 1.0
+    base, one, two = made(loud), made(left, 1), made(better, 2)
+    assert complete(Floor(0.8), base, one) and not complete(Floor(0.5), one, one)  # type: ignore[arg-type]
+    assert not worth(Floor(0.8), base, one, two)  # type: ignore[arg-type]
+    everywhere = made(np.where(np.arange(4000) < 200, 6.0, 0.5), 2)
+    assert worth(Floor(0.4), base, one, everywhere)  # type: ignore[arg-type]
 
 
 def test_a_fit_is_complete_near_the_floor():
-    assert complete(Floor(1.0), made(np.full(10, 0.5)))  # type: ignore[arg-type]
-    assert complete(Floor(1.0), made(np.full(10, 1.0)))  # type: ignore[arg-type]
-    assert not complete(Floor(1.0), made(np.full(10, 2.0)))  # type: ignore[arg-type]
+    for rms, expected in ((0.5, True), (1.0, True), (2.0, False)):
+        fitted = made(np.full(10, rms))
+        assert complete(Floor(1.0), fitted, fitted) == expected  # type: ignore[arg-type]
+    assert complete(Floor(1.0, hiss=True), made(np.full(10, 5.0)), made(np.full(10, 5.0)))  # type: ignore[arg-type]
+    assert not complete(Floor(1.0, hiss=True), made(np.full(10, 50.0)), made(np.full(10, 50.0)))  # type: ignore[arg-type]
 
 
 def smooth(rng, n, memory):

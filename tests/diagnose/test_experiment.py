@@ -3,11 +3,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.cli.common import load_config, with_reference
-from rtctl.config.errors import NoAnswer, UserError
+from rtctl.cli.common import load_config
+from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import experiment
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.experiment import FILE, design, limits_of
+from rtctl.diagnose.experiment import design, limits_of
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.motions import MENU, Limits
@@ -174,23 +174,19 @@ def test_every_motion_stays_within_travel_and_speed(plant, low, span, speed, sti
         assert motion.words.endswith(".")
 
 
-@pytest.mark.parametrize("make", MENU)
-def test_the_file_plays_the_motion(dry_or_viscous, tmp_path, make):
-    record, models = dry_or_viscous
-    found = design(record, models)._replace(motion=make(limits_of(Simulator(record)), 1.0))
-    found = found._replace(distance={found.name: 1.0, **found.distance})
-    path = found.write(tmp_path)
-    assert path == tmp_path / FILE
-    config = with_reference(load_config("axis", []), str(path))
-    params = reference.build(config.reference, 1e-3)
-    state, setpoint = np.zeros(1, reference.REFERENCE_STATE), np.zeros(1, reference.SETPOINT)
-    reference.start(params, state[0], 0)
-    n = round(min(found.motion.seconds, 20.0) * 1000)
-    played = np.array([reference.step(params, state[0], setpoint[0], k) for k in range(n)])
-    assert np.abs(played - found.motion.reference(np.arange(n) * 1e-3)).max() < 1e-3 * np.ptp(played)
-    text = path.read_text()
-    assert text.startswith("# The experiment to run next.\n# " + found.words)
-    assert f"--for {found.as_dict()['seconds']:g}s" in text
+def test_rivals_are_called_by_what_they_differ_in():
+    rivals = ("friction.stribeck:carriage + drive.lag:drive", "friction.stribeck:carriage + timing.delay:loop")
+    assert experiment.called(rivals) == ["a lag at the drive", "extra delay at the loop"]
+    assert experiment.called(("drive.lag:drive", "nothing")) == ["a lag at the drive", "nothing"]
+    assert experiment.called(("drive.lag:drive + drive.offset:drive", "drive.lag:drive"))[1] == "no more"
+    numbered = ("drive.lag:drive (1)", "drive.lag:drive (2)")
+    assert len(set(experiment.called(numbered))) == 2
+
+
+def test_what_it_is_for_is_said_in_words(dry_or_viscous):
+    why = design(*dry_or_viscous).why
+    assert why.startswith("It tells dry friction at the carriage from viscous friction at the carriage: ")
+    assert why.endswith(" times the noise apart.")
 
 
 def test_what_goes_into_the_diagnosis(dry_or_viscous):
@@ -202,12 +198,6 @@ def test_what_goes_into_the_diagnosis(dry_or_viscous):
     }
     assert said["reference"]["unit"] == "m" and said["reference"]["knots"][0] == [0.0, 0.0]
     assert said["limits"]["travel"][0] < 0 < said["limits"]["travel"][1]
-
-
-def test_a_folder_that_cannot_be_written_is_said(dry_or_viscous, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="cannot be written"):
-        design(*dry_or_viscous).write(tmp_path / "file")
 
 
 def test_a_reel_unit(recorded, rivals):

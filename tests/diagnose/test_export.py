@@ -10,9 +10,10 @@ from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.config.load import load_settings
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.export import read_model, to_config, write_model
+from rtctl.diagnose.export import read_model, to_config, write_model, write_turn
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import Record, load_record
+from rtctl.diagnose.turn import Turn
 from rtctl.plants.physics import TERMS
 
 SHARED = Path(__file__).parents[2].parent / "shared"
@@ -221,3 +222,14 @@ def test_recordings_from_outside(name, tmp_path):
     model = owner_model(record.case)
     back = read_model(write_model(model, record, tmp_path / "m.yaml"), record)
     assert back.base == pytest.approx(model.base, rel=1e-5)
+
+
+def test_the_turn_is_a_table(tmp_path):
+    angle = np.array([0.5, 1.5, 2.5])
+    found = Turn(angle, np.array([1e-3, np.nan, -2e-3]), np.array([1e-4, np.nan, 2e-4]), np.array([4, 0, 5]), (), 5.0)
+    path = write_turn(found, tmp_path / "torque_over_turn.csv")
+    lines = path.read_text().splitlines()
+    assert lines[0] == "angle_rad,torque_Nm,band_Nm,visits"
+    assert lines[1:] == ["0.500000,0.001,0.0001,4", "1.500000,,,0", "2.500000,-0.002,0.0002,5"]
+    with pytest.raises(UserError, match="cannot be written"):
+        write_turn(found, tmp_path / "nowhere" / "x.csv")

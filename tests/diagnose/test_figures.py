@@ -24,7 +24,7 @@ CASE = {
 }  # fmt: skip
 ALL = (
     figures.heldout_overlay, figures.missing_force, figures.polar_map, figures.spectra, figures.evidence_bars,
-    figures.parameters, figures.where_map, figures.coverage,
+    figures.parameters, figures.where_map, figures.coverage, figures.turn_map,
 )  # fmt: skip
 
 
@@ -90,7 +90,7 @@ def visible(figure):
 def test_every_figure_draws_within_its_frame(found, draw):
     figure = draw(*found)
     if figure is None:
-        assert draw is figures.polar_map  # a sliding axis has no turn
+        assert draw in (figures.polar_map, figures.turn_map)  # a sliding axis has no turn
         return
     figure.canvas.draw()
     width, height = figure.canvas.get_width_height()
@@ -98,7 +98,7 @@ def test_every_figure_draws_within_its_frame(found, draw):
         assert box.x0 > -2 and box.x1 < width + 2 and box.y0 > -2 and box.y1 < height + 2, text
 
 
-@pytest.mark.parametrize("draw", [f for f in ALL if f not in (figures.polar_map, figures.coverage)])
+@pytest.mark.parametrize("draw", [f for f in ALL if f not in (figures.polar_map, figures.turn_map, figures.coverage)])
 def test_no_words_lie_on_others(found, draw):
     boxes = visible(draw(*found))
     for k, (one, a) in enumerate(boxes):
@@ -215,3 +215,21 @@ def test_practice_bundles_have_a_map_of_the_turn(case, name, node):
         figure.canvas.draw()
     y, _, _, _ = figures.Missing(d, sim).of(name, node)
     assert np.isfinite(y).all() and np.std(y) > 0
+
+
+def test_the_turn_of_an_axis_that_turns_with_its_orders(found):
+    d, _ = found
+    t = np.arange(20000) / 500.0
+    x = 2.0 * t
+    case = {**CASE, "sensors": {"unit": "rad"}, "controller": {"kind": "unknown"}, "parameters": {"M": 2.0}}
+    columns = {"t": t, "ref": 0 * t, "w": 0 * t, "u": 0.3 * np.cos(7 * x), "x": x}
+    record = check(columns, read_case(case, "."))
+    turning = d._replace(record=record, verdict=NOTHING, owner=owner_model(record.case))
+    figure = figures.turn_map(turning)
+    drawn = texts(figure)
+    assert "missing torque, Nm" in drawn and "mean of 12 visits" in drawn and "times a turn" in drawn
+    curve = figure.axes[0].lines[0]
+    assert curve.get_ydata() == pytest.approx(-3.0 * np.cos(7 * np.radians(curve.get_xdata())), abs=0.1)
+    boxes = visible(figure)
+    width, height = figure.canvas.get_width_height()
+    assert all(b.x0 > -2 and b.x1 < width + 2 and b.y0 > -2 and b.y1 < height + 2 for _, b in boxes)

@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.hypotheses import EXTRAS, SEARCH, Choice, Hint, Turn, hypotheses
+from rtctl.diagnose.hypotheses import EXTRAS, HINTED, SEARCH, Choice, Turn, forms, hypotheses, richer
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.space import PLACE, SHAPE
 from rtctl.plants.physics import TERMS
 
-HINTS = {"order": [2.0, 7.0], "wavelength": [0.01], "spot": [0.005], "jump": [0.3, 0.7]}
+JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
+HINTS = {
+    "order": [2.0, 7.0], "wavelength": [0.01], "spot": [0.005], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
+    "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -91,14 +95,14 @@ def test_none_is_the_same_as_another(moved, kind):
 def test_only_some_may_be_asked_about(moved):
     record, base = moved("axis")
     some = hypotheses(record, base, only=("friction.coulomb", "friction.stribeck"))
-    assert [h.name for h in some] == ["friction.coulomb:carriage"] + ["friction.stribeck:carriage"] * 3
+    assert [h.name for h in some] == ["friction.coulomb:carriage"] + ["friction.stribeck:carriage"] * 5
 
 
 def test_starts_of_a_shape_are_shares_of_what_the_node_does(moved):
     record, base = moved("axis")
     speeds = [h.coordinates[1].scale for h in hypotheses(record, base, only=("friction.stribeck",))]
     rms = 0.05 * 2 * np.pi / np.sqrt(2)
-    np.testing.assert_allclose(speeds, [0.05 * rms, 0.2 * rms, 0.7 * rms], rtol=0.05)
+    np.testing.assert_allclose(speeds, [x * rms for x in (0.004, 0.02, 0.08, 0.3, 0.9)], rtol=0.05)
     size = hypotheses(record, base, only=("friction.stribeck",))[0].coordinates[0]
     assert size.offset == 20.0
 
@@ -106,9 +110,28 @@ def test_starts_of_a_shape_are_shares_of_what_the_node_does(moved):
 def test_without_hints_nothing_that_needs_one_is_asked(moved):
     record, base = moved("axis")
     asked = {h.term for h in hypotheses(record, base)}
-    needing = {t for t, parts in SEARCH.items() if any(isinstance(p, Hint) for p in parts)}
-    assert not asked & needing
-    assert "sensor.missed_counts" in {h.term for h in hypotheses(record, base, {"jump": [0.5]})}
+    assert {"sensor.missed_counts", "guide.dirt"} <= set(HINTED)
+    assert not asked & set(HINTED)
+
+
+def test_jumps_of_a_sensor_are_one_hypothesis_with_one_size(moved):
+    record, base = moved("axis")
+    told = {"jump:sensor": [(3.0, -2e-3), (1.0, 1e-3)]}
+    (h,) = hypotheses(record, base, told, only=("sensor.missed_counts",))
+    assert h.settings([-1.0]).size == pytest.approx(-2e-3)
+    assert (h.fixed["at"], h.fixed["more"]) == (3.0, ((1.0, -0.5),))
+
+
+def test_forms_and_richer_forms_keep_the_term_and_its_place(moved):
+    record, base = moved("axis")
+    (h, *_) = hypotheses(record, base, only=("friction.stribeck",))
+    assert [f.fixed["form"] for f in forms(h)] == ["exponential", "tustin"]
+    assert forms(forms(h)[0])[0].fixed["form"] == "gaussian"
+    (dahl, *_) = hypotheses(record, base, only=("friction.presliding",))
+    more = richer(record, base, dahl)
+    assert more.name == dahl.name and more.fixed["form"] == "lugre"
+    assert [c.name for c in more.coordinates] == ["z_s", "rise", "v_s", "tau_s"]
+    assert richer(record, base, more) is None  # it has them already
 
 
 def test_a_hint_of_a_node_goes_before_a_hint_for_all(moved):

@@ -20,8 +20,8 @@ def test_the_error_is_where_the_effect_that_was_found_stands(tilted, searched):
     best = looked.rounds[0][0]
     told = located(tilted.sim, problem, base, best, looked)
     assert told.channel == "x"
-    assert told.node == "carriage"
-    assert told.axis == TERMS["friction.asymmetry"].axis
+    assert told.node == best.space.hypotheses[0].node
+    assert told.axis == TERMS[best.space.hypotheses[0].term].axis
     assert told.share == pytest.approx(1.0 - best.cost / base.cost)
     assert told.share > 0.9
     assert problem.rows.start * tilted.record.dt <= told.since_s < 2.0

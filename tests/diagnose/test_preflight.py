@@ -272,3 +272,15 @@ def test_the_oscillator_is_driven_without_a_loop():
     found = practice("data/silverbox_multisine")
     assert said(found, "no loop")
     assert "law" not in found.numbers
+
+
+def test_rows_at_uneven_times_are_told_with_what_became_of_them():
+    t = np.cumsum(np.random.default_rng(3).uniform(0.7e-3, 1.3e-3, N))
+    case = read_case({**CASES["axis"], "sample_rate": None, "controller": LAW}, ".")
+    columns = {"t": t, "ref": np.full(N, np.nan), "w": np.zeros(N), "u": np.sin(9 * t), "x": 0.1 * np.sin(t)}
+    record = check(columns, case)
+    found = preflight(record)
+    assert any("The clock is uneven" in finding for finding in found.findings)
+    assert any(f"Its {N} rows" in f and f"laid onto {len(record.t)} rows" in f for f in found.findings)
+    assert found.numbers["clock"]["rows_even"] == len(record.t)
+    assert found.numbers["clock"]["jitter"] > 0.1

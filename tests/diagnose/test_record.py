@@ -330,3 +330,27 @@ def test_a_copy_with_another_rate_is_refused(shared, tmp_path):
     (folder / "case.json").write_text(text.replace('"sample_rate": 500.0', '"sample_rate": 400.0'))
     with pytest.raises(UserError, match=r"500 rows a second where sample_rate in case\.json is 400 Hz"):
         load_record(folder)
+
+
+def test_rows_at_uneven_times_are_laid_onto_an_even_clock(bundle_of, columns_of, case_of):
+    t = np.cumsum(np.random.default_rng(2).uniform(0.8e-3, 1.2e-3, 4000))
+    columns = {**columns_of("axis", 4000, 1000.0), "t": t, "x": np.sin(3 * t), "u": np.cos(2 * t)}
+    columns["ref"] = np.full(4000, np.nan)
+    case = case_of("axis", sample_rate=None, controller={"kind": "unknown"}, controller_known=False)
+    record = load_record(bundle_of(columns, case))
+    assert np.diff(record.t) == pytest.approx(record.dt, rel=1e-9)
+    assert record.dt == pytest.approx(np.median(np.diff(t)))
+    assert (record.t[0], record.t[-1]) == pytest.approx((t[0], t[-1]), abs=record.dt)
+    assert len(record.u) == len(record.ref) == len(record.w) == len(record.y["x"]) == len(record.t)
+    assert record.y["x"] == pytest.approx(np.sin(3 * record.t), abs=1e-5)
+    assert record.u[:, 0] == pytest.approx(np.cos(2 * record.t), abs=1e-5)
+    assert np.isnan(record.ref).all()
+    assert (record.columns["t"] == t).all()
+
+
+def test_counters_stay_whole_on_an_even_clock(bundle_of, columns_of, case_of):
+    t = np.cumsum(np.random.default_rng(2).uniform(0.8e-3, 1.2e-3, 4000))
+    case = case_of("ldu", sample_rate=None, controller={"kind": "unknown"}, controller_known=False)
+    record = load_record(bundle_of({**columns_of("ldu", 4000, 1000.0), "t": t}, case))
+    counts = record.y["encoder_counts"]
+    assert (counts == np.round(counts)).all()

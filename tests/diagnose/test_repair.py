@@ -10,13 +10,17 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtctl.cli.common import load_config
+from rtctl.cli.main import main
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path
 from rtctl.diagnose import repair
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.folder import own_config, write
 from rtctl.diagnose.model import Model, owner_model
+from rtctl.diagnose.motions import MENU, Limits
 from rtctl.diagnose.record import Record, load_record
+from rtctl.laws import reference
 from rtctl.machines import CONFIGS
 from rtctl.plants.physics import TERMS
 
@@ -145,10 +149,51 @@ AXIS = Model("axis", {"M": 95.0, "K": 35.0, "F_v": 200.0, "F_c": 20.0, "k": 0.0}
 def test_what_the_experiment_file_holds():
     text = repair.experiment_yaml(small(AXIS, AXIS, EXPERIMENT))
     head = "".join(line for line in text.splitlines() if line.startswith("#"))
+    assert any("`rtctl run experiment.yaml --for 7s`" in line for line in text.splitlines())  # in one line, to copy
     assert "Crawl" in head and "drive.lag from timing.delay" in head and "--for 7s" in head and "not ours" in head
+    assert "\n  - [0.5, 0.02]\n" in text  # a knot a line
     settings = CONFIGS["axis"].model_validate(yaml.safe_load(text))
     assert settings.reference.knots[1] == (0.5, 0.02)
     assert settings.plant.parameters.M == 95.0
+    assert settings.loop.mode == "fused"  # a stand-in needs no clock
+
+
+def test_the_head_says_how_much_room_it_needs_and_what_else_was_tried():
+    plan = {**EXPERIMENT, "limits": {"travel": [-0.02, 0.05]}}
+    plan["why"] = {
+        "words": "To tell.",
+        "distance": {"dither": 0.2, "slow_ramp": 3.0},
+        "refused": {"warm_up": "too far"},
+    }
+    head = [line for line in repair.experiment_yaml(small(AXIS, AXIS, plan)).splitlines() if line.startswith("#")]
+    assert "with room of -20 to 50 mm around it" in " ".join(head)
+    assert [line.split()[1] for line in head if line.startswith("#     ")] == ["slow_ramp", "dither", "warm_up"]
+
+
+@pytest.mark.parametrize("make", MENU)
+def test_every_motion_is_played_from_the_file_as_it_is(tmp_path, make):
+    limits = Limits("axis", "m", 1e-3, -0.02, 0.05, 0.1, 1.0, 1e-6, 8.0)
+    motion = make(limits, 1.0)
+    plan = {"reference": {"unit": "m", "knots": motion.knots, "repeat": motion.repeat, "relative": True}}
+    path = tmp_path / "experiment.yaml"
+    path.write_text(repair.experiment_yaml(small(AXIS, AXIS, {**plan, "seconds": motion.seconds})))
+    settings = load_config(str(path), [])
+    params = reference.build(settings.reference, 1e-3)
+    state, setpoint = np.zeros(1, reference.REFERENCE_STATE), np.zeros(1, reference.SETPOINT)
+    reference.start(params, state[0], 0)
+    n = round(min(motion.seconds, 20.0) * 1000)
+    played = np.array([reference.step(params, state[0], setpoint[0], k) for k in range(n)])
+    assert np.abs(played - motion.reference(np.arange(n) * 1e-3)).max() < 1e-3 * np.ptp(played)
+    knots = path.read_text().partition("knots:\n")[2].partition("\n  repeat")[0].partition("\n  relative")[0]
+    assert all(line.startswith("  - [") for line in knots.splitlines())
+
+
+def test_the_file_is_run_as_it_is(runtime, tmp_path):
+    path = tmp_path / "experiment.yaml"
+    path.write_text(repair.experiment_yaml(small(AXIS, AXIS, EXPERIMENT)))
+    assert main(["run", str(path), "--for", "3s", "--out", str(tmp_path / "run")]) == 0
+    again = load_record(tmp_path / "run")
+    assert np.ptp(again.ref) == pytest.approx(0.02, rel=0.01)
 
 
 def test_the_experiment_on_our_own_machine_is_its_config(config):

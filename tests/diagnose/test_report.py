@@ -183,6 +183,33 @@ def test_ambiguous_brings_a_campaign_that_reads_back(pages):
     assert "Run this next" not in pages[NAMED].partition("</style>")[2].replace("Run this next: ", "")
 
 
+def test_a_designed_experiment_is_told_and_drawn_instead_of_listed(named):
+    plan = {
+        "name": "dither", "words": "Move slowly there and back.", "why": {
+            "words": "It tells one from the other.", "distance": {"dither": 0.5, "slow_ramp": 1.5},
+            "refused": {"warm_up": "hot"},
+        },
+        "reference": {"unit": "m", "knots": [[0.0, 0.0], [1.25, 0.0123], [2.5, 0.0]], "repeat": 2.5, "relative": True},
+        "seconds": 12.0, "limits": {"travel": [-0.01, 0.03]}, "file": "experiment.yaml",
+    }  # fmt: skip
+    rival = DRAGS._replace(instead_of="friction.stribeck:carriage")
+    page = parse(report.html(named._replace(verdict=AMBIGUOUS, effects=(STICKS, rival), experiment=plan)))
+    shown = " ".join(" ".join(page.words).split())
+    assert "Run this next: move slowly there and back." in shown and "Move slowly there and back." in shown
+    assert "It tells one from the other." in shown and "with room of -10 to 30 mm around it" in shown
+    assert "rtctl run experiment.yaml --for 12s" in shown and "left out: hot" in shown
+    assert "0.0123" not in shown and "knots" not in shown
+    assert "motion-alt" in page.ids and shown.index("slow ramp") < shown.index("dither")
+
+
+def test_where_it_is_does_not_say_the_axis_twice(named):
+    at = Located("x", "carriage", "velocity", "velocity -0.1 to 0.1", 0.5, 0.8)
+    assert report.located(named._replace(located=at)) == (
+        "The position shows it from 500 ms on. "
+        "Of the error 80 % comes from the carriage; it goes with velocity, -0.1 to 0.1."
+    )
+
+
 def test_text_from_the_owner_is_escaped(named):
     case = named.record.case._replace(warnings=("<b>bold</b> & more",))
     page = report.html(named._replace(record=named.record._replace(case=case)))

@@ -73,7 +73,7 @@ def test_a_predicted_point_is_within_the_bounds_of_its_space(tilted, scored):
 
 def test_on_a_record_with_nothing_in_it_nothing_gains(plain, scored):
     _, base, scores = scored(plain)
-    assert scores[0].gain < 0.1 * base.cost
+    assert scores[0].gain < 0.15 * base.cost
 
 
 def test_a_prediction_comes_true_where_the_effect_is_smooth(tilted, scored):

@@ -111,7 +111,7 @@ def compiled(kind: str) -> tuple[Any, np.dtype, np.dtype]:
             if line is not None:
                 field = term.name.replace(".", "_")
                 filled = line.format(**{k: name.format(field) for k, name in names.items()})
-                lines += [f"if number == {number}:", f"    {filled}"]
+                lines += [f"if number == {number}:", *(f"    {part}" for part in filled.split("\n"))]
         sites[site] = "\n    ".join(lines)
     scope: dict[str, Any] = {}
     modules = ", ".join(sorted({term.build.__module__.rpartition(".")[2] for term in terms}))

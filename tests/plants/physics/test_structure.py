@@ -49,5 +49,29 @@ def test_the_cubic_spring_holds_what_it_should():
 
 @given(st.floats(-1, 1), st.floats(-1e6, 1e6))
 def test_it_pulls_alike_both_ways(e, c3):
-    p = structure.StiffeningParams(c3)
-    assert structure.stiffening(p, -e) == -structure.stiffening(p, e)
+    p = structure.StiffeningParams(c3, 0.0, 0.0)
+    assert structure.stiffening(p, -e, 0.0) == -structure.stiffening(p, e, 0.0)
+
+
+def test_a_quadratic_part_makes_it_stiffer_one_way():
+    p = structure.StiffeningParams(0.0, 2e5, 0.0)
+    assert structure.stiffening(p, 0.01, 0.0) == structure.stiffening(p, -0.01, 0.0) == pytest.approx(20.0)
+
+
+@given(st.floats(-1, 1), st.floats(-10, 10), st.floats(0, 1e6))
+def test_its_damping_never_feeds_energy_in(e, v, b2):
+    p = structure.StiffeningParams(0.0, 0.0, b2)
+    assert structure.stiffening(p, e, v) * v >= 0.0
+
+
+def test_a_swing_that_bends_it_further_dies_faster():
+    def kept(start: float) -> float:
+        """Share of the swing that is left after a second of twenty."""
+        terms = [bench.usual("structure.stiffening", "axis", c3=0.0, b2=b2)]
+        r = bench.run("axis", terms, np.where(np.arange(20000) < 5000, start, 0.0), k=95.1 * (2 * np.pi * 5) ** 2,
+                      F_v=20.0, F_c=0.0)  # fmt: skip
+        swing = np.abs(r.q[5000:, 0])
+        return swing[-2500:].max() / swing[:2500].max()
+
+    b2 = 1e9
+    assert kept(1.0) < 0.9 * kept(0.1)

@@ -1,0 +1,266 @@
+"""What a term looks like: its own curve along its own axis, as it comes out of its compiled code.
+
+A plant is held by the hand: its nodes are moved, its tape is pulled or its drives are commanded as the term's axis asks
+for. Nothing moves by itself, and what the term changes is read off. Nothing of the physics is written here again: the
+line of the term is compiled as in the generated plant. The machine's record is filled by the plant's own `start`, but
+without compiling that, which would take longer than all the rest.
+"""
+
+from types import FunctionType, SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.idiom import Settings, fill_record, record_dtype
+from rtctl.plants import linear
+from rtctl.plants.physics.place import PLANTS, place
+from rtctl.plants.physics.term import SITES, Term
+
+ROWS = 600
+SAMPLE = 2e-3  # s
+VOLTS, TENSION, STILL = 3.0, 1.5, 1.0  # V and N to either side; V that is held
+IVU_FIRST = "angle", "tension", "command"  # axes that a tape unit shows best; the others are shown on an axis
+ORDER = "axis", "ivu", "ldu"
+DRIVES: dict[str, tuple] = {"axis": (), "ivu": ([(0.2, 2e3, 0.7, 0.0)] * 2,), "ldu": ((6e3, 0.7),)}
+STAND: dict[str, dict[str, float]] = {"axis": {"k": 200.0}, "ivu": {"k1": 0.0, "k2": 0.0}, "ldu": {}}
+UNITS = {"axis": ("m", "N"), "ivu": ("rad", "Nm"), "ldu": ("rad", "Nm")}  # of way and push, where nothing slides
+SCALES = {  # what the typical sizes are multiples of
+    "axis": {"force": 20.4, "speed": 0.1, "travel": 0.1, "inertia": 95.1, "stiffness": 200.0, "contact": 20.0},
+    "ivu": {"force": 2.5e-3, "speed": 2.0, "travel": 6.0, "inertia": 1.5e-3, "stiffness": 450.0, "contact": 1.0},
+    "ldu": {"force": 1e-3, "speed": 10.0, "travel": 6.0, "inertia": 1e-5, "stiffness": 7.6, "contact": 7.0},
+}
+MOTIONS = {  # by the term's axis
+    "velocity": "speeds", "position": "to and fro", "angle": "turn", "command": "commands", "time": "wait",
+    "frequency": "step", "tension": "pull",
+}  # fmt: skip
+OWN = {  # terms that show themselves better under another one
+    "transmission.backlash": "to and fro", "sensor.rectified": "to and fro", "transmission.creep": "taut",
+    "geometry.radius_change": "turn", "load.bump": "past",
+}  # fmt: skip
+SPAN = {  # how far a sweep goes, by the parameter that the shape hangs on
+    "v_s": 4.0, "z_s": 6.0, "z_h": 4.0, "gap": 2.0, "offset": 3.0, "band": 3.0, "limit": 1.6, "wavelength": 1.25,
+    "width": 4.0, "extra": 3.0, "tau": 5.0, "F_max": 2.0,
+}  # fmt: skip
+CHANGES = "volts", "read", "pull", "dry", "force"  # in this order: the first that a term changes is what it shows
+
+TEXT = '''
+import numpy as np
+from rtctl.idiom import tick
+from rtctl.plants import {kind}, linear
+from rtctl.plants.physics import {module}
+
+@tick
+def run(acts, P, S, p, s, i, r, l, c, q, v, volts, read, pull, dry, force):
+    """Move the nodes row by row; commands come in, and what the term leaves of everything goes out."""
+    m = s.m
+    nq = m.r.shape[0]
+    for k in range(q.shape[0]):
+        for n in range(nq):
+            m.x[n], m.x[nq + n] = q[k, n] - 0.5 * m.h * v[k, n], v[k, n]
+            m.qm[n], m.vm[n], m.f[n], m.dry[n] = q[k, n], v[k, n], 0.0, m.dry_base[n]
+        m.link_T[:] = 0.0
+        m.volts[:] = volts[k]
+        if acts:
+            {command}
+        m.u[:] = m.volts
+        if acts:
+            {force}
+        m.t += m.h
+        for n in range(nq):
+            m.r[n] = -np.sign(v[k, n]) * m.dry[n]
+            m.x[n] = q[k, n] + 0.5 * m.h * v[k, n]
+        for n in range(m.link_T.shape[0]):
+            pull[k, n] = linear.tension(m, n)
+        {read}
+        if acts:
+            {reading}
+        volts[k], read[k], dry[k], force[k] = m.volts, m.y, m.dry, m.f
+'''
+READ = {"axis": "axis.read(s)", "ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)"}
+
+
+class Curve(NamedTuple):
+    """A term's curve (n,), and what there is without the term (n,)."""
+
+    x: np.ndarray
+    y: np.ndarray
+    without: np.ndarray
+    x_words: str
+    y_words: str
+    settings: Settings
+    kind: str  # of the plant
+
+
+class Hand(NamedTuple):
+    """What the hand does, row by row: the node's way and speed, the stretch of its link in m, the volts."""
+
+    h: float
+    x: np.ndarray
+    v: np.ndarray
+    stretch: np.ndarray
+    volts: np.ndarray
+
+    @property
+    def t(self) -> np.ndarray:
+        """Middle of each row, s."""
+        return (np.arange(len(self.x)) + 0.5) * self.h
+
+
+def portrait(term: Term) -> Curve:
+    """The curve of a term at a typical size, at the first node of the plant that shows its axis best."""
+    order = ("ivu", *ORDER) if term.axis in IVU_FIRST else ORDER
+    kind = next(k for k in order if k in term.nodes)
+    return curve(term, typical(term, kind, term.nodes[kind][0]), kind)
+
+
+def typical(term: Term, kind: str, node: str) -> Settings:
+    """Settings in the middle of what is met in practice."""
+    of = SCALES[kind]
+    of = of | {
+        "": 1.0, "dry": of["force"], "force/speed": of["force"] / of["speed"], "sample period": SAMPLE,
+        "force/travel": of["force"] / of["travel"], "largest command": VOLTS,
+        "stiffness/stretch^2": 3.0 * of["stiffness"] / of["travel"] ** 2,
+    }  # fmt: skip
+    values = {
+        name: float(f"{(low * high) ** 0.5 * of[term.scale.get(name, '')]:.2g}")
+        for name, (low, high) in term.typical.items()
+    }
+    if "at" in term.settings.model_fields:  # not where the machine starts, where an error counts as none
+        values["at"] = 1.5 * values["width"] if "width" in values else 0.5
+    return term.settings.model_validate({"term": term.name, "node": node, **values})
+
+
+def curve(term: Term, settings: Any, kind: str) -> Curve:
+    """Move the stand as the term's axis asks for, and read off what the term makes of it."""
+    motion = OWN.get(term.name, MOTIONS[term.axis])
+    hand = motions(motion, settings, SCALES[kind])
+    spot, link = place(kind, settings.node), place(kind, settings.node).link
+    if settings.node == "capstan" and kind == "ivu":
+        link = 1
+    run = compiled(term, kind)
+    got, none = (measure(run, acts, term, settings, kind, hand, link) for acts in (True, False))
+    way, push = ("m", "N") if spot.factor or settings.node.startswith("tape") else UNITS[kind]
+    shown = next((name for name in CHANGES if np.abs(got[name] - none[name]).max() > 0.0), "force")
+    sign = np.where(hand.v < 0.0, -1.0, 1.0)
+
+    def seen(of: dict[str, np.ndarray]) -> np.ndarray:
+        if shown == "pull":  # the capstan carries the difference of its two tapes
+            both = settings.node == "capstan"
+            return of["pull"][:, 1] - of["pull"][:, 0] if both else of["pull"][:, link]
+        if shown == "dry" or term.name.startswith("friction."):
+            return sign * of["dry"][:, spot.node] - of["force"][:, spot.node]
+        return of[shown][:, spot.channel if shown in ("volts", "read") else spot.node]
+
+    y, without = seen(got), seen(none)
+    words = {
+        "volts": "at the motor, V",
+        "read": f"reading, {way}",
+        "pull": "carried by the contact, N" if settings.node == "capstan" else "pull, N",
+        "dry": f"drag, {push}",
+    }
+    y_words = f"drag, {push}" if term.name.startswith("friction.") else words.get(shown, f"force, {push}")
+    if shown == "read" and term.name not in OWN:
+        y, without, y_words = y - without, 0.0 * y, f"reading off by, {way}"
+    x, x_words = {
+        "speeds": (hand.v, f"speed, {way}/s"), "commands": (hand.volts, "command, V"), "wait": (hand.t, "time, s"),
+        "step": (hand.t, "time, s"), "turn": (hand.x / (2 * np.pi), "turns"),
+        "pull": (none["pull"][:, link], "pull of a tape that gives in proportion, N"),
+    }.get(motion, (hand.x, f"position, {way}"))  # fmt: skip
+    return Curve(x, y, without, x_words, y_words, settings, kind)
+
+
+def motions(motion: str, settings: Any, scales: dict[str, float]) -> Hand:
+    """Way and speed, stretch and volts of a motion, as far as the term's own sizes ask for."""
+    z = (np.arange(ROWS) + 0.5) / ROWS
+    still = np.zeros(ROWS)
+    swing = np.interp(z, [0.0, 0.2, 0.6, 1.0], [0.0, 1.0, -1.0, 1.0])
+    span = next((SPAN[n] * abs(getattr(settings, n)) for n in SPAN if hasattr(settings, n)), None)
+    on = np.where(z > 0.1, 1.0, 0.0)
+    if motion == "speeds":
+        v = (2.0 * z - 1.0) * (span or scales["speed"])
+        return Hand(SAMPLE, np.cumsum(v) * SAMPLE, v, still, still)
+    if motion == "commands":
+        return Hand(SAMPLE, still, still, still, (2.0 * z - 1.0) * (span or VOLTS))
+    if motion == "wait":
+        h = (span or 1.0) / ROWS
+        return Hand(h, z * scales["travel"], still + scales["travel"] / (ROWS * h), still, still + STILL)
+    if motion == "step":
+        h = (8.0 / settings.f_Hz if hasattr(settings, "f_Hz") else span or 1.0) / ROWS
+        up = 0.5 - 0.5 * np.cos(np.pi * np.clip((z - 0.1) / 0.04, 0.0, 1.0))
+        x = 1e-4 * scales["travel"] * up
+        return Hand(h, x, np.gradient(x, h), 1e-3 * up, on * STILL)
+    if motion == "past":
+        x = (2.0 * z - 1.0) * (span or scales["travel"])
+        return Hand(SAMPLE, x, np.gradient(x, SAMPLE), still, still)
+    if motion == "pull":
+        most = span or TENSION
+        return Hand(SAMPLE, still, still, np.interp(z, [0.0, 0.4, 1.0], [0.0, 1.0, -1.0]) * most / 450.0, still)
+    if motion in ("turn", "taut"):
+        many = 8.0 if hasattr(settings, "d") else 1.0 if hasattr(settings, "per_turn") else 2.0
+        x = 2.0 * np.pi * many * z
+        v = still + scales["speed"]
+        return Hand(2.0 * np.pi * many / ROWS / scales["speed"], x, v, still + TENSION / 450.0, still)
+    x = swing * (span or scales["travel"])
+    return Hand(SAMPLE, x, np.gradient(x, SAMPLE), still, still)
+
+
+def measure(run: Any, acts: bool, term: Term, settings: Any, kind: str, hand: Hand, link: int) -> dict[str, np.ndarray]:
+    """What `CHANGES` names, (n, of each), under the hand, with the term or without."""
+    p, s = stand(kind, hand.h)
+    m, spot = s.m, place(kind, settings.node)
+    r = getattr(p, spot.factor) if spot.factor else 1.0
+    ratio = ratios(kind, p)
+    ratio = ratio / (ratio[spot.node] * r)
+    q, v = hand.x[:, None] * ratio, hand.v[:, None] * ratio
+    if kind == "ivu" and hand.stretch.any():
+        end, arm = m.link_i[link], m.link_a[link]
+        q[:, end] += hand.stretch / arm
+        v[:, end] += np.gradient(hand.stretch, hand.h) / arm
+    n, nq = q.shape
+    volts = np.repeat(hand.volts[:, None], len(m.u), axis=1)
+    out = [volts, np.zeros((n, len(m.y))), np.zeros((n, len(m.link_T))), np.zeros((n, nq)), np.zeros((n, nq))]
+    params = term.build(settings, hand.h)
+    P = np.zeros(1, record_dtype(params)).view(np.recarray)[0]
+    fill_record(P, params)
+    S = np.zeros(1, term.state if term.state is not None else [("spare", "f8")]).view(np.recarray)[0]
+    run(acts, P, S, p, s, spot.node, r, spot.link, spot.channel, q, v, *out)
+    for torque in out[3:]:
+        torque /= r
+    return dict(zip(CHANGES, out, strict=True))
+
+
+def compiled(term: Term, kind: str) -> Any:
+    """The stand's run with the term's lines in it."""
+    names = {"p": "P", "s": "S", "m": "m", "i": "i", "r": "r", "l": "l", "c": "c"}
+    lines = {
+        site: (term.act_at(site, kind) or "pass").format(**names).replace("\n", "\n" + 12 * " ")  # as deep as its site
+        for site in SITES
+    }
+    module = term.build.__module__.rpartition(".")[2]
+    scope: dict[str, Any] = {}
+    exec(TEXT.format(kind=kind, module=module, read=READ[kind], **lines), scope)
+    return scope["run"]
+
+
+def stand(kind: str, h: float) -> tuple[Any, Any]:
+    """Params and state of a machine at rest whose rows last `h` s."""
+    plant = PLANTS[kind]
+    name = kind.capitalize()
+    p = plant.build(getattr(plant, f"{name}Settings")(parameters=STAND[kind]), h, *DRIVES[kind])
+    s = np.zeros(1, getattr(plant, f"{kind.upper()}_STATE")).view(np.recarray)[0]
+    scope = dict(vars(plant))  # as plain Python, and without the matrix exponential, which nobody asks for
+    scope["linear"] = SimpleNamespace(link=linear.link.py_func, discretise_into=lambda *_: None)
+    for key, value in vars(plant).items():
+        if hasattr(value, "py_func"):
+            scope[key] = FunctionType(value.py_func.__code__, scope)
+    scope["start"](p, s)
+    s.m.Gamma_T[:, :] = h * s.m.G.T
+    return p, s
+
+
+def ratios(kind: str, p: Any) -> np.ndarray:
+    """How the nodes turn together when nothing is stretched, to the capstan's turn (nq,)."""
+    if kind == "ivu":
+        one, two = p.R_c / p.R1, -p.R_c / p.R2
+        return np.array([one, one, 1.0, two, two])
+    return np.array([p.N, 1.0, 1.0, 1.0]) if kind == "ldu" else np.ones(1)

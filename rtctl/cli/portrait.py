@@ -1,0 +1,89 @@
+"""A term's curve on the terminal, in dots of braille, and as a picture."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+COLUMNS, LINES = 56, 12
+DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # of a braille cell, row by row (Unicode 6.0, 2800)
+SPARSE = 6  # every which dot of the curve without the term is drawn
+
+
+def lines(curve: Any, braille: bool = True) -> list[str]:
+    """The curve as lines of text, and in sparse dots how it is without the term; `braille` or plain characters."""
+    (left, right), (low, high) = ends(curve.x), ends(np.concatenate([curve.y, curve.without]))
+    wide, tall = 2 * COLUMNS, 4 * LINES
+    dots = np.zeros((tall, wide), bool)
+
+    def row(y: np.ndarray) -> np.ndarray:
+        return np.round((high - y) / (high - low) * (tall - 1)).astype(int)
+
+    columns, rows, plain = (
+        np.round((curve.x - left) / (right - left) * (wide - 1)).astype(int),
+        row(curve.y),
+        row(curve.without),
+    )
+    sparse = columns % SPARSE == 0
+    dots[plain[sparse], columns[sparse]] = True
+    dots[rows, columns] = True
+    for k in np.flatnonzero((np.abs(np.diff(rows)) > 1) & (np.abs(np.diff(columns)) <= 1)):  # steep parts hang together
+        dots[min(rows[k : k + 2]) : max(rows[k : k + 2]) + 1, columns[k + 1]] = True
+    ticks = {0: number(high, high - low), LINES - 1: number(low, high - low)}
+    zero = int(row(np.zeros(1))[0]) // 4
+    if low < 0.0 < high and 0 < zero < LINES - 1:
+        ticks[zero] = "0"
+    out = [f"{'':10}{curve.y_words}"]
+    for line in range(LINES):
+        cells = dots[4 * line : 4 * line + 4].reshape(4, COLUMNS, 2).transpose(1, 0, 2)
+        text = "".join(character(cell, braille) for cell in cells)
+        out.append(f"{ticks.get(line, ''):>9} |{text}".rstrip())
+    out.append(f"{'':10}+{'-' * COLUMNS}")
+    a, b = number(left, right - left), number(right, right - left)
+    return [*out, f"{'':11}{a}{curve.x_words:^{COLUMNS - len(a) - len(b)}}{b}"]
+
+
+def character(cell: np.ndarray, braille: bool) -> str:
+    """Four rows of two dots as one character."""
+    if not cell.any():
+        return " "
+    return chr(0x2800 + sum(DOTS[r][c] for r, c in np.argwhere(cell))) if braille else "*"
+
+
+def number(value: float, span: float) -> str:
+    """An end of a scale of this span: as many figures as tell it from the other end."""
+    return f"{round(value, 1 - math.floor(math.log10(span))) + 0.0:.6g}"
+
+
+def ends(values: np.ndarray) -> tuple[float, float]:
+    """Lowest and highest of the values, apart in any case."""
+    low, high = float(values.min()), float(values.max())
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def sizes(curve: Any) -> str:
+    """At which sizes it was drawn."""
+    given = curve.settings.model_dump(exclude_unset=True)
+    values = [f"{k} {v:g}" for k, v in given.items() if isinstance(v, int | float) and not isinstance(v, bool)]
+    return f"drawn at {given['node']} of the {curve.kind}" + (f" with {', '.join(values)}" if values else "")
+
+
+def picture(curve: Any, path: Path) -> None:
+    """The same as a PNG. Raises UserError where it cannot be written."""
+    from matplotlib.figure import Figure
+
+    from rtctl.config.errors import UserError
+
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot(curve.x, curve.without, ":", color="0.5", label="without")
+    axes.plot(curve.x, curve.y, color="C0", label=curve.settings.term)
+    axes.set(xlabel=curve.x_words, ylabel=curve.y_words, title=sizes(curve))
+    axes.legend()
+    axes.grid(alpha=0.3)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, format="png", dpi=150)
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror}") from None

@@ -1,0 +1,120 @@
+"""What a record asks for: base fit, search, the rivals of what was found, and nothing in doubt that is not needed."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from rtctl.diagnose import decide
+from rtctl.diagnose.base import base_fit
+from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.heldout import better
+from rtctl.diagnose.hints import hints
+from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
+from rtctl.diagnose.name import Search, dropped, eliminate, enrich, names, polish, rivals, search
+from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.space import Hypothesis
+from rtctl.diagnose.verdict import SURE, Alternative, standing
+
+CLOSE = 1.3  # times the best cost: a rival this near may be ahead in its richer form
+CLEARLY = 0.5  # of the best cost: what a richer form must come down to, to take its place
+NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
+MOST = 4  # rivals of one hypothesis
+Progress = Callable[[str], None]
+Places = tuple[tuple[Alternative, ...], ...]
+
+
+class Found(NamedTuple):
+    """What the search came to."""
+
+    problem: Problem
+    jitter: Jitter | None  # of the ticks
+    base: Fit
+    best: Fit
+    search: Search
+    rivals: tuple[tuple[Alternative, ...], ...]  # for each hypothesis of the best, fits with another in its place
+
+
+def quiet(text: str) -> None:
+    """Say nothing."""
+
+
+def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:
+    """Base fit, search, and the rivals of what it found."""
+    progress("fitting the owner's parameters")
+    base = base_fit(sim, problem)
+    off = jitter(sim, base.model, problem.rows)
+    if off is not None:
+        problem = allowed_for(problem, base.model, off)
+        base = base_fit(sim, problem)
+    worth = partial(decide.worth, problem, base)
+    propose = partial(proposed, sim)
+    looked = search(problem, base, propose, partial(decide.complete, problem, base), worth, progress)
+    best = base
+    for level in looked.rounds:
+        if worth(best, level[0]):
+            best = level[0]
+    if len(best.space.hypotheses) > 1:
+        best = polish(problem, eliminate(problem, best, worth))
+    near = replacements(problem, best, looked, propose(base), progress)
+    others = [place.fit for places in near for place in places]
+    if best.rms > decide.COMPLETE * problem.floor and best.space.hypotheses:
+        close = [best, *(f for f in others if f.cost < CLOSE * best.cost)]
+        others += [f for f in (enrich(problem, f, better) for f in close) if f.cost < CLEARLY * best.cost]
+    ahead = min(others, key=lambda f: f.merit, default=best)
+    if ahead.merit < best.merit:  # a rival came out ahead once it was fitted to the bottom
+        best, near = ahead, replacements(problem, ahead, looked, (), progress)
+    best, near = without_doubtful(problem, best, looked, near, progress)
+    return Found(problem, off, base, best, looked, near)
+
+
+def without_doubtful(
+    problem: Problem, best: Fit, looked: Search, near: Places, progress: Progress
+) -> tuple[Fit, Places]:
+    """Leave out what others could stand in for as well, as long as the rest explains enough without it."""
+    while len(best.space.hypotheses) > 1 and decide.enough(problem, looked.base, best):
+        sure = [standing(best, i, places) for i, places in enumerate(near)]
+        weakest = min(range(len(sure)), key=lambda i: sure[i])
+        if sure[weakest] >= SURE:
+            break
+        less = dropped(problem, best, weakest, 10)
+        if not decide.enough(problem, looked.base, less):
+            break
+        best = polish(problem, less)
+        near = replacements(problem, best, looked, (), progress)
+    return best, near
+
+
+def proposed(sim: Simulator, seen_by: Fit) -> list[Hypothesis]:
+    """All hypotheses, with the starts that the record suggests once it is seen through a model."""
+    model = seen_by.model
+    return hypotheses(sim.record, model.base, hints(sim, model))
+
+
+def replacements(
+    problem: Problem, best: Fit, looked: Search, candidates: Sequence[Hypothesis], progress: Progress
+) -> Places:
+    """For each hypothesis of the best model, fits with another one in its place, nearest first.
+
+    They are those that the search has fitted and, where there are `candidates`, the most likely of these.
+    """
+    out = []
+    for index, h in enumerate(best.space.hypotheses):
+        rest = set(names(best)) - {h.name}
+        tried = [f for f in looked.fits if len(f.space.hypotheses) == len(rest) + 1 and rest < set(names(f))]
+        if rest and candidates and decide.enough(problem, looked.base, best):  # else nothing is named
+            progress(f"look-alikes of {h.name}")
+            tried += rivals(problem, best, index, candidates)
+        nearest: dict[tuple[str, ...], Fit] = {}
+        for f in sorted(tried, key=lambda f: f.merit):
+            if names(f) != names(best):
+                nearest.setdefault(names(f), f)
+        fits = [polish(problem, f) if f.cost < NEAR * best.cost else f for f in list(nearest.values())[:MOST]]
+        places = [Alternative(f, _other(f, rest)) for f in sorted(fits, key=lambda f: f.merit)]
+        out.append(tuple(places))
+    return tuple(out)
+
+
+def _other(fitted: Fit, rest: set[str]) -> int:
+    """Index of the hypothesis that is not among the rest."""
+    return next(i for i, h in enumerate(fitted.space.hypotheses) if h.name not in rest)

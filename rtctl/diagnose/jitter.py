@@ -1,0 +1,87 @@
+"""Ticks off their times: an error that no model of motion predicts, but whose size grows with speed.
+
+A tick that comes d late shows a reading v d further on. The d are independent, so that the error's second difference,
+which what is smooth hardly touches, has the variance 3/2 (s^2 + (v sigma)^2) and forgets after two ticks.
+
+Source: Cervin et al., How does control timing affect performance, IEEE Control Systems 23(3) (2003); Box, Jenkins &
+Reinsel, Time series analysis (2008), ch. 3 for the correlation of a differenced white series.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import norm
+
+from rtctl.diagnose.fit import Problem, means
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.simulate import Simulator, resolution
+
+FAST = 0.7  # counts a tick: slower, the cut into counts is no white noise
+ENOUGH = 400  # rows that fast
+LEAST = 0.02  # of a tick: less is what any clock does
+LOUD = 0.15  # of the variance at the usual speed, what jitter must add
+CERTAIN = 8.0  # standard errors
+MIXED = (-0.82, -0.5)  # correlation of neighbouring second differences: -2/3 where the ticks are independent
+
+
+class Jitter(NamedTuple):
+    """Standard deviation of the ticks' times and its standard error, s."""
+
+    sigma: float
+    error: float
+
+
+def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
+    """Of the main sensor's error under `model`; None where there is no sign of it."""
+    out = sim.run(model)[:, 0]
+    e = (sim.seen - out)[rows]
+    v = np.gradient(out, sim.record.dt)[rows][1:-1]
+    d = e[1:-1] - 0.5 * (e[:-2] + e[2:])
+    count = 1.0 if sim.record.plant != "axis" else resolution(sim.record)
+    fast = np.abs(v) * sim.record.dt > FAST * count
+    if not np.isfinite(e).all() or fast.sum() < ENOUGH:
+        return None
+    d, v = d[fast], v[fast]
+    beyond = np.abs(d) > 8 * np.median(np.abs(d)) + count  # lost counts
+    d, v = d[~beyond], v[~beyond]
+    slope, error, floor = growth(d**2 / 1.5, v**2)
+    sigma = float(np.sqrt(max(slope, 0.0)))
+    if slope < CERTAIN * error or sigma < LEAST * sim.record.dt or slope * np.mean(v**2) < LOUD * floor:
+        return None
+    z = d / np.sqrt(floor + slope * v**2)
+    mixed = float(z[1:] @ z[:-1]) / float(z @ z)
+    if not MIXED[0] < mixed < MIXED[1]:
+        return None
+    return Jitter(sigma, 0.5 * error / sigma)
+
+
+def growth(power: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
+    """Slope of `power` (n,) over x (n,), its standard error and what is left at x = 0, the latter not below zero.
+
+    A power of noise scatters by its own mean, so that rows are weighed by the fit of the round before.
+    """
+    A = np.stack([np.ones_like(x), x], axis=1)
+    mean = np.full(len(x), power.mean())
+    for _ in range(4):
+        w = 1.0 / mean
+        H = (A * w[:, None]).T @ (A * w[:, None])
+        a, b = np.linalg.solve(H, (A * w[:, None]).T @ (power * w))
+        if a < 0.0:
+            a, b = 0.0, float(np.sum(w**2 * x * power) / np.sum(w**2 * x * x))
+        mean = np.maximum(a + b * x, 0.05 * power.mean())
+    scatter = float(np.mean(((power - mean) / mean) ** 2))  # 2 for independent ones; neighbours share ticks
+    return float(b), float(np.sqrt(2.0 * scatter * np.linalg.inv(H)[1, 1])), float(a)
+
+
+def allowed_for(problem: Problem, model: Model, found: Jitter) -> Problem:
+    """The problem with errors weighed by what a jitter lets one expect of each."""
+    out = problem.sim.run(model)[:, problem.channels]
+    v = np.gradient(out, problem.sim.record.dt, axis=0)[problem.rows]
+    spread = means((v * found.sigma / problem.sigma) ** 2, problem.mean) / problem.mean
+    return problem.weighed(1.0 / np.sqrt(1.0 + spread.T.ravel()))
+
+
+def interval(found: Jitter) -> tuple[float, float]:
+    """90 % interval of sigma, s."""
+    half = float(norm.ppf(0.95)) * found.error
+    return max(found.sigma - half, 0.0), found.sigma + half

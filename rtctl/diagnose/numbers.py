@@ -1,0 +1,58 @@
+"""Numbers as a person writes them: few figures, a prefix that fits, a unit."""
+
+import math
+
+PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M"}
+PREFIXED = ("Nm", "N", "V", "s", "Hz", "m", "rad", "A", "m/s", "rad/s", "N/m", "Nm/rad", "Nms/rad", "Ns/m")
+LARGE = ("N/m", "Nm/rad", "Hz")  # of which kilo is in use
+
+
+def nice(value: float, unit: str = "", digits: int = 2) -> str:
+    """A number as a person writes it, with a prefix that fits: nice(0.0031, "Nm") is "3.1 mNm"."""
+    if not math.isfinite(value):
+        return "any size" if value > 0 else "unknown"
+    power = prefix(value, unit, digits)
+    return f"{figures(value / 10.0**power, digits)} {PREFIXES[power]}{unit}".rstrip()
+
+
+def prefix(value: float, unit: str, digits: int = 2) -> int:
+    """Power of ten of the prefix that fits a size; 0 for units that take none."""
+    if unit not in PREFIXED or value == 0 or not math.isfinite(value):
+        return 0
+    rounded = float(f"{abs(value):.{max(digits, 2) - 1}e}")
+    power = 3 * math.floor(math.log10(rounded) / 3 + 1e-12)
+    if unit in ("rad/s", "Hz", "m/s") and rounded >= 0.1:  # nobody says 300 mHz
+        power = max(power, 0)
+    return min(max(power, -9), 6 if unit in LARGE else 0)
+
+
+def figures(x: float, digits: int) -> str:
+    """`digits` figures, none of them lost, and no exponent within reason."""
+    if x == 0:
+        return "0"
+    x = float(f"{x:.{digits - 1}e}")
+    size = math.floor(math.log10(abs(x)) + 1e-12)
+    if not -4 <= size <= 6:
+        return f"{x:.{digits - 1}e}"
+    return f"{x:.{max(digits - 1 - size, 0)}f}"
+
+
+def both(a: float, b: float, unit: str = "") -> tuple[str, str]:
+    """Two sizes with as many figures as it takes to see them differ."""
+    for digits in (2, 3, 4):
+        one, two = nice(a, unit, digits), nice(b, unit, digits)
+        if one != two:
+            break
+    return one, two
+
+
+def span(low: float, high: float, unit: str = "") -> str:
+    """Two ends with one prefix: span(-0.0047, 0.00024, "m") is "-4.7 to 0.24 mm"."""
+    power = prefix(max(abs(low), abs(high)), unit)
+    ends = (figures(x / 10.0**power, 2) for x in (low, high))
+    return f"{' to '.join(ends)} {PREFIXES[power]}{unit}".rstrip()
+
+
+def percent(share: float) -> str:
+    """A share, as "3.4 %"."""
+    return f"{figures(100 * share, 2)} %"

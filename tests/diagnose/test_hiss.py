@@ -1,0 +1,42 @@
+"""Hiss and what is none, as errors of a model that is kept on track."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+
+from rtctl.diagnose.hiss import is_hiss
+
+DT, N, W = 1e-3, 20000, 30.0
+
+
+def error(force: np.ndarray) -> np.ndarray:
+    """e'' + 1.4 W e' + W^2 e = W^2 force, backward differences."""
+    a = np.array([1.0, -2.0, 1.0]) / DT**2 + 1.4 * W * np.array([1.0, -1.0, 0.0]) / DT + np.array([W**2, 0.0, 0.0])
+    return lfilter([W**2], a, force)
+
+
+def noise(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(N)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6), st.floats(1.0, 30.0))
+def test_white_forces_are(seed, size):
+    e = error(size * noise(seed)) + 0.3 * noise(seed + 1)
+    assert is_hiss(e, DT, W, 0.3)
+
+
+@pytest.mark.parametrize("what", ["drift", "reversals", "ripple", "vibration"])
+def test_what_has_a_pattern_is_not(what):
+    t = DT * np.arange(N)
+    force = {
+        "drift": t / t[-1], "reversals": np.sign(np.sin(2 * np.pi * 0.4 * t)), "ripple": np.sin(2 * np.pi * 2.3 * t),
+        "vibration": 50.0 * np.sin(2 * np.pi * 40.0 * t),
+    }[what]  # fmt: skip
+    assert not is_hiss(error(3.0 * force + noise(0)) + 0.05 * noise(1), DT, W, 0.05)
+
+
+def test_a_record_too_short_for_a_spectrum_says_nothing():
+    assert not is_hiss(noise(0)[:500], DT, W, 1.0)

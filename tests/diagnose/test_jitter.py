@@ -1,0 +1,74 @@
+"""Jitter of ticks, seen in errors made by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.diagnose.jitter import growth, interval, jitter
+
+DT, N = 2e-3, 8000
+T = DT * np.arange(N)
+WAY = 3000.0 * (1 - np.cos(2 * np.pi * 0.5 * T))  # counts
+
+
+def stand(error, way=WAY):
+    """As much of a simulator as is looked at: the model's way, and a reading that is off by `error` (n,)."""
+    record = SimpleNamespace(dt=DT, plant="ivu")
+    return SimpleNamespace(record=record, seen=way + error, run=lambda model: way[:, None])
+
+
+def found(error):
+    return jitter(stand(error), None, slice(10, None))  # type: ignore[arg-type]
+
+
+def off(sigma, seed=0, noise=0.35):
+    rng = np.random.default_rng(seed)
+    return np.gradient(WAY, DT) * sigma * rng.standard_normal(N) + noise * rng.standard_normal(N)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.floats(1e-4, 6e-4), st.integers(0, 1000))
+def test_its_size_is_found_within_its_interval(sigma, seed):
+    seen = found(off(sigma, seed))
+    assert seen.sigma == pytest.approx(sigma, rel=0.1)
+    low, high = interval(seen)
+    assert low < seen.sigma < high < 1.2 * sigma
+
+
+def test_where_ticks_are_on_time_there_is_none():
+    assert found(off(0.0)) is None
+    assert found(off(2e-6)) is None
+
+
+def test_an_error_that_is_smooth_is_none_however_much_it_grows_with_speed():
+    smooth = np.gradient(WAY, DT) * 4e-4 * np.sin(2 * np.pi * 9.0 * T)
+    assert found(smooth + off(0.0)) is None
+
+
+def test_vibration_at_speed_is_none():
+    """At a tenth of the sample rate it is not smooth, but neighbouring ticks know of each other."""
+    ringing = np.gradient(WAY, DT) * 4e-4 * np.sin(2 * np.pi * 50.0 * T)
+    assert found(ringing + off(0.0)) is None
+
+
+def test_it_stands_beside_a_missing_effect():
+    seen = found(off(3e-4) + 40.0 * np.sin(2 * np.pi * 1.0 * T))
+    assert seen.sigma == pytest.approx(3e-4, rel=0.1)
+
+
+def test_a_machine_that_hardly_moves_shows_none():
+    still = 0.01 * WAY
+    error = off(0.0)
+    assert jitter(stand(error, still), None, slice(10, None)) is None  # type: ignore[arg-type]
+
+
+def test_growth_is_the_slope_of_noise_power():
+    rng = np.random.default_rng(0)
+    x = rng.uniform(0, 4, 20000)
+    slope, error, rest = growth((1.0 + 0.5 * x) * rng.standard_normal(20000) ** 2, x)
+    assert slope == pytest.approx(0.5, abs=4 * error)
+    assert rest == pytest.approx(1.0, rel=0.1)
+    assert 0.0 < error < 0.05
