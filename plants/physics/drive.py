@@ -14,7 +14,7 @@ from rtctl.plants.physics.term import Term
 
 DRIVES = {"ivu": ("drive1", "drive2"), "ldu": ("drive",), "axis": ("drive",)}
 DEADBAND_FORMS = ("shift", "cut", "floor")
-SAG_FORMS = ("current", "power")
+SAG_FORMS = ("current", "power", "drawn")
 
 
 class OffsetSettings(Settings):
@@ -153,31 +153,42 @@ def saturation(p, s, u):
 
 
 class SupplySagSettings(Settings):
-    """k is the size. current: what the motors draw grows with |volts|; power: with their square."""
+    """k is the size. current: they draw |volts|; power: their square; drawn: what is left of |volts| once it sags."""
 
     term: Literal["drive.supply_sag"] = "drive.supply_sag"
     node: str
     k: float = quantity(unit="", ge=0, le=1, help="share of gain lost per volt, or per volt squared, of all drives")
-    form: Literal["current", "power"] = "current"
+    form: Literal["current", "power", "drawn"] = "current"
+    tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of the supply's capacitor; 0: it has none")
 
 
 class SupplySagParams(NamedTuple):
     k: float
     form: int
+    share: float  # of the way to the load of now, a substep
+
+
+SUPPLY_SAG_STATE = state(load=float)
 
 
 def build_supply_sag(settings: SupplySagSettings, h: float) -> SupplySagParams:
-    """Nothing to discretise."""
-    return SupplySagParams(settings.k, SAG_FORMS.index(settings.form))
+    """Exact step of the capacitor under a load that is held."""
+    share = -math.expm1(-h / settings.tau) if settings.tau > 0.0 else 1.0
+    return SupplySagParams(settings.k, SAG_FORMS.index(settings.form), share)
 
 
 @tick
-def supply_sag(p, volts):
-    """Lower all `volts` (n,) by what all of them together draw."""
+def supply_sag(p, s, volts):
+    """Lower all `volts` (n,) by what all of them together have drawn."""
     load = 0.0
     for i in range(volts.shape[0]):
-        load += abs(volts[i]) if p.form == 0 else volts[i] * volts[i]
-    gain = max(1.0 - p.k * load, 0.0)
+        load += volts[i] * volts[i] if p.form == 1 else abs(volts[i])
+    if p.form == 2:  # what flows has sagged already: load' = (load0 (1 - k load) - load) / tau, exact
+        more = 1.0 + p.k * load
+        s.load += (1.0 - (1.0 - p.share) ** more) * (load / more - s.load)
+    else:
+        s.load += p.share * (load - s.load)
+    gain = max(1.0 - p.k * s.load, 0.0)
     for i in range(volts.shape[0]):
         volts[i] *= gain
 
@@ -266,7 +277,7 @@ SUPPLY_SAG = Term(
     source="Krishnan 2001",
     settings=SupplySagSettings,
     build=build_supply_sag,
-    act={"command": "drive.supply_sag({p}, {m}.volts)"},
+    act={"command": "drive.supply_sag({p}, {s}, {m}.volts)"},
     nodes={"ivu": ("drive1",), "ldu": ("drive",), "axis": ("drive",)},
     look_alikes={
         "drive.saturation": "a hard push of one motor alone and of both: sag asks what the other draws",
@@ -276,5 +287,5 @@ SUPPLY_SAG = Term(
     },
     typical={"k": (0.01, 0.08)},
     axis="command",
-    state=None,
+    state=SUPPLY_SAG_STATE,
 )

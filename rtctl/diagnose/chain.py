@@ -1,6 +1,7 @@
 """The whole diagnosis, stage by stage: preflight, base fit, hints, search, verdict, prediction, answer."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +9,12 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rtctl.config.errors import NoAnswer
-from rtctl.diagnose import decide, heldout, locate
+from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, Diagnosis, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet
-from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.name import names
@@ -24,8 +25,10 @@ from rtctl.diagnose.uncertainty import covariance, parameter_intervals, paramete
 from rtctl.diagnose.verdict import Verdict, judge, with_jitter
 from rtctl.plants.physics.timing import JitterSettings
 
+QUICK = 10 / 3  # times the usual bandwidth of the correction
+FASTEST = 0.1  # rad a tick
+SHOWS = 2.5  # times the noise floor
 HELDOUT = 0.25  # share of a record, at its end, that the prediction is judged on
-BLOCK = 1.0  # s, longer than any machine here remembers
 
 
 def diagnose(folder: Path | str, other: Path | str | None = None, progress: Progress = quiet) -> Diagnosis:
@@ -47,20 +50,39 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         problem = Problem(sim)
         found = find(sim, problem, progress)
         problem = found.problem
-        block = max(2, round(BLOCK / (record.dt * problem.mean)))
-        verdict = judge(problem, found.base, found.best, found.rivals, block)
+        checked = replace(checked, findings=(*checked.findings, solver.finding(problem, found.best.model)))
+        verdict = judge(problem, found.base, found.best, found.rivals, problem.block)
         verdict = verdict if found.jitter is None else with_jitter(verdict, found.jitter)
         progress("predicting rows that were not fitted")
-        return _answer(sim, other, problem, found, verdict, checked, block)._replace(seconds=time.monotonic() - began)
+        return _answer(sim, other, problem, found, verdict, checked)._replace(seconds=time.monotonic() - began)
 
 
 def simulator(record: Record) -> Simulator:
-    """For a machine without a controller: of a command that was held and one that was sampled, the one that fits."""
-    sim = Simulator(record)
-    if record.case.controller.kind != "none":
-        return sim
-    smooth = Simulator(record, held=False)
-    return min(sim, smooth, key=lambda s: base_fit(s, Problem(s)).cost)
+    """The recording to be simulated, at the bandwidth that suits it.
+
+    For a machine without a controller: of a command that was held and one that was sampled, the one that fits. For an
+    axis that is far from its model: a quicker correction, which lets less of the slow wandering through that random
+    forces make and that a small difference between two hypotheses drowns in; but only if what is missing still shows.
+    """
+    held = True
+    base = base_of(Simulator(record))
+    if record.case.controller.kind == "none":
+        smooth = base_of(Simulator(record, held=False))
+        held = base[1].cost <= smooth[1].cost
+        base = base if held else smooth
+    problem, fitted = base
+    faster = min(QUICK * problem.sim.follow, FASTEST / record.dt)
+    if record.plant == "axis" and fitted.rms > decide.LOUD * problem.floor and faster > problem.sim.follow:
+        quick, fitted = base_of(Simulator(record, held=held, follow=faster))
+        if fitted.rms > SHOWS * quick.floor:
+            return quick.sim
+    return problem.sim
+
+
+def base_of(sim: Simulator) -> tuple[Problem, Fit]:
+    """Its problem, and the fit of the owner's parameters."""
+    problem = Problem(sim)
+    return problem, base_fit(sim, problem)
 
 
 def _answer(
@@ -70,7 +92,6 @@ def _answer(
     found: Found,
     verdict: Verdict,
     checked: Preflight,
-    block: int,
 ) -> Diagnosis:
     """Prediction, intervals and all that the report needs."""
     record, base, best = sim.record, found.base, found.best
@@ -91,7 +112,7 @@ def _answer(
         verdict=verdict.verdict,
         effects=verdict.effects,
         located=None if verdict.verdict == NOTHING else where(sim, found),
-        parameters=parameter_intervals(taken, covariance(taken, block)),
+        parameters=parameter_intervals(taken, covariance(taken, problem.block)),
         owner=owner_model(record.case, record),
         before=base.model,
         after=runs if found.jitter is None else runs.add(ticks(found.jitter, record.dt)),

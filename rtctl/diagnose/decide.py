@@ -13,13 +13,15 @@ from scipy.stats import norm
 
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.stretches import loudness
+from rtctl.plants.physics import TERMS
 
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
 LOUD = 4.5  # times the noise floor: below it what no hypothesis explains may be a machine that is not quiet
-NEARLY = 0.2  # the same where the model is already near the noise
+NEARLY = 0.1  # the same where the model is already near the noise
+OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
+LUCK = 1e-4  # chance that a term does so well there by luck
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
 FORM = 0.04  # of what a term does: what the form of its law may miss
-HISS = 12.0  # times the noise floor: random forces that a quiet machine may have
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
 
@@ -33,8 +35,15 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     weights = discount(problem, base, before)
     if rms(weights * before.r) < problem.floor:
         return False
-    share = NEARLY if complete(problem, base, before) else MATERIAL
-    return merit(after, weights) < (1.0 - share) * merit(before, weights)
+    near = complete(problem, base, before)
+    if near and p_value(after, before, problem.block) > LUCK:
+        return False
+    return merit(after, weights) < (1.0 - (NEARLY if near else MATERIAL)) * merit(before, weights)
+
+
+def better(before: Fit, after: Fit) -> bool:
+    """Whether a richer form of the same terms earns its numbers, whatever else is left over."""
+    return after.merit < (1.0 - MATERIAL) * before.merit
 
 
 def rms(r: np.ndarray) -> float:
@@ -57,13 +66,15 @@ def discount(problem: Problem, base: Fit, fitted: Fit) -> np.ndarray:
 def complete(problem: Problem, base: Fit, fitted: Fit) -> bool:
     """Whether what is left is noise: of the sensor, or of random forces on the machine."""
     left = rms(discount(problem, base, fitted) * fitted.r)
-    return left < COMPLETE * problem.floor or (left < HISS * problem.floor and problem.hiss(fitted.r))
+    return left < COMPLETE * problem.floor or problem.hiss(fitted.r)
 
 
 def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     """Whether the terms of `after` explain so much that they may be named."""
     share = explained(problem, before, after)
-    return share > (MOSTLY if complete(problem, before, after) else ENOUGH)
+    if not complete(problem, before, after):
+        return share > ENOUGH
+    return share > MOSTLY or p_value(after, before, problem.block) < LUCK
 
 
 def explained(problem: Problem, before: Fit, after: Fit) -> float:
@@ -83,12 +94,27 @@ def p_value(best: Fit, rival: Fit, block: int) -> float:
 
 
 def probabilities(fits: list[Fit]) -> np.ndarray:
-    """Weights of rival models by the likelihood of their errors, of which only every `memory`-th counts."""
+    """Weights of rival models by the likelihood of their sizes and errors, of which only every `memory`-th counts."""
     best = min(fits, key=lambda f: f.merit)
     count = len(best.r) / memory(best.r)
-    log = np.array([0.5 * count * np.log(f.merit / best.merit) for f in fits])
-    w = np.exp(-np.minimum(log, 700.0))
+    log = np.array([0.5 * count * np.log(f.merit / best.merit) - unusual(f) for f in fits])
+    w = np.exp(-np.clip(log - log.min(), 0.0, 700.0))
     return w / w.sum()
+
+
+def unusual(fitted: Fit) -> float:
+    """Minus the logarithm of how likely sizes like these are: only what tells two equal laws apart.
+
+    Within the term's typical range all are alike; beyond it a factor of OFTEN counts as one standard deviation.
+    """
+    total = 0.0
+    for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True):
+        term, values = TERMS[h.term], h.values(x)
+        for name, (low, high) in term.typical.items():
+            size = abs(values.get(name, 0.0))
+            if name not in term.scale and size > 0.0:
+                total -= 0.5 * min(max(np.log(low / size), np.log(size / high), 0.0) / np.log(OFTEN), 3.0) ** 2
+    return float(total)
 
 
 def memory(r: np.ndarray, most: int = 500) -> float:

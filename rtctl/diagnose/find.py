@@ -7,9 +7,8 @@ from typing import NamedTuple
 from rtctl.diagnose import decide
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.fit import Fit, Problem
-from rtctl.diagnose.heldout import better
 from rtctl.diagnose.hints import hints
-from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.hypotheses import hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
 from rtctl.diagnose.name import Search, dropped, eliminate, enrich, names, polish, rivals, search
 from rtctl.diagnose.simulate import Simulator
@@ -18,6 +17,7 @@ from rtctl.diagnose.verdict import SURE, Alternative, standing
 
 CLOSE = 1.3  # times the best cost: a rival this near may be ahead in its richer form
 CLEARLY = 0.5  # of the best cost: what a richer form must come down to, to take its place
+RICH = 10.0  # the same, of one that is tried in its richer form because the best is in it
 NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
 MOST = 4  # rivals of one hypothesis
 Progress = Callable[[str], None]
@@ -60,12 +60,25 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:
     others = [place.fit for places in near for place in places]
     if best.rms > decide.COMPLETE * problem.floor and best.space.hypotheses:
         close = [best, *(f for f in others if f.cost < CLOSE * best.cost)]
-        others += [f for f in (enrich(problem, f, better) for f in close) if f.cost < CLEARLY * best.cost]
+        others += [f for f in (enrich(problem, f, decide.better) for f in close) if f.cost < CLEARLY * best.cost]
     ahead = min(others, key=lambda f: f.merit, default=best)
     if ahead.merit < best.merit:  # a rival came out ahead once it was fitted to the bottom
         best, near = ahead, replacements(problem, ahead, looked, (), progress)
+    likelier = by_size(best, near)
+    if likelier is not best:
+        best, near = likelier, replacements(problem, likelier, looked, (), progress)
     best, near = without_doubtful(problem, best, looked, near, progress)
     return Found(problem, off, base, best, looked, near)
+
+
+def by_size(best: Fit, near: Places) -> Fit:
+    """Of models that explain the record equally well, the one whose sizes are the more usual."""
+    for places in near:
+        fits = [best, *(place.fit for place in places)]
+        weights = decide.probabilities(fits)
+        if weights.argmax() > 0:
+            return fits[int(weights.argmax())]
+    return best
 
 
 def without_doubtful(
@@ -109,7 +122,10 @@ def replacements(
         for f in sorted(tried, key=lambda f: f.merit):
             if names(f) != names(best):
                 nearest.setdefault(names(f), f)
-        fits = [polish(problem, f) if f.cost < NEAR * best.cost else f for f in list(nearest.values())[:MOST]]
+        fits = list(nearest.values())[:MOST]
+        if is_rich(h):  # so shall they be
+            fits = [enrich(problem, f, decide.better) if f.cost < RICH * best.cost else f for f in fits]
+        fits = [polish(problem, f) if f.cost < NEAR * best.cost else f for f in fits]
         places = [Alternative(f, _other(f, rest)) for f in sorted(fits, key=lambda f: f.merit)]
         out.append(tuple(places))
     return tuple(out)

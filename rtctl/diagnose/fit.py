@@ -26,9 +26,11 @@ FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # 
 TOLL = 0.08  # share of the cost that a further number of a term must take off
 FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
 THREADS = 2
+LOUDEST = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, of what random forces leave
 IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
 TOGETHER = 100.0  # errors that count as one
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
+FORGOTTEN = 4.0  # the same, after which errors no longer go together
 FORGET = 8.0  # over the bandwidth of the correction
 SIGMA = {"encoder": 0.4, "scale": 0.5}  # counts: what quantisation and a quiet machine leave
 
@@ -107,9 +109,16 @@ class Problem:
         e = np.nan_to_num(self.error(model, coarse), nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)
         return e.T.ravel() * self.weights
 
+    @property
+    def block(self) -> int:
+        """Errors after which a model on track has forgotten."""
+        return max(2, round(FORGOTTEN / (self.sim.follow * self.sim.record.dt * self.mean)))
+
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
         main = r[: len(r) // len(self.channels)]
+        if float(np.sqrt(np.mean(main**2))) > LOUDEST[self.sim.record.plant] * self.floor:
+            return False
         return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.floor)
 
 

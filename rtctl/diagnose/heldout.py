@@ -10,7 +10,7 @@ the recorded command as the measure of a model; Ljung, System Identification (19
 
 import numpy as np
 
-from rtctl.diagnose.decide import MATERIAL
+from rtctl.diagnose.decide import better
 from rtctl.diagnose.fit import Fit, Problem, fit
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
@@ -92,11 +92,6 @@ def free_fit(sim: Simulator, fitted: Fit) -> Fit:
         moved = fit(problem, moved.space, moved.x, rounds=10, enough=1e-3)
     problem.weigh(moved.model)
     return moved if problem.near < WORSE * track else fitted
-
-
-def better(before: Fit, after: Fit) -> bool:
-    """Whether a richer form of the same terms earns its numbers, whatever else is left over."""
-    return after.merit < (1.0 - MATERIAL) * before.merit
 
 
 def rms(x: np.ndarray) -> float:

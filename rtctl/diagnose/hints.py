@@ -62,7 +62,12 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
         span = float(np.ptp(way)) or 1.0
         waves = span * np.geomspace(0.1, 2.0, WAVES)
         found["wavelength"] = peaks(waves, spectrum(way, target, 2 * np.pi / waves), MOST)
-        found["spot"] = spots(way, target, MOST)
+        found["spot"] = spots(x, target, MOST)
+    else:
+        found["spot"] = spots(x, d, MOST)
+    whole = record.y[sim.channels[0]] / per_unit(record.case)[0]
+    low, span = float(whole.min()), float(np.ptp(whole)) or 1.0
+    found["spot"] = [float((x.min() + share * np.ptp(x) - low) / span) for share in found["spot"]]
     for channel, sensor in enumerate(SENSORS[record.plant]):
         if channel < len(sim.channels):
             error = record.y[sim.channels[channel]] - read[:, channel]
@@ -121,15 +126,15 @@ def peaks(grid: np.ndarray, height: np.ndarray, most: int) -> list[float]:
     return [float(grid[i]) for i in inner[np.argsort(-height[inner])][:most]]
 
 
-def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 60) -> list[float]:
-    """Places where the signal's mean stands out from that of the places around."""
+def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 80) -> list[float]:
+    """Places, as shares of the way, where the signal's mean stands out from that of the places around."""
     edges = np.linspace(way.min(), way.max() + 1e-12, bins + 1)
     index = np.clip(np.digitize(way, edges) - 1, 0, bins - 1)
     count = np.bincount(index, minlength=bins)
     mean = np.bincount(index, signal, bins) / np.maximum(count, 1)
     around = np.convolve(np.pad(mean, 4, mode="edge"), np.ones(9) / 9, "valid")
     off = np.abs(mean - around) * np.sqrt(np.minimum(count, np.median(count)))
-    return [float(0.5 * (edges[i] + edges[i + 1])) for i in np.argsort(-off)[:most]]
+    return [float((i + 0.5) / bins) for i in np.argsort(-off)[:most]]
 
 
 def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:

@@ -59,10 +59,13 @@ class Turn(NamedTuple):
 
 
 class At(NamedTuple):
-    """A place along the node's travel, started at `places` of them."""
+    """A place and a width along the travel: wide ones at `places` of them, narrow ones at spots that stand out."""
 
     name: str
+    width: str
     places: int
+    wide: float  # of the span
+    narrow: float
 
 
 class Hint(NamedTuple):
@@ -111,7 +114,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "load.spring": (Size("k", "stiff", 0.2, signed=True),),
     "load.imbalance": (Turn("A", "phi", "force", 0.1),),
     "load.bump": (
-        Size("F", "force", 0.2, signed=True), At("at", 10), Shape("width", "span", (0.04,), 3.7),
+        Size("F", "force", 0.2, signed=True), At("at", "width", 8, 0.05, 0.012),
         Choice("form", ("drag", "hill", "push")),
     ),
     "drive.offset": (Size("offset", "volts", 0.05, signed=True),),
@@ -153,13 +156,16 @@ EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, t
         Shape("tau_s", "seconds", (3e-3,), 300.0), Choice("form", ("lugre",)),
     ),
     "drive.lag": (Shape("zeta", "one", (0.7,), 20.0),),
+    "drive.supply_sag": (Shape("tau", "seconds", (0.02,), 30.0),),
     "structure.stiffening": (Size("c2", "square", 0.05, signed=True), Size("b2", "swell", 0.05)),
 }  # fmt: skip
 FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in its other values once the term stands
     "friction.stribeck": ("form", ("gaussian", "exponential", "tustin")),
     "transmission.backlash": ("damping", (0.0, 1.0)),
+    "drive.supply_sag": ("form", ("current", "power", "drawn")),
+    "drive.deadband": ("form", ("shift", "cut", "floor")),
 }
-HINTED = tuple(name for name, parts in SEARCH.items() if any(isinstance(part, Hint | Jumps) for part in parts))
+HINTED = tuple(name for name, parts in SEARCH.items() if any(isinstance(part, Hint | Jumps | At) for part in parts))
 
 
 ALONE = ("sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt")  # asks for a second sensor
@@ -199,12 +205,16 @@ def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis 
     if parts is None:
         return None
     measures = Measures(record, base, node_scales(record, base), {})
-    if len(h.coordinates) > sum(
-        2 if isinstance(part, Turn) else 1 for part in SEARCH[h.term] if not isinstance(part, Choice)
-    ):
-        return None  # it has them already
+    if is_rich(h):
+        return None
     more = _starts(h.term, h.node, parts, measures)[0]
     return h._replace(coordinates=(*h.coordinates, *more.coordinates), fixed={**h.fixed, **more.fixed})
+
+
+def is_rich(h: Hypothesis) -> bool:
+    """Whether it has its richer form already."""
+    plain = sum(2 if isinstance(part, Turn | At) else 1 for part in SEARCH[h.term] if not isinstance(part, Choice))
+    return len(h.coordinates) > plain
 
 
 def forms(h: Hypothesis) -> list[Hypothesis]:
@@ -351,7 +361,7 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
         s = m.scale(node)
         for value in found:
             if part.place:
-                yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=value),), {}
+                yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}
             else:
                 yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach),), {}
     elif isinstance(part, Jumps):
@@ -362,10 +372,13 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             yield (Coordinate(part.name, SIZE, abs(first)),), {"at": at, "more": more}
     elif isinstance(part, At):
         s = m.scale(node)
-        for k in range(part.places):
-            middle = s.low + s.span * (k + 0.5) / part.places
-            reach = s.span / part.places
-            yield (Coordinate(part.name, PLACE, reach, -1.5, 1.5, offset=middle),), {}
+        low, high = 0.2 * part.narrow * s.span, 4.0 * part.wide * s.span
+        places = [((k + 0.5) / part.places, part.wide, 1.0 / part.places) for k in range(part.places)]
+        spots = [(spot, part.narrow, 2 * part.narrow) for spot in m.hints.get("spot", [])]
+        for where, share, reach in places + spots:
+            width = share * s.span
+            place = Coordinate(part.name, PLACE, reach * s.span, -1.5, 1.5, offset=s.at(where))
+            yield (place, Coordinate(part.width, SHAPE, width, np.log(low / width), np.log(high / width))), {}
     else:
         for value in part.values:
             yield (), {part.name: value * m.of(part.measure, node) if part.measure else value}

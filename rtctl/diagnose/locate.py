@@ -1,12 +1,22 @@
-"""Where simulation and recording part: channel, node, axis, since when, and how much of the error lives there."""
+"""Where simulation and recording part: channel, node, axis, since when, and how much of the error lives there.
+
+With a name, node and axis are the term's own. Without one, the axis is the one along which the missing force, as a
+disturbance observer sees it, repeats itself best, and the node is that of the nearest guess.
+"""
 
 import numpy as np
 
 from rtctl.diagnose.diagnosis import Located
 from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.hints import ORDERS, observe, spectrum
+from rtctl.diagnose.model import Model
 from rtctl.diagnose.name import Search
 from rtctl.diagnose.simulate import Simulator, per_unit
 from rtctl.plants.physics import TERMS
+
+BINS = 24  # along an axis
+REPEATS = 0.35  # share of the missing force that must repeat along an axis, to be told
+UNITS = {"velocity": ("rad/s", "m/s"), "position": ("rad", "m"), "angle": ("rad", "m"), "command": ("V", "V")}
 
 
 def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Search, ticks: bool = False) -> Located:
@@ -25,22 +35,56 @@ def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Sear
     if top is None or not top.space.hypotheses:
         return Located(channel, "loop", "time", "everywhere", since, 0.0)
     h = top.space.hypotheses[0]
-    axis = TERMS[h.term].axis
     share = float(np.clip(1.0 - top.cost / base.cost, 0.0, 1.0))
+    axis = TERMS[h.term].axis
+    if not best.space.hypotheses or share < 0.5:
+        axis = repeats(sim, base.model) or axis
     return Located(channel, h.node, axis, where(sim, problem, error[worst], axis), since, share)
 
 
-def where(sim: Simulator, problem: Problem, error: np.ndarray, axis: str) -> str:
-    """In words: the part of the axis that holds most of the error."""
+def along(sim: Simulator) -> dict[str, np.ndarray]:
+    """Values (n,) of each axis that every record has."""
     x = sim.record.y[sim.channels[0]] / per_unit(sim.record.case)[0]
-    v = np.gradient(x, sim.record.dt)
-    u = sim.record.u[:, 0]
-    values = {"velocity": v, "position": x, "angle": x, "command": u, "time": sim.record.t}.get(axis, sim.record.t)
-    rows = values[problem.rows][: len(error) * problem.mean].reshape(-1, problem.mean).mean(axis=1)
+    return {
+        "velocity": np.gradient(x, sim.record.dt),
+        "position": x,
+        "command": sim.record.u[:, 0],
+        "time": sim.record.t - sim.record.t[0],
+    }
+
+
+def repeats(sim: Simulator, model: Model) -> str:
+    """The axis along which most of the force that `model` lacks repeats itself; empty where none does."""
+    _, push = observe(sim, model)
+    start = len(push) // 20
+    total = float(np.var(push[start:])) or 1.0
+    shares = {}
+    for name, values in along(sim).items():
+        v, d = values[start:], push[start:]
+        index = np.searchsorted(np.quantile(v, np.linspace(0, 1, BINS + 1)[1:-1]), v)
+        count = np.maximum(np.bincount(index, minlength=BINS), 1)
+        mean = np.bincount(index, d, BINS) / count
+        shares[name] = float(count @ (mean - d.mean()) ** 2) / len(d) / total
+    x = along(sim)["position"][start:]
+    thin = max(1, len(x) // 8000)
+    if sim.record.plant != "axis" or sim.record.case.sensors.unit == "rad":
+        shares["angle"] = float(spectrum(x[::thin], push[start::thin], ORDERS).max(initial=0.0))
+    best = max(shares, key=lambda name: shares[name])
+    return best if shares[best] > REPEATS else ""
+
+
+def where(sim: Simulator, problem: Problem, error: np.ndarray, axis: str) -> str:
+    """In words: the part of the axis that holds most of the error; of time where the axis has no values of its own."""
+    values = along(sim)
+    values["angle"] = values["position"]
+    name = axis if axis in values else "time"
+    rows = values[name][problem.rows][: len(error) * problem.mean].reshape(-1, problem.mean).mean(axis=1)
     edges = np.quantile(rows, np.linspace(0, 1, 9))
     index = np.clip(np.searchsorted(edges, rows, side="right") - 1, 0, 7)
     power = np.array([np.mean(error[index == k] ** 2) if (index == k).any() else 0.0 for k in range(8)])
     if power.max() < 2.5 * np.median(power):
         return f"over all of the {axis}"
     k = int(np.argmax(power))
-    return f"{axis} {edges[k]:.3g} to {edges[k + 1]:.3g}"
+    linear = sim.record.plant == "axis" and sim.record.case.sensors.unit != "rad"
+    unit = UNITS.get(name, ("s", "s"))[linear]
+    return f"{name} {edges[k]:.3g} to {edges[k + 1]:.3g} {unit}"

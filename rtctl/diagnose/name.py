@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
 from rtctl.diagnose.hypotheses import HINTED, forms, richer
 from rtctl.diagnose.screen import Score, screen
@@ -65,9 +66,10 @@ def search(
     first: tuple[Score, ...] = ()
     away: Fit | None = None
     candidates = list(propose(base))
+    known = {key(h) for h in candidates}
     for level in range(MOST):
         if level > 0:
-            candidates = with_new_starts(candidates, propose(beam[0]))
+            candidates = [*candidates, *new_starts(propose(beam[0]), known)]
         rough: dict[tuple[str, ...], Fit] = {}
         likely: list[Fit] = []
         if level == 0 and not sure:
@@ -83,13 +85,11 @@ def search(
                 candidates = best_starts(scores)
             for rank, score in enumerate(shortlist(scores, QUICK if sure else LIKELY[level])):
                 trial = roughly(problem, parent, score)
-                key = names(trial)
-                if (
-                    level == 0 and rank < SURE and not sure
-                ):  # what the first look puts ahead is fitted in full, however rough it looks
+                which = names(trial)
+                if level == 0 and rank < SURE and not sure:  # fitted in full, however bad the rough fit is
                     likely.append(trial)
-                if key not in rough or trial.cost < rough[key].cost:
-                    rough[key] = trial
+                if which not in rough or trial.cost < rough[which].cost:
+                    rough[which] = trial
         ranked = sorted(rough.values(), key=lambda f: f.merit)[: 2 if sure else FULL[level]]
         if not ranked:
             break
@@ -100,14 +100,15 @@ def search(
         for trial in ranked:
             fitted = from_both(problem, trial, best, None if away is None else away.x)
             best = min(best, fitted.cost)
-            key = names(fitted)
-            if key not in full_by_name or fitted.cost < full_by_name[key].cost:
-                full_by_name[key] = fitted
+            which = names(fitted)
+            if which not in full_by_name or fitted.cost < full_by_name[which].cost:
+                full_by_name[which] = fitted
         full = list(full_by_name.values())
         full.sort(key=lambda f: f.merit)
         wide = BEAM[level]
         full = [polish(problem, f) if f.cost < 6 * full[0].cost else f for f in full[:wide]] + full[wide:]
-        full = [f if enough(f) else enrich(problem, f, worth) for f in full[:wide]] + full[wide:]
+        loud = decide.COMPLETE * problem.floor
+        full = [enrich(problem, f, decide.better) if f.rms > loud else f for f in full[:wide]] + full[wide:]
         full.sort(key=lambda f: f.merit)
         rounds.append(tuple(full))
         if not worth(beam[0], full[0]) or (level == 1 and full[0].cost > FAR * base.cost):
@@ -175,20 +176,20 @@ def best_starts(scores: Sequence[Score]) -> list[Hypothesis]:
     return out
 
 
-def with_new_starts(candidates: Sequence[Hypothesis], proposed: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """The candidates, and those proposed that are none of them but of whom a like one was never screened away."""
-    known = {
-        (h.name, tuple(c.scale for c in h.coordinates), tuple(c.offset for c in h.coordinates)) for h in candidates
-    }
-    new = [h for h in proposed if h.term in HINTED]
-    return [
-        *candidates,
-        *(
-            h
-            for h in new
-            if (h.name, tuple(c.scale for c in h.coordinates), tuple(c.offset for c in h.coordinates)) not in known
-        ),
-    ]
+def new_starts(proposed: Sequence[Hypothesis], known: set[tuple]) -> list[Hypothesis]:
+    """Those of the proposed that were not proposed before, by what the record suggested; `known` is kept up to date."""
+    new = [h for h in proposed if h.term in HINTED and key(h) not in known]
+    known.update(key(h) for h in proposed)
+    return new
+
+
+def key(h: Hypothesis) -> tuple:
+    """What tells a hypothesis and its start from another."""
+    return (
+        h.name,
+        str(sorted(h.fixed.items())),
+        tuple((round(c.scale, 12), round(c.offset, 12)) for c in h.coordinates),
+    )
 
 
 class Hopeless:

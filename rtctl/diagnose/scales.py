@@ -17,6 +17,11 @@ class Scales(NamedTuple):
     span: float
     force: float
     low: float  # lowest position
+    back: bool = False  # whether it goes down as the main sensor goes up
+
+    def at(self, share: float) -> float:
+        """Position of the node where the main sensor has gone that share of its span."""
+        return self.low + self.span * (1.0 - share if self.back else share)
 
 
 def node_scales(record: Record, base: dict[str, float]) -> dict[str, Scales]:
@@ -32,7 +37,7 @@ def node_scales(record: Record, base: dict[str, float]) -> dict[str, Scales]:
 
     def put(node: str, ratio: float, force: float) -> None:
         ends = sorted((low * ratio, (low + span) * ratio))
-        out[node] = Scales(abs(ratio) * speed, ends[1] - ends[0], force, ends[0])
+        out[node] = Scales(abs(ratio) * speed, ends[1] - ends[0], force, ends[0], ratio < 0.0)
 
     if record.plant == "ivu":
         amp = record.case.drive.amp_per_volt

@@ -16,6 +16,7 @@ from rtctl.diagnose.jitter import Jitter, interval
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals
 
+HALF = 0.5  # of the excess explained, and not by luck: something is there
 SURE = 0.7  # weight of a name among its rivals
 POSSIBLE = 0.05  # weight from which a rival is mentioned
 JITTER = 0.95  # confidence in a jitter, whose sign nothing else gives
@@ -48,6 +49,7 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
     share = decide.explained(problem, base, best)
     whole = decide.complete(problem, base, best)
     if not decide.enough(problem, base, best):
+        loud = loud or (share > HALF and decide.p_value(best, base, block) < decide.LUCK)
         return Verdict(UNNAMED if loud else NOTHING, (), share)
     trust = 0.98 if whole else 0.6 + 0.35 * share
     own, others = [], []

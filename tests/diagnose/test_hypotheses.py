@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.hypotheses import EXTRAS, HINTED, SEARCH, Choice, Turn, forms, hypotheses, richer
+from rtctl.diagnose.hypotheses import EXTRAS, HINTED, SEARCH, At, Choice, Turn, forms, hypotheses, richer
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.space import PLACE, SHAPE
+from rtctl.diagnose.scales import node_scales
+from rtctl.diagnose.space import SHAPE
 from rtctl.plants.physics import TERMS
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
 HINTS = {
-    "order": [2.0, 7.0], "wavelength": [0.01], "spot": [0.005], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
+    "order": [2.0, 7.0], "wavelength": [0.01], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
     "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
 }  # fmt: skip
 
@@ -34,6 +35,7 @@ def names(parts):
     out = []
     for part in parts:
         out += [part.amplitude, part.phase] if isinstance(part, Turn) else [part.name]
+        out += [part.width] if isinstance(part, At) else []
     return out
 
 
@@ -111,7 +113,7 @@ def test_without_hints_nothing_that_needs_one_is_asked(moved):
     record, base = moved("axis")
     asked = {h.term for h in hypotheses(record, base)}
     assert {"sensor.missed_counts", "guide.dirt"} <= set(HINTED)
-    assert not asked & set(HINTED)
+    assert not asked & set(HINTED) - {"load.bump"}  # which has starts of its own besides
 
 
 def test_jumps_of_a_sensor_are_one_hypothesis_with_one_size(moved):
@@ -142,14 +144,29 @@ def test_a_hint_of_a_node_goes_before_a_hint_for_all(moved):
     assert ("motor1", 3.0) not in orders
 
 
-def test_places_cover_the_travel_of_the_node(moved):
+def test_places_cover_the_travel_of_the_node_and_spots_are_narrow(moved):
     record, base = moved("axis")
-    bumps = hypotheses(record, base, only=("load.bump",))
-    at = sorted({c.offset for h in bumps for c in h.coordinates if c.kind == PLACE})
-    assert len(at) == 10
-    np.testing.assert_allclose(at, 0.1 * (np.arange(10) + 0.5) / 10, atol=1e-4)
+    bumps = hypotheses(record, base, {"spot": [0.3]}, only=("load.bump",))
+    starts = {(c.offset, w.scale) for h in bumps for c, w in [h.coordinates[1:]]}
+    x = record.y["x"]
+    wide = sorted(at for at, width in starts if width > 0.04 * np.ptp(x))
+    np.testing.assert_allclose(wide, x.min() + np.ptp(x) * (np.arange(8) + 0.5) / 8, atol=1e-4)
+    ((at, width),) = [start for start in starts if start[1] < 0.04 * np.ptp(x)]
+    assert at == pytest.approx(x.min() + 0.3 * np.ptp(x), abs=1e-6)
+    assert width == pytest.approx(0.012 * np.ptp(x))
     forms = {h.fixed["form"] for h in bumps}
     assert forms == set(next(p.values for p in SEARCH["load.bump"] if isinstance(p, Choice)))
+
+
+def test_a_spot_is_where_the_node_is_then(moved):
+    """Reel 2 turns the other way."""
+    record, base = moved("ivu")
+    at = {h.node: h.coordinates[1].offset for h in hypotheses(record, base, {"spot": [0.9]}, only=("load.bump",))
+          if h.coordinates[2].scale < 0.02 * node_scales(record, base)[h.node].span}  # fmt: skip
+    x = record.y["capstan_counts"] * 2 * np.pi / record.case.sensors.capstan_counts_per_rev
+    place = x.min() + 0.9 * np.ptp(x)
+    assert at["capstan"] == pytest.approx(place)
+    assert at["motor2"] == pytest.approx(-place * base["R_c"] / base["R2"])
 
 
 def test_a_drive_that_turns_may_be_asked_about_turns(blank):

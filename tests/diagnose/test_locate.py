@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from rtctl.diagnose.fit import Fit
-from rtctl.diagnose.locate import located, where
+from rtctl.diagnose.locate import located, repeats, where
 from rtctl.diagnose.name import Search
 from rtctl.plants.physics import TERMS
 
 
 def span(text):
-    """The two numbers of `position 0.01 to 0.02`."""
-    _, low, _, high = text.split()
+    """The two numbers of `position 0.01 to 0.02 m`."""
+    _, low, _, high, _ = text.split()
     return float(low), float(high)
 
 
@@ -70,3 +70,20 @@ def test_an_error_everywhere_is_told_as_that(tilted, searched):
     error = np.random.default_rng(0).standard_normal(len(base.r))
     assert where(tilted.sim, problem, error, "position") == "over all of the position"
     assert "over all" in where(tilted.sim, problem, error, "frequency")
+
+
+def test_an_axis_without_values_of_its_own_is_told_by_time(tilted, searched):
+    problem, base, _ = searched(tilted)
+    error = np.full(len(base.r), 0.1)
+    error[:300] = 10.0
+    assert where(tilted.sim, problem, error, "frequency").startswith("time ")
+    assert where(tilted.sim, problem, error, "frequency").endswith(" s")
+
+
+@pytest.mark.parametrize(("term", "axis"), [
+    ({"term": "load.bump", "node": "carriage", "F": 60.0, "at": 0.05, "width": 1e-2, "form": "push"}, "position"),
+    ({"term": "friction.coulomb", "node": "carriage", "F_C": 20.0}, "velocity"),
+])  # fmt: skip
+def test_the_missing_force_tells_along_what_it_repeats(make_axis, term, axis):
+    made = make_axis(term)
+    assert repeats(made.sim, made.model._replace(terms=())) == axis

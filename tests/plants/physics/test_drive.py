@@ -86,17 +86,44 @@ def test_a_slow_rise_takes_its_time_and_its_mean():
     assert drive.saturation(p, s, 0.95) == pytest.approx(0.95)
 
 
+def sagging():
+    return np.zeros(1, drive.SUPPLY_SAG_STATE).view(np.recarray)[0]
+
+
+def test_what_flows_has_sagged_already():
+    """One over one plus, at once and in the end; both the fixed point of a load that the sag itself lowers."""
+    for tau, steps in ((0.0, 1), (0.02, 2000)):
+        p, s = (
+            drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1, form="drawn", tau=tau), H),
+            sagging(),
+        )
+        for _ in range(steps):
+            u = np.array([2.0, -3.0])
+            drive.supply_sag(p, s, u)
+        assert u == pytest.approx(np.array([2.0, -3.0]) / 1.5)
+
+
+def test_a_capacitor_holds_the_supply_for_a_while():
+    p, s, got = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1, tau=0.02), H), sagging(), []
+    for _ in range(100):
+        u = np.array([2.0, 0.0])
+        drive.supply_sag(p, s, u)
+        got.append(u[0])
+    t = H * np.arange(1, 101)
+    np.testing.assert_allclose(got, 2.0 * (1 - 0.2 * (1 - np.exp(-t / 0.02))), rtol=1e-12)
+
+
 def test_sag_lowers_all_by_what_all_draw():
     p = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1), H)
     u = np.array([1.0, -2.0])
-    drive.supply_sag(p, u)
+    drive.supply_sag(p, sagging(), u)
     assert u == pytest.approx([0.7, -1.4])
     p = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1, form="power"), H)
     u = np.array([1.0, -2.0])
-    drive.supply_sag(p, u)
+    drive.supply_sag(p, sagging(), u)
     assert u == pytest.approx([0.5, -1.0])
     u = np.array([9.0, 9.0])
-    drive.supply_sag(p, u)
+    drive.supply_sag(p, sagging(), u)
     assert list(u) == [0.0, 0.0]  # nothing is left, and it does not turn
 
 

@@ -1,0 +1,25 @@
+"""Whether the simulation itself is to be trusted: the same model at half the step. A solver's error once looked like a
+delay."""
+
+import numpy as np
+
+from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.simulate import Simulator
+
+LOUD = 0.5  # of the noise floor
+
+
+def step_error(problem: Problem, model: Model) -> float:
+    """Rms change of the weighted error of `model` by half the step, over the noise floor."""
+    sim = problem.sim
+    half = Problem(Simulator(sim.record, finer=2, follow=sim.follow), mean=problem.mean, channels=problem.channels)
+    change = half.error(model) - problem.error(model)
+    return float(np.sqrt(np.mean(change**2))) / max(problem.floor, 1e-12)
+
+
+def finding(problem: Problem, model: Model) -> str:
+    """What that says, in a sentence."""
+    share = step_error(problem, model)
+    text = f"Half the solver's step changes the simulation by {share:.2g} of what the noise leaves"
+    return f"{text}." if share < LOUD else f"{text}: too much; take the sizes of small effects with care."
