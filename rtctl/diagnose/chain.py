@@ -61,19 +61,19 @@ def simulator(record: Record) -> Simulator:
     """The recording to be simulated, at the bandwidth that suits it.
 
     For a machine without a controller: of a command that was held and one that was sampled, the one that fits. For an
-    axis that is far from its model: a quicker correction, which lets less of the slow wandering through that random
-    forces make and that a small difference between two hypotheses drowns in; but only if what is missing still shows.
+    axis under control that is far from its model: a quicker correction, which lets less of the slow wandering through
+    that random forces make and that a small difference between two hypotheses drowns in; but only if what is missing
+    still shows.
     """
-    held = True
-    base = base_of(Simulator(record))
+    if record.plant != "axis":
+        return Simulator(record)
+    problem, fitted = base_of(Simulator(record))
     if record.case.controller.kind == "none":
         smooth = base_of(Simulator(record, held=False))
-        held = base[1].cost <= smooth[1].cost
-        base = base if held else smooth
-    problem, fitted = base
+        return problem.sim if fitted.cost <= smooth[1].cost else smooth[0].sim
     faster = min(QUICK * problem.sim.follow, FASTEST / record.dt)
-    if record.plant == "axis" and fitted.rms > decide.LOUD * problem.floor and faster > problem.sim.follow:
-        quick, fitted = base_of(Simulator(record, held=held, follow=faster))
+    if fitted.rms > decide.LOUD * problem.floor and faster > problem.sim.follow:
+        quick, fitted = base_of(Simulator(record, follow=faster))
         if fitted.rms > SHOWS * quick.floor:
             return quick.sim
     return problem.sim

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from rtctl.diagnose import chain
+from rtctl.diagnose import chain, find
 from rtctl.diagnose.diagnosis import as_json
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.record import Record, load_record
@@ -49,7 +49,7 @@ def some(practice: Path) -> dict[str, Any]:
         SINGLE: written(chain.diagnose(practice / SINGLE)),
     }
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chain, "hypotheses", partial(hypotheses, only=PLAIN))
+        patch.setattr(find, "hypotheses", partial(hypotheses, only=PLAIN))
         made[DRIVE] = written(chain.diagnose_record(first(load_record(practice / DRIVE), 4.0)))
     return made
 
