@@ -18,6 +18,7 @@ from rtctl.plants.physics import TERMS
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
 LOUD = 4.5  # times the noise floor: below it what no hypothesis explains may be a machine that is not quiet
 NEARLY = 0.1  # the same where the model is already near the noise
+QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
 LUCK = 1e-4  # chance that a term does so well there by luck
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
@@ -93,11 +94,18 @@ def p_value(best: Fit, rival: Fit, block: int) -> float:
     return float(norm.sf(sums.sum() / max(spread, 1e-12)))
 
 
-def probabilities(fits: list[Fit]) -> np.ndarray:
-    """Weights of rival models by the likelihood of their sizes and errors, of which only every `memory`-th counts."""
-    best = min(fits, key=lambda f: f.merit)
+def probabilities(fits: list[Fit], floor: float = 0.0) -> np.ndarray:
+    """Weights of rival models by their sizes, their number of numbers and the likelihood of their errors.
+
+    Of the errors only every `memory`-th counts, and what lies well below the noise `floor` counts as equal: there a law
+    only follows the cut into counts. Source: Schwarz, Annals of Statistics 6 (1978), for the price of a number.
+    """
+    best = min(fits, key=lambda f: f.cost)
     count = len(best.r) / memory(best.r)
-    log = np.array([0.5 * count * np.log(f.merit / best.merit) - unusual(f) for f in fits])
+    costs = np.array([max(f.cost, 0.5 * len(f.r) * (QUIET * floor) ** 2, 1e-300) for f in fits])
+    numbers = np.array([len(f.x) - f.space.nb for f in fits])
+    log = 0.5 * count * np.log(costs / costs.min()) + 0.5 * numbers * np.log(max(count, 2.0))
+    log -= np.array([unusual(f) for f in fits])
     w = np.exp(-np.clip(log - log.min(), 0.0, 700.0))
     return w / w.sum()
 

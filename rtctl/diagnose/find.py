@@ -64,18 +64,18 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:
     ahead = min(others, key=lambda f: f.merit, default=best)
     if ahead.merit < best.merit:  # a rival came out ahead once it was fitted to the bottom
         best, near = ahead, replacements(problem, ahead, looked, (), progress)
-    likelier = by_size(best, near)
+    likelier = most_likely(problem, best, near)
     if likelier is not best:
         best, near = likelier, replacements(problem, likelier, looked, (), progress)
     best, near = without_doubtful(problem, best, looked, near, progress)
     return Found(problem, off, base, best, looked, near)
 
 
-def by_size(best: Fit, near: Places) -> Fit:
-    """Of models that explain the record equally well, the one whose sizes are the more usual."""
+def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:
+    """Of models that explain the record equally well, the one with fewer numbers and the more usual sizes."""
     for places in near:
         fits = [best, *(place.fit for place in places)]
-        weights = decide.probabilities(fits)
+        weights = decide.probabilities(fits, problem.floor)
         if weights.argmax() > 0:
             return fits[int(weights.argmax())]
     return best
@@ -86,7 +86,7 @@ def without_doubtful(
 ) -> tuple[Fit, Places]:
     """Leave out what others could stand in for as well, as long as the rest explains enough without it."""
     while len(best.space.hypotheses) > 1 and decide.enough(problem, looked.base, best):
-        sure = [standing(best, i, places) for i, places in enumerate(near)]
+        sure = [standing(problem, best, i, places) for i, places in enumerate(near)]
         weakest = min(range(len(sure)), key=lambda i: sure[i])
         if sure[weakest] >= SURE:
             break

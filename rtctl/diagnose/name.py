@@ -17,17 +17,25 @@ from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
 from rtctl.diagnose.stretches import loudness, usual
 
-BEAM = (3, 2, 2)  # models that the next round builds on
-LIKELY = (14, 9, 7)  # rough fits a model of the beam, by round
-FULL = (5, 4, 3)  # full fits a round
 FAR = 0.4  # of the base's cost: where two terms leave more, no third will do
-SURE = 2  # hypotheses a model of the beam that are fitted in full whatever their rough fit says
 CALMER = 0.8  # of the usual error: parameters that fit the quiet stretches this much better are a start of their own
 ROBUST = 3  # rounds of weights
 STARTS = 3  # of one hypothesis that later rounds try
-QUICK = 8  # rough fits where the model is already down to the noise
 MOST = 3  # terms at once
 ROUGH = 4  # rounds of a rough fit
+
+
+class Breadth(NamedTuple):
+    """How broad a round is."""
+
+    likely: int  # rough fits a model of the beam
+    full: int  # full fits
+    sure: int  # first in the screening of each model, which are fitted in full whatever their rough fit says
+    keep: int  # models that the next round builds on
+
+
+ROUNDS = (Breadth(14, 5, 2, 3), Breadth(9, 4, 0, 2), Breadth(7, 3, 0, 2))
+QUICK = Breadth(8, 2, 0, 2)  # where the model is already down to the noise
 
 
 class Search(NamedTuple):
@@ -59,63 +67,77 @@ def search(
     """Grow models until a further term does not earn its place by `worth(before, after)`.
 
     `propose(model)` lists hypotheses with the starts that the record suggests once it is seen through that model.
-    Where a model is `enough`, down to the noise, one quick round looks for what may still hide beside it.
+    Where a model is `enough`, down to the noise, a quick round looks for what may still hide beside it, and only if
+    there is something a broad one for what it is.
     """
     beam, sure = [base], enough(base)
     rounds: list[tuple[Fit, ...]] = []
-    first: tuple[Score, ...] = ()
-    away: Fit | None = None
+    away = None if sure else elsewhere(problem, base)
     candidates = list(propose(base))
     known = {key(h) for h in candidates}
+    first: tuple[Score, ...] = ()
     for level in range(MOST):
         if level > 0:
             candidates = [*candidates, *new_starts(propose(beam[0]), known)]
-        rough: dict[tuple[str, ...], Fit] = {}
-        likely: list[Fit] = []
-        if level == 0 and not sure:
-            away = elsewhere(problem, base)
-        for parent in [*beam, away] if level == 0 and away is not None else beam:
-            taken = set(names(parent))
-            progress(
-                f"screening {len(candidates)} hypotheses" + (f" beside {' and '.join(sorted(taken))}" * bool(taken))
-            )
-            scores = screen(problem, parent, [h for h in candidates if h.name not in taken])
-            if level == 0 and not first:
-                first = tuple(scores)
-                candidates = best_starts(scores)
-            for rank, score in enumerate(shortlist(scores, QUICK if sure else LIKELY[level])):
-                trial = roughly(problem, parent, score)
-                which = names(trial)
-                if level == 0 and rank < SURE and not sure:  # fitted in full, however bad the rough fit is
-                    likely.append(trial)
-                if which not in rough or trial.cost < rough[which].cost:
-                    rough[which] = trial
-        ranked = sorted(rough.values(), key=lambda f: f.merit)[: 2 if sure else FULL[level]]
-        if not ranked:
+        parents = [*beam, away] if level == 0 and away is not None else beam
+        full, scores = grow(problem, parents, candidates, QUICK if sure else ROUNDS[level], away, progress)
+        if level == 0:
+            first, candidates = tuple(scores), best_starts(scores)
+        if full and sure and worth(beam[0], full[0]):
+            full, _ = grow(problem, parents, candidates, ROUNDS[level], away, progress)
+        if not full:
             break
-        progress("fitting " + ", ".join(" + ".join(names(f)) for f in ranked[:3]))
-        ranked += [trial for trial in likely if not any(trial is f for f in ranked)]
-        best = min(f.cost for f in ranked)
-        full_by_name: dict[tuple[str, ...], Fit] = {}
-        for trial in ranked:
-            fitted = from_both(problem, trial, best, None if away is None else away.x)
-            best = min(best, fitted.cost)
-            which = names(fitted)
-            if which not in full_by_name or fitted.cost < full_by_name[which].cost:
-                full_by_name[which] = fitted
-        full = list(full_by_name.values())
-        full.sort(key=lambda f: f.merit)
-        wide = BEAM[level]
-        full = [polish(problem, f) if f.cost < 6 * full[0].cost else f for f in full[:wide]] + full[wide:]
-        loud = decide.COMPLETE * problem.floor
-        full = [enrich(problem, f, decide.better) if f.rms > loud else f for f in full[:wide]] + full[wide:]
-        full.sort(key=lambda f: f.merit)
         rounds.append(tuple(full))
         if not worth(beam[0], full[0]) or (level == 1 and full[0].cost > FAR * base.cost):
             break
         sure = enough(full[0])
-        beam = full[:1] if sure else [f for f in full[:wide] if f.cost < 30 * full[0].cost]
+        beam = full[:1] if sure else [f for f in full[: ROUNDS[level].keep] if f.cost < 30 * full[0].cost]
     return Search(base, tuple(rounds), first)
+
+
+def grow(
+    problem: Problem,
+    parents: Sequence[Fit],
+    candidates: Sequence[Hypothesis],
+    breadth: Breadth,
+    away: Fit | None,
+    progress: Callable[[str], None],
+) -> tuple[list[Fit], list[Score]]:
+    """One term more on top of each parent: fits, best first, and the scores beside the first parent."""
+    rough: dict[tuple[str, ...], Fit] = {}
+    likely: list[Fit] = []
+    first: list[Score] = []
+    for parent in parents:
+        taken = set(names(parent))
+        beside = f" beside {' and '.join(sorted(taken))}" * bool(taken)
+        progress(f"screening {len(candidates)} hypotheses{beside}")
+        scores = screen(problem, parent, [h for h in candidates if h.name not in taken])
+        if not first:
+            first, candidates = scores, best_starts(scores) if len(parents) > 1 and not taken else candidates
+        for rank, score in enumerate(shortlist(scores, breadth.likely)):
+            trial = roughly(problem, parent, score)
+            if rank < breadth.sure:  # fitted in full, however bad the rough fit is
+                likely.append(trial)
+            if names(trial) not in rough or trial.cost < rough[names(trial)].cost:
+                rough[names(trial)] = trial
+    ranked = sorted(rough.values(), key=lambda f: f.merit)[: breadth.full]
+    if not ranked:
+        return [], first
+    progress("fitting " + ", ".join(" + ".join(names(f)) for f in ranked[:3]))
+    ranked += [trial for trial in likely if not any(trial is f for f in ranked)]
+    best = min(f.cost for f in ranked)
+    fits: dict[tuple[str, ...], Fit] = {}
+    for trial in ranked:
+        fitted = from_both(problem, trial, best, None if away is None else away.x)
+        best = min(best, fitted.cost)
+        if names(fitted) not in fits or fitted.cost < fits[names(fitted)].cost:
+            fits[names(fitted)] = fitted
+    full = sorted(fits.values(), key=lambda f: f.merit)
+    near, rest = full[: breadth.keep], full[breadth.keep :]
+    near = [polish(problem, f) if f.cost < 6 * near[0].cost else f for f in near]
+    loud = decide.COMPLETE * problem.floor
+    near = [enrich(problem, f, decide.better) if f.rms > loud else f for f in near]
+    return sorted([*near, *rest], key=lambda f: f.merit), first
 
 
 def elsewhere(problem: Problem, base: Fit) -> Fit:

@@ -56,7 +56,7 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
     doubt = False
     for index in range(len(best.space.hypotheses)):
         places = [Alternative(best, index), *rivals[index]]
-        weights = decide.probabilities([p.fit for p in places])
+        weights = decide.probabilities([p.fit for p in places], problem.floor)
         names = weigh(places, weights)
         term = places[0].hypothesis.term
         own.append(_effect(places[0], names[term] * trust, best, rivals[index], block))
@@ -84,10 +84,10 @@ def with_jitter(verdict: Verdict, found: Jitter) -> Verdict:
     return verdict._replace(effects=(*verdict.effects, effect)[:MOST])
 
 
-def standing(best: Fit, index: int, rivals: Sequence[Alternative]) -> float:
+def standing(problem: Problem, best: Fit, index: int, rivals: Sequence[Alternative]) -> float:
     """Weight of the name of one hypothesis of the best model among those that could stand in its place."""
     places = [Alternative(best, index), *rivals]
-    return weigh(places, decide.probabilities([p.fit for p in places]))[places[0].hypothesis.term]
+    return weigh(places, decide.probabilities([p.fit for p in places], problem.floor))[places[0].hypothesis.term]
 
 
 def weigh(places: Sequence[Alternative], weights: np.ndarray) -> dict[str, float]:

@@ -145,6 +145,13 @@ def test_probabilities_add_up_to_one_and_go_by_cost(told):
                 assert weight >= other * (1 - 1e-9)
 
 
+def test_well_below_the_noise_models_are_equally_good():
+    noise = np.random.default_rng(0).standard_normal(2000)
+    fits = [made(level * noise, 1) for level in (0.6, 0.7, 1.0)]
+    assert probabilities(fits)[0] > 0.99
+    np.testing.assert_allclose(probabilities(fits, 0.9), [0.5, 0.5, 0.0], atol=1e-6)
+
+
 def test_equals_share_and_the_one_with_more_numbers_is_less_likely():
     same = probabilities([made(np.ones(20), 1), made(np.ones(20), 1)])
     np.testing.assert_allclose(same, [0.5, 0.5])
