@@ -28,6 +28,7 @@ class Size(NamedTuple):
     most: float = np.inf  # in units of share times measure
     least: float = -np.inf
     offset: str = ""  # "dry": on top of the base's dry friction
+    undoes: str = ""  # what of the base's a negative one takes away, and no more: friction never pushes
     finest: float = 0.0  # in steps of the sensor: less is no effect that this sensor could show
 
 
@@ -93,8 +94,8 @@ class Choice(NamedTuple):
 
 Part = Size | Limit | Shape | Turn | At | Hint | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
-    "friction.coulomb": (Size("F_C", "force", 0.1, signed=True),),
-    "friction.viscous": (Size("B", "drag", 0.1, signed=True),),
+    "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),
+    "friction.viscous": (Size("B", "drag", 0.1, signed=True, undoes="thick"),),
     "friction.stribeck": (
         Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.004, 0.02, 0.08, 0.3, 0.9), 5.0),
     ),
@@ -282,6 +283,14 @@ class Measures:
             return self.base["F_c"] * self.base["R_c"]
         return self.base.get("F_c" if self.record.plant == "axis" else name, 0.0)
 
+    def thick(self, node: str) -> float:
+        """Viscous friction of the base that a node feels, in its own unit."""
+        b = self.base
+        if self.record.plant == "ldu":
+            turning = b["B_c"] + b["R_c"] ** 2 * b["B_m"]
+            return {"carriage": turning / b["R_c"] ** 2, "motor": b["K_m2"] + turning / b["N"] ** 2}.get(node, turning)
+        return b.get("F_v", 0.0)
+
     def contact(self, node: str) -> float:
         """What a friction contact at the node carries, N (Nm of the motor at a wheel): what stands beyond it."""
         b, s = self.base, self.scale(node)
@@ -337,6 +346,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
         top = part.most if part.most < np.inf else 0.5 * m.most(part.name)
         for scale in dict.fromkeys(min(x * m.of(part.measure, node), top) for x in shares):
             least = part.least if part.signed else part.finest * m.of("grain", node) / scale
+            if part.undoes:
+                least = -(m.dry(node) if part.undoes == "dry" else m.thick(node)) / scale - 1e-3
             most = part.most / scale if part.measure == "one" else part.most
             yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset),), {}
     elif isinstance(part, Shape):

@@ -261,11 +261,13 @@ def roughly(problem: Problem, parent: Fit, score: Score) -> Fit:
 
 
 def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:
-    """Take out, one by one, every term without which the model is as good."""
+    """Take out, one by one, every term without which the model is as good, in another of its forms if need be."""
     while len(found.space.hypotheses) > 1:
         indices = range(len(found.space.hypotheses))
         trials = [dropped(problem, found, i, 10) for i in indices]
         less = min(trials, key=lambda f: f.merit)
+        if less.rms > decide.COMPLETE * problem.floor:
+            less = enrich(problem, less, decide.better)
         if worth(less, found):
             return found
         found = less

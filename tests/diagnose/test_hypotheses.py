@@ -182,3 +182,14 @@ def test_a_linear_drive_with_one_sensor_is_not_asked_about_its_second(moved):
     lost = {h.term for h in hypotheses(record, base, HINTS)} - {h.term for h in hypotheses(alone, base, HINTS)}
     assert "sensor.scale" in lost
     assert lost <= {"sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt"}
+
+
+@pytest.mark.parametrize(("kind", "node", "term", "most"), [
+    ("axis", "carriage", "friction.coulomb", 20.0), ("axis", "carriage", "friction.viscous", 200.0),
+    ("ivu", "motor1", "friction.viscous", 0.0), ("ldu", "carriage", "friction.viscous", 0.65),
+])  # fmt: skip
+def test_less_friction_than_the_base_has_is_no_push(moved, kind, node, term, most):
+    record, base = moved(kind)
+    (h,) = [h for h in hypotheses(record, base, only=(term,)) if h.node == node]
+    c = h.coordinates[0]
+    assert c.low * c.scale == pytest.approx(-most, rel=0.3, abs=2e-3 * c.scale)

@@ -1,0 +1,56 @@
+"""From a machine with something hidden in it to the opened seal: plant and loop as two processes, the capture
+diagnosed, the model run against it."""
+
+import os
+import signal
+from functools import partial
+
+import pytest
+
+from rtctl.diagnose import chain, find
+from rtctl.diagnose.export import read_model, write_model
+from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.kernel import TRACK
+from rtctl.diagnose.measure import compare
+from rtctl.diagnose.record import load_record
+from rtctl.diagnose.seal import open_seal
+from rtctl.trace.bundle import load_case
+
+AMONG = (  # of the LDU, whose library takes a minute in full
+    "friction.stribeck", "friction.coulomb", "friction.viscous", "friction.load", "drive.offset", "drive.deadband",
+    "load.spring",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("machine", "seed", "reference", "seconds", "only"),
+    [("ivu", 2, "steps", 13, ()), ("ldu", 2, "print_steps", 6, AMONG)],
+)
+def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(
+    started, runtime, tmp_path, monkeypatch, machine, seed, reference, seconds, only
+):
+    name, seal, folder = f"{machine}{os.getpid()}", tmp_path / "seal.json", tmp_path / "bundle"
+    endpoint = f"ipc://{runtime}/{name}.plant"
+    hide = ["--endpoint", endpoint, "--mode", "lockstep", "--conceal", str(seed), "--seal", str(seal)]
+    changes = [f"name={name}", f"link.endpoint={endpoint}", "link.plant=external", "link.timeout=60"]
+    run = ["run", machine, "--mode", "lockstep", "--reference", reference, "--for", f"{seconds}s", "--no-plot"]
+    with started("plant", machine, "--set", f"name={name}", *hide) as plant:
+        plant.stdout.readline()
+        with started(*run, "--out", str(folder), *(w for c in changes for w in ("--set", c))) as loop:
+            _, err = loop.communicate(timeout=300)
+        assert loop.returncode == 0, err
+        if plant.poll() is None:
+            plant.send_signal(signal.SIGINT)
+        plant.communicate(timeout=30)
+    record = load_record(folder)
+    assert 1 / record.dt == {"ivu": 500, "ldu": 10000}[machine]
+    if only:
+        monkeypatch.setattr(find, "hypotheses", partial(hypotheses, only=only))
+    told = chain.diagnose_record(record)
+    (entry,) = open_seal(seal)[0]["physics"]
+    assert (told.verdict, [e.name for e in told.effects]) == ("named", [entry["term"]])
+    path = write_model(told.after, record, tmp_path / "model.yaml", load_case(folder)["config"])
+    channel = next(iter(record.y))
+    models = (told.before, read_model(path, record))
+    before, after = (compare(record, model, TRACK, skip=len(record.t) // 4).channels[channel].rmse for model in models)
+    assert after < 0.6 * before
