@@ -11,18 +11,20 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, Diagnosis, Evidence, Interval, Located
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, Diagnosis, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit, Problem, fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.name import names
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.record import Record, load_record
+from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
-from rtctl.diagnose.verdict import Verdict, judge, with_jitter
+from rtctl.diagnose.verdict import Verdict, judge, of_factor, of_jitter, with_known
 from rtctl.plants.physics.timing import JitterSettings
 
 QUICK = 10 / 3  # times the usual bandwidth of the correction
@@ -52,7 +54,9 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         problem = found.problem
         checked = replace(checked, findings=(*checked.findings, solver.finding(problem, found.best.model)))
         verdict = judge(problem, found.base, found.best, found.rivals, problem.block)
-        verdict = verdict if found.jitter is None else with_jitter(verdict, found.jitter)
+        known = [of_jitter(found.jitter)] if found.jitter is not None else []
+        known += [of_factor(found.factor)] if found.factor is not None else []
+        verdict = with_known(verdict, known)
         progress("predicting rows that were not fitted")
         return _answer(sim, other, problem, found, verdict, checked)._replace(seconds=time.monotonic() - began)
 
@@ -95,7 +99,10 @@ def _answer(
 ) -> Diagnosis:
     """Prediction, intervals and all that the report needs."""
     record, base, best = sim.record, found.base, found.best
-    taken = best if verdict.verdict in (NAMED, AMBIGUOUS) else base
+    named = {e.name for e in verdict.effects}
+    taken = best if any(h.term in named for h in best.space.hypotheses) else base
+    if found.factor is not None and "sensor.scale" in named:
+        taken = fit(problem, taken.space.add(scaled(found.factor)), taken.x, rounds=8)
     cut = len(record.t) - round(HELDOUT * len(record.t))
     if other is None:
         judge_sim, rows = sim, slice(cut, None)
@@ -129,9 +136,16 @@ def _answer(
     )
 
 
+def scaled(found: Factor) -> Hypothesis:
+    """An encoder whose factor is known."""
+    return Hypothesis("sensor.scale", "encoder", (), {"relative": found.relative})
+
+
 def where(sim: Simulator, found: Found) -> Located:
     """Where recording and simulation part."""
     ticks = found.jitter is not None
+    if found.factor is not None and not ticks and not found.best.space.hypotheses:
+        return Located("reel1_counts", "encoder", "position", "all along the way", 0.0, 1.0)
     return locate.located(sim, found.problem, found.base, found.best, found.search, ticks)
 
 

@@ -11,6 +11,7 @@ from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
 from rtctl.diagnose.name import Search, dropped, eliminate, enrich, names, polish, rivals, search
+from rtctl.diagnose.reels import Factor, factor
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.verdict import SURE, Alternative, standing
@@ -19,6 +20,7 @@ CLOSE = 1.3  # times the best cost: a rival this near may be ahead in its richer
 CLEARLY = 0.5  # of the best cost: what a richer form must come down to, to take its place
 RICH = 10.0  # the same, of one that is tried in its richer form because the best is in it
 NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
+LOSES_WAY = ("transmission.slip", "transmission.creep", "sensor.scale", "sensor.rectified", "geometry.radius_change")
 MOST = 4  # rivals of one hypothesis
 Progress = Callable[[str], None]
 Places = tuple[tuple[Alternative, ...], ...]
@@ -29,6 +31,7 @@ class Found(NamedTuple):
 
     problem: Problem
     jitter: Jitter | None  # of the ticks
+    factor: Factor | None  # of the encoder, by the way of the reels
     base: Fit
     best: Fit
     search: Search
@@ -68,7 +71,9 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:
     if likelier is not best:
         best, near = likelier, replacements(problem, likelier, looked, (), progress)
     best, near = without_doubtful(problem, best, looked, near, progress)
-    return Found(problem, off, base, best, looked, near)
+    other = any(h.term in LOSES_WAY for h in best.space.hypotheses)
+    scale = None if other else factor(sim, best.model, base.space.owner)
+    return Found(problem, off, scale, base, best, looked, near)
 
 
 def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:

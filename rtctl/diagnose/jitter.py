@@ -21,6 +21,7 @@ ENOUGH = 400  # rows that fast
 LEAST = 0.02  # of a tick: less is what any clock does
 LOUD = 0.15  # of the variance at the usual speed, what jitter must add
 CERTAIN = 8.0  # standard errors
+LOUDER = 1.5  # times the noise that is left: a late tick also holds the last command for longer
 MIXED = (-0.82, -0.5)  # correlation of neighbouring second differences: -2/3 where the ticks are independent
 
 
@@ -78,7 +79,9 @@ def allowed_for(problem: Problem, model: Model, found: Jitter) -> Problem:
     out = problem.sim.run(model)[:, problem.channels]
     v = np.gradient(out, problem.sim.record.dt, axis=0)[problem.rows]
     spread = means((v * found.sigma / problem.sigma) ** 2, problem.mean) / problem.mean
-    return problem.weighed(1.0 / np.sqrt(1.0 + spread.T.ravel()))
+    allowing = problem.weighed(1.0 / np.sqrt(1.0 + spread.T.ravel()))
+    allowing.louder = LOUDER
+    return allowing
 
 
 def interval(found: Jitter) -> tuple[float, float]:

@@ -13,13 +13,14 @@ from rtctl.diagnose import decide
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.jitter import Jitter, interval
+from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals
 
 HALF = 0.5  # of the excess explained, and not by luck: something is there
 SURE = 0.7  # weight of a name among its rivals
 POSSIBLE = 0.05  # weight from which a rival is mentioned
-JITTER = 0.95  # confidence in a jitter, whose sign nothing else gives
+KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
 
 
@@ -73,15 +74,24 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
     return Verdict(AMBIGUOUS, tuple([*own, *new][:MOST]), share)
 
 
-def with_jitter(verdict: Verdict, found: Jitter) -> Verdict:
-    """The verdict with the jitter of the ticks beside it, which shows in the noise and stands for itself."""
-    low, high = interval(found)
-    effect = Effect("timing.jitter", "loop", JITTER, {"sigma": Interval(found.sigma, low, high, "s")}, ())
-    if verdict.verdict == NOTHING:
-        return Verdict(NAMED, (effect,), verdict.explained)
-    if verdict.verdict == UNNAMED:
+def with_known(verdict: Verdict, known: Sequence[Effect]) -> Verdict:
+    """The verdict with effects beside it that show elsewhere than in the error of the fit, and stand for themselves."""
+    if not known or verdict.verdict == UNNAMED:
         return verdict
-    return verdict._replace(effects=(*verdict.effects, effect)[:MOST])
+    effects = [*verdict.effects, *(e for e in known if e.name not in {v.name for v in verdict.effects})]
+    named = NAMED if verdict.verdict == NOTHING else verdict.verdict
+    return verdict._replace(verdict=named, effects=tuple(effects[:MOST]))
+
+
+def of_jitter(found: Jitter) -> Effect:
+    """Of the ticks, which shows in the noise."""
+    low, high = interval(found)
+    return Effect("timing.jitter", "loop", KNOWN, {"sigma": Interval(found.sigma, low, high, "s")}, ())
+
+
+def of_factor(found: Factor) -> Effect:
+    """Of the encoder, which shows in the way of the reels."""
+    return Effect("sensor.scale", "encoder", KNOWN, {"relative": Interval(*found, "")}, ())
 
 
 def standing(problem: Problem, best: Fit, index: int, rivals: Sequence[Alternative]) -> float:
