@@ -16,7 +16,7 @@ class Floor:
     """As much of a Problem as the judge looks at."""
 
     def __init__(self, floor, hiss=False):
-        self.floor, self.hiss, self.block = floor, lambda r: hiss, 20
+        self.floor, self.hiss, self.block, self.louder = floor, lambda r: hiss, 20, 1.0
 
 
 def made(r, terms=0, x=None):
