@@ -10,15 +10,18 @@ from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
-from rtctl.diagnose.name import Search, dropped, eliminate, enrich, names, polish, rivals, search
+from rtctl.diagnose.name import Search, dropped, eliminate, enrich, look_alikes, names, polish, rivals, search
 from rtctl.diagnose.reels import Factor, factor
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.verdict import SURE, Alternative, standing
+from rtctl.plants.physics import TERMS
 
 CLOSE = 1.3  # times the best cost: a rival this near may be ahead in its richer form
 CLEARLY = 0.5  # of the best cost: what a richer form must come down to, to take its place
 RICH = 10.0  # the same, of one that is tried in its richer form because the best is in it
+USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan")}
+EQUAL = 1.02  # times the best cost: equally good
 NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
 LOSES_WAY = ("transmission.slip", "transmission.creep", "sensor.scale", "sensor.rectified", "geometry.radius_change")
 MOST = 4  # rivals of one hypothesis
@@ -71,6 +74,7 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:
     if likelier is not best:
         best, near = likelier, replacements(problem, likelier, looked, (), progress)
     best, near = without_doubtful(problem, best, looked, near, progress)
+    best, near = usual_nodes(sim.record.plant, best, near)
     other = any(h.term in LOSES_WAY for h in best.space.hypotheses)
     scale = None if other else factor(sim, best.model, base.space.owner)
     return Found(problem, off, scale, base, best, looked, near)
@@ -84,6 +88,28 @@ def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:
         if weights.argmax() > 0:
             return fits[int(weights.argmax())]
     return best
+
+
+def usual_nodes(plant: str, best: Fit, near: Places) -> tuple[Fit, Places]:
+    """Of nodes that move together, and at which a term does equally well, the one where it usually stands."""
+    for places in near:
+        for k, place in enumerate(places):
+            own = {h.term: h.node for h in best.space.hypotheses}.get(place.hypothesis.term)
+            swap = own is not None and (plant, place.hypothesis.node) in USUAL and (plant, own) not in USUAL
+            same = sorted(h.term for h in place.fit.space.hypotheses) == sorted(h.term for h in best.space.hypotheses)
+            if swap and same and place.fit.cost < EQUAL * best.cost:
+                at = next(i for i, h in enumerate(best.space.hypotheses) if h.term == place.hypothesis.term)
+                others = [p for j, p in enumerate(places) if j != k]
+                changed = list(near)
+                changed[near.index(places)] = (Alternative(best, at), *others)
+                return place.fit, in_order(place.fit, best, tuple(changed))
+    return best, near
+
+
+def in_order(fitted: Fit, before: Fit, near: Places) -> Places:
+    """The rivals of each hypothesis, in the order of `fitted`, of the same terms as `before`."""
+    by_term = {h.term: places for h, places in zip(before.space.hypotheses, near, strict=True)}
+    return tuple(by_term[h.term] for h in fitted.space.hypotheses)
 
 
 def without_doubtful(
@@ -120,9 +146,14 @@ def replacements(
     for index, h in enumerate(best.space.hypotheses):
         rest = set(names(best)) - {h.name}
         tried = [f for f in looked.fits if len(f.space.hypotheses) == len(rest) + 1 and rest < set(names(f))]
-        if rest and candidates and decide.enough(problem, looked.base, best):  # else nothing is named
+        if candidates and decide.enough(problem, looked.base, best):  # else nothing is named
             progress(f"look-alikes of {h.name}")
-            tried += rivals(problem, best, index, candidates)
+            alike = set(TERMS[h.term].look_alikes)
+            if rest:
+                tried += rivals(problem, best, index, candidates, alike)
+            else:
+                alike -= {f.space.hypotheses[0].term for f in tried}
+                tried += look_alikes(problem, looked.base, looked.scores, alike, best.cost)
         nearest: dict[tuple[str, ...], Fit] = {}
         for f in sorted(tried, key=lambda f: f.merit):
             if names(f) != names(best):

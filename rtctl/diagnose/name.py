@@ -5,7 +5,7 @@ the likely ones roughly, the best of those in full, and keeps the best few, so t
 something else is still found. Then what is no longer needed is taken out.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -285,14 +285,27 @@ def drop(found: Fit, index: int) -> np.ndarray:
     return np.delete(found.x, found.space.columns(index))
 
 
-def rivals(problem: Problem, found: Fit, index: int, candidates: Sequence[Hypothesis], most: int = 3) -> list[Fit]:
-    """Full fits in which term `index` is replaced by each of the most likely others."""
+def rivals(
+    problem: Problem, found: Fit, index: int, candidates: Sequence[Hypothesis], alike: Collection[str], most: int = 3
+) -> list[Fit]:
+    """Full fits in which term `index` is replaced by each of the most likely others, and by those that look `alike`."""
     rest = dropped(problem, found, index, 4)
     taken = {h.name for h in found.space.hypotheses}
-    scores = shortlist(screen(problem, rest, [h for h in candidates if h.name not in taken]), 8)
-    rough = sorted((roughly(problem, rest, score) for score in scores), key=lambda f: f.merit)
+    scores = screen(problem, rest, [h for h in candidates if h.name not in taken])
+    rough = sorted((roughly(problem, rest, score) for score in shortlist(scores, 8)), key=lambda f: f.merit)
     best = [fit(problem, f.space, f.x, rounds=16, J=f.J, give_up=Hopeless(found.cost)) for f in rough[:most]]
-    return sorted(best, key=lambda f: f.merit)
+    seen = {f.space.hypotheses[-1].term for f in best}
+    return sorted([*best, *look_alikes(problem, rest, scores, set(alike) - seen, found.cost)], key=lambda f: f.merit)
+
+
+def look_alikes(problem: Problem, rest: Fit, scores: Sequence[Score], terms: Collection[str], cost: float) -> list[Fit]:
+    """Full fits of these terms on top of `rest`, each at the node and start that does best at first sight."""
+    first: dict[str, Score] = {}
+    for score in scores:
+        if score.hypothesis.term in terms and np.isfinite(score.gain):
+            first.setdefault(score.hypothesis.term, score)
+    rough = [roughly(problem, rest, score) for score in first.values()]
+    return [fit(problem, f.space, f.x, rounds=16, J=f.J, give_up=Hopeless(cost)) for f in rough]
 
 
 def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:

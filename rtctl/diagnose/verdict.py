@@ -49,6 +49,8 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
         return Verdict(UNNAMED if loud else NOTHING, (), 0.0)
     share = decide.explained(problem, base, best)
     whole = decide.complete(problem, base, best)
+    if patched(best):
+        return Verdict(UNNAMED, (), share)
     if not decide.enough(problem, base, best):
         loud = loud or (share > HALF and decide.p_value(best, base, block) < decide.LUCK)
         return Verdict(UNNAMED if loud else NOTHING, (), share)
@@ -72,6 +74,16 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
         return Verdict(NAMED, tuple(own), share)
     new = [e for e in others if e.name not in {o.name for o in own}]
     return Verdict(AMBIGUOUS, tuple([*own, *new][:MOST]), share)
+
+
+def patched(best: Fit) -> bool:
+    """Whether frictions that take from each other imitate a curve over speed that the library has not.
+
+    Less of one kind and more of another is no machine's doing.
+    """
+    found = {h.term: h.values(x) for h, x in zip(best.space.hypotheses, best.space.parts(best.x), strict=True)}
+    others = {"friction.viscous", "friction.stribeck"} & set(found)
+    return bool(others) and found.get("friction.coulomb", {}).get("F_C", 0.0) < 0.0
 
 
 def with_known(verdict: Verdict, known: Sequence[Effect]) -> Verdict:

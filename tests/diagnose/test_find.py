@@ -1,0 +1,48 @@
+"""Between models that explain a record equally well: usual sizes, and nodes where a term usually stands."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from rtctl.diagnose.find import most_likely, usual_nodes
+from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
+from rtctl.diagnose.verdict import Alternative
+
+R = np.random.default_rng(0).standard_normal(3000)
+PROBLEM = SimpleNamespace(floor=1.0)
+
+
+def fitted(*terms, loud=1.0, size=0.1):
+    hypotheses = tuple(Hypothesis(t, node, (Coordinate(name, SIZE, 1.0),)) for t, node, name in terms)
+    space = Space(Model("ldu", {"M": 1.0}), (), lambda name: 0.1, hypotheses)
+    r = loud * R
+    return Fit(space, np.full(len(terms), size), r, np.zeros((len(r), len(terms))), 0.5 * float(r @ r))
+
+
+SPRING = ("load.spring", "carriage", "k")
+CAPSTAN, CARRIAGE = (("friction.stribeck", node, "F_s") for node in ("capstan", "carriage"))
+
+
+def test_of_nodes_that_move_together_the_usual_one_is_told():
+    best, other, rival = fitted(SPRING, CAPSTAN), fitted(CARRIAGE, SPRING), fitted(SPRING, loud=3.0)
+    near = ((Alternative(rival, 0),), (Alternative(other, 0),))
+    found, places = usual_nodes("ldu", best, near)  # type: ignore[arg-type]
+    assert found is other
+    assert [p.fit for p in places[0]] == [best]  # in the order of what was found, the former best among its rivals
+    assert [p.fit for p in places[1]] == [rival]
+
+
+def test_but_not_where_it_does_worse():
+    best, other = fitted(CAPSTAN), fitted(CARRIAGE, loud=1.1)
+    assert usual_nodes("ldu", best, ((Alternative(other, 0),),))[0] is best  # type: ignore[arg-type]
+    usual = fitted(CARRIAGE)
+    assert usual_nodes("ldu", usual, ((Alternative(fitted(CAPSTAN), 0),),))[0] is usual  # type: ignore[arg-type]
+
+
+def test_of_equal_models_the_usual_size_goes_first():
+    tilt = fitted(("friction.asymmetry", "carriage", "a"), size=0.95)
+    push = fitted(("drive.offset", "drive", "offset"))
+    assert most_likely(PROBLEM, tilt, ((Alternative(push, 0),),)) is push  # type: ignore[arg-type]
+    assert most_likely(PROBLEM, push, ((Alternative(tilt, 0),),)) is push  # type: ignore[arg-type]

@@ -1,0 +1,45 @@
+"""What becomes of a best model: a name, and no name for what only imitates."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
+from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.jitter import Jitter
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.reels import Factor
+from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
+from rtctl.diagnose.verdict import Verdict, of_factor, of_jitter, patched, with_known
+
+
+def fitted(**sizes):
+    names = {"F_C": "friction.coulomb", "B": "friction.viscous", "offset": "drive.offset"}
+    hypotheses = tuple(Hypothesis(names[k], "carriage", (Coordinate(k, SIZE, 1.0),)) for k in sizes)
+    space = Space(Model("axis", {"M": 1.0}), (), lambda name: 0.1, hypotheses)
+    return Fit(space, np.array(list(sizes.values())), np.ones(10), np.zeros((10, len(sizes))), 5.0)
+
+
+@pytest.mark.parametrize(("sizes", "expected"), [
+    ({"F_C": -1.0, "B": 5.0}, True), ({"F_C": 1.0, "B": 5.0}, False), ({"F_C": -1.0}, False),
+    ({"F_C": -1.0, "offset": 0.1}, False),
+])  # fmt: skip
+def test_less_dry_and_more_viscous_friction_is_another_curve(sizes, expected):
+    assert patched(fitted(**sizes)) == expected
+
+
+def test_what_shows_elsewhere_stands_beside_a_verdict():
+    jitter, scale = of_jitter(Jitter(2e-4, 1e-5)), of_factor(Factor(0.07, 0.05, 0.09))
+    assert jitter.parameters["sigma"].low < 2e-4 < jitter.parameters["sigma"].high
+    nothing, unnamed = Verdict(NOTHING, (), 0.0), Verdict(UNNAMED, (), 0.2)
+    assert with_known(nothing, []) is nothing
+    assert with_known(unnamed, [jitter]) is unnamed
+    both = with_known(nothing, [jitter, scale])
+    assert (both.verdict, [e.name for e in both.effects]) == (NAMED, ["timing.jitter", "sensor.scale"])
+    doubt = Verdict(AMBIGUOUS, (Effect("drive.offset", "drive", 0.5, {}, ()),), 1.0)
+    assert with_known(doubt, [jitter]).verdict == AMBIGUOUS
+    assert [e.name for e in with_known(doubt, [jitter]).effects] == ["drive.offset", "timing.jitter"]
+
+
+def test_it_is_not_told_twice():
+    named = Verdict(NAMED, (Effect("sensor.scale", "encoder", 0.9, {}, ()),), 1.0)
+    assert with_known(named, [of_factor(Factor(0.07, 0.05, 0.09))]).effects == named.effects
