@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, Diagnosis, Evidence, Interval, Located
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet
 from rtctl.diagnose.fit import Fit, Problem, fit
@@ -24,7 +24,7 @@ from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
-from rtctl.diagnose.verdict import Verdict, judge, of_factor, of_jitter, with_known
+from rtctl.diagnose.verdict import Verdict, judge, of_factor, of_jitter, proven, with_known
 from rtctl.plants.physics.timing import JitterSettings
 
 QUICK = 10 / 3  # times the usual bandwidth of the correction
@@ -54,9 +54,6 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         problem = found.problem
         checked = replace(checked, findings=(*checked.findings, solver.finding(problem, found.best.model)))
         verdict = judge(problem, found.base, found.best, found.rivals, problem.block)
-        known = [of_jitter(found.jitter)] if found.jitter is not None else []
-        known += [of_factor(found.factor)] if found.factor is not None else []
-        verdict = with_known(verdict, known)
         progress("predicting rows that were not fitted")
         return _answer(sim, other, problem, found, verdict, checked)._replace(seconds=time.monotonic() - began)
 
@@ -99,7 +96,9 @@ def _answer(
 ) -> Diagnosis:
     """Prediction, intervals and all that the report needs."""
     record, base, best = sim.record, found.base, found.best
-    named = {e.name for e in verdict.effects}
+    known = [of_jitter(found.jitter)] if found.jitter is not None else []
+    known += [of_factor(found.factor)] if found.factor is not None else []
+    named = {e.name for e in with_known(verdict, known).effects}
     taken = best if any(h.term in named for h in best.space.hypotheses) else base
     if found.factor is not None and "sensor.scale" in named:
         taken = fit(problem, taken.space.add(scaled(found.factor)), taken.x, rounds=8)
@@ -112,6 +111,9 @@ def _answer(
         before, after = base.model, taken.model
     errors = [heldout.nrmse(judge_sim, model, rows) for model in (before, after)]
     floor = problem.floor * float(problem.sigma[0]) / (float(np.std(judge_sim.seen)) or 1.0)
+    verdict = with_known(proven(verdict, errors[0], errors[1], floor), known)
+    if verdict.verdict == UNNAMED:
+        taken, errors[1] = base, errors[0]
     runs = heldout.free_fit(sim, taken).model
     return Diagnosis(
         record=record,

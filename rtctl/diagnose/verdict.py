@@ -20,6 +20,9 @@ from rtctl.diagnose.uncertainty import covariance, effect_intervals
 HALF = 0.5  # of the excess explained, and not by luck: something is there
 SURE = 0.7  # weight of a name among its rivals
 POSSIBLE = 0.05  # weight from which a rival is mentioned
+LOST = 1e3  # error of a free run that ran away, which tells nothing of the terms
+TELLING = 3.0  # times the noise: a prediction that was worse than that can be made better
+CLOSED, CLOSED_BY_SEVERAL = 0.6, 0.87  # of the gap to the noise, that one named term and that several must close
 KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
 
@@ -74,6 +77,21 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
         return Verdict(NAMED, tuple(own), share)
     new = [e for e in others if e.name not in {o.name for o in own}]
     return Verdict(AMBIGUOUS, tuple([*own, *new][:MOST]), share)
+
+
+def proven(verdict: Verdict, before: float, after: float, floor: float) -> Verdict:
+    """The verdict once its model has predicted rows that it was not fitted on, with errors `before` and `after` it.
+
+    Terms that only imitate what is missing fit the rows that they have seen and predict the others badly, several of
+    them together most of all. Where hardly anything was to be gained the prediction says nothing.
+    """
+    if verdict.verdict != NAMED or before < TELLING * floor or max(before, after) >= LOST:
+        return verdict
+    gap = (before - after) / (before - floor)
+    if gap < (CLOSED if len(verdict.effects) == 1 else CLOSED_BY_SEVERAL):
+        return Verdict(UNNAMED, (), verdict.explained)
+    sure = 0.5 + 0.5 * min(gap, 1.0)
+    return verdict._replace(effects=tuple(e._replace(confidence=min(e.confidence, sure)) for e in verdict.effects))
 
 
 def patched(best: Fit) -> bool:

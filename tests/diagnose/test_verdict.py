@@ -9,7 +9,7 @@ from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
-from rtctl.diagnose.verdict import Verdict, of_factor, of_jitter, patched, with_known
+from rtctl.diagnose.verdict import Verdict, of_factor, of_jitter, patched, proven, with_known
 
 
 def fitted(**sizes):
@@ -43,3 +43,15 @@ def test_what_shows_elsewhere_stands_beside_a_verdict():
 def test_it_is_not_told_twice():
     named = Verdict(NAMED, (Effect("sensor.scale", "encoder", 0.9, {}, ()),), 1.0)
     assert with_known(named, [of_factor(Factor(0.07, 0.05, 0.09))]).effects == named.effects
+
+
+@pytest.mark.parametrize(("count", "after", "expected"), [
+    (1, 0.2, NAMED), (1, 0.5, UNNAMED), (2, 0.12, NAMED), (2, 0.2, UNNAMED), (3, 2.0, UNNAMED),
+])  # fmt: skip
+def test_a_name_must_predict(count, after, expected):
+    """From 1.0, where noise leaves 0.01."""
+    named = Verdict(NAMED, (Effect("drive.offset", "drive", 0.98, {}, ()),) * count, 1.0)
+    told = proven(named, 1.0, after, 0.01)
+    assert told.verdict == expected
+    assert all(0.88 < e.confidence < 0.96 for e in told.effects)
+    assert proven(named, 0.02, 0.02, 0.01) is named  # where there was nothing to predict
