@@ -21,6 +21,7 @@ from rtctl.diagnose.name import names
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.reels import Factor
+from rtctl.diagnose.rest import awake
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
@@ -47,12 +48,16 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
     began = time.monotonic()
     with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
         progress("preflight")
+        whole, record = len(record.t), awake(record)
         checked = preflight(record)
         sim = simulator(record)
         problem = Problem(sim)
         found = find(sim, problem, progress)
         problem = found.problem
-        checked = replace(checked, findings=(*checked.findings, solver.finding(problem, found.best.model)))
+        more = [solver.finding(problem, found.best.model)]
+        if len(record.t) < whole:
+            more.append(f"The last {(whole - len(record.t)) * record.dt:.0f} s, in which it rests, are left out.")
+        checked = replace(checked, findings=(*checked.findings, *more))
         verdict = judge(problem, found.base, found.best, found.rivals, problem.block)
         progress("predicting rows that were not fitted")
         return _answer(sim, other, problem, found, verdict, checked)._replace(seconds=time.monotonic() - began)

@@ -1,0 +1,34 @@
+"""A long rest at the end is left out, and only that."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.rest import REST, awake
+
+MOVE, RATE = 5.0, 1000
+
+
+@pytest.fixture
+def resting(blank):
+    def make(rest, works=False):
+        t = np.arange(round((MOVE + rest) * RATE)) / RATE
+        x = np.where(t < MOVE, 0.05 * (1 - np.cos(2 * np.pi * t / MOVE * 1.5)), 0.1)
+        u = np.where(t < MOVE, np.sin(t), 0.5 * np.sin(40 * t) if works else 0.2)
+        return blank("axis", u, x)
+
+    return make
+
+
+def test_what_follows_the_last_motion_is_left_out(resting):
+    record = resting(60.0)
+    short = awake(record)
+    assert len(short.t) * short.dt == pytest.approx(MOVE + REST, abs=0.3)
+    for name in ("ref", "w", "u"):
+        assert len(getattr(short, name)) == len(short.t) == len(short.y["x"])
+    assert len(record.t) == 65 * RATE
+
+
+@pytest.mark.parametrize(("rest", "works"), [(0.0, False), (4.0, False), (60.0, True)])
+def test_a_short_rest_and_a_machine_that_is_pushed_at_rest_stay(resting, rest, works):
+    record = resting(rest, works)
+    assert awake(record) is record
