@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import norm
 
 from rtctl.diagnose.fit import Fit, Problem
-from rtctl.diagnose.stretches import loudness
+from rtctl.diagnose.stretches import loudness, rms
 from rtctl.plants.physics import TERMS
 
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
@@ -45,11 +45,6 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
 def better(before: Fit, after: Fit) -> bool:
     """Whether a richer form of the same terms earns its numbers, whatever else is left over."""
     return after.merit < (1.0 - MATERIAL) * before.merit
-
-
-def rms(r: np.ndarray) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(r**2)))
 
 
 def merit(fitted: Fit, weights: np.ndarray) -> float:

@@ -21,6 +21,7 @@ from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.space import Space
+from rtctl.diagnose.stretches import rms
 
 FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # of SIGMA, on quiet machines
 TOLL = 0.08  # share of the cost that a further number of a term must take off
@@ -52,7 +53,7 @@ class Fit(NamedTuple):
     @property
     def rms(self) -> float:
         """Of the weighted error: 1 or less is all noise."""
-        return float(np.sqrt(np.mean(self.r**2)))
+        return rms(self.r)
 
     @property
     def merit(self) -> float:
@@ -118,7 +119,7 @@ class Problem:
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
         main = r[: len(r) // len(self.channels)]
-        if float(np.sqrt(np.mean(main**2))) > LOUDEST[self.sim.record.plant] * self.floor:
+        if rms(main) > LOUDEST[self.sim.record.plant] * self.floor:
             return False
         return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.floor)
 

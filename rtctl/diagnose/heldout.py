@@ -18,8 +18,10 @@ from rtctl.diagnose.model import Model
 from rtctl.diagnose.name import enrich
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.stretches import rms
 
 TRIES = 4  # weights of the two errors, by what the last fit left of each
+NONE = 1e-12  # an rms to divide by is never quite 0
 WORSE = 1.5  # times the rms on track: a free run is not bought at any price
 
 
@@ -62,7 +64,7 @@ class FreeRun(Problem):
     def weigh(self, model: Model) -> None:
         """Make both errors of `model` count alike, and begin the free run as it wants to."""
         self.start = begin(self.sim, model)
-        self.near, self.far = rms(super().residual(model)), rms(self.drift(model))
+        self.near, self.far = (max(rms(x), NONE) for x in (super().residual(model), self.drift(model)))
 
     def drift(self, model: Model, coarse: bool = False) -> np.ndarray:
         """Error of the free run (rows,), in the sensor's unit."""
@@ -92,8 +94,3 @@ def free_fit(sim: Simulator, fitted: Fit) -> Fit:
         moved = fit(problem, moved.space, moved.x, rounds=10, enough=1e-3)
     problem.weigh(moved.model)
     return moved if problem.near < WORSE * track else fitted
-
-
-def rms(x: np.ndarray) -> float:
-    """Root of the mean square, never quite 0."""
-    return max(float(np.sqrt(np.mean(x**2))), 1e-12)

@@ -254,7 +254,6 @@ class Measures:
             "low": s.low,
             "drag": s.force / s.speed,
             "stiff": s.force / s.span,
-            "contact": self.contact(node),
             "twist": s.force / self.stiffness(node),
             "cubic": self.stiffness(node) ** 3 / s.force**2,
             "square": self.stiffness(node) ** 2 / s.force,
@@ -290,15 +289,6 @@ class Measures:
             turning = b["B_c"] + b["R_c"] ** 2 * b["B_m"]
             return {"carriage": turning / b["R_c"] ** 2, "motor": b["K_m2"] + turning / b["N"] ** 2}.get(node, turning)
         return b.get("F_v", 0.0)
-
-    def contact(self, node: str) -> float:
-        """What a friction contact at the node carries, N (Nm of the motor at a wheel): what stands beyond it."""
-        b, s = self.base, self.scale(node)
-        if self.record.plant == "ivu":
-            return (b["tau_Fc"] + b["J_c"] * s.force / self.inertia("capstan")) / b["R_c"]
-        if node == "capstan":
-            return b["F_c"] + b["M"] * self.scale("carriage").force / self.inertia("carriage")
-        return s.force / b["N"] if node == "wheel" else s.force
 
     def inertia(self, node: str) -> float:
         """Inertia or mass that moves with a node."""

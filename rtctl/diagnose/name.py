@@ -146,11 +146,7 @@ def elsewhere(problem: Problem, base: Fit) -> Fit:
     Those that fit the quiet stretches of the record if they fit them clearly better; else the owner's.
     """
     calm = calm_fit(problem, base)
-    x = (
-        calm.x
-        if usual(calm.r) < CALMER * usual(base.r)
-        else np.where(np.arange(len(base.x)) < base.space.nb, 0.0, base.x)
-    )
+    x = calm.x if usual(calm.r) < CALMER * usual(base.r) else np.zeros_like(base.x)
     return Fit(base.space, x, *at(problem, base.space, x))
 
 

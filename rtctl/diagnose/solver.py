@@ -1,11 +1,10 @@
 """Whether the simulation itself is to be trusted: the same model at half the step. A solver's error once looked like a
 delay."""
 
-import numpy as np
-
 from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.stretches import rms
 
 LOUD = 0.5  # of the noise floor
 
@@ -15,7 +14,7 @@ def step_error(problem: Problem, model: Model) -> float:
     sim = problem.sim
     half = Problem(Simulator(sim.record, finer=2, follow=sim.follow), mean=problem.mean, channels=problem.channels)
     change = half.error(model) - problem.error(model)
-    return float(np.sqrt(np.mean(change**2))) / max(problem.floor, 1e-12)
+    return rms(change) / max(problem.floor, 1e-12)
 
 
 def finding(problem: Problem, model: Model) -> str:

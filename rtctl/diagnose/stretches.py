@@ -5,6 +5,11 @@ import numpy as np
 LENGTH = 100  # errors
 
 
+def rms(r: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(r**2)))
+
+
 def loudness(r: np.ndarray) -> np.ndarray:
     """Rms of the errors r (n,) in the stretch that each lies in, (n,)."""
     count = max(len(r) // LENGTH, 1)

@@ -54,14 +54,15 @@ def parameter_intervals(fitted: Fit, cov: np.ndarray) -> dict[str, Interval]:
 def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Interval]:
     """90 % intervals of the parameters of one hypothesis."""
     h, kind = fitted.space.hypotheses[index], fitted.model.kind
-    at = fitted.space.nb + sum(len(g.coordinates) for g in fitted.space.hypotheses[:index])
+    columns = fitted.space.columns(index)
+    own = cov[np.ix_(columns, columns)]
     x = fitted.space.parts(fitted.x)[index]
     values = h.values(x)
     out: dict[str, Interval] = {}
     for i, c in enumerate(h.coordinates):
-        half = Z90 * float(np.sqrt(max(cov[at + i, at + i], 0.0)))
+        half = Z90 * float(np.sqrt(max(own[i, i], 0.0)))
         if c.kind == COSINE:
-            out |= _turn(kind, h, x, i, cov[at + i : at + i + 2, at + i : at + i + 2], values)
+            out |= _turn(kind, h, x, i, own[i : i + 2, i : i + 2], values)
         elif c.kind == SHAPE:
             v = values[c.name]
             out[c.name] = Interval(
