@@ -9,8 +9,8 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.cli.common import load_config, with_loop, with_reference
-from rtctl.daemon.loop_process import Loop
 from rtctl.loop import generate
+from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.records import layout
 from rtctl.plants import ivu, ldu, linear

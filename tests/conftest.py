@@ -14,8 +14,8 @@ import yaml
 
 from rtctl import machines
 from rtctl.config.load import set_path
-from rtctl.daemon.loop_process import Loop
 from rtctl.loop import generate
+from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout

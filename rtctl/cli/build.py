@@ -60,9 +60,9 @@ def _compile(machine: Any, link: str) -> None:
     import tempfile
     from pathlib import Path
 
-    from rtctl.daemon.loop_process import Loop
     from rtctl.daemon.plant_process import Plant
     from rtctl.loop import generate, zmq_link
+    from rtctl.loop.loop import Loop
     from rtctl.loop.memory import Segment
     from rtctl.loop.records import layout
 
