@@ -50,9 +50,7 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         progress("preflight")
         whole, record = len(record.t), awake(record)
         checked = preflight(record)
-        sim = simulator(record)
-        problem = Problem(sim)
-        found = find(sim, problem, progress)
+        sim, found = searched(record, progress)
         problem = found.problem
         more = [solver.finding(problem, found.best.model)]
         if len(record.t) < whole:
@@ -63,26 +61,30 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         return _answer(sim, other, problem, found, verdict, checked)._replace(seconds=time.monotonic() - began)
 
 
-def simulator(record: Record) -> Simulator:
-    """The recording to be simulated, at the bandwidth that suits it.
+def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
+    """What is found in a recording, and the simulator, at the bandwidth that suits it.
 
     For a machine without a controller: of a command that was held and one that was sampled, the one that fits. For an
-    axis under control that is far from its model: a quicker correction, which lets less of the slow wandering through
-    that random forces make and that a small difference between two hypotheses drowns in; but only if what is missing
-    still shows.
+    axis under control that no model explains down to the noise: a quicker correction, which lets less of the slow
+    wandering through that random forces make and that a small difference between two hypotheses drowns in; but only
+    if what is missing still shows.
     """
-    if record.plant != "axis":
-        return Simulator(record)
-    problem, fitted = base_of(Simulator(record))
-    if record.case.controller.kind == "none":
+    sim = Simulator(record)
+    if record.plant == "axis" and record.case.controller.kind == "none":
+        problem, fitted = base_of(sim)
         smooth = base_of(Simulator(record, held=False))
-        return problem.sim if fitted.cost <= smooth[1].cost else smooth[0].sim
-    faster = min(QUICK * problem.sim.follow, FASTEST / record.dt)
-    if fitted.rms > decide.LOUD * problem.floor and faster > problem.sim.follow:
-        quick, fitted = base_of(Simulator(record, follow=faster))
-        if fitted.rms > SHOWS * quick.floor:
-            return quick.sim
-    return problem.sim
+        sim = sim if fitted.cost <= smooth[1].cost else smooth[0].sim
+    found = find(sim, Problem(sim), progress)
+    faster = min(QUICK * sim.follow, FASTEST / record.dt)
+    if record.plant != "axis" or record.case.controller.kind == "none" or faster <= sim.follow:
+        return sim, found
+    problem, base = found.problem, found.base
+    if base.rms < decide.LOUD * problem.floor or decide.quiet(problem, base, found.best):
+        return sim, found
+    quick, fitted = base_of(Simulator(record, follow=faster))
+    if fitted.rms < SHOWS * quick.floor:
+        return sim, found
+    return quick.sim, find(quick.sim, quick, progress)
 
 
 def base_of(sim: Simulator) -> tuple[Problem, Fit]:

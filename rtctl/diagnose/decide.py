@@ -18,9 +18,12 @@ from rtctl.plants.physics import TERMS
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
 LOUD = 4.5  # times the noise floor: below it what no hypothesis explains may be a machine that is not quiet
 NEARLY = 0.1  # the same where the model is already near the noise
+BESIDE = 0.5  # the same where more is left than noise, which the form of a law may account for
 QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
 LUCK = 1e-4  # chance that a term does so well there by luck
+NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
+CLEAR = 0.15  # share of the cost that it must take off
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
 FORM = 0.04  # of what a term does: what the form of its law may miss
 MOSTLY = 0.75  # share of the excess that a name must explain besides
@@ -36,10 +39,16 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     weights = discount(problem, base, before)
     if rms(weights * before.r) < problem.floor:
         return False
-    near = complete(problem, base, before)
-    if near and (problem.louder > 1.0 or p_value(after, before, problem.block) > LUCK):
-        return False  # of a machine that is known to be louder nobody knows what is noise
-    return merit(after, weights) < (1.0 - (NEARLY if near else MATERIAL)) * merit(before, weights)
+    share = MATERIAL
+    if complete(problem, base, before):
+        chance = p_value(after, before, problem.block)
+        if problem.louder > 1.0 or chance > LUCK:
+            return False  # of a machine that is known to be louder nobody knows what is noise
+        noise = rms(before.r) < COMPLETE * problem.floor
+        if noise and chance < NEVER and after.cost < (1.0 - CLEAR) * before.cost:
+            return True
+        share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
+    return merit(after, weights) < (1.0 - share) * merit(before, weights)
 
 
 def better(before: Fit, after: Fit) -> bool:
@@ -61,8 +70,12 @@ def discount(problem: Problem, base: Fit, fitted: Fit) -> np.ndarray:
 
 def complete(problem: Problem, base: Fit, fitted: Fit) -> bool:
     """Whether what is left is noise: of the sensor, or of random forces on the machine."""
-    left = rms(discount(problem, base, fitted) * fitted.r)
-    return left < COMPLETE * problem.floor or problem.hiss(fitted.r)
+    return quiet(problem, base, fitted) or problem.hiss(fitted.r)
+
+
+def quiet(problem: Problem, base: Fit, fitted: Fit) -> bool:
+    """Whether what is left is no more than the noise of the sensor."""
+    return rms(discount(problem, base, fitted) * fitted.r) < COMPLETE * problem.floor
 
 
 def enough(problem: Problem, before: Fit, after: Fit) -> bool:

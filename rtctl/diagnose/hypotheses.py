@@ -97,7 +97,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),
     "friction.viscous": (Size("B", "drag", 0.1, signed=True, undoes="thick"),),
     "friction.stribeck": (
-        Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.004, 0.02, 0.08, 0.3, 0.9), 5.0),
+        Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.012, 0.035, 0.1, 0.3, 0.9), 4.0),
     ),
     "friction.presliding": (Size("z_s", "span", 1e-3, finest=1.0), Choice("form", ("dahl", "lugre"))),
     "friction.asymmetry": (Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),

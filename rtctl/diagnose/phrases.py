@@ -40,8 +40,8 @@ PHRASES: dict[str, Phrase] = {name: Phrase(*words) for name, words in {
                   "quick changes of the command"),
     "drive.thermal": ("drift with warmth", "{here} changes as it warms", "{a:%} {a:weaker|stronger} once warm, with a "
                       "time constant of {tau}", "a longer time of hard work"),
-    "friction.coulomb": ("dry friction", "{here} rubs", "{F_C} {F_C:more|less} dry friction than in the model, at any "
-                         "speed", BOTH),
+    "friction.coulomb": ("dry friction", "{here} rubs", "{F_added} {F_added:more|less} dry friction than in the "
+                         "model, at any speed", BOTH),
     "friction.viscous": ("viscous friction", "{here} drags with speed", "{B} {B:more|less} viscous friction than in "
                          "the model", "moves at several speeds"),
     "friction.stribeck": ("sticking", "{here} sticks", "{sticking:words}", "standstills and slow moves"),

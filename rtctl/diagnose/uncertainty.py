@@ -13,7 +13,7 @@ from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, Hypothesis
-from rtctl.diagnose.words import unit_at
+from rtctl.diagnose.words import DRY, base_dry, unit_at
 
 Z90 = 1.645
 EVEN = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within one either way
@@ -74,7 +74,24 @@ def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Inte
         elif c.kind in ("size", PLACE):
             v, w = values[c.name], abs(c.scale) * half
             out[c.name] = Interval(v, v - w, v + w, parameter_unit(kind, h, c.name))
-    return out
+    return with_total(out, fitted, h, cov, columns[0]) if h.term == "friction.coulomb" else out
+
+
+def with_total(
+    own: dict[str, Interval], fitted: Fit, h: Hypothesis, cov: np.ndarray, column: int
+) -> dict[str, Interval]:
+    """What a term of dry friction adds, F_added, and all the dry friction of its node, F_C: the record knows the sum
+    better than its parts."""
+    added = own["F_C"]
+    name = DRY[fitted.model.kind].get(h.node, "")
+    dry = base_dry(fitted.model, h.node)
+    if name not in fitted.space.names or not np.isfinite(dry):
+        return {"F_added": added, **own}
+    i, dry = fitted.space.names.index(name), dry - added.value
+    slope = np.array([dry, h.coordinates[0].scale])
+    half = Z90 * float(np.sqrt(max(slope @ cov[np.ix_([i, column], [i, column])] @ slope, 0.0)))
+    total = dry + added.value
+    return {"F_C": Interval(total, total - half, total + half, added.unit), "F_added": added}
 
 
 def _turn(

@@ -13,6 +13,7 @@ from rtctl.diagnose import decide
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.jitter import Jitter, interval
+from rtctl.diagnose.name import dropped
 from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals
@@ -25,6 +26,7 @@ TELLING = 3.0  # times the noise: a prediction that was worse than that can be m
 CLOSED, CLOSED_BY_SEVERAL = 0.6, 0.87  # of the gap to the noise, that one named term and that several must close
 KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
+WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
 
 
 class Alternative(NamedTuple):
@@ -60,7 +62,7 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
     trust = 0.98 if whole else 0.6 + 0.35 * share
     own, others = [], []
     doubt = False
-    for index in range(len(best.space.hypotheses)):
+    for index in by_weight(problem, best):
         places = [Alternative(best, index), *rivals[index]]
         weights = decide.probabilities([p.fit for p in places], problem.floor)
         names = weigh(places, weights)
@@ -77,6 +79,15 @@ def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alte
         return Verdict(NAMED, tuple(own), share)
     new = [e for e in others if e.name not in {o.name for o in own}]
     return Verdict(AMBIGUOUS, tuple([*own, *new][:MOST]), share)
+
+
+def by_weight(problem: Problem, best: Fit) -> list[int]:
+    """Numbers of the hypotheses, that first without which the model is worst."""
+    count = len(best.space.hypotheses)
+    if count < 2:
+        return list(range(count))
+    without = [dropped(problem, best, i, WITHOUT).cost for i in range(count)]
+    return sorted(range(count), key=lambda i: -without[i])
 
 
 def proven(verdict: Verdict, before: float, after: float, floor: float) -> Verdict:

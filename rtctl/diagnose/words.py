@@ -33,7 +33,8 @@ DIMENSIONS = {  # unit of a parameter where a node turns, and where it slides
     "stiff": ("Nm/rad", "N/m"), "inertia": ("kg m^2", "kg"), "cubic": ("Nm/rad^3", "N/m^3"),
 }  # fmt: skip
 BY_NODE = {
-    "F_C": "force", "F_s": "force", "F": "force", "F_h": "force", "B": "drag", "B_a": "drag", "v_s": "speed",
+    "F_C": "force", "F_added": "force", "F_s": "force", "F": "force", "F_h": "force", "B": "drag", "B_a": "drag",
+    "v_s": "speed",
     "z_s": "way", "z_h": "way", "gap": "way", "size": "way", "each": "way", "mark": "way", "at": "way", "width": "way",
     "x0": "way", "turn": "way", "mass": "inertia", "c3": "cubic", "k": "stiff",
 }  # fmt: skip
@@ -91,7 +92,7 @@ class Sizes:
         """SI value; nan where nobody knows it."""
         if name in self.parameters:
             return float(self.parameters[name].value)
-        found = getattr(self.term, name, None)
+        found = getattr(self.term, "F_C" if name == "F_added" else name, None)
         if found is None and self.name in TERMS:
             field = TERMS[self.name].settings.model_fields.get(name)
             found = None if field is None or field.is_required() else field.get_default(call_default_factory=True)
@@ -107,13 +108,16 @@ class Sizes:
         return given or unit_at(self.model.kind, self.name, self.node, name)
 
 
+DRY = {  # parameter that the dry friction of a node is, or comes from
+    "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
+    "ldu": {"capstan": "F_c", "carriage": "F_c"},
+    "axis": {"carriage": "F_c"},
+}
+
+
 def base_dry(model: Model, node: str) -> float:
     """Dry friction that the model has at a node without Stribeck's, Nm or N; nan where its equations have none."""
-    name = {
-        "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
-        "ldu": {"capstan": "F_c", "carriage": "F_c"},
-        "axis": {"carriage": "F_c"},
-    }[model.kind].get(node)
+    name = DRY[model.kind].get(node)
     dry = model.base.get(name, 0.0) if name else 0.0
     if model.kind == "ldu" and node == "capstan":
         dry *= model.base.get("R_c", 1.0)

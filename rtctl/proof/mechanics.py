@@ -127,7 +127,7 @@ def creep(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
         return {"per_N": k / s.truth["R_c"]}
     relative = about(rng, 6e-4) * size
     k = relative / s.span["torque"]
-    s.m["y_creep"][1] = -k  # the scale reads less where the capstan drives
+    s.m["y_creep"][1] = k  # the scale reads less where the capstan drives
     return {"per_N": k * s.truth["R_c"]}
 
 

@@ -141,3 +141,18 @@ def test_an_effect_behind_others_takes_its_own_columns():
     cov = np.diag([1.0, 1.0, 1e-4])
     k = effect_intervals(Fit(s, x, np.ones(4), np.zeros((4, 3)), 1.0), 1, cov)["k"]
     assert k.high - k.low == pytest.approx(2 * 1.645 * 1.0)
+
+
+def test_the_sum_of_dry_friction_is_known_better_than_its_parts():
+    """The owner's friction and the term do the same: only their sum shows."""
+    rng = np.random.default_rng(4)
+    rubs = Hypothesis("friction.coulomb", "carriage", (Coordinate("F_C", SIZE, 10.0),))
+    s, x = space(rubs, names=("F_c",), tolerance=0.15), np.array([0.0, 0.6])
+    one = slow(rng, 1)
+    found = linear(rng, s, one @ np.array([[20.0, 10.0]]), x, 1)
+    cov = covariance(found, BLOCK)
+    out = effect_intervals(found, 0, cov)
+    assert set(out) == {"F_C", "F_added"}
+    added, total = out["F_added"], out["F_C"]
+    assert total.value == pytest.approx(20.0 * np.exp(found.x[0]) + added.value)
+    assert total.high - total.low < 0.2 * (added.high - added.low)

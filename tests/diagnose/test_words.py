@@ -37,6 +37,7 @@ def sample(name: str, value: float = 0.01) -> dict[str, Interval]:
     """Any values for the parameters that a term asks for."""
     fields = TERMS[name].settings.model_fields
     wanted = [n for n, f in fields.items() if f.is_required() and n != "node"]
+    wanted += ["F_added"] * (name == "friction.coulomb")
     return {n: Interval(value, 0.9 * value, 1.1 * value) for n in wanted}
 
 
