@@ -8,7 +8,7 @@ from rtctl.diagnose import decide
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.hints import hints
-from rtctl.diagnose.hypotheses import hypotheses, is_rich
+from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
 from rtctl.diagnose.name import Search, dropped, eliminate, enrich, look_alikes, names, polish, rivals, search
 from rtctl.diagnose.reels import Factor, factor
@@ -20,7 +20,6 @@ from rtctl.plants.physics import TERMS
 CLOSE = 1.3  # times the best cost: a rival this near may be ahead in its richer form
 CLEARLY = 0.5  # of the best cost: what a richer form must come down to, to take its place
 RICH = 10.0  # the same, of one that is tried in its richer form because the best is in it
-USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan")}
 EQUAL = 1.02  # times the best cost: equally good
 NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
 LOSES_WAY = ("transmission.slip", "transmission.creep", "sensor.scale", "sensor.rectified", "geometry.radius_change")

@@ -92,6 +92,7 @@ class Choice(NamedTuple):
     measure: str = ""
 
 
+USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
 Part = Size | Limit | Shape | Turn | At | Hint | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),

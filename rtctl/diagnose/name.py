@@ -13,6 +13,7 @@ import numpy as np
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
 from rtctl.diagnose.hypotheses import HINTED, forms, richer
+from rtctl.diagnose.scan import resonances
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
 from rtctl.diagnose.stretches import loudness, usual
@@ -83,6 +84,9 @@ def search(
         full, scores = grow(problem, parents, candidates, QUICK if sure else ROUNDS[level], away, progress)
         if level == 0:
             first, candidates = tuple(scores), best_starts(scores)
+            if not sure and not (full and enough(full[0])):
+                progress("looking for resonances")
+                full = sorted([*full, *resonances(problem, base, scores)], key=lambda f: f.merit)
         if full and sure and worth(beam[0], full[0]):
             full, _ = grow(problem, parents, candidates, ROUNDS[level], away, progress)
         if not full:
