@@ -3,7 +3,7 @@
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -11,12 +11,12 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Evidence, Interval, Located
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Effect, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
-from rtctl.diagnose.find import Found, Progress, find, quiet
+from rtctl.diagnose.find import Found, Progress, find, quiet, with_fewer
 from rtctl.diagnose.fit import Fit, Problem, fit
 from rtctl.diagnose.jitter import Jitter
-from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.name import names
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.record import Record, load_record
@@ -56,9 +56,14 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         if len(record.t) < whole:
             more.append(f"The last {(whole - len(record.t)) * record.dt:.0f} s, in which it rests, are left out.")
         checked = replace(checked, findings=(*checked.findings, *more))
-        verdict = judge(problem, found.base, found.best, found.rivals, problem.block)
         progress("predicting rows that were not fitted")
-        return _answer(sim, other, problem, found, verdict, checked)._replace(seconds=time.monotonic() - began)
+        known = [of_jitter(found.jitter)] if found.jitter is not None else []
+        known += [of_factor(found.factor)] if found.factor is not None else []
+        shown = predicted(sim, other, found, known)
+        while shown.refused and len(found.best.space.hypotheses) > 1:  # several that only imitate: one may be there
+            found = with_fewer(found)
+            shown = predicted(sim, other, found, known)
+        return _answer(sim, found, shown, checked)._replace(seconds=time.monotonic() - began)
 
 
 def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
@@ -93,24 +98,28 @@ def base_of(sim: Simulator) -> tuple[Problem, Fit]:
     return problem, base_fit(sim, problem)
 
 
-def _answer(
-    sim: Simulator,
-    other: Record | None,
-    problem: Problem,
-    found: Found,
-    verdict: Verdict,
-    checked: Preflight,
-) -> Diagnosis:
-    """Prediction, intervals and all that the report needs."""
-    record, base, best = sim.record, found.base, found.best
-    known = [of_jitter(found.jitter)] if found.jitter is not None else []
-    known += [of_factor(found.factor)] if found.factor is not None else []
+class Shown(NamedTuple):
+    """A verdict, the models without and with what it names, and how well these predict."""
+
+    verdict: Verdict
+    refused: bool  # names that the fit gave and the prediction did not bear out
+    taken: Fit
+    before: Model
+    before_error: float
+    after_error: float
+    floor: float
+
+
+def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Effect]) -> Shown:
+    """The verdict on what was found, once its model has predicted rows that it was not fitted on."""
+    problem, base, best = found.problem, found.base, found.best
+    verdict = judge(problem, base, best, found.rivals, problem.block)
     named = {e.name for e in with_known(verdict, known).effects}
     taken = best if any(h.term in named for h in best.space.hypotheses) else base
     if found.factor is not None and "sensor.scale" in named:
         taken = fit(problem, taken.space.add(scaled(found.factor)), taken.x, rounds=8)
-    cut = len(record.t) - round(HELDOUT * len(record.t))
     if other is None:
+        cut = cut_of(sim.record)
         judge_sim, rows = sim, slice(cut, None)
         before, after = (heldout.refit(sim, problem, f, cut).model for f in (base, taken))
     else:
@@ -118,9 +127,22 @@ def _answer(
         before, after = base.model, taken.model
     errors = [heldout.nrmse(judge_sim, model, rows) for model in (before, after)]
     floor = problem.floor * float(problem.sigma[0]) / (float(np.std(judge_sim.seen)) or 1.0)
-    verdict = with_known(proven(verdict, errors[0], errors[1], floor), known)
+    proved = proven(verdict, errors[0], errors[1], floor)
+    refused = proved.verdict == UNNAMED and verdict.verdict != UNNAMED
+    verdict = with_known(proved, known)
     if verdict.verdict == UNNAMED:
         taken, errors[1] = base, errors[0]
+    return Shown(verdict, refused, taken, before, errors[0], errors[1], floor)
+
+
+def cut_of(record: Record) -> int:
+    """First row of the part that is predicted and not fitted."""
+    return len(record.t) - round(HELDOUT * len(record.t))
+
+
+def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> Diagnosis:
+    """Intervals and all that the report needs."""
+    record, problem, base, taken, verdict = sim.record, found.problem, found.base, shown.taken, shown.verdict
     runs = heldout.free_fit(sim, taken).model
     return Diagnosis(
         record=record,
@@ -132,15 +154,15 @@ def _answer(
         owner=owner_model(record.case, record),
         before=base.model,
         after=runs if found.jitter is None else runs.add(ticks(found.jitter, record.dt)),
-        heldout_before=errors[0],
-        heldout_after=errors[1],
-        noise_floor=min(floor, errors[1]),
+        heldout_before=shown.before_error,
+        heldout_after=shown.after_error,
+        noise_floor=min(shown.floor, shown.after_error),
         evidence=evidence(problem, found),
         null_line=decide.MATERIAL,
         cannot_test=tuple(checked.cannot_test),
         hides=smallest(found) if verdict.verdict == NOTHING else {},
         experiment=_experiment(sim, found) if verdict.verdict == AMBIGUOUS else None,
-        fit_rows=(problem.rows.start or 0, cut),
+        fit_rows=(problem.rows.start or 0, cut_of(record)),
         seconds=0.0,
     )
 

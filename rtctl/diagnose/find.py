@@ -128,6 +128,15 @@ def without_doubtful(
     return best, near
 
 
+def with_fewer(found: Found) -> Found:
+    """The same without the term that is missed least."""
+    problem = found.problem
+    count = range(len(found.best.space.hypotheses))
+    best = polish(problem, min((dropped(problem, found.best, i, 10) for i in count), key=lambda f: f.cost))
+    best = enrich(problem, best, decide.better)
+    return found._replace(best=best, rivals=replacements(problem, best, found.search, (), quiet))
+
+
 def proposed(sim: Simulator, seen_by: Fit) -> list[Hypothesis]:
     """All hypotheses, with the starts that the record suggests once it is seen through a model."""
     model = seen_by.model

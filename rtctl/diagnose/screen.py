@@ -52,7 +52,14 @@ def screen(problem: Problem, fitted: Fit, candidates: list[Hypothesis]) -> list[
         at = end
         if np.isfinite(C).all() and np.abs(C / step).max() < 1e5:
             score = _line(ground, h, C / step) if h.sizes else Score(h, -np.inf, fitted.x, 0.0, 0.0)
-            scores.append(max(score, _there(ground, score, C[:, 0], step[0]), key=_gain) if len(step) == 1 else score)
+            if len(step) == 1:
+                there = _there(ground, score, C[:, 0], step[0])
+                limit = bool(h.sizes) and h.coordinates[h.sizes[0]].kind == INVERSE
+                if limit and there.gain > 0.0:  # below a limit nothing happens: no line leads on from there
+                    score = there
+                else:
+                    score = max(score, there, key=_gain)
+            scores.append(score)
     return sorted(scores, key=_gain, reverse=True)
 
 
