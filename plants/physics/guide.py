@@ -26,25 +26,38 @@ class ThicknessSettings(Settings):
     A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="amplitude of the position error")
     wavelength: float = quantity(0.15, unit="m", gt=1e-4, le=1e2, help="along the guide")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
+    A2: float = quantity(0.0, unit="m", ge=-1e-2, le=1e-2, help="amplitude at half the wavelength")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    A3: float = quantity(0.0, unit="m", ge=-1e-2, le=1e-2, help="amplitude at a third of the wavelength")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
 
 
 class ThicknessParams(NamedTuple):
     A: float
     n: float  # rad/m
     phi: float
+    A2: float
+    phi2: float
+    A3: float
+    phi3: float
     zero: float
 
 
 def build_thickness(settings: ThicknessSettings, h: float) -> ThicknessParams:
     """Error at position 0, which counters never show."""
     s = settings
-    return ThicknessParams(s.A, 2.0 * math.pi / s.wavelength, s.phi, s.A * math.sin(s.phi))
+    zero = s.A * math.sin(s.phi) + s.A2 * math.sin(s.phi2) + s.A3 * math.sin(s.phi3)
+    return ThicknessParams(s.A, 2.0 * math.pi / s.wavelength, s.phi, s.A2, s.phi2, s.A3, s.phi3, zero)
 
 
 @tick
 def thickness(p, x):
     """Position error at `x` m, m."""
-    return p.A * math.sin(p.n * x + p.phi) - p.zero
+    a = p.n * x
+    e = p.A * math.sin(a + p.phi)
+    if p.A2 != 0.0 or p.A3 != 0.0:
+        e += p.A2 * math.sin(2.0 * a + p.phi2) + p.A3 * math.sin(3.0 * a + p.phi3)
+    return e - p.zero
 
 
 class StripSettings(Settings):

@@ -240,8 +240,13 @@ def beyond_format(config: Any) -> tuple[str, ...]:
             has.append("friction compensation")
         if part.get("position", {}).get("kind") == "pi_velocity":
             has.append("feedback of a filtered speed with anti-windup")
-        if config.get("machine") == "ldu" and (config.get("sensors") or {}).get("feedback") == "scale":
+        if part.get("inertia", {}).get("volts"):
+            has.append("computed torque from the shaped reference")
+        sensors = config.get("sensors") or {}
+        if config.get("machine") == "ldu" and sensors.get("feedback") == "scale":
             has.append("feedback from the scale")
+        if sensors.get("correction"):
+            has.append("an error table for the encoder")
     if part.get("limit", {}).get("slew") is not None:
         has.append("a slew limit")
     return tuple(has)

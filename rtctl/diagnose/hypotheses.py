@@ -134,7 +134,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "ripple.encoder": (Turn("A", "phi", "one", 2e-3),),
     "ripple.reel": (Turn("e", "phi", "one", 1e-4),),
     "ripple.capstan": (Turn("a", "phi", "one", 1e-5),),
-    "guide.thickness": (Turn("A", "phi", "one", 5e-6), Hint("wavelength", "wavelength", 0.3)),
+    "guide.thickness": (Turn("A", "phi", "one", 5e-6), Hint("wavelength", "wavelength", 0.6)),
     "guide.dirt": (
         Size("A", "one", 1e-5, signed=True), Hint("at", "spot", 0.05, True), Shape("width", "span", (0.02,), 10.0),
     ),
@@ -151,6 +151,7 @@ EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, t
     "ripple.encoder": (Turn("A2", "phi2", "one", 5e-4), Turn("A3", "phi3", "one", 5e-4)),
     "ripple.reel": (Turn("e2", "phi2", "one", 3e-5), Turn("e3", "phi3", "one", 3e-5)),
     "ripple.capstan": (Turn("a2", "phi2", "one", 3e-6), Turn("a3", "phi3", "one", 3e-6)),
+    "guide.thickness": (Turn("A2", "phi2", "one", 1e-6), Turn("A3", "phi3", "one", 1e-6)),
     "tape.viscoelastic": (Size("c_branch2", "stiffness", 0.2), Shape("tau2", "seconds", (0.5,), 60.0)),
     "friction.asymmetry": (Size("B_a", "drag", 0.05, signed=True),),
     "friction.presliding": (
