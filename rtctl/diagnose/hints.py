@@ -9,6 +9,7 @@ squares on cosine and sine of the angle, since angles are not evenly sampled.
 """
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.fit import settled
 from rtctl.diagnose.model import Model
@@ -23,6 +24,8 @@ SENSORS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)
 CALM = {"ivu": 0.02, "ldu": 2e-3}  # s, over which an acceleration is taken
 SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)])
+SEEN = 2.0  # times the observer's bandwidth: a quicker ripple is not in what it shows
+SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 
 
@@ -44,7 +47,9 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
     x = (record.y[sim.channels[0]] / per_unit(record.case)[0])[start:]
     d = push[start:]
     thin = max(1, len(x) // 8000)
+    rate = uniform_filter1d(np.abs(np.gradient(x)) / record.dt, SMOOTH)[::thin]
     x, d = x[::thin], d[::thin]
+    quick = SEEN * FAST[record.plant] * sim.follow
     ratios = {"": 1.0}
     base = model.base
     if record.plant == "ivu":
@@ -53,7 +58,9 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
         ratios = {":motor": base["N"], ":wheel": 1.0}
     found: dict[str, list] = grips(record, base, read[:, 0])
     for node, ratio in ratios.items():
-        found["order" + node] = peaks(ORDERS, spectrum(x * ratio, d, ORDERS), MOST)
+        slow = [np.flatnonzero(rate * abs(ratio) * order < quick) for order in ORDERS]
+        height = [spectrum(x[k] * ratio, d[k], np.array([n]))[0] * len(k) for n, k in zip(ORDERS, slow, strict=True)]
+        found["order" + node] = peaks(ORDERS, np.array(height), MOST)
     if record.plant != "ivu":
         way = x * (base["R_c"] if record.plant == "ldu" else 1.0)
         target = d
@@ -104,6 +111,8 @@ def _second(sim: Simulator, model: Model, start: int) -> np.ndarray:
 
 def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray) -> np.ndarray:
     """Share of the variance of `signal` that a sinusoid of each order in `angle` explains, slow drift taken out."""
+    if len(signal) < FEWEST:
+        return np.zeros(len(orders))
     z = np.linspace(-1, 1, len(signal))
     slow = np.stack([np.ones_like(z), angle - angle.mean(), np.sign(np.gradient(angle))], axis=1)
     rest = signal - slow @ np.linalg.lstsq(slow, signal, rcond=None)[0]

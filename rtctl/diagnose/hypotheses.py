@@ -93,6 +93,7 @@ class Choice(NamedTuple):
 
 
 USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
+TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
 Part = Size | Limit | Shape | Turn | At | Hint | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),
@@ -366,7 +367,9 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}
             else:
-                yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach),), {}
+                turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
+                step = min(1e-2, TURN / turns)
+                yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach, step=step),), {}
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
         if jumps:

@@ -36,6 +36,7 @@ class Breadth(NamedTuple):
 
 
 ROUNDS = (Breadth(14, 5, 2, 3), Breadth(9, 4, 0, 2), Breadth(7, 3, 0, 2))
+QUIET = 1.2  # times the noise floor: a heavy resonance leaves more
 QUICK = Breadth(8, 2, 0, 2)  # where the model is already down to the noise
 
 
@@ -84,7 +85,8 @@ def search(
         full, scores = grow(problem, parents, candidates, QUICK if sure else ROUNDS[level], away, progress)
         if level == 0:
             first, candidates = tuple(scores), best_starts(scores)
-            if not sure and not (full and enough(full[0])):
+            quiet = base.rms < QUIET * problem.floor
+            if not quiet and (sure or not full or not enough(full[0])):
                 progress("looking for resonances")
                 full = sorted([*full, *resonances(problem, base, scores)], key=lambda f: f.merit)
         if full and sure and worth(beam[0], full[0]):

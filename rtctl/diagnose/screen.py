@@ -16,6 +16,7 @@ from rtctl.diagnose.fit import Fit, Problem, bounded_step, parallel, trust
 from rtctl.diagnose.space import INVERSE, Hypothesis
 
 TRIES = 3
+RUNAWAY = 9e5  # times the noise: no reading changes by so much
 TOO_FAR = 2.0  # times the residual: a step that changes more says little about what is missing
 
 
@@ -50,7 +51,7 @@ def screen(problem: Problem, fitted: Fit, candidates: list[Hypothesis]) -> list[
         end = at + max(len(h.sizes), 1)
         C, step = np.stack(changes[at:end], axis=1), np.array(steps[at:end])
         at = end
-        if np.isfinite(C).all() and np.abs(C / step).max() < 1e5:
+        if np.isfinite(C).all() and np.abs(C).max() < RUNAWAY:
             score = _line(ground, h, C / step) if h.sizes else Score(h, -np.inf, fitted.x, 0.0, 0.0)
             if len(step) == 1:
                 there = _there(ground, score, C[:, 0], step[0])

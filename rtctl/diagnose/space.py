@@ -29,6 +29,7 @@ class Coordinate(NamedTuple):
     high: float = np.inf
     start: float = 0.0
     offset: float = 0.0  # SI, of a place, or of a size that is not 0 where the effect is none
+    step: float = 1e-2  # of the difference quotient
 
 
 class Hypothesis(NamedTuple):
@@ -159,7 +160,7 @@ class Space(NamedTuple):
 
     def steps(self) -> np.ndarray:
         """Steps of the difference quotients."""
-        return np.array([2e-3] * self.nb + [1e-2] * (len(self.start()) - self.nb))
+        return np.array([2e-3] * self.nb + [c.step for h in self.hypotheses for c in h.coordinates])
 
     def add(self, *hypotheses: Hypothesis) -> "Space":
         """With more hypotheses."""

@@ -116,10 +116,10 @@ def patched(best: Fit) -> bool:
 
 
 def with_known(verdict: Verdict, known: Sequence[Effect]) -> Verdict:
-    """The verdict with effects beside it that show elsewhere than in the error of the fit, and stand for themselves."""
+    """The verdict with effects before it that show elsewhere than in the error of the fit, and stand for themselves."""
     if not known or verdict.verdict == UNNAMED:
         return verdict
-    effects = [*verdict.effects, *(e for e in known if e.name not in {v.name for v in verdict.effects})]
+    effects = [*known, *(v for v in verdict.effects if v.name not in {e.name for e in known})]
     named = NAMED if verdict.verdict == NOTHING else verdict.verdict
     return verdict._replace(verdict=named, effects=tuple(effects[:MOST]))
 
