@@ -26,6 +26,7 @@ SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact m
 ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)])
 SEEN = 2.0  # times the observer's bandwidth: a quicker ripple is not in what it shows
 SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
+FINEST = 120.0  # waves along the way of an axis
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 
 
@@ -58,9 +59,7 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
         ratios = {":motor": base["N"], ":wheel": 1.0}
     found: dict[str, list] = grips(record, base, read[:, 0])
     for node, ratio in ratios.items():
-        slow = [np.flatnonzero(rate * abs(ratio) * order < quick) for order in ORDERS]
-        height = [spectrum(x[k] * ratio, d[k], np.array([n]))[0] * len(k) for n, k in zip(ORDERS, slow, strict=True)]
-        found["order" + node] = peaks(ORDERS, np.array(height), MOST)
+        found["order" + node] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
     if record.plant != "ivu":
         way = x * (base["R_c"] if record.plant == "ldu" else 1.0)
         target = d
@@ -69,6 +68,11 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
         span = float(np.ptp(way)) or 1.0
         waves = span * np.geomspace(0.1, 2.0, WAVES)
         found["wavelength"] = peaks(waves, spectrum(way, target, 2 * np.pi / waves), MOST)
+        if record.plant == "axis":  # of forces and of readings, whose errors the observer takes for forces
+            turns = np.arange(2.5, FINEST, 0.25)  # waves along the whole way
+            height = seen(way, target, rate, 2 * np.pi * turns / span, quick)
+            fine = peaks(span / turns, height, MOST)
+            found["wavelength"] += [w for w in fine if all(abs(w / v - 1) > 0.1 for v in found["wavelength"])]
         found["spot"] = spots(x, target, MOST)
     else:
         found["spot"] = spots(x, d, MOST)
@@ -127,6 +131,15 @@ def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray) -> np.nd
         fit = A @ np.linalg.lstsq(A, rest, rcond=None)[0]
         out[k] = float(fit @ fit) / total
     return out
+
+
+def seen(angle: np.ndarray, signal: np.ndarray, rate: np.ndarray, orders: np.ndarray, quick: float) -> np.ndarray:
+    """As `spectrum`, each order where it passes slower than `quick` rad/s, so that the signal can show it; `rate` is
+    that of the angle. By the number of rows that are left."""
+    slow = [np.flatnonzero(rate * order < quick) for order in orders]
+    return np.array(
+        [spectrum(angle[k], signal[k], np.array([n]))[0] * len(k) for n, k in zip(orders, slow, strict=True)]
+    )
 
 
 def peaks(grid: np.ndarray, height: np.ndarray, most: int) -> list[float]:

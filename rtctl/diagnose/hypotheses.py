@@ -173,7 +173,12 @@ HINTED = tuple(name for name, parts in SEARCH.items() if any(isinstance(part, Hi
 
 
 ALONE = ("sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt")  # asks for a second sensor
-TURNING = {"axis": ("load.imbalance", "ripple.cogging", "ripple.encoder")}  # ask for an axis that turns
+TURNING = {"axis": ("load.imbalance",)}  # ask for an axis that turns
+SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
+    "ripple.encoder": (Turn("A", "phi", "one", 1e-5), Hint("turn", "wavelength", 0.4)),
+    "ripple.cogging": (Turn("A", "phi", "force", 0.05), Hint("turn", "wavelength", 0.4)),
+}
+LEAD = 0.045  # m: a shorter wave of a linear axis is a turn of its screw or encoder, a longer one its guide's
 
 
 def hypotheses(
@@ -193,13 +198,14 @@ def hypotheses(
             and (not only or name in only)
         ):
             for node in term.nodes.get(record.plant, ()):
+                slides = record.plant == "axis" and record.case.sensors.unit != "rad"
                 if (
-                    (node == "sensor" and name in ALONE)
+                    (node == "sensor" and name in ALONE and not (slides and name == "guide.thickness"))
                     or (record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ()))
                     or (name == "friction.stribeck" and not measures.dry(node))
                 ):  # falls to what the base has
                     continue
-                out += _starts(name, node, SEARCH[name], measures)
+                out += _starts(name, node, (slides and SLIDING.get(name)) or SEARCH[name], measures)
     return out
 
 
@@ -363,6 +369,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
     elif isinstance(part, Hint):
         found = m.hints.get(f"{part.kind}:{node}", m.hints.get(part.kind, []))
         s = m.scale(node)
+        if node == "sensor" and part.kind == "wavelength":
+            found = [value for value in found if (value < LEAD) == (part.name == "turn")]
         for value in found:
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}

@@ -100,7 +100,14 @@ def test_a_bump_on_the_way_is_suggested_as_a_spot(make_axis):
     assert set(found) == {"order", "wavelength", "spot", "jump:sensor"}
     x = made.record.y["x"]
     assert min(abs(x.min() + s * np.ptp(x) - 0.05) for s in found["spot"][:2]) < 4e-3
-    assert all(len(v) <= MOST for v in found.values())
+    assert all(len(v) <= MOST * (1 + (kind == "wavelength")) for kind, v in found.items())
+
+
+def test_a_short_wave_of_the_drive_is_suggested(make_axis):
+    """Shorter than a tenth of the way, where it passes slowly enough for the observer."""
+    made = make_axis({"term": "ripple.cogging", "node": "carriage", "A": 4.0, "turn": 4e-3})
+    found = hints(made.sim, made.model._replace(terms=()))
+    assert min(abs(w / 4e-3 - 1) for w in found["wavelength"]) < 0.03
 
 
 def test_a_two_reel_unit_is_asked_about_each_of_its_motors(monkeypatch, plain, blank):

@@ -11,7 +11,7 @@ from rtctl.plants.physics import TERMS
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
 HINTS = {
-    "order": [2.0, 7.0], "wavelength": [0.01], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
+    "order": [2.0, 7.0], "wavelength": [0.01, 0.1], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
     "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
 }  # fmt: skip
 
@@ -61,8 +61,7 @@ def test_every_one_stands_where_its_term_can_and_all_are_there(moved, kind):
         assert h.node in TERMS[h.term].nodes[kind]
     wanted = {name for name in SEARCH if TERMS[name].nodes.get(kind)}
     if kind == "axis":  # this one slides, and it has one sensor, which would have to disagree with itself
-        wanted -= {"load.imbalance", "ripple.cogging", "ripple.encoder"}
-        wanted -= {"sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt"}
+        wanted -= {"load.imbalance", "sensor.scale", "sensor.rectified", "guide.dirt"}
     assert wanted == {h.term for h in found}
 
 
@@ -193,3 +192,22 @@ def test_less_friction_than_the_base_has_is_no_push(moved, kind, node, term, mos
     (h,) = [h for h in hypotheses(record, base, only=(term,)) if h.node == node]
     c = h.coordinates[0]
     assert c.low * c.scale == pytest.approx(-most, rel=0.3, abs=2e-3 * c.scale)
+
+
+def test_a_wave_of_a_linear_axis_is_its_screws_or_its_guides_by_its_length(moved):
+    record, base = moved("axis")
+    waves = {"wavelength": [0.01, 0.02, 0.15]}
+    found = hypotheses(record, base, waves, only=("ripple.encoder", "guide.thickness", "ripple.cogging"))
+    by = {}
+    for h in found:
+        by.setdefault(h.term, []).append(h.coordinates[-1].scale)
+    assert by == {"ripple.encoder": [0.01, 0.02], "guide.thickness": [0.15], "ripple.cogging": [0.01, 0.02, 0.15]}
+    assert {h.coordinates[-1].name for h in found} == {"turn", "wavelength"}
+
+
+def test_the_step_of_a_wave_moves_its_far_end_by_little(moved):
+    record, base = moved("axis")
+    span = float(np.ptp(record.y["x"]))
+    for h in hypotheses(record, base, {"wavelength": [0.001, 0.3]}, only=("ripple.cogging",)):
+        c = h.coordinates[-1]
+        assert c.step * 2 * np.pi / c.scale * span <= 0.1 * 1.2
