@@ -29,6 +29,8 @@ COMMANDS = {
     "reset": "switch",
     "stop": "switch",
     "play": "switch",
+    "identify": "identify",
+    "tune": "tune",
     "diagnose": "diagnose",
     "simulate": "simulate",
     "prove": "prove",

@@ -17,6 +17,7 @@ from rtctl.drivers.ls7084 import Ls7084Settings
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.laws import (
     bumpless,
+    error_table,
     friction_feedforward,
     limit,
     pd,
@@ -27,6 +28,7 @@ from rtctl.laws import (
     velocity,
 )
 from rtctl.laws.bumpless import BumplessSettings
+from rtctl.laws.error_table import ErrorTableSettings
 from rtctl.laws.excitation import ExcitationSettings, NoneSettings
 from rtctl.laws.limit import LimitSettings
 from rtctl.laws.pd import PdMetreSettings
@@ -68,6 +70,9 @@ class LduSensorSettings(Settings):
     scale: LinearScaleSettings = LinearScaleSettings()
     feedback: Literal["encoder", "scale"] = Field(default="encoder", description="what the loop closes on (11.3)")
     R_c: float = quantity(3.0e-3, unit="m", gt=0, help="capstan radius that turns encoder angle into position (11.2)")
+    correction: ErrorTableSettings | None = Field(
+        default=None, description="error table for the position by the encoder (11.12)"
+    )
 
 
 class PiLawSettings(PiVelocitySettings):
@@ -94,10 +99,24 @@ class FrictionSettings(Settings):
     newton_per_volt: float = quantity(14.0, unit="N/V", gt=0, help="force at the carriage per volt: N K_m 0.1 / R_c")
 
 
+class ComputedTorqueSettings(Settings):
+    volts: float = quantity(
+        0.0,
+        unit="V*s^2/m",
+        ge=0,
+        help="what the shaped reference's acceleration takes (12.10); the shaper has to be on",
+    )
+
+
+class ComputedTorqueParams(NamedTuple):
+    volts: float
+
+
 class LduLawSettings(Settings):
     shaper: ShaperSettings = ShaperSettings()
     position: PositionSettings
     friction: FrictionSettings = FrictionSettings()
+    inertia: ComputedTorqueSettings = ComputedTorqueSettings()
     limit: LimitSettings = LimitSettings(high=3.0)
     bumpless: BumplessSettings = BumplessSettings()
     velocity: VelocitySettings = VelocitySettings(filter=200.0)
@@ -196,11 +215,11 @@ LAWS: dict[str, tuple[Any, Any]] = {
 def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Lines of the tick for the law and the feedback of this config."""
     step, reset = LAW_LINES[config.law.position.kind]
-    position = (
-        "y.scale"
-        if config.sensors.feedback == "scale"
-        else "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
-    )
+    position = "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
+    if config.sensors.feedback == "scale":
+        position = "y.scale"
+    elif config.sensors.correction is not None:
+        position = f"error_table.step(p.correction, {position})"
     track = ("pi_velocity.track(p.position, s.position, u_c, u)",) if config.law.position.kind == "pi_velocity" else ()
     return (
         (
@@ -240,7 +259,9 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
                 "changed = c.gains != s.machine.gains",
                 "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",
                 "s.machine.gains = c.gains",
-                "u_c = s.machine.u_fb + friction_feedforward.step(p.friction, s.friction, y.ref) + y.w",
+                "u_ff = friction_feedforward.step(p.friction, s.friction, y.ref)",
+                "u_ff += p.inertia.volts * s.shaper.acceleration",
+                "u_c = s.machine.u_fb + u_ff + y.w",
                 "u = limit.step(p.limit, s.limit, u_c)",
                 *track,
                 "y.u_c = u_c",
@@ -292,11 +313,14 @@ def diagram(config: LduConfig, dt: float) -> Diagram:
     build, law_state = LAWS[law.position.kind]
     output = at_mio_16de.build_output(config.board.output, dt)
     volts = law.friction.F_c / law.friction.newton_per_volt
+    table = config.sensors.correction if config.sensors.feedback == "encoder" else None
+    corrections = [] if table is None else [Block("correction", error_table.build(table, dt), None)]
     blocks = (
         Block("machine", LduParams(config.sensors.R_c, config.board.direction_line, round(0.05 / dt), 0.1), LDU_STATE),
         Block("safety", safety.build(config.safety, dt), safety.SAFETY_STATE),
         Block("encoder", ls7084.build(config.sensors.encoder, dt), daq_stc.READER_STATE),
         Block("scale", linear_scale.build(config.sensors.scale, dt), daq_stc.READER_STATE),
+        *corrections,
         Block("reference", None, reference.REFERENCE_STATE),
         Block("shaper", shaper.build(law.shaper, dt), shaper.SHAPER_STATE),
         Block("velocity", velocity.build(law.velocity, dt), velocity.VELOCITY_STATE),
@@ -307,11 +331,13 @@ def diagram(config: LduConfig, dt: float) -> Diagram:
             friction_feedforward.FrictionFeedforwardParams(volts),
             friction_feedforward.FRICTION_FEEDFORWARD_STATE,
         ),
+        Block("inertia", ComputedTorqueParams(law.inertia.volts), None),
         Block("limit", limit.build(law.limit, dt), limit.LIMIT_STATE),
         Block("amplifier", ldu_amplifier.build(config.amplifier, dt, output.volts_per_code), None),
         Block("output", output, None),
     )
-    return Diagram((*USES, f"rtctl.laws.{law.position.kind}"), blocks, COLUMNS, stages(config))
+    uses = (*USES, f"rtctl.laws.{law.position.kind}", *(["rtctl.laws.error_table"] if corrections else []))
+    return Diagram(uses, blocks, COLUMNS, stages(config))
 
 
 USES = (

@@ -7,7 +7,11 @@ from rtctl import __version__
 from rtctl.cli import common
 from rtctl.cli.main import COMMANDS
 
-GROUPS = {"trace": ("info", "plot", "repair"), "keys": ("new",)}
+GROUPS = {
+    "trace": ("info", "plot", "repair"),
+    "keys": ("new",),
+    "identify": ("frf", "multisine", "fit", "friction", "radius", "driver", "scale", "steps"),
+}
 LEAVES = [(c,) for c in COMMANDS if c not in GROUPS] + [(g, c) for g, commands in GROUPS.items() for c in commands]
 
 

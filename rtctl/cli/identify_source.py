@@ -1,0 +1,79 @@
+"""What an experiment reads: bundles as they are, or the machine of a config that plays it first."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rtctl.cli import common
+
+SourceArgument = Annotated[
+    list[str],
+    typer.Argument(metavar="BUNDLE...|CONFIG", help="Recordings of this experiment, or a config that plays it first."),
+]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="DIR", help="Of a CONFIG: keep the recordings here; a real machine's always."),
+]
+PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE", help="Draw the result into a PNG.")]
+
+
+def are_bundles(words: list[str]) -> bool:
+    """Whether all words are folders. Raises UserError where some are, or where two configs are given."""
+    from rtctl.config.errors import UserError
+
+    folders = [Path(word).is_dir() for word in words]
+    if all(folders):
+        return True
+    if any(folders) or len(words) > 1:
+        odd = words[folders.index(False)]
+        raise UserError(f"{odd} is not a folder: give bundles, or one config that plays the experiment")
+    return False
+
+
+def load(words: list[str]) -> list[Any]:
+    """The bundles."""
+    from rtctl.trace.bundle import load_bundle
+
+    return [load_bundle(word) for word in words]
+
+
+def play(config: Any, experiments: list[Any], out: Path | None, say: Callable[[str], None]) -> list[Any]:
+    """Play experiments: (config, seconds) each. Emulated machines on virtual time, in this process; with `out`, and on
+    a machine that is not ours always, as a daemon does, each into a bundle of its own.
+
+    Raises UserError where the machine cannot be run. What went wrong in a run is for its reader to find.
+    """
+    from rtctl.config.errors import UserError
+    from rtctl.config.load import set_path
+    from rtctl.trace.bundle import load_bundle
+
+    emulated = config.link.spawns
+    folder = out if out is not None else None if emulated else common.default_folder(config.name)
+    found: list[Any] = []
+    for i, experiment in enumerate(experiments):
+        one, seconds = experiment
+        if emulated:
+            one = set_path(one, "loop.mode", "fused")
+        say(f"playing {i + 1} of {len(experiments)}, {seconds:.0f} s of the machine's time")
+        if folder is None:
+            from rtctl.loop import fused
+
+            try:
+                found.append(fused.run(one, seconds))
+            except ValueError as error:
+                raise UserError(f"{config.name}: {error}") from error
+            continue
+        from rtctl.daemon.session import Session
+
+        bundle = folder / f"{i + 1:02}"
+        if Session(one, bundle, seconds, arm=True, say=lambda _: None).run()["interrupted"]:
+            raise KeyboardInterrupt
+        found.append(load_bundle(bundle))
+    return found
+
+
+def say_on_stderr(json: bool) -> Callable[[str], None]:
+    """Progress for a person; silence for a program."""
+    return (lambda text: None) if json else (lambda text: typer.echo(text, err=True))

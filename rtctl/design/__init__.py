@@ -1,0 +1,1 @@
+"""Designs on models: responses, margins, controllers, mechanics, tables."""

@@ -1,0 +1,84 @@
+"""A design shown on the emulator: the loop gain measured in a fused run, and its margins.
+
+    S = U_c / W        L = 1 / S - 1
+
+A periodic multisine w is added to the command while the machine holds its place; u_c is what the loop makes of it.
+Dry friction is left out on both sides, since it is no part of the linear loop that was designed. A multisine has whole
+periods in the record, so nothing leaks, and what is left is quantisation.
+
+Source: thesis 8.1 and 12.3 (sensitivity); Pintelon & Schoukens, System Identification (2012), section 4.3.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.config.errors import NoAnswer
+from rtctl.config.load import set_path
+from rtctl.design import margins, response
+from rtctl.design.margins import Margins
+from rtctl.loop import fused, safety
+
+PERIODS = 3  # averaged, after one in which the loop forgets how it began
+NO_FRICTION = {
+    "ivu": {
+        "plant.parameters.tau_F1": 0.0,
+        "plant.parameters.tau_F2": 0.0,
+        "plant.parameters.tau_Fc": 0.0,
+        "law.friction.motor1.tau_C": 0.0,
+        "law.friction.motor2.tau_C": 0.0,
+    },
+    "ldu": {"plant.parameters.F_c": 0.0, "law.friction.F_c": 0.0},
+    "axis": {"plant.parameters.F_c": 0.0},
+}
+
+
+class Measured(NamedTuple):
+    """Loop gain as measured, and its margins."""
+
+    f: np.ndarray  # (n,) Hz
+    L: np.ndarray  # (n,)
+    margins: Margins
+
+
+def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None = None) -> Any:
+    """The config to play: fused, without dry friction, with a multisine of `rms` V up to `f_max` Hz.
+
+    A reel unit gets motor 1 alone for its position, so that the loop does not change hands at every zero of the
+    command. `f_max` is 0.4 of the sample rate if absent.
+    """
+    values: dict[str, Any] = {**NO_FRICTION[config.machine], "loop.mode": "fused", "loop.write": config.loop.write}
+    if config.machine == "ivu":
+        values["law.allocation.kind"] = "motor1"
+    for path, value in values.items():
+        config = set_path(config, path, value)
+    f_max = f_max or 0.4 * config.loop.rate
+    config = set_path(config, "reference", {})
+    return set_path(
+        config,
+        "excitation",
+        {"kind": "multisine", "rms": rms, "f_min": 0.9 / period, "f_max": f_max, "period": period, "seed": 1},
+    )
+
+
+def measure(config: Any, rms: float, period: float = 2.0, f_max: float | None = None) -> Measured:
+    """Loop gain and margins of a config on its emulator.
+
+    Raises NoAnswer where the run trips or the output is limited: then it says nothing of the linear loop.
+    """
+    played = experiment(config, rms, period, f_max)
+    run = fused.run(played, (PERIODS + 1) * period + 2.0)
+    if run.tripped:
+        raise NoAnswer(f"the run tripped ({run.tripped}) at {run['t'][np.argmax(run['trip'] > 0)]:.3g} s; lower rms")
+    n = round(period * played.loop.rate)
+    first = int(np.argmax(run["state"] == safety.RUNNING)) + n
+    rows = run.rows[first : first + PERIODS * n]
+    limited = np.abs(rows["u_c"]) >= played.law.limit.high
+    if limited.any():
+        raise NoAnswer(f"the output is limited at {rows['t'][np.argmax(limited)]:.3g} s; lower rms from {rms:g} V")
+    w, u = (np.fft.rfft(rows[name].reshape(PERIODS, n).mean(axis=0)) for name in ("w", "u_c"))
+    lines = np.flatnonzero(np.abs(w) > 0.3 * np.abs(w).max())
+    f, L = lines / period, w[lines] / u[lines] - 1
+    parts = response.take(played)
+    share = response.law_response(parts, f, "reference") / response.law_response(parts, f)
+    return Measured(f, L, margins.points(f, L, share * L))

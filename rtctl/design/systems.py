@@ -1,0 +1,73 @@
+"""The loop of a config as sampled linear systems of python-control: exact between the samples, with every pole.
+
+The plant is discretised with its hold by the matrix exponential, the tick until a command is written is a state, and
+the law is the law as it is ticked. Where `response` gives curves, this gives poles and step responses.
+
+Source: Franklin, Powell & Workman, Digital Control of Dynamic Systems (1998), 4.3 (exact discretisation).
+"""
+
+from typing import Any
+
+import control
+import numpy as np
+
+from rtctl.design import response
+from rtctl.design.response import Loop, Model
+from rtctl.plants import linear
+
+
+def sampled(config: Any, motor: int = 1) -> tuple[Any, Any, Any]:
+    """Plant with its delay, law from the negative position, and law from the reference, all `control.StateSpace`."""
+    parts = response.take(config, motor)
+    return plant_system(parts.model, parts.dt, parts.delay), law_system(parts), law_system(parts, "reference")
+
+
+def poles(config: Any, motor: int = 1) -> np.ndarray:
+    """Poles of the closed loop in the z plane; stable where all lie inside the unit circle."""
+    P, K, _ = sampled(config, motor)
+    return np.asarray(control.feedback(P * K, 1).poles())
+
+
+def closed(config: Any, motor: int = 1) -> Any:
+    """System from the shaped reference to the measured position."""
+    P, K, R = sampled(config, motor)
+    return control.feedback(P, K) * R
+
+
+def plant_system(model: Model, dt: float, delay: int) -> Any:
+    """A model behind a zero-order hold and `delay` ticks, as a sampled system."""
+    Phi_T, Gamma_T = linear.discretise(model.A, model.b[:, None], dt)
+    system = control.ss(Phi_T.T, Gamma_T.T, model.c[None, :], 0, dt)
+    for _ in range(delay):
+        system = system * control.ss(0, 1, 1, 0, dt)
+    return system
+
+
+def law_system(parts: Loop, path: str = "feedback") -> Any:
+    """The law as a sampled system: `feedback` from the negative position, `reference` from the reference."""
+    p, dt = parts.blocks["position"], parts.dt
+    if parts.kind == "sections":
+        K = _system([1.0], [1.0], dt)
+        for section in p:
+            K = _system([section.b0, section.b1, section.b2], [1.0, section.a1, section.a2], dt) * K
+    elif parts.kind == "pd":
+        K = p.gain * (1 + p.tau_d * _difference(p.a, dt))
+    else:
+        K = _system([p.gain], [1.0], dt)
+        if p.integral:
+            K = K + _system([p.integral, 0.0], [1.0, -1.0], dt)
+        if path == "feedback":
+            v = parts.blocks["velocity"]
+            K = K + p.velocity_gain * _difference(v.a, v.dt)
+    return parts.factor * K
+
+
+def _difference(a: float, dt: float) -> Any:
+    return _system([a / dt, -a / dt], [1.0, a - 1.0], dt)
+
+
+def _system(num: list[float], den: list[float], dt: float) -> Any:
+    """num / den in falling powers of z; coefficients that are 0 at the end of both are delays that are not there."""
+    while len(den) > 1 and num[-1] == den[-1] == 0.0:
+        num, den = num[:-1], den[:-1]
+    return control.ss(control.tf(num, den, dt))

@@ -1,0 +1,1 @@
+"""Experiments: what the data of a run say of the machine. Each is a function of a record and a config that plays it."""

@@ -1,0 +1,83 @@
+"""What bench experiments share: a config changed, and played on virtual time into a record.
+
+Each experiment is a pure function on a record or on arrays. Those that need a motion of their own have a function that
+gives the config to play: `play` plays it in this process, `rtctl run` on a bench.
+"""
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.load import set_path
+from rtctl.identify.records import Record, take
+
+ARMING = {"given": 1.0, "measured": 14.0}  # s, at most, until the reference plays
+REST = 0.5  # s, behind the end of the reference
+
+
+def changed(config: Any, changes: Mapping[str, Any]) -> Any:
+    """The config with other values at dotted keys, which leaves no excitation but one that `changes` asks for.
+
+    Raises UserError where the machine does not know a key or the value is out of bounds.
+    """
+    for path, value in {"excitation": {"kind": "none"}, **changes}.items():
+        config = set_path(config, path, value)
+    return config
+
+
+def need(machine: str, name: str, *machines: str) -> None:
+    """Raise UserError where a machine is not one of these."""
+    if machine not in machines:
+        raise UserError(f"{name}: this experiment is for {' and '.join(machines)}, not for {machine}")
+
+
+def seconds(config: Any) -> float:
+    """How long a config plays from the first tick on until its reference has ended."""
+    reference, end, at = config.reference, 0.0, 0.0
+    for step in reference.steps:
+        end, at = step.at + (abs(step.to - at) / step.ramp if step.ramp else 0.0), step.to
+    if reference.knots:
+        end = reference.knots[-1][0]
+    return end + REST + ARMING[config.radius.source if config.machine == "ivu" else "given"]
+
+
+def play(config: Any, length: float | None = None) -> Record:
+    """Play a config in this process on virtual time for `length` s, by default until its reference has ended.
+
+    Raises NoAnswer where the machine trips, with the time; UserError where settings contradict each other.
+    """
+    from rtctl.loop import fused
+
+    try:
+        run = fused.run(set_path(config, "loop.mode", "fused"), seconds(config) if length is None else length)
+    except ValueError as error:
+        raise UserError(f"{config.name}: {error}") from error
+    return whole(take(run))
+
+
+def whole(record: Record) -> Record:
+    """The record, unless the machine tripped in it: then raise NoAnswer with the time."""
+    if record.trip:
+        raise NoAnswer(f"{record.source}: the run tripped, {record.trip} at {record.trip_time:.3f} s")
+    return record
+
+
+def ramps(t: np.ndarray, ref: np.ndarray, least: float) -> list[tuple[int, int]]:
+    """Stretches [begin, end) of at least `least` s in which the reference `ref` (n,) moves at one speed."""
+    slope = np.diff(ref) / np.diff(t)
+    fastest = np.abs(slope).max(initial=0.0)
+    if fastest == 0.0:
+        return []
+    breaks = np.flatnonzero(np.abs(np.diff(slope)) > 1e-6 * fastest) + 1
+    edges = np.concatenate(([0], breaks, [len(slope)]))
+    return [(int(a), int(b)) for a, b in pairwise(edges) if abs(slope[a]) > 1e-4 * fastest and t[b - 1] - t[a] >= least]
+
+
+def counts_per_turn(record: Record) -> int:
+    """Of the encoder on the capstan."""
+    sensors = record.config.sensors
+    encoder = sensors.capstan if record.kind == "ivu" else sensors.encoder
+    return int(encoder.lines * encoder.multiply)

@@ -1,0 +1,162 @@
+"""What to play for a frequency response: constant speed to and fro, and an excitation within the machine's limits.
+
+The reference goes half a leg back and then whole legs to and fro, so that the mean radii of the reels are those at the
+start and dry friction is seen in both directions but never turns within a leg. The excitation stays so small that
+speed keeps its sign and the drive its limits. One motor of the reel unit carries the whole command (`motor`): with the
+usual allocation the two pull by turns, which is not one response.
+
+    ivu   5 V/rad and 0.5 Vs/rad, a loop of 1 Hz; that is 1 V/rad and 0.1 Vs/rad of 8.1 with the driver's 0.2 A/V in it
+    ldu   1e3 V/m and 0.1 s, 5 mm/s, 0.25 V rms                                                                   (12.3)
+
+Source: thesis 8.1 and 12.3. Erratum: 8.1 leaves out the driver; by its equations 1 V/rad gives 0.4 Hz.
+"""
+
+from math import ceil
+from typing import Any, NamedTuple
+
+from rtctl.config.errors import UserError
+from rtctl.config.load import set_path
+from rtctl.identify.sensitivity import AVERAGES, SETTLE, WINDOW
+from rtctl.laws.excitation import MOST
+
+PERIOD = 4.096  # s: lines 0.24 Hz apart, every other one excited
+START = 0.2  # s at rest before the first leg
+ARMING = {"given": 1.0, "measured": 14.0}  # s until the reference plays
+
+
+class Experiment(NamedTuple):
+    """A config that plays it, and how long that takes from the first tick on."""
+
+    config: Any
+    seconds: float
+
+
+class Usual(NamedTuple):
+    """What a machine is excited with where nobody says otherwise."""
+
+    speed: float  # rad/s or m/s
+    rms: float  # V, multisine
+    noise_rms: float  # V
+    band: tuple[float, float]  # Hz, multisine
+    noise_top: float  # Hz
+    settle: float  # s from a turn of the reference to constant speed
+    law: dict[str, Any]  # keys of the config
+
+
+USUAL = {
+    "ivu": Usual(  # at 2 rad/s a period would hold a whole number of counts, and rounding would look like distortion
+        1.97, 1.0, 1.2, (0.4, 60.0), 240.0, 2.2,
+        {"law.position": {"gain": 5.0, "tau_d": 0.1, "derivative_filter": 40.0}, "law.tension.F_t": 0.6,
+         "law.gain_schedule.mode": "off"},
+    ),
+    "ldu": Usual(
+        5e-3, 0.25, 0.25, (0.9, 250.0), 1000.0, 0.5,
+        {"law.position": {"kind": "pd", "gain": 1e3, "tau_d": 0.1, "derivative_filter": 1000.0}},
+    ),
+}  # fmt: skip
+
+
+def multisine(
+    config: Any,
+    realisations: int = 4,
+    periods: int = 4,
+    legs: int = 2,
+    motor: int = 1,
+    rms: float | None = None,
+    speed: float | None = None,
+    band: tuple[float, float] | None = None,
+    period: float = PERIOD,
+    keep_law: bool = False,
+) -> list[Experiment]:
+    """One experiment a realisation, for `best_linear.identify`: `legs` at constant speed, each of `periods` periods
+    and one more for the transient.
+
+    `rms` in V, `speed` in rad/s or m/s, `band` in Hz, `period` in s. `keep_law` leaves gains as they are.
+    Raises UserError where the size does not fit the machine's limits.
+    """
+    usual = usual_of(config)
+    low, high = band or usual.band
+    leg = usual.settle + (periods + 1) * period
+    made = _prepared(config, usual, motor, keep_law)
+    rms = usual.rms if rms is None else rms
+    check_size(made, rms)
+    made, seconds = _to_and_fro(made, legs, leg, usual.speed if speed is None else speed)
+    wave = {"kind": "multisine", "rms": rms, "f_min": low, "f_max": high, "period": period}
+    return [
+        Experiment(set_path(made, "excitation", {**wave, "seed": seed}), seconds) for seed in range(1, realisations + 1)
+    ]
+
+
+def noise(
+    config: Any,
+    averages: int = AVERAGES,
+    windows: int = 8,
+    motor: int = 1,
+    rms: float | None = None,
+    speed: float | None = None,
+    top: float | None = None,
+    keep_law: bool = False,
+) -> list[Experiment]:
+    """Band-limited noise for `sensitivity.identify`: `averages` windows of 4.096 s at half overlap, `windows` a leg.
+
+    One run where its noise lasts without repeating, else one a leg, each with noise of its own: a waveform has 65536
+    ticks, 131 s at 500 Hz and 6.6 s at 10 kHz. `rms` in V, `speed` in rad/s or m/s, `top` in Hz.
+    Raises UserError where the size does not fit the limits.
+    """
+    usual = usual_of(config)
+    rate = config.loop.rate
+    rms = usual.noise_rms if rms is None else rms
+    made = _prepared(config, usual, motor, keep_law)
+    check_size(made, rms)
+    leg = usual.settle + SETTLE + WINDOW * (windows + 1) / 2
+    legs, period = ceil(averages / windows), MOST / rate
+    runs = 1 if period > averages * WINDOW / 2 else legs
+    made, seconds = _to_and_fro(made, legs // runs, leg, usual.speed if speed is None else speed)
+    wave = {"kind": "noise", "rms": rms, "f_max": min(top or usual.noise_top, 0.49 * rate), "period": period}
+    return [Experiment(set_path(made, "excitation", {**wave, "seed": seed}), seconds) for seed in range(1, runs + 1)]
+
+
+def usual_of(config: Any) -> Usual:
+    """The usual excitation of a machine. Raises UserError where there is none."""
+    if config.machine not in USUAL:
+        raise UserError(
+            f"{config.name}: a frequency response is played on {' and '.join(USUAL)}, not on {config.machine}"
+        )
+    return USUAL[config.machine]
+
+
+def check_size(config: Any, rms: float) -> None:
+    """Raise UserError where four times `rms` V leaves the drive's linear range (8.1: 5 V; 12.2: 3 V, runaway)."""
+    most = min(config.law.limit.high, 5.0 if config.machine == "ivu" else config.amplifier.limit)
+    if 4 * rms > most:
+        raise UserError(
+            f"{config.name}: excitation of {rms:g} V rms peaks at some {4 * rms:.2g} V, the drive takes {most:g} V; "
+            f"take {most / 4:.2g} V or less"
+        )
+
+
+def _prepared(config: Any, usual: Usual, motor: int, keep_law: bool) -> Any:
+    if motor not in (1, 2) or (motor == 2 and config.machine != "ivu"):
+        raise UserError(f"{config.name}: motor {motor}: the {config.machine} has no such motor")
+    for key, value in ({} if keep_law else usual.law).items():
+        config = set_path(config, key, value)
+    if config.machine == "ivu":
+        config = set_path(config, "law.allocation.kind", f"motor{motor}")
+        if config.safety.following_error:
+            config = set_path(config, "safety.following_error", max(config.safety.following_error, 1.0))
+    return config
+
+
+def _to_and_fro(config: Any, legs: int, leg: float, speed: float) -> tuple[Any, float]:
+    """Half a leg back, then `legs` whole ones of `leg` s each, on ticks."""
+    dt = 1.0 / config.loop.rate
+    leg = ceil(leg / dt) * dt
+    length = speed * leg
+    steps, t, x = [], START, 0.0
+    for i in range(legs + 1):
+        to = length / 2 * (-1) ** (i + 1)
+        steps.append({"at": round(t, 9), "to": to, "ramp": speed})
+        t += abs(to - x) / speed + dt
+        t, x = ceil(t / dt - 1e-6) * dt, to
+    source = config.radius.source if config.machine == "ivu" else "given"
+    return set_path(config, "reference", {"steps": steps}), t + ARMING[source]

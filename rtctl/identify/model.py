@@ -1,0 +1,92 @@
+"""A machine's own model as a function of named parameters, at the reel radii and with the motor of a response.
+
+    H = P(j w) sinc(f T) e^(-j w tau)         hold T = 1/rate, delay tau = T_s/2 + T_c  (8.2)
+
+P is `state_space` of the plant with the parameters at hand. On the reel unit one name stands for both sides where they
+are alike: J_m for J_m1 and J_m2, and so for c_m, k_m, c, k and K_m.
+
+Source: thesis 4.9-4.17, 8.2 and appendix F, through rtctl.plants.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rtctl.design import response
+from rtctl.drivers import l292
+from rtctl.identify.frf import Frf, drive
+from rtctl.plants import ivu as plant_ivu
+from rtctl.plants import ldu as plant_ldu
+
+PAIRS = {name: (f"{name}1", f"{name}2") for name in ("J_m", "c_m", "k_m", "c", "k", "K_m")}  # equal on both sides
+F_GAIN = 1.0  # Hz, of the process gain (8.2)
+
+
+def keys(kind: str, name: str) -> tuple[str, ...]:
+    """Keys of the plant's parameters for which a name stands."""
+    return PAIRS[name] if kind == "ivu" and name in PAIRS else (name,)
+
+
+class Model:
+    """A machine's plant as a function of named parameters."""
+
+    def __init__(self, config: Any, names: Sequence[str]):
+        self.config, self.kind = config, config.machine
+        self.parts = response.take(config)
+        plant = plant_ivu if self.kind == "ivu" else plant_ldu
+        self.base = plant.parameters(config.plant)
+        self.start = {name: float(getattr(self.base, keys(self.kind, name)[0])) for name in names}
+
+    def settings(self, values: Mapping[str, float]) -> Any:
+        """Settings of the plant with these values in its parameters."""
+        given = self.config.plant.parameters.model_dump(exclude_unset=True)
+        for name, value in values.items():
+            given.update(dict.fromkeys(keys(self.kind, name), value))
+        plant = self.config.plant
+        return plant.model_copy(update={"parameters": type(plant.parameters)(**given)})
+
+    def linear(self, values: Mapping[str, float], frf: Frf) -> response.Model:
+        """The plant linearised at the radii of a response, the motor of that response pulling."""
+        settings = self.settings(values)
+        if self.kind == "ldu":
+            w = 2 * np.pi * settings.bandwidth
+            p: Any = plant_ldu.build(settings, 1e-3, (w, settings.damping))
+        else:
+            at = settings.parameters.model_copy(update=_at_radii(settings, frf))
+            zero = settings.driver.R_F * settings.driver.C_F
+            one = (*l292.second_order(settings.driver), zero)
+            p = plant_ivu.build(settings.model_copy(update={"parameters": at}), 1e-3, [one, one])
+        alone = self.config
+        if self.kind == "ivu":
+            blocks = {**self.parts.blocks, "allocation": self.parts.blocks["allocation"]._replace(kind=1 + frf.motor)}
+        else:
+            blocks = self.parts.blocks
+        return response.MODELS[self.kind](alone, p, blocks, frf.motor)
+
+    def response(self, values: Mapping[str, float], frf: Frf, tau: float) -> np.ndarray:
+        """H at the lines of a response, hold and the delay `tau` s included, per ampere where the response is."""
+        P = response.plant_response(self.linear(values, frf), frf.f)
+        if frf.per_ampere:
+            P = P / drive(self.config, frf.f)
+        return P * np.sinc(frf.f * frf.dt) * np.exp(-2j * np.pi * frf.f * tau)
+
+    def process_gain(self, values: Mapping[str, float], frf: Frf) -> float:
+        """|H| (2 pi f)^2 per ampere at 1 Hz, rad/s^2/A or m/s^2/A (8.2), without hold and delay."""
+        f = np.array([F_GAIN])
+        H = response.plant_response(self.linear(values, frf), f) / drive(self.config, f)
+        return float(np.abs(H[0]) * (2 * np.pi * F_GAIN) ** 2)
+
+
+def process_gain(config: Any, frf: Frf) -> float:
+    """Process gain at 1 Hz of the model in a config, at the radii of a response; rad/s^2/A or m/s^2/A."""
+    return Model(config, ()).process_gain({}, frf)
+
+
+def _at_radii(settings: Any, frf: Frf) -> dict[str, float | None]:
+    """Radii of a response; inertias that were given belong to the starting radii and move with (4.1, 4.2)."""
+    p = plant_ivu.parameters(settings)
+    moved: dict[str, float | None] = {"R1": frf.R1, "R2": frf.R2}
+    for J, R, was in (("J_1", frf.R1, p.R1), ("J_2", frf.R2, p.R2)):
+        moved[J] = getattr(p, J) + 0.5 * np.pi * p.rho_tape * p.h_tape * (R**4 - was**4)
+    return moved

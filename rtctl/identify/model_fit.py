@@ -1,0 +1,250 @@
+"""Fit of a machine's own model to its measured response, magnitude and phase weighted by how well they are known.
+
+    minimise sum over lines of |ln(H / H_model)|^2 / (sd / |H|)^2          real part magnitude, imaginary part phase
+    H_model = P(j w; parameters) (1 - e^(-j w T)) / (j w T) e^(-j w (tau - T/2))          tau = T_s/2 + T_c    (8.2)
+
+P is `state_space` of the plant, evaluated with the parameters at hand; nothing is written twice. The logarithm makes
+an error of magnitude and of phase worth the same and has no bias for a circular error. Parameters are fitted by their
+logarithm, so they stay positive and their intervals are factors. The covariance is (J^T J)^-1, made larger by the
+chi-square a line where the misfit is more than the noise, and by an error of 0.1 % that all lines share (rounding of
+the encoder is no noise), times Student's t: the interval covers 95 %.
+
+What the capstan's angle alone carries, one motor pulling (reel unit): J_m from the level, since K_m and the radii are
+known; c and k of the tape from the decoupling of the far reel at 2.6 Hz; c_m and k_m from the mode at 42 Hz, where reel
+1 (its inertia from its radius, 4.1) swings between its shaft and the tape. The reel sensors are not needed. It takes
+both sides as equal, as the thesis does (c_1 = c_2 and so on). What it hardly carries is K_m beside J_m: their ratio is
+the level, and only the known inertia of the reel tells them apart, to some 5 %.
+
+Where the sides are not equal that model does not explain the response, and the fit refuses (`MISFIT`). All ten
+parameters of the two sides (`EACH`) take responses of both motors at two pairs of radii, say 38/22 and 30/30 mm: by
+each motor its own reel is the near one, and an empty reel (8e-6 kg m^2) has its shaft mode at 190 Hz, out of the band.
+
+The linear drive is a mass-damper up to 50 Hz, whose level is the motor behind its transmission: J_m N^2 / R_c^2 = 44 kg
+beside a carriage of 1.25 kg. M, k_c and b_c come from the mode at 119 Hz. k_s and b_s have theirs at 2.1 kHz, and the
+fit refuses them.
+
+Source: thesis 8.1, 8.2, 12.3; Pintelon & Schoukens, System Identification (2012), chapter 9.
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.config.errors import NoAnswer, UserError, nearest
+from rtctl.identify.frf import Frf
+from rtctl.identify.model import PAIRS, Model, keys, process_gain
+
+__all__ = ["EACH", "FREE", "Estimate", "Fit", "fit", "process_gain"]
+
+FREE = {
+    "ivu": ("J_m", "c", "k", "c_m", "k_m"),
+    "ldu": ("J_m", "M", "k_c", "b_c"),
+}
+EACH = ("J_m1", "J_m2", "c1", "c2", "k1", "k2", "c_m1", "c_m2", "k_m1", "k_m2")  # for both motors at two pairs of radii
+BAND = {"ivu": (0.4, 60.0), "ldu": (0.9, 250.0)}  # Hz; 8.1 leaves out what is above 60 Hz, 12.3 what is above 250 Hz
+SPAN = 8.0  # factor by which a parameter may leave its start
+VAGUE = 1.0  # logarithm: an interval wider than a factor of e each way is no answer
+MISFIT = 2.0  # chi-square a degree of freedom above which the model is not that of the machine
+COMMON = 1e-3  # relative deviation that all lines share: rounding of the encoder turns H of the ldu by 1 to 3 mrad
+STEP = 1e-4  # logarithm, of a difference
+STARTS, AROUND = 8, 0.35  # further starts of the fit, logarithms away from the model
+
+
+class Estimate(NamedTuple):
+    value: float
+    low: float  # 95 % interval
+    high: float
+    unit: str
+
+
+class Fit(NamedTuple):
+    parameters: dict[str, Estimate]
+    tau: Estimate  # s, delay with that of the hold (8.2)
+    K_p: Estimate  # |H| (2 pi f)^2 at 1 Hz, rad/s^2 per A or m/s^2 per A, of the first response
+    chi2: float  # misfit a degree of freedom; 1 where the model explains all but the noise
+    lines: int
+    band: tuple[float, float]  # Hz
+    correlation: np.ndarray  # (m, m) of the logarithms, tau last
+    settings: Any  # the plant's settings with the parameters in them
+    frfs: tuple[Frf, ...]
+    models: tuple[np.ndarray, ...]  # response of the model at the lines of each
+
+
+def fit(
+    frfs: Frf | Sequence[Frf],
+    config: Any,
+    free: Sequence[str] | None = None,
+    band: tuple[float, float] | None = None,
+    tau: float | None = None,
+) -> Fit:
+    """Fit the model of `config.plant`, from which it starts, to one or more responses at their own reel radii.
+
+    `free` names parameters (one name for both sides of the reel unit: J_m, c, k, c_m, k_m), `band` is in Hz, `tau` in
+    s is fitted as well where it is None. Raises UserError for a name that the plant does not have, NoAnswer where the
+    lines do not carry the parameters (too few, or an interval wider than a factor of 2.7 each way, named).
+    """
+    from scipy.stats import t as student
+
+    given = (frfs,) if isinstance(frfs, Frf) else tuple(frfs)
+    names = tuple(FREE.get(config.machine, ()) if free is None else free)
+    _check(given, config, names)
+    bottom, top = band or BAND[config.machine]
+    kept = tuple(frf.select((frf.f >= bottom) & (frf.f <= top) & (frf.relative < 0.5)) for frf in given)
+    lines = sum(len(frf.f) for frf in kept)
+    if 2 * lines < 3 * (len(names) + 1):
+        raise NoAnswer(
+            f"{lines} lines of the response are carried from {bottom:g} to {top:g} Hz; {len(names) + 1} parameters "
+            f"need {int(np.ceil(1.5 * (len(names) + 1)))} at least"
+        )
+    model = Model(config, names)
+    dt = kept[0].dt
+    tau_0 = dt * (0.5 + (config.loop.write == "next_tick"))
+    start = np.log([model.start[name] for name in names] + ([tau_0] if tau is None else []))
+
+    def predicted(x: np.ndarray) -> list[np.ndarray]:
+        values = dict(zip(names, np.exp(x[: len(names)]), strict=True))
+        late = float(np.exp(x[-1])) if tau is None else tau
+        return [model.response(values, frf, late) for frf in kept]
+
+    def misfit(x: np.ndarray) -> np.ndarray:
+        parts = []
+        for frf, H in zip(kept, predicted(x), strict=True):
+            off = np.log(frf.H / H) * (np.sqrt(2 / frf.inflation) / frf.relative)
+            parts += [off.real, off.imag]
+        return np.concatenate(parts)
+
+    span = np.log(SPAN)
+    found = _best(misfit, start, span)
+    freedom = 2 * lines - len(start)
+    chi2 = 2 * found.cost / freedom * kept[0].inflation
+    if chi2 > MISFIT:
+        raise NoAnswer(_misfit(kept, predicted(found.x), chi2, config))
+    weights = np.concatenate([np.sqrt(2 / frf.inflation) / frf.relative for frf in kept])
+    alone = _covariance(found.jac, names, tau is None)
+    covariance = alone * max(chi2, 1.0) + _common(found.jac, alone, [len(frf.f) for frf in kept], weights)
+    wide = float(student.ppf(0.975, freedom)) * np.sqrt(np.diag(covariance))
+    _check_known(found.x, start, wide, names, span, (bottom, top))
+    units = _units(config, names)
+
+    def estimate(i: int, unit: str) -> Estimate:
+        value, low, high = (float(np.exp(found.x[i] + side * wide[i])) for side in (0, -1, 1))
+        return Estimate(value, low, high, unit)
+
+    parameters = {name: estimate(i, units[name]) for i, name in enumerate(names)}
+    values = {name: e.value for name, e in parameters.items()}
+    late = Estimate(tau, tau, tau, "s") if tau is not None else estimate(len(names), "s")
+    deviation = np.sqrt(np.diag(covariance))
+    return Fit(
+        parameters, late, _process_gain(model, kept[0], values, found.x, covariance, wide, deviation), float(chi2),
+        lines, (bottom, top), covariance / np.outer(deviation, deviation), model.settings(values), kept,
+        tuple(predicted(found.x)),
+    )  # fmt: skip
+
+
+def _check(frfs: tuple[Frf, ...], config: Any, names: Sequence[str]) -> None:
+    if config.machine not in FREE:
+        raise UserError(f"{config.name}: a response is fitted for {' and '.join(FREE)}, not for {config.machine}")
+    known = type(config.plant.parameters).model_fields
+    for name in names:
+        if not all(key in known for key in keys(config.machine, name)):
+            choices = [*known, *(PAIRS if config.machine == "ivu" else ())]
+            near = nearest(name, choices)
+            raise UserError(f"free: the {config.machine} has no parameter '{name}'"
+                            + (f"; did you mean '{near}'?" if near else ""))  # fmt: skip
+    meant = [key for name in names for key in keys(config.machine, name)]
+    if len(set(meant)) < len(meant) or not names:
+        raise UserError(f"free: {', '.join(names) or 'nothing'}: name each parameter once, and at least one")
+    if not frfs or any(frf.kind != config.machine or frf.dt != frfs[0].dt for frf in frfs):
+        raise UserError(f"{config.name}: the responses must be of an {config.machine}, all at one rate")
+
+
+def _best(misfit: Callable[[np.ndarray], np.ndarray], start: np.ndarray, span: float) -> Any:
+    """Least squares from the model and from STARTS points around it: a resonance has more than one valley."""
+    from scipy.optimize import least_squares
+
+    around = np.random.default_rng(0).uniform(-AROUND, AROUND, (STARTS, len(start)))
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        """Central differences, wide enough that rounding in a stiff plant does not pass for sensitivity."""
+        steps = STEP * np.eye(len(x))
+        return np.stack([(misfit(x + h) - misfit(x - h)) / (2 * STEP) for h in steps], axis=1)
+
+    options: dict[str, Any] = {"jac": jacobian, "bounds": (start - span, start + span), "x_scale": 0.1}
+    tries = [least_squares(misfit, start + off, **options) for off in (0 * start, *around)]
+    best = min(tries, key=lambda one: float(one.cost))
+    return least_squares(misfit, best.x, xtol=1e-11, ftol=1e-11, **options)
+
+
+def _misfit(frfs: tuple[Frf, ...], models: list[np.ndarray], chi2: float, config: Any) -> str:
+    off = [np.abs(np.log(frf.H / H)) / frf.relative for frf, H in zip(frfs, models, strict=True)]
+    worst = max(range(len(off)), key=lambda i: float(off[i].max()))
+    f = frfs[worst].f[off[worst] > 0.5 * off[worst].max()]
+    hint = ""
+    if config.machine == "ivu":
+        hint = "; where the two sides are not alike, give responses of both motors at two pairs of radii and free "
+        hint += ", ".join(EACH)
+    return (
+        f"the model does not explain the response: its misfit is {np.sqrt(chi2):.3g} times the noise, worst from "
+        f"{f.min():.3g} to {f.max():.3g} Hz{hint}"
+    )
+
+
+def _covariance(J: np.ndarray, names: Sequence[str], late: bool) -> np.ndarray:
+    """(J^T J)^-1. Raises NoAnswer that names the parameters where the lines say nothing of a combination of them."""
+    _, s, V = np.linalg.svd(J, full_matrices=False)
+    if s[-1] < 1e-9 * s[0]:
+        every = (*names, "tau") if late else tuple(names)
+        mixed = [name for name, part in zip(every, V[-1], strict=True) if abs(part) > 0.3]
+        raise NoAnswer(f"the response does not carry {' and '.join(mixed)} apart; fix one of them")
+    return (V.T / s**2) @ V
+
+
+def _common(J: np.ndarray, alone: np.ndarray, counts: list[int], weights: np.ndarray) -> np.ndarray:
+    """Covariance by an error of COMMON in the magnitude of all lines, and another in their phase."""
+    ends = np.cumsum([0, *counts])
+    total = np.zeros_like(alone)
+    for part in (0, 1):
+        r = np.concatenate(
+            [np.concatenate([(i == part) * COMMON * weights[a:b] for i in (0, 1)]) for a, b in pairwise(ends)]
+        )
+        shift = alone @ J.T @ r
+        total += np.outer(shift, shift)
+    return total
+
+
+def _check_known(
+    x: np.ndarray, start: np.ndarray, wide: np.ndarray, names: Sequence[str], span: float, band: tuple[float, float]
+) -> None:
+    for i, name in enumerate((*names, "tau")[: len(x)]):
+        if abs(x[i] - start[i]) > 0.99 * span:
+            raise NoAnswer(
+                f"{name} runs to {np.exp(x[i]):.3g}, {SPAN:g} times from where the model has it; the response from "
+                f"{band[0]:g} to {band[1]:g} Hz does not carry it, or is not that of this model"
+            )
+        if wide[i] > VAGUE:
+            raise NoAnswer(
+                f"the response from {band[0]:g} to {band[1]:g} Hz does not carry {name}: {np.exp(x[i]):.3g} within a "
+                f"factor of {np.exp(wide[i]):.2g}; widen the band, measure longer, or leave it out"
+            )
+
+
+def _units(config: Any, names: Sequence[str]) -> dict[str, str]:
+    fields = type(config.plant.parameters).model_fields
+    return {n: (fields[keys(config.machine, n)[0]].json_schema_extra or {}).get("unit", "") for n in names}
+
+
+def _process_gain(
+    model: Model, frf: Frf, values: dict[str, float], x: np.ndarray, covariance: np.ndarray, wide: Any, deviation: Any
+) -> Estimate:
+    """At 1 Hz, with the interval that the covariance of the parameters gives it."""
+    K = model.process_gain(values, frf)
+    slope = np.zeros(len(x))
+    for i, name in enumerate(values):
+        more = {**values, name: values[name] * 1.001}
+        slope[i] = np.log(model.process_gain(more, frf) / K) / np.log(1.001)
+    half = float(wide[0] / deviation[0]) * float(np.sqrt(slope @ covariance @ slope))
+    return Estimate(
+        K, float(K * np.exp(-half)), float(K * np.exp(half)), f"{'rad' if frf.kind == 'ivu' else 'm'}/s^2/A"
+    )

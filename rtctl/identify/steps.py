@@ -1,0 +1,115 @@
+"""Step responses: of the reel unit by a radian (8.3), of the linear drive by 1/12 and 1/24 mm (chapter 10).
+
+What a step is judged by is `rtctl.trace.metrics`; here are the configs that make steps, and the figures over many.
+
+Source: thesis 8.3, figure 8.6; chapter 10 for the printing steps; 11.1 for 4 um as more than is allowed.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.config.errors import NoAnswer
+from rtctl.identify.bench import changed, need
+from rtctl.identify.records import Record
+from rtctl.trace.metrics import scales, step_metrics
+
+TWELFTH, TWENTY_FOURTH = 1e-3 / 12, 1e-3 / 24  # m
+
+
+class Steps(NamedTuple):
+    """Steps of a record by one sensor, in the order in which they come."""
+
+    each: tuple[dict[str, float | None], ...]  # as step_metrics
+    by: str  # column that was judged
+    mm: float  # in one unit of position
+    mean_mm: float  # of the final error
+    worst_mm: float
+    spread_mm: float  # deviation of the way stepped, which is what makes bands
+    overshoot_pct: float  # largest
+    settling_s: float | None  # slowest; None where one did not settle
+
+
+def printing_config(config: Any, size: float = TWELFTH, count: int = 24, hold: float = 0.4) -> Any:
+    """The config that makes `count` steps of `size` m, `hold` s each, and the same home again."""
+    need(config.machine, config.name, "ldu")
+    ends = [*range(1, count + 1), *range(count - 1, -1, -1)]
+    steps = [{"at": 0.5 + k * hold, "to": n * size} for k, n in enumerate(ends)]
+    last = {"at": 0.5 + len(ends) * hold, "to": 0.0}
+    return changed(config, {"reference": {"steps": [*steps, last]}})
+
+
+def radian_config(config: Any, tau_C: float = 2.4e-3, R1: float = 0.025, R2: float = 0.035, size: float = 1.0) -> Any:
+    """The config of figure 8.6: -1 rad at once, +1 rad 3 s later, friction compensated by `tau_C` Nm.
+
+    A step is a jump, as in the thesis, without the shaper and the feedforward of inertia; the friction of both motors
+    is compensated in full, at standstill too.
+    """
+    need(config.machine, config.name, "ivu")
+    changes = {
+        "law.shaper": {},
+        "law.inertia": {},
+        "law.friction": {"motor1": {"tau_C": tau_C}, "motor2": {"tau_C": tau_C}, "hand_over": 1.0},
+        "radius": {"source": "given", "R1": R1, "R2": R2},
+        "plant.parameters.R1": R1,
+        "plant.parameters.R2": R2,
+        "safety.following_error": 0,
+        "reference": {"steps": [{"at": 0.5, "to": -size}, {"at": 3.5, "to": 0.0}, {"at": 6.5, "to": 0.0}]},
+    }
+    return changed(config, changes)
+
+
+def steps(record: Record, by: str | None = None) -> Steps:
+    """Judge all steps of a record by the column `by`: the loop's own sensor where none is named, or `scale`.
+
+    Raises NoAnswer where the reference makes no step.
+    """
+    machine = record.kind
+    by = by or {"ivu": "capstan", "ldu": "position", "axis": "x"}[machine]
+    mm, rad = scales({"plant": machine, "parameters": {"R_c": radius(record.config)}})
+    # three counts of the encoder are at rest: a step need not settle closer
+    floor = {"ivu": 3 * 2 * np.pi / 10_000, "ldu": 4e-6, "axis": 0.0}[machine]
+    each = step_metrics(record["t"], record["target"], record[by], mm, rad, settle_floor=floor)
+    if not each:
+        raise NoAnswer(f"{record.source}: the reference makes no step")
+    return summary(each, by, mm)
+
+
+def summary(each: Sequence[dict[str, float | None]], by: str, mm: float) -> Steps:
+    """Figures over many steps."""
+    errors = np.array([step["final_error_mm"] for step in each], float)
+    settling = [step["settling_s"] for step in each]
+    return Steps(
+        each=tuple(each),
+        by=by,
+        mm=mm,
+        mean_mm=float(errors.mean()),
+        worst_mm=float(errors[np.argmax(np.abs(errors))]),
+        spread_mm=float(np.diff(errors, prepend=0.0).std()),
+        overshoot_pct=max(float(step["overshoot_pct"] or 0.0) for step in each),
+        settling_s=None if None in settling else max(float(s) for s in settling if s is not None),
+    )
+
+
+def radius(config: Any) -> float | None:
+    """Radius of the capstan, between radians and metres; None on an axis."""
+    if config.machine == "axis":
+        return None
+    return float(config.R_c if config.machine == "ivu" else config.sensors.R_c)
+
+
+def usual_configs(config: Any) -> list[Any]:
+    """What the thesis plays: 1/12 and 1/24 mm on a linear drive; on a reel unit figure 8.6 (a) and (b).
+
+    Raises UserError for another machine.
+    """
+    need(config.machine, config.name, "ivu", "ldu")
+    if config.machine == "ldu":
+        return [printing_config(config, TWELFTH), printing_config(config, TWENTY_FOURTH)]
+    return [radian_config(config, 2.4e-3), radian_config(config, 1.5e-3)]
+
+
+def size_mm(one: Steps) -> float:
+    """Usual size of a record's steps, mm, from the first."""
+    return abs(float(one.each[0]["size"] or 0.0)) * one.mm

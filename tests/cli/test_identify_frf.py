@@ -1,0 +1,103 @@
+"""`rtctl identify frf | multisine | fit` on an emulated machine and on its recordings."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from rtctl.cli.main import COMMANDS
+
+SHORT = ["--averages", "8", "--rms", "1V"]
+
+
+@pytest.fixture(autouse=True)
+def registered(monkeypatch):
+    monkeypatch.setitem(COMMANDS, "identify", "identify")
+
+
+@pytest.fixture(scope="module")
+def bundles(tmp_path_factory):
+    """Two realisations, recorded as a daemon does."""
+    from rtctl.cli import identify_source
+    from rtctl.cli.common import load_config
+    from rtctl.identify import experiment
+
+    config = load_config("ivu", ["name=frf"])
+    out = tmp_path_factory.mktemp("runs")
+    plan = experiment.multisine(config, realisations=2, periods=2)
+    identify_source.play(config, plan, out, lambda _: None)
+    return [str(path) for path in sorted(out.iterdir())]
+
+
+def test_the_sensitivity_of_an_emulated_machine(rtctl, tmp_path):
+    picture = tmp_path / "frf.png"
+    code, out, err = rtctl("identify", "frf", "ivu", *SHORT, "--plot", picture)
+    assert code == 0
+    assert "averages, H_p carried at" in out and "coherence" in out
+    assert "playing 1 of 1" in err
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_as_json_per_ampere(rtctl):
+    code, out, err = rtctl("identify", "frf", "ivu", *SHORT, "--per-ampere", "--json")
+    found = json.loads(out)
+    assert code == 0 and err == ""
+    assert found["frf"]["unit"] == "rad/A"
+    assert len(found["f"]) == len(found["coherence"]) == len(found["S"]["re"])
+
+
+def test_realisations_from_recordings(rtctl, bundles):
+    code, out, _ = rtctl("identify", "multisine", *bundles)
+    assert code == 0
+    assert out.startswith("2 realisations of 4 periods")
+    code, out, _ = rtctl("identify", "multisine", *bundles, "--json")
+    assert json.loads(out)["frf"]["motor"] == 1
+
+
+def test_a_fit_from_recordings(rtctl, bundles):
+    code, out, _ = rtctl("identify", "fit", *bundles, "--json")
+    found = json.loads(out)["parameters"]
+    assert code == 0
+    assert set(found) == {"J_m", "c", "k", "c_m", "k_m", "tau", "K_p"}
+    assert found["J_m"]["value"] == pytest.approx(1.5e-3, rel=0.05)
+    code, out, _ = rtctl("identify", "fit", *bundles, "--free", "J_m", "--free", "c", "--model", "ivu")
+    assert code == 0 and "95 % from" in out
+
+
+def test_data_that_carry_no_answer(rtctl, bundles):
+    code, out, err = rtctl("identify", "multisine", bundles[0])
+    assert (code, out) == (3, "") and "at least two" in err
+    code, out, err = rtctl("identify", "frf", "ivu", *SHORT, "--band", "1:200")
+    assert (code, out) == (3, "") and "not carried from" in err
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["frfs"], "did you mean 'frf'?"),
+        (["frf", "axis"], "not on axis"),
+        (["frf", "ivu", "--band", "60"], "write the ends in Hz with a colon"),
+        (["frf", "ivu", "--rms", "2kg"], "--rms 2kg"),
+        (["frf", "ivu", "--rms", "5V"], "take 1.2 V or less"),
+        (["frf", "ivu", "ldu"], "is not a folder"),
+    ],
+)
+def test_mistakes(rtctl, arguments, said):
+    code, out, err = rtctl("identify", *arguments)
+    assert (code, out) == (2, "")
+    assert said in err
+
+
+def test_options_of_a_config_do_not_go_with_recordings(rtctl, bundles):
+    code, _, err = rtctl("identify", "multisine", *bundles, "--set", "loop.seed=2")
+    assert code == 2 and "goes with a CONFIG" in err
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys; from rtctl.cli import main; main.COMMANDS['identify'] = 'identify'; "
+        "main.main(['identify', 'fit', '--help']); print('numpy' in sys.modules, 'numba' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "False False"

@@ -1,0 +1,51 @@
+"""A loop measured on the emulator is the loop that was designed; a limited output measures nothing."""
+
+import filters
+import fused
+import numpy as np
+import pytest
+
+from rtctl.config.errors import NoAnswer
+from rtctl.config.load import set_path
+from rtctl.design import check, margins, response
+
+
+def shaped():
+    return set_path(fused.config("ldu"), "law.position", {"kind": "sections", **filters.FIFTY_HERTZ})
+
+
+def test_reel_unit_has_its_loop():
+    """Motor 1 alone, as the measurement has it."""
+    config = fused.config("ivu", law__allocation__kind="motor1")
+    got = check.measure(config, rms=1.5, f_max=80.0)
+    wanted = margins.of_config(config)
+    assert pytest.approx(wanted.GM, abs=0.6) == got.margins.GM
+    assert pytest.approx(wanted.PM, abs=3.0) == got.margins.PM
+    middle = (got.f > 3) & (got.f < 30)
+    assert np.median(np.abs(got.L[middle] / response.loop(config, got.f[middle]) - 1)) < 0.05
+
+
+def test_lines_are_odd_and_within_the_band():
+    got = check.measure(shaped(), rms=0.4, period=1.0, f_max=120.0)
+    assert got.f[0] == 1.0 and got.f[-1] <= 120.0
+    assert (np.diff(got.f) == 2.0).all()
+
+
+def test_experiment_leaves_dry_friction_out_and_the_law_in():
+    config = shaped()
+    played = check.experiment(config, 0.5)
+    assert played.plant.parameters.F_c == played.law.friction.F_c == 0.0
+    assert played.law.position == config.law.position
+    assert played.loop.mode == "fused" and played.loop.write == config.loop.write
+    assert played.excitation.f_max == 4000.0
+
+
+def test_limited_output_is_no_measurement():
+    with pytest.raises(NoAnswer, match=r"limited at .* s; lower rms from 3 V"):
+        check.measure(shaped(), rms=3.0, period=0.5, f_max=120.0)
+
+
+def test_a_trip_is_no_measurement():
+    config = set_path(shaped(), "safety.following_error", 1e-5)
+    with pytest.raises(NoAnswer, match="tripped"):
+        check.measure(config, rms=0.5, period=0.5, f_max=120.0)
