@@ -78,6 +78,12 @@ class Hint(NamedTuple):
     place: bool = False
 
 
+class Where(NamedTuple):
+    """A place that is where the machine starts, or anywhere, from the middle of the travel."""
+
+    name: str
+
+
 class Jumps(NamedTuple):
     """The size of the largest of the jumps that the record shows; the others keep their share of it."""
 
@@ -94,7 +100,7 @@ class Choice(NamedTuple):
 
 USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
-Part = Size | Limit | Shape | Turn | At | Hint | Jumps | Choice
+Part = Size | Limit | Shape | Turn | At | Hint | Where | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),
     "friction.viscous": (Size("B", "drag", 0.1, signed=True, undoes="thick"),),
@@ -114,7 +120,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     ),
     "structure.stiffening": (Size("c3", "cubic", 0.2, signed=True),),
     "tape.viscoelastic": (Size("c_branch", "stiffness", 0.5), Shape("tau", "seconds", (0.01, 0.05, 0.25, 1.2))),
-    "load.spring": (Size("k", "stiff", 0.2, signed=True),),
+    "load.spring": (Size("k", "stiff", 0.2, signed=True), Where("x0")),
     "load.imbalance": (Turn("A", "phi", "force", 0.1),),
     "load.bump": (
         Size("F", "force", 0.2, signed=True), At("at", "width", 8, 0.05, 0.012),
@@ -223,8 +229,8 @@ def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis 
 
 def is_rich(h: Hypothesis) -> bool:
     """Whether it has its richer form already."""
-    plain = sum(2 if isinstance(part, Turn | At) else 1 for part in SEARCH[h.term] if not isinstance(part, Choice))
-    return len(h.coordinates) > plain
+    more = {part[0] for part in EXTRAS.get(h.term, ()) if not isinstance(part, Choice)}
+    return any(c.name.partition("|")[0] in more for c in h.coordinates)
 
 
 def forms(h: Hypothesis) -> list[Hypothesis]:
@@ -378,6 +384,10 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
                 turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
                 step = min(1e-2, TURN / turns)
                 yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach, step=step),), {}
+    elif isinstance(part, Where):
+        s = m.scale(node)
+        yield (), {}
+        yield (Coordinate(part.name, PLACE, s.span, -3.0, 3.0, offset=s.at(0.5)),), {}
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
         if jumps:
