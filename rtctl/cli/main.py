@@ -31,6 +31,7 @@ COMMANDS = {
     "play": "switch",
     "identify": "identify",
     "tune": "tune",
+    "reproduce": "reproduce",
     "diagnose": "diagnose",
     "simulate": "simulate",
     "prove": "prove",

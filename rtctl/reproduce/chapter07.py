@@ -1,0 +1,91 @@
+"""Chapter 7, the prototype: the motor driver (figure 7.4), the motors, the encoder."""
+
+import math
+
+import numpy as np
+
+from rtctl.drivers import l292
+from rtctl.drivers.l292 import L292Settings
+from rtctl.identify.frf import drive
+from rtctl.plants import ivu
+from rtctl.reproduce import figures as fig
+from rtctl.reproduce.played import config, play
+from rtctl.reproduce.rows import Part, Picture, Row
+
+STALL, SLIP = 0.1, 2.5e-3  # A that moves the fullest reel, and Nm of the slip couplings (7.3)
+ACCURACY = 1e-3  # m, of positioning (7.4)
+
+DRIVER = (
+    Row("7.sensing_resistor", "R_S for 2 A at 10 V", "(7.2)", 0.24, "ohm", 0.01),
+    Row("7.cutoff_filter", "corner of the current filter with R_F and C_F", "7.2", 3.0, "kHz", 0.02),
+    Row("7.error_capacitor", "C for zeta = 0.71", "7.2", 6.6, "nF", 0.03),
+    Row("7.error_resistor", "R that cancels the motor's pole", "(7.3)", 170.0, "kohm", 0.02),
+    Row("7.damping", "damping of the current loop", "7.2", 0.5 * math.sqrt(2), "", 0.02),
+    Row("7.bandwidth", "bandwidth of the driver, -3 dB", "7.2, figure 7.4", 1.0, "kHz", bound="at least"),
+    Row("7.oscillator", "switching frequency with R_O and C_O", "7.2", 22.0, "kHz", 0.02),
+)  # fmt: skip
+MOTOR = (
+    Row("7.friction_torque", "torque of 0.1 A that puts the fullest reel in motion", "7.3", 61.0, "mNm", 0.01,
+        erratum="0.1 A times 61e-3 Nm/A is 6.1e-3 Nm, a factor of 10", expected=6.1),
+    Row("7.least_torque", "with the 2.5 mNm of the slip couplings", "7.3", 64.0, "mNm", 0.01,
+        erratum="follows from the row above", expected=8.6),
+    Row("7.motor_torque", "continuous torque of the motor that was chosen, enough for it", "7.3", 450.0, "mNm",
+        bound="at most", remark="what the emulated machine takes at most in its steps"),
+    Row("7.increments", "least increments of the encoder for 1 mm", "7.4", 80.0, "", 0.03),
+)  # fmt: skip
+
+
+def driver(short: bool) -> dict[str, float]:
+    """The shipped driver's components through (7.1) to (7.3)."""
+    p = L292Settings()
+    loop = 2 * p.V_S / (p.V_R * p.R_M) * p.R_S  # G_mo R_S
+    wanted = 2 * p.R_F * p.C_F * loop / p.R_4  # C for zeta^2 = 1/2
+    f = np.geomspace(10.0, 1e5, 4000)
+    H = np.abs(l292.transfer_function(p, f))
+    return {
+        "7.sensing_resistor": p.ratio * 10.0 / p.I_max,
+        "7.cutoff_filter": 1e-3 / (2 * np.pi * p.R_F * p.C_F),
+        "7.error_capacitor": 1e9 * wanted,
+        "7.error_resistor": 1e-3 * p.L_M / p.R_M / p.C,
+        "7.damping": l292.second_order(p)[2],
+        "7.bandwidth": 1e-3 * float(f[np.argmax(H < H[0] / np.sqrt(2))]),
+        "7.oscillator": 1e-3 * l292.f_osc(p),
+    }
+
+
+def motors(short: bool) -> dict[str, float]:
+    """Torques by the motor constant, and what the machine's own steps take."""
+    made = config("ivu", {"reference": {"steps": [{"at": 0.5, "to": 1.0}, {"at": 3.0, "to": 0.0}]}})
+    p = ivu.parameters(made.plant)
+    run = play(made, 5.0)
+    most = max(float(np.abs(run[name]).max()) for name in ("u1", "u2")) * l292.gain(made.plant.driver) * p.K_m1
+    return {
+        "7.friction_torque": 1e3 * STALL * p.K_m1,
+        "7.least_torque": 1e3 * (STALL * p.K_m1 + SLIP),
+        "7.motor_torque": 1e3 * most,
+        "7.increments": 2 * np.pi * made.R_c / ACCURACY,
+    }
+
+
+def figure_7_4(short: bool) -> Picture:
+    """Response of the driver, as (7.1) and after the cancellation."""
+    f = np.geomspace(10.0, 1e5, 400)
+    figure, (above, turn) = fig.panels(2, sharex=True)
+    full, short_form = l292.transfer_function(L292Settings(), f), drive(config("ivu"), f)
+    for H, color, style, words in ((full, fig.BLUE, "-", "(7.1)"), (short_form, fig.INK, "--", "after (7.3)")):
+        above.semilogx(f, fig.db(H), style, color=color, linewidth=1.1, label=words)
+        turn.semilogx(f, np.degrees(np.unwrap(np.angle(H))), style, color=color, linewidth=1.1)
+    above.set_ylabel("gain [dB, A/V]")
+    turn.set(ylabel="phase [deg]", xlabel="frequency [Hz]")
+    fig.legend(above)
+    sentence = (
+        "The motor driver from volts to amperes with the components of the text: flat to "
+        f"{1e-3 * l292.cutoff(L292Settings()):.1f} kHz, far beyond the tape and the reels."
+    )
+    return Picture("7.4", sentence, figure)
+
+
+PARTS = (
+    Part("motor driver", DRIVER, driver, {"7.4": figure_7_4}),
+    Part("motors and encoder", MOTOR, motors),
+)

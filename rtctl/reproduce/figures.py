@@ -1,0 +1,76 @@
+"""What the figures share: a small figure with its axes, in the colours of the other pictures, and saving it."""
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from rtctl.trace.plot import BLUE, GREEN, GREY, INK, ORANGE, RED, envelope
+
+__all__ = [
+    "BLUE", "COLORS", "GREEN", "GREY", "INK", "ORANGE", "RED",
+    "db", "degrees", "legend", "line", "panels", "save", "title",
+]  # fmt: skip
+
+COLORS = (BLUE, ORANGE, GREEN, RED)
+DOTS = 100  # an inch
+PALETTE = 48  # colours
+
+
+def panels(
+    rows: int, columns: int = 1, height: float = 2.0, width: float = 7.2, sharex: Any = False
+) -> tuple[Figure, list[Axes]]:
+    """A figure with `rows` times `columns` axes, each `height` inches high, row by row."""
+    figure = Figure(figsize=(width, 0.4 + rows * height), dpi=DOTS, layout="constrained")
+    FigureCanvasAgg(figure)
+    every = list(figure.subplots(rows, columns, squeeze=False, sharex=sharex).flat)
+    for axes in every:
+        axes.grid(True, color="#e3e5e8", linewidth=0.7)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=8)
+        axes.xaxis.label.set_size(9)
+        axes.yaxis.label.set_size(9)
+    return figure, every
+
+
+def line(axes: Axes, x: Any, y: Any, color: str = BLUE, style: str = "-", **more: Any) -> None:
+    """A line of however many points, drawn with those that can be seen."""
+    x, y = envelope(np.asarray(x, float), np.asarray(y, float), 600)
+    axes.plot(x, y, style, color=color, **{"linewidth": 1.1, **more})
+
+
+def title(axes: Axes, words: str) -> None:
+    """A few words above the axes, at their left end."""
+    axes.set_title(words, loc="left", fontsize=9)
+
+
+def legend(axes: Axes, **more: Any) -> None:
+    """A legend without a frame."""
+    axes.legend(**{"frameon": False, "fontsize": 8, **more})
+
+
+def db(x: Any) -> np.ndarray:
+    """Magnitude in dB."""
+    return np.asarray(20 * np.log10(np.maximum(np.abs(x), 1e-30)))
+
+
+def degrees(x: Any) -> np.ndarray:
+    """Phase in degrees, without jumps, from between -360 and 0 on: a mass starts at -180."""
+    phase = np.degrees(np.unwrap(np.angle(x)))
+    return np.asarray(phase - 360 * np.round((phase[0] + 180) / 360))
+
+
+def save(figure: Figure, folder: Path, number: str) -> Path:
+    """The figure as a small PNG: `figure_8_3.png` for number 8.3."""
+    buffer = BytesIO()
+    figure.savefig(buffer)
+    path = folder / f"figure_{number.replace('.', '_')}.png"
+    with Image.open(buffer) as image:  # few colours are enough for lines, and half the bytes
+        image.convert("RGB").quantize(PALETTE).save(path, optimize=True)
+    return path

@@ -1,0 +1,179 @@
+"""Figures of chapter 11, and its parts."""
+
+import numpy as np
+
+from rtctl.design import mechanics
+from rtctl.identify import luminance
+from rtctl.reproduce import chapter11 as ch
+from rtctl.reproduce import figures as fig
+from rtctl.reproduce.rows import Part, Picture
+
+STRIP, WAVE = 0.1e-3, 0.1  # m, of figure 11.4
+
+
+def figure_11_2(short: bool) -> Picture:
+    """Deviation of the capstan's radius, and the error that it makes."""
+    one = ch.rippled(None, None, 0.0)
+    figure, (above, below) = fig.panels(2, sharex=True, height=1.7)
+    turns = 360 * one.x / ch.TURN
+    fig.line(above, turns, 1e6 * np.gradient(_smooth(one.e), one.x) * ch.R_C, label="from the error, filtered")
+    fig.line(below, turns, 1e6 * one.e, fig.RED)
+    above.set(ylabel="R_c - mean [um]")
+    below.set(ylabel="error [um]", xlabel="rotation of the capstan [deg]", xlim=(0, 1080))
+    sentence = (
+        "An oval capstan on the emulator: a radius that swings by 2 um makes an error of "
+        f"{1e6 * 2 * ch.amplitude(one):.1f} um from end to end."
+    )
+    return Picture("11.2", sentence, figure)
+
+
+def figure_11_3(short: bool) -> Picture:
+    """Reading error of a bearing that is off centre, over a turn."""
+    theta = np.linspace(0, 2 * np.pi, 200)
+    one = ch.rippled(0.0, None, None)
+    figure, (axes,) = fig.panels(1)
+    fig.line(axes, np.degrees(one.x / ch.R_C), -1e3 * (one.e - one.e.mean()) / ch.R_C, "#9ecbea", label="emulator")
+    error = np.arctan(ch.ECCENTRICITY * np.cos(theta) / ch.R_G)
+    at = one.x[np.argmax(_smooth(-one.e)[one.x < ch.TURN])] / ch.R_C  # where the pass began is not where the disc did
+    axes.plot(np.degrees(theta), 1e3 * np.interp(theta - at, theta, error, period=2 * np.pi), "--", color=fig.INK,
+              linewidth=1.0, label="(11.5)")  # fmt: skip
+    axes.set(xlabel="rotation [deg]", ylabel="reading error [mrad]", xlim=(0, 360))
+    fig.legend(axes)
+    sentence = (
+        "Reading error of an encoder whose bearing is 5 um off the centre of its disc: "
+        f"{1e3 * mechanics.disc_error(ch.ECCENTRICITY, ch.R_G):.2f} mrad, read by the emulator with its own "
+        "counts."
+    )
+    return Picture("11.3", sentence, figure)
+
+
+def figure_11_4(short: bool) -> Picture:
+    """Error by a wavy strip."""
+    x = np.linspace(0, 0.2, 2001)
+    slope = 2 * np.pi * STRIP / WAVE * np.cos(2 * np.pi * x / WAVE)
+    e = np.concatenate(([0.0], np.cumsum(1 - np.hypot(1, slope))[:-1])) * (x[1] - x[0])
+    figure, (above, below) = fig.panels(2, sharex=True, height=1.6)
+    above.plot(1e3 * x, 1e3 * STRIP * np.sin(2 * np.pi * x / WAVE), color=fig.BLUE, linewidth=1.1)
+    below.plot(1e3 * x, 1e6 * e, color=fig.RED, linewidth=1.1)
+    above.set_ylabel("strip y [mm]")
+    below.set(ylabel="error x - l [um]", xlabel="position [mm]")
+    whole = -1e6 * mechanics.strip_error(STRIP, WAVE, 0.2)
+    sentence = (
+        f"Path along a strip that waves by 0.1 mm over 100 mm, by (11.6): {whole:.1f} um over 200 mm, a small "
+        "error for so large a wave."
+    )
+    return Picture("11.4", sentence, figure)
+
+
+def figure_11_5(short: bool) -> Picture:
+    """Capstan, bearing and coupling in their worst and best phases."""
+    figure, axes = fig.panels(1, 2)
+    said = []
+    cases = (("worst phases", (np.pi, np.pi, 0.0)), ("best phases", (np.pi, 0.0, 0.0)))
+    for one, (words, phases) in zip(axes, cases, strict=True):
+        run = ch.rippled(*phases)
+        turns = 360 * run.x / ch.TURN
+        fig.line(one, turns, 1e6 * (run.e - run.e.mean()), fig.RED)
+        one.set(xlim=(0, 1080), ylim=(-8, 8), xlabel="rotation of the capstan [deg]")
+        fig.title(one, words)
+        said.append(1e6 * ch.amplitude(run))
+    axes[0].set_ylabel("error [um]")
+    sentence = (
+        f"Capstan, bearing and coupling together on the emulator: {said[0]:.1f} um of amplitude where they add, "
+        f"{said[1]:.1f} um where they do not."
+    )
+    return Picture("11.5", sentence, figure)
+
+
+def figure_11_6(short: bool) -> Picture:
+    """Position error over 600 mm, with and without its trend."""
+    one, (found, _) = ch.printer(ch.SPEEDS[0]), ch.analysed(ch.SPEEDS[0])
+    figure, (above, below) = fig.panels(2, sharex=True)
+    fig.line(above, 1e3 * one.x, 1e3 * one.e)
+    fig.line(below, 1e3 * found.x, 1e6 * found.e)
+    above.set_ylabel("error [mm]")
+    below.set(ylabel="without trend [um]", xlabel="position [mm]", xlim=(0, 600))
+    value = ch.by_scale(short)
+    sentence = (
+        f"Position error of the printer against its linear scale: {value['11.trend']:.2f} mm over 600 mm, a "
+        f"capstan that is {value['11.radius']:.2f} um too large."
+    )
+    return Picture("11.6", sentence, figure)
+
+
+def figure_11_7(short: bool) -> Picture:
+    """Fourier transform of the error on two scales."""
+    found, peaks = ch.analysed(ch.SPEEDS[0])
+    figure, axes = fig.panels(2)
+    for one, longest in zip(axes, (600, 40), strict=True):
+        one.plot(1e3 * found.wavelength, 1e6 * np.abs(found.E), ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
+        inside = found.wavelength <= 1e-3 * longest
+        one.set(xlim=(0, longest), ylim=(0, 1.15e6 * float(np.abs(found.E[inside]).max())), ylabel="|E| [um]")
+    axes[1].set_xlabel("wavelength [mm]")
+    bins = ", ".join(f"{1e3 * peak.bin:.2f}" for peak in peaks)
+    sentence = f"Fourier transform (11.10) of that error on two scales, with peaks at {bins} mm."
+    return Picture("11.7", sentence, figure)
+
+
+def figure_11_8(short: bool) -> Picture:
+    """Luminance of a grey image, and its Fourier transform on two scales."""
+    made, cross = ch.image()
+    figure, axes = fig.panels(3, height=1.6)
+    fig.line(axes[0], 1e3 * made.x, made.L, linewidth=0.8)
+    axes[0].set(xlabel="position [mm]", ylabel="L*", xlim=(0, 600))
+    for one, longest in zip(axes[1:], (600, 40), strict=True):
+        inside = cross.wavelength <= 1e-3 * longest
+        size = np.abs(cross.Gamma)
+        one.plot(1e3 * cross.wavelength, size, ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
+        one.set(xlim=(0, longest), ylim=(0, 1.15 * float(size[inside].max())), ylabel="|Gamma| [L*]")
+    axes[2].set_xlabel("wavelength [mm]")
+    sentence = (
+        "Luminance of an emulated grey image and its Fourier transform: a peak at "
+        f"{ch.by_luminance(short)['11.peak_luminance']:.2f} mm over the slow drift of ink and paper."
+    )
+    return Picture("11.8", sentence, figure)
+
+
+def figure_11_9(short: bool) -> Picture:
+    """Cross power spectrum."""
+    _, cross = ch.image()
+    figure, (axes,) = fig.panels(1)
+    axes.plot(1e3 * cross.wavelength, 1e6 * np.abs(cross.S), ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
+    axes.set(xlim=(0, 60), xlabel="wavelength [mm]", ylabel="|S| [um L*]")
+    axes.set_ylim(bottom=0, top=1.15e6 * float(np.abs(cross.S[cross.wavelength < 0.06]).max()))
+    sentence = (
+        "Cross power spectrum of position error and luminance: they share "
+        f"{ch.by_luminance(short)['11.peak_cross']:.2f} mm, the turn of the capstan."
+    )
+    return Picture("11.9", sentence, figure)
+
+
+def figure_11_10(short: bool) -> Picture:
+    """Luminance through the band around a turn."""
+    band = luminance.band_pass(ch.image()[0])
+    figure, (axes,) = fig.panels(1)
+    fig.line(axes, 1e3 * band.x, band.L)
+    axes.set(xlim=(0, 600), xlabel="position [mm]", ylabel="L* in the band")
+    sentence = (
+        f"Luminance between 17 and 20 mm: a wave of {1e3 * band.wavelength:.2f} mm whose size changes by "
+        f"{100 * band.ripple:.0f} %."
+    )
+    return Picture("11.10", sentence, figure)
+
+
+def _smooth(e: np.ndarray) -> np.ndarray:
+    """Without the edges of scale and encoder: the first three waves of a turn."""
+    line = np.linspace(e[0], e[-1], len(e))
+    spectrum_of = np.fft.rfft(e - line)
+    spectrum_of[19:] = 0.0  # the pass has six turns
+    return np.asarray(np.fft.irfft(spectrum_of, len(e)) + line)
+
+
+PARTS = (
+    Part("where errors come from", ch.ORIGINS, ch.origins,
+         {"11.2": figure_11_2, "11.3": figure_11_3, "11.4": figure_11_4, "11.5": figure_11_5}),
+    Part("error against the scale", ch.SCALE, ch.by_scale, {"11.6": figure_11_6, "11.7": figure_11_7}),
+    Part("luminance of a grey image", ch.LUMINANCE, ch.by_luminance,
+         {"11.8": figure_11_8, "11.9": figure_11_9, "11.10": figure_11_10}),
+    Part("error tables", ch.TABLE, ch.tables),
+)  # fmt: skip

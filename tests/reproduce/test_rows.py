@@ -1,0 +1,51 @@
+"""A row passes by its own tolerance, against the thesis or against what its equations give."""
+
+import math
+
+import pytest
+
+from rtctl.config.errors import NoAnswer
+from rtctl.reproduce.rows import Part, Row, measured
+
+ROW = Row("8.delay", "delay", "(8.2)", 3.0, "ms", 0.03)
+
+
+@pytest.mark.parametrize(
+    ("row", "good", "bad"),
+    [
+        (ROW, (3.0, 2.92, 3.08), (2.9, 3.1, math.nan, math.inf)),
+        (ROW._replace(relative=False), (2.975, 3.025), (2.96, 3.04)),
+        (ROW._replace(bound="at least"), (2.92, 30.0), (2.9, math.nan)),
+        (ROW._replace(bound="at most"), (0.0, 3.08), (3.1, math.nan)),
+        (ROW._replace(expected=6.0, erratum="a factor of 2"), (6.0, 5.83), (3.0,)),
+        (ROW._replace(thesis=None, expected=-4.0), (-4.0, -4.1), (4.0,)),
+        (ROW._replace(tolerance=0.0), (3.0,), (3.0001,)),
+    ],
+)
+def test_passes(row, good, bad):
+    assert all(row._replace(measured=value).passes for value in good)
+    assert not any(row._replace(measured=value).passes for value in bad)
+
+
+def test_json_says_what_it_was_held_against():
+    row = ROW._replace(expected=6.0, erratum="a factor of 2", measured=6.1)
+    made = row.as_json()
+    assert {"name", "source", "thesis", "measured", "tolerance", "pass", "erratum"} <= set(made)
+    assert made["thesis"] == 3.0 and made["against"] == 6.0 and made["erratum"] == "a factor of 2"
+    assert made["pass"] is (abs(made["measured"] - made["against"]) <= made["tolerance"]) is True
+    assert ROW.as_json()["measured"] is None and ROW.as_json()["erratum"] is None
+
+
+def test_an_experiment_without_an_answer_fails_its_rows_and_says_why():
+    def play(short):
+        raise NoAnswer("too short from 1 to 2 Hz")
+
+    (row,) = measured(Part("delay", (ROW,), play), True)
+    assert not row.passes
+    assert row.as_json()["remark"] == "too short from 1 to 2 Hz"
+
+
+def test_a_part_may_measure_more_than_is_asked_for():
+    part = Part("delay", (ROW,), lambda short: {"8.delay": 3.01, "8.gain": 6.2})
+    assert [row.measured for row in measured(part, True)] == [3.01]
+    assert part.chapter == 8
