@@ -1,12 +1,8 @@
 """`rtctl identify`: experiments on a machine that runs, an emulated one, or a recording. Each has a file of its own."""
 
-import importlib
-from typing import Any
-
 import typer
-from typer.core import TyperGroup
 
-from rtctl.config.errors import UserError, nearest
+from rtctl.cli.lazy import LazyGroup
 
 # Name of each experiment, in the order of `rtctl identify --help`, and its module here. Modules import nothing heavy.
 EXPERIMENTS = {
@@ -21,27 +17,13 @@ EXPERIMENTS = {
 }
 
 
-class LazyExperiments(TyperGroup):
-    """Loads an experiment's module when that experiment is asked for."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        return list(EXPERIMENTS)
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        if cmd_name not in EXPERIMENTS:
-            if ctx.resilient_parsing:  # the shell completes what is not yet a command
-                return None
-            near = nearest(cmd_name, EXPERIMENTS)
-            hint = f"did you mean '{near}'?" if near else f"it is one of {', '.join(EXPERIMENTS)}"
-            raise UserError(f"no experiment '{cmd_name}'; {hint}")
-        module = importlib.import_module(f"rtctl.cli.{EXPERIMENTS[cmd_name]}")
-        command = typer.main.get_command(module.app)
-        command = getattr(command, "commands", {}).get(cmd_name, command)
-        command.name = cmd_name
-        return command
+class Experiments(LazyGroup):
+    modules = EXPERIMENTS
+    what = "experiment"
+    otherwise = f"it is one of {', '.join(EXPERIMENTS)}"
 
 
-app = typer.Typer(cls=LazyExperiments, add_completion=False, no_args_is_help=True)
+app = typer.Typer(cls=Experiments, add_completion=False, no_args_is_help=True)
 
 
 @app.callback()

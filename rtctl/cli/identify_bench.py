@@ -7,7 +7,7 @@ import typer
 
 from rtctl.cli import common
 from rtctl.cli.common import JsonOption, SetOption
-from rtctl.cli.identify_source import OutOption, PlotOption, SourceArgument
+from rtctl.cli.identify_source import OutOption, PlotOption, SourceArgument, positive_si
 
 if TYPE_CHECKING:
     from rtctl.identify.stribeck import Stribeck
@@ -170,8 +170,8 @@ def scale(
     """
     from rtctl.identify import scale_error, wavelength
 
-    length = _si(travel, "--travel", "m", "600mm")
-    speeds = [_si(text, "--speed", "m/s", "20mm/s") for text in speed or ("20mm/s", "50mm/s")]
+    length = positive_si(travel, "--travel", "m", "600mm")
+    speeds = [positive_si(text, "--speed", "m/s", "20mm/s") for text in speed or ("20mm/s", "50mm/s")]
     records = _records(
         source, set_, out, json, lambda config: [scale_error.scale_config(config, length + MARGIN, v) for v in speeds]
     )
@@ -329,20 +329,6 @@ def _list(text: str | None, option: str) -> list[float] | None:
     if min(values) <= 0:
         raise UserError(f"{option} {text}: every speed must be more than nothing")
     return values
-
-
-def _si(text: str, option: str, unit: str, example: str) -> float:
-    from rtctl.config.errors import UserError
-    from rtctl.config.units import to_si
-
-    value, given = common.quantity_of(text, option, example)
-    try:
-        si = float(to_si(f"{value} {given}", unit) if given else value)
-    except ValueError as error:
-        raise UserError(f"{option} {text}: {error}") from None
-    if si <= 0:
-        raise UserError(f"{option} {text}: must be more than nothing")
-    return si
 
 
 def _save(figure: Any, path: Path) -> None:

@@ -6,7 +6,7 @@ import typer
 
 from rtctl.cli import common
 from rtctl.cli.common import JsonOption, SetOption
-from rtctl.cli.identify_source import OutOption, PlotOption, SourceArgument
+from rtctl.cli.identify_source import OutOption, PlotOption, SourceArgument, positive_si
 
 if TYPE_CHECKING:
     from rtctl.identify.best_linear import BestLinear
@@ -227,26 +227,14 @@ def _band(text: str | None) -> tuple[float, float] | None:
 
 
 def _volts(text: str | None) -> float | None:
-    return None if text is None else _si(text, "--rms", "V", "0.5V")
+    return None if text is None else positive_si(text, "--rms", "V", "0.5V")
 
 
 def _speed(config: Any, text: str | None) -> float | None:
     unit = "rad/s" if config.machine == "ivu" else "m/s"
-    return None if text is None else _si(text, "--speed", unit, "2rad/s" if config.machine == "ivu" else "5mm/s")
-
-
-def _si(text: str, option: str, unit: str, example: str) -> float:
-    from rtctl.config.errors import UserError
-    from rtctl.config.units import to_si
-
-    value, given = common.quantity_of(text, option, example)
-    try:
-        si = float(to_si(f"{value} {given}", unit) if given else value)
-    except ValueError as error:
-        raise UserError(f"{option} {text}: {error}") from None
-    if si <= 0:
-        raise UserError(f"{option} {text}: must be more than nothing")
-    return si
+    return (
+        None if text is None else positive_si(text, "--speed", unit, "2rad/s" if config.machine == "ivu" else "5mm/s")
+    )
 
 
 def _pick(f: Any) -> Any:

@@ -77,3 +77,18 @@ def play(config: Any, experiments: list[Any], out: Path | None, say: Callable[[s
 def say_on_stderr(json: bool) -> Callable[[str], None]:
     """Progress for a person; silence for a program."""
     return (lambda text: None) if json else (lambda text: typer.echo(text, err=True))
+
+
+def positive_si(text: str, option: str, unit: str, example: str) -> float:
+    """A quantity above 0 with its unit, in SI. Raises UserError with the option and an example of what is right."""
+    from rtctl.config.errors import UserError
+    from rtctl.config.units import to_si
+
+    value, given = common.quantity_of(text, option, example)
+    try:
+        si = float(to_si(f"{value} {given}", unit) if given else value)
+    except ValueError as error:
+        raise UserError(f"{option} {text}: {error}") from None
+    if si <= 0:
+        raise UserError(f"{option} {text}: must be more than nothing")
+    return si

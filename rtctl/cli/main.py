@@ -1,6 +1,5 @@
 """`rtctl`: every command is a module of its own, imported when it is used, so that `rtctl status` starts at once."""
 
-import importlib
 import os
 import sys
 import traceback
@@ -8,9 +7,9 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from rtctl.config.errors import NoAnswer, UserError, nearest
+from rtctl.cli.lazy import LazyGroup
+from rtctl.config.errors import NoAnswer, UserError
 
 # Name of each command, in the order of `rtctl --help`, and its module here. Modules import nothing heavy.
 COMMANDS = {
@@ -42,28 +41,11 @@ COMMANDS = {
 USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]  # typer's own, which it does not export
 
 
-class LazyGroup(TyperGroup):
-    """Loads a command's module when that command is asked for."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        if cmd_name not in COMMANDS:
-            if ctx.resilient_parsing:  # the shell completes what is not yet a command
-                return None
-            near = nearest(cmd_name, COMMANDS)
-            raise UserError(
-                f"no command '{cmd_name}'" + (f"; did you mean '{near}'?" if near else "; see rtctl --help")
-            )
-        module = importlib.import_module(f"rtctl.cli.{COMMANDS[cmd_name]}")
-        command = typer.main.get_command(module.app)
-        command = getattr(command, "commands", {}).get(cmd_name, command)
-        command.name = cmd_name
-        return command
+class Commands(LazyGroup):
+    modules = COMMANDS
 
 
-app = typer.Typer(cls=LazyGroup, add_completion=True, help="Real-time controller daemon for motion hardware.")
+app = typer.Typer(cls=Commands, add_completion=True, help="Real-time controller daemon for motion hardware.")
 
 
 def _version(wanted: bool) -> None:

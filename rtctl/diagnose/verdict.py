@@ -119,7 +119,7 @@ def with_known(verdict: Verdict, known: Sequence[Effect]) -> Verdict:
     """The verdict with effects before it that show elsewhere than in the error of the fit, and stand for themselves."""
     if not known or verdict.verdict == UNNAMED:
         return verdict
-    effects = [*known, *(v for v in verdict.effects if v.name not in {e.name for e in known})]
+    effects = [*(e for e in known if e.name not in {v.name for v in verdict.effects}), *verdict.effects]
     named = NAMED if verdict.verdict == NOTHING else verdict.verdict
     return verdict._replace(verdict=named, effects=tuple(effects[:MOST]))
 

@@ -1,19 +1,13 @@
 """`rtctl identify frf | multisine | fit` on an emulated machine and on its recordings."""
 
 import json
+import os
 import subprocess
 import sys
 
 import pytest
 
-from rtctl.cli.main import COMMANDS
-
 SHORT = ["--averages", "8", "--rms", "1V"]
-
-
-@pytest.fixture(autouse=True)
-def registered(monkeypatch):
-    monkeypatch.setitem(COMMANDS, "identify", "identify")
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +17,7 @@ def bundles(tmp_path_factory):
     from rtctl.cli.common import load_config
     from rtctl.identify import experiment
 
-    config = load_config("ivu", ["name=frf"])
+    config = load_config("ivu", [f"name=frf-{os.getpid()}"])
     out = tmp_path_factory.mktemp("runs")
     plan = experiment.multisine(config, realisations=2, periods=2)
     identify_source.play(config, plan, out, lambda _: None)
@@ -96,7 +90,7 @@ def test_options_of_a_config_do_not_go_with_recordings(rtctl, bundles):
 
 def test_help_loads_nothing_heavy():
     code = (
-        "import sys; from rtctl.cli import main; main.COMMANDS['identify'] = 'identify'; "
+        "import sys; from rtctl.cli import main; "
         "main.main(['identify', 'fit', '--help']); print('numpy' in sys.modules, 'numba' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -48,13 +48,20 @@ def test_a_dead_band_is_found_with_its_size(make_axis, searched):
 
 
 def test_a_pair_is_found_whole(make_axis, searched):
-    problem, base, looked = searched(make_axis(ASYMMETRY, SPRING, M=100.0))
+    problem, base, looked = searched(make_axis(DEADBAND, SPRING, M=100.0))
     found = best(problem, base, looked)
     assert len(names(found)) == 2
-    spring, other = sorted(found.model.terms, key=lambda t: t.term != "load.spring")
+    spring, dead = sorted(found.model.terms, key=lambda t: t.term != "load.spring")
     assert spring.k == pytest.approx(600.0, rel=0.05)
-    assert other.term in ("friction.asymmetry", "drive.offset")
-    assert tilt(other) == pytest.approx(0.25, rel=0.07)
+    assert (dead.term, dead.band) == ("drive.deadband", pytest.approx(0.12, rel=0.1))
+
+
+def test_a_spring_and_a_constant_push_are_a_spring_that_rests_elsewhere(make_axis, searched):
+    problem, base, looked = searched(make_axis(ASYMMETRY, SPRING, M=100.0))
+    found = best(problem, base, looked)
+    assert names(found) == ("load.spring:carriage",)
+    assert found.model.terms[0].k == pytest.approx(600.0, rel=0.05)
+    assert abs(found.model.terms[0].x0) == pytest.approx(0.25 * 20.0 / 600.0, rel=0.1)
 
 
 def test_on_a_record_with_nothing_in_it_no_term_earns_its_place(plain, searched):

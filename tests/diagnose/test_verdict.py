@@ -37,7 +37,7 @@ def test_what_shows_elsewhere_stands_beside_a_verdict():
     assert (both.verdict, [e.name for e in both.effects]) == (NAMED, ["timing.jitter", "sensor.scale"])
     doubt = Verdict(AMBIGUOUS, (Effect("drive.offset", "drive", 0.5, {}, ()),), 1.0)
     assert with_known(doubt, [jitter]).verdict == AMBIGUOUS
-    assert [e.name for e in with_known(doubt, [jitter]).effects] == ["drive.offset", "timing.jitter"]
+    assert [e.name for e in with_known(doubt, [jitter]).effects] == ["timing.jitter", "drive.offset"]
 
 
 def test_it_is_not_told_twice():
