@@ -20,6 +20,7 @@ from rtctl.design.margins import Margins
 from rtctl.loop import fused, safety
 
 PERIODS = 3  # averaged, after one in which the loop forgets how it began
+SURE = 0.05  # deviation of the mean loop gain over the periods, above which a line is left out
 NO_FRICTION = {
     "ivu": {
         "plant.parameters.tau_F1": 0.0,
@@ -64,7 +65,8 @@ def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None
 def measure(config: Any, rms: float, period: float = 2.0, f_max: float | None = None) -> Measured:
     """Loop gain and margins of a config on its emulator.
 
-    Raises NoAnswer where the run trips or the output is limited: then it says nothing of the linear loop.
+    Raises NoAnswer where the run trips, the output is limited or most lines are noise: then it says nothing of the
+    linear loop.
     """
     played = experiment(config, rms, period, f_max)
     run = fused.run(played, (PERIODS + 1) * period + 2.0)
@@ -76,9 +78,19 @@ def measure(config: Any, rms: float, period: float = 2.0, f_max: float | None = 
     limited = np.abs(rows["u_c"]) >= played.law.limit.high
     if limited.any():
         raise NoAnswer(f"the output is limited at {rows['t'][np.argmax(limited)]:.3g} s; lower rms from {rms:g} V")
-    w, u = (np.fft.rfft(rows[name].reshape(PERIODS, n).mean(axis=0)) for name in ("w", "u_c"))
-    lines = np.flatnonzero(np.abs(w) > 0.3 * np.abs(w).max())
-    f, L = lines / period, w[lines] / u[lines] - 1
+    w, u = (np.fft.rfft(rows[name].reshape(PERIODS, n), axis=1) for name in ("w", "u_c"))
+    lines = np.flatnonzero(np.abs(w[0]) > 0.3 * np.abs(w[0]).max())
+    each = w[:, lines] / u[:, lines] - 1
+    L = w[:, lines].sum(axis=0) / u[:, lines].sum(axis=0) - 1
+    deviation = np.sqrt((np.abs(each - L) ** 2).sum(axis=0) / (PERIODS - 1) / PERIODS)
+    sure = deviation < SURE * np.maximum(np.abs(L), 1.0)
+    if sure.mean() < 0.5:
+        noisy = lines[~sure] / period
+        raise NoAnswer(
+            f"{noisy.size} of {len(lines)} lines, {noisy[0]:g} to {noisy[-1]:g} Hz, differ from period to period: "
+            f"take more rms than {rms:g} V, or fewer lines (f_max)"
+        )
+    f, L = lines[sure] / period, L[sure]
     parts = response.take(played)
     share = response.law_response(parts, f, "reference") / response.law_response(parts, f)
     return Measured(f, L, margins.points(f, L, share * L))

@@ -49,3 +49,9 @@ def test_a_trip_is_no_measurement():
     config = set_path(shaped(), "safety.following_error", 1e-5)
     with pytest.raises(NoAnswer, match="tripped"):
         check.measure(config, rms=0.5, period=0.5, f_max=120.0)
+
+
+def test_lines_that_are_noise_are_no_measurement():
+    """A hundredth of a volt moves the capstan by less than a count."""
+    with pytest.raises(NoAnswer, match="differ from period to period: take more rms"):
+        check.measure(fused.config("ivu", law__allocation__kind="motor1"), rms=0.01, f_max=80.0)
