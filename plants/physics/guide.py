@@ -140,7 +140,7 @@ THICKNESS = Term(
         "guide.strip": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
         "guide.dirt": "several wavelengths of travel: dirt is at one place, thickness everywhere",
     },
-    typical={"A": (2e-6, 3e-5), "wavelength": (0.05, 0.3)},
+    typical={"A": (2e-6, 5e-4), "wavelength": (0.02, 0.3)},
     axis="position",
 )
 STRIP = Term(

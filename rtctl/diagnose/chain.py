@@ -62,7 +62,7 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         shown = predicted(sim, other, found, known)
         while shown.refused and len(found.best.space.hypotheses) > 1:  # several that only imitate: one may be there
             found = with_fewer(found)
-            shown = predicted(sim, other, found, known)
+            shown = predicted(sim, other, found, known, again=True)
         return _answer(sim, found, shown, checked)._replace(seconds=time.monotonic() - began)
 
 
@@ -110,8 +110,9 @@ class Shown(NamedTuple):
     floor: float
 
 
-def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Effect]) -> Shown:
-    """The verdict on what was found, once its model has predicted rows that it was not fitted on."""
+def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Effect], again: bool = False) -> Shown:
+    """The verdict on what was found, once its model has predicted rows that it was not fitted on; `again` where more
+    has been refused."""
     problem, base, best = found.problem, found.base, found.best
     verdict = judge(problem, base, best, found.rivals, problem.block)
     named = {e.name for e in with_known(verdict, known).effects}
@@ -127,7 +128,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
         before, after = base.model, taken.model
     errors = [heldout.nrmse(judge_sim, model, rows) for model in (before, after)]
     floor = problem.floor * float(problem.sigma[0]) / (float(np.std(judge_sim.seen)) or 1.0)
-    proved = proven(verdict, errors[0], errors[1], floor)
+    proved = proven(verdict, errors[0], errors[1], floor, again)
     refused = proved.verdict == UNNAMED and verdict.verdict != UNNAMED
     verdict = with_known(proved, known)
     if verdict.verdict == UNNAMED:

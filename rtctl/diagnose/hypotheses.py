@@ -79,7 +79,8 @@ class Hint(NamedTuple):
 
 
 class Where(NamedTuple):
-    """A place that is where the machine starts, or anywhere, from the middle of the travel."""
+    """A place that is where the machine starts or the middle of the travel. Elsewhere is a constant push besides, which
+    has names of its own."""
 
     name: str
 
@@ -184,7 +185,7 @@ SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
     "ripple.encoder": (Turn("A", "phi", "one", 1e-5), Hint("turn", "wavelength", 0.4)),
     "ripple.cogging": (Turn("A", "phi", "force", 0.05), Hint("turn", "wavelength", 0.4)),
 }
-LEAD = 0.045  # m: a shorter wave of a linear axis is a turn of its screw or encoder, a longer one its guide's
+LEAD, RAIL = 0.045, 0.012  # m: the longest turn of a screw or encoder of a linear axis, the shortest wave of its guide
 
 
 def hypotheses(
@@ -376,7 +377,7 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
         found = m.hints.get(f"{part.kind}:{node}", m.hints.get(part.kind, []))
         s = m.scale(node)
         if node == "sensor" and part.kind == "wavelength":
-            found = [value for value in found if (value < LEAD) == (part.name == "turn")]
+            found = [value for value in found if (value < LEAD if part.name == "turn" else value > RAIL)]
         for value in found:
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}
@@ -385,9 +386,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
                 step = min(1e-2, TURN / turns)
                 yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach, step=step),), {}
     elif isinstance(part, Where):
-        s = m.scale(node)
         yield (), {}
-        yield (Coordinate(part.name, PLACE, s.span, -3.0, 3.0, offset=s.at(0.5)),), {}
+        yield (), {part.name: m.scale(node).at(0.5)}
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
         if jumps:

@@ -90,16 +90,17 @@ def by_weight(problem: Problem, best: Fit) -> list[int]:
     return sorted(range(count), key=lambda i: -without[i])
 
 
-def proven(verdict: Verdict, before: float, after: float, floor: float) -> Verdict:
+def proven(verdict: Verdict, before: float, after: float, floor: float, again: bool = False) -> Verdict:
     """The verdict once its model has predicted rows that it was not fitted on, with errors `before` and `after` it.
 
     Terms that only imitate what is missing fit the rows that they have seen and predict the others badly, several of
-    them together most of all. Where hardly anything was to be gained the prediction says nothing.
+    them together most of all; what is left of such (`again`) has to do as much as they. Where hardly anything was to be
+    gained the prediction says nothing.
     """
     if verdict.verdict != NAMED or before < TELLING * floor or max(before, after) >= LOST:
         return verdict
     gap = (before - after) / (before - floor)
-    if gap < (CLOSED if len(verdict.effects) == 1 else CLOSED_BY_SEVERAL):
+    if gap < (CLOSED if len(verdict.effects) == 1 and not again else CLOSED_BY_SEVERAL):
         return Verdict(UNNAMED, (), verdict.explained)
     sure = 0.5 + 0.5 * min(gap, 1.0)
     return verdict._replace(effects=tuple(e._replace(confidence=min(e.confidence, sure)) for e in verdict.effects))

@@ -55,3 +55,8 @@ def test_a_name_must_predict(count, after, expected):
     assert told.verdict == expected
     assert all(0.88 < e.confidence < 0.96 for e in told.effects)
     assert proven(named, 0.02, 0.02, 0.01) is named  # where there was nothing to predict
+
+
+def test_what_is_left_of_names_that_did_not_predict_must_predict_as_well_as_they():
+    named = Verdict(NAMED, (Effect("drive.offset", "drive", 0.98, {}, ()),), 1.0)
+    assert [proven(named, 1.0, 0.2, 0.01, again).verdict for again in (False, True)] == [NAMED, UNNAMED]
