@@ -13,13 +13,14 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.physics.ripple import harmonics
 from rtctl.plants.physics.term import Term
 
 GUIDES = {"ldu": ("carriage", "scale"), "axis": ("sensor",)}
 
 
 class ThicknessSettings(Settings):
-    """A is the size."""
+    """A, A2, A3 are the sizes: once, twice, three times in a wavelength."""
 
     term: Literal["guide.thickness"] = "guide.thickness"
     node: str
@@ -46,18 +47,14 @@ class ThicknessParams(NamedTuple):
 def build_thickness(settings: ThicknessSettings, h: float) -> ThicknessParams:
     """Error at position 0, which counters never show."""
     s = settings
-    zero = s.A * math.sin(s.phi) + s.A2 * math.sin(s.phi2) + s.A3 * math.sin(s.phi3)
+    zero = harmonics.py_func(0.0, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3)
     return ThicknessParams(s.A, 2.0 * math.pi / s.wavelength, s.phi, s.A2, s.phi2, s.A3, s.phi3, zero)
 
 
 @tick
 def thickness(p, x):
     """Position error at `x` m, m."""
-    a = p.n * x
-    e = p.A * math.sin(a + p.phi)
-    if p.A2 != 0.0 or p.A3 != 0.0:
-        e += p.A2 * math.sin(2.0 * a + p.phi2) + p.A3 * math.sin(3.0 * a + p.phi3)
-    return e - p.zero
+    return harmonics(p.n * x, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3) - p.zero
 
 
 class StripSettings(Settings):
@@ -126,7 +123,7 @@ def dirt(p, x):
 THICKNESS = Term(
     name="guide.thickness",
     words="a strip or rail of uneven thickness: the carriage is a little off, in waves along the guide",
-    equation="e = A (sin(2 pi x / wavelength + phi) - sin(phi))",
+    equation="e = A sin(n x + phi) + A2 sin(2 n x + phi2) + A3 sin(3 n x + phi3) less that at 0, n = 2 pi / wavelength",
     source="thesis 11.1, figure 11.7",
     settings=ThicknessSettings,
     build=build_thickness,

@@ -50,10 +50,15 @@ def build_cogging(settings: CoggingSettings, h: float) -> CoggingParams:
 
 
 @tick
+def harmonics(x, A, phi, A2, phi2, A3, phi3):
+    """A sine and two harmonics of it at the angle `x` rad, in the unit of its amplitudes."""
+    return A * math.sin(x + phi) + A2 * math.sin(2.0 * x + phi2) + A3 * math.sin(3.0 * x + phi3)
+
+
+@tick
 def cogging(p, q):
     """Force on the node at position `q`, Nm or N: it has a potential, so a whole tooth takes no work."""
-    x = p.n * q
-    return p.A * math.sin(x + p.phi) + p.A2 * math.sin(2.0 * x + p.phi2) + p.A3 * math.sin(3.0 * x + p.phi3)
+    return harmonics(p.n * q, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3)
 
 
 class EncoderSettings(Settings):
@@ -87,16 +92,14 @@ class EncoderParams(NamedTuple):
 def build_encoder(settings: EncoderSettings, h: float) -> EncoderParams:
     """Error at position 0, which counters never show."""
     s = settings
-    zero = s.A * math.sin(s.phi) + s.A2 * math.sin(s.phi2) + s.A3 * math.sin(s.phi3)
+    zero = harmonics.py_func(0.0, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3)
     return EncoderParams(s.order * TURN / s.turn, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3, zero)
 
 
 @tick
 def encoder(p, y):
     """What is shown for a true reading of `y` rad or m."""
-    x = p.n * y
-    error = p.A * math.sin(x + p.phi) + p.A2 * math.sin(2.0 * x + p.phi2) + p.A3 * math.sin(3.0 * x + p.phi3)
-    return y + error - p.zero
+    return y + harmonics(p.n * y, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3) - p.zero
 
 
 COGGING = Term(

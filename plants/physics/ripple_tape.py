@@ -15,6 +15,7 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
+from rtctl.plants.physics.ripple import harmonics
 from rtctl.plants.physics.term import Term
 
 
@@ -68,13 +69,13 @@ def build_capstan(settings: CapstanSettings, h: float) -> WheelParams:
 
 def wheel(a: float, phi: float, a2: float, phi2: float, a3: float, phi3: float) -> WheelParams:
     """The way at angle 0 filled in."""
-    return WheelParams(a, phi, a2, phi2, a3, phi3, a * math.sin(phi) + a2 * math.sin(phi2) + a3 * math.sin(phi3))
+    return WheelParams(a, phi, a2, phi2, a3, phi3, harmonics.py_func(0.0, a, phi, a2, phi2, a3, phi3))
 
 
 @tick
 def way(p, q):
     """Tape or travel beyond R q at angle `q`, m."""
-    return p.a * math.sin(q + p.phi) + p.a2 * math.sin(2.0 * q + p.phi2) + p.a3 * math.sin(3.0 * q + p.phi3) - p.zero
+    return harmonics(q, p.a, p.phi, p.a2, p.phi2, p.a3, p.phi3) - p.zero
 
 
 @tick

@@ -136,10 +136,13 @@ def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray) -> np.nd
 def seen(angle: np.ndarray, signal: np.ndarray, rate: np.ndarray, orders: np.ndarray, quick: float) -> np.ndarray:
     """As `spectrum`, each order where it passes slower than `quick` rad/s, so that the signal can show it; `rate` is
     that of the angle. By the number of rows that are left."""
-    slow = [np.flatnonzero(rate * order < quick) for order in orders]
-    return np.array(
-        [spectrum(angle[k], signal[k], np.array([n]))[0] * len(k) for n, k in zip(orders, slow, strict=True)]
-    )
+    out = np.zeros(len(orders))
+    rows = np.array([np.count_nonzero(rate * order < quick) for order in orders])
+    for count in np.unique(rows):  # the rows of a higher order are among those of a lower one: as many are the same
+        same = np.flatnonzero(rows == count)
+        slow = rate * orders[same[0]] < quick
+        out[same] = spectrum(angle[slow], signal[slow], orders[same]) * count
+    return out
 
 
 def peaks(grid: np.ndarray, height: np.ndarray, most: int) -> list[float]:

@@ -24,6 +24,11 @@ FITTED = {  # what a fit may move, in the order of the Jacobian's columns; the r
     ),
     "axis": ("M", "K", "F_v", "F_c", "k"),
 }  # fmt: skip
+DRY = {  # parameter that the dry friction of a node is, or comes from
+    "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
+    "ldu": {"capstan": "F_c", "carriage": "F_c"},
+    "axis": {"carriage": "F_c"},
+}
 KNOWN = 1e-3  # a tolerance below this is no freedom
 
 
@@ -75,6 +80,19 @@ def free_parameters(case: Case, model: Model) -> tuple[str, ...]:
     known = {"K"} if not np.isfinite(case.tolerance("M")) else set()  # of an unknown mass only the ratio is seen
     names = (n for n in FITTED[case.plant] if n not in known)
     return tuple(n for n in names if model.base.get(n, 0.0) != 0.0 and case.tolerance(n) > KNOWN)
+
+
+def dry_friction(kind: str, base: dict[str, float], node: str) -> float:
+    """Dry friction that a plant's parameters give a node, Nm or N; 0 where its equations have none."""
+    dry = base.get(DRY[kind].get(node, ""), 0.0)
+    return dry * base.get("R_c", 1.0) if (kind, node) == ("ldu", "capstan") else dry
+
+
+def dry_with_terms(model: Model, node: str) -> float:
+    """The same with what terms add to it at any speed."""
+    terms: list[Any] = list(model.terms)
+    added = sum(float(t.F_C) for t in terms if (t.term, t.node) == ("friction.coulomb", node))
+    return dry_friction(model.kind, model.base, node) + added
 
 
 def plant_params(model: Model, case: Case, h: float) -> Any:

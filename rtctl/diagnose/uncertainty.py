@@ -12,8 +12,9 @@ import numpy as np
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
+from rtctl.diagnose.model import DRY, dry_friction
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, Hypothesis
-from rtctl.diagnose.words import DRY, base_dry, unit_at
+from rtctl.diagnose.words import unit_at
 
 Z90 = 1.645
 EVEN = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within one either way
@@ -84,10 +85,9 @@ def with_total(
     better than its parts."""
     added = own["F_C"]
     name = DRY[fitted.model.kind].get(h.node, "")
-    dry = base_dry(fitted.model, h.node)
-    if name not in fitted.space.names or not np.isfinite(dry):
+    if name not in fitted.space.names:
         return {"F_added": added, **own}
-    i, dry = fitted.space.names.index(name), dry - added.value
+    i, dry = fitted.space.names.index(name), dry_friction(fitted.model.kind, fitted.model.base, h.node)
     slope = np.array([dry, h.coordinates[0].scale])
     half = Z90 * float(np.sqrt(max(slope @ cov[np.ix_([i, column], [i, column])] @ slope, 0.0)))
     total = dry + added.value

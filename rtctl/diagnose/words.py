@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, UNNAMED, Diagnosis, Effect, Interval, Located
-from rtctl.diagnose.model import Model
+from rtctl.diagnose.model import Model, dry_with_terms
 from rtctl.diagnose.numbers import PREFIXES as PREFIXES  # for those who draw with words
 from rtctl.diagnose.numbers import both, nice, percent
 from rtctl.diagnose.numbers import figures as figures
@@ -108,23 +108,6 @@ class Sizes:
         return given or unit_at(self.model.kind, self.name, self.node, name)
 
 
-DRY = {  # parameter that the dry friction of a node is, or comes from
-    "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
-    "ldu": {"capstan": "F_c", "carriage": "F_c"},
-    "axis": {"carriage": "F_c"},
-}
-
-
-def base_dry(model: Model, node: str) -> float:
-    """Dry friction that the model has at a node without Stribeck's, Nm or N; nan where its equations have none."""
-    name = DRY[model.kind].get(node)
-    dry = model.base.get(name, 0.0) if name else 0.0
-    if model.kind == "ldu" and node == "capstan":
-        dry *= model.base.get("R_c", 1.0)
-    terms: list[Any] = list(model.terms)
-    return dry + sum(float(t.F_C) for t in terms if (t.term, t.node) == ("friction.coulomb", node))
-
-
 class _Slot:
     """One name in a phrase."""
 
@@ -157,7 +140,7 @@ class _Slots(dict):
 
 
 def _sticking(s: Sizes) -> str:
-    dry = base_dry(s.model, s.node)
+    dry = dry_with_terms(s.model, s.node)
     start, keep = both(s.value("F_s"), dry, s.unit("F_s"))
     return f"it needs {start} to start but {keep} to keep moving"
 
