@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtctl.cli import common
+from rtctl.cli import identify_source as sources
 from rtctl.cli.common import JsonOption, SetOption
 from rtctl.cli.identify_source import OutOption, PlotOption, SourceArgument, positive_si
 
@@ -256,18 +257,10 @@ def steps(
 
 def _records(source: list[str], set_: list[str] | None, out: Path | None, json: bool, plan: Any) -> list[Any]:
     """Records of bundles, or of the configs that `plan` makes of one, played. Raises NoAnswer where one tripped."""
-    from rtctl.cli import identify_source as sources
-    from rtctl.config.errors import UserError
     from rtctl.identify.bench import seconds, whole
-    from rtctl.identify.records import take_all
 
-    if sources.are_bundles(source):
-        for option, given in (("--set", set_), ("--out", out)):
-            if given:
-                raise UserError(f"{option} goes with a CONFIG, not with recordings")
-        return [whole(record) for record in take_all(sources.load(source))]
-    plays = [(config, seconds(config)) for config in plan(common.load_config(source[0], set_))]
-    return [whole(record) for record in take_all(sources.play(plays[0][0], plays, out, sources.say_on_stderr(json)))]
+    found = sources.records(source, set_, out, json, lambda config: [(one, seconds(one)) for one in plan(config)])
+    return [whole(record) for record in found]
 
 
 def _image(one: Any, length: float) -> tuple[Any, Any, Any]:
@@ -332,6 +325,6 @@ def _list(text: str | None, option: str) -> list[float] | None:
 
 
 def _save(figure: Any, path: Path) -> None:
-    from rtctl.identify.frf_figures import save
+    from rtctl.trace.plot import save
 
     save(figure, path)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtctl.cli import common
+from rtctl.cli import identify_source as sources
 from rtctl.cli.common import JsonOption, SetOption
 from rtctl.cli.identify_source import OutOption, PlotOption, SourceArgument, positive_si
 
@@ -53,10 +54,9 @@ def frf(
 
       rtctl identify frf runs/noise --band 1:60 --json
     """
-    from rtctl.cli import identify_source as sources
     from rtctl.identify import experiment, sensitivity
 
-    records = _records(
+    records = sources.records(
         source, set_, out, json,
         lambda config: experiment.noise(
             config, averages, motor=motor, rms=_volts(rms), speed=_speed(config, speed), keep_law=keep_law
@@ -68,8 +68,9 @@ def frf(
         result = result._replace(frf=result.frf.without_drive(_config(records)))
     if plot is not None:
         from rtctl.identify import frf_figures
+        from rtctl.trace.plot import save
 
-        frf_figures.save(frf_figures.sensitivity(result), plot)
+        save(frf_figures.sensitivity(result), plot)
     if json:
         common.print_json(_sensitivity_json(result))
     else:
@@ -104,7 +105,7 @@ def multisine(
     """
     from rtctl.identify import best_linear, experiment
 
-    records = _records(
+    records = sources.records(
         source, set_, out, json,
         lambda config: experiment.multisine(
             config, realisations, periods, motor=motor, rms=_volts(rms), speed=_speed(config, speed), keep_law=keep_law
@@ -115,8 +116,9 @@ def multisine(
         result = result._replace(frf=result.frf.without_drive(_config(records)))
     if plot is not None:
         from rtctl.identify import frf_figures
+        from rtctl.trace.plot import save
 
-        frf_figures.save(frf_figures.best_linear(result), plot)
+        save(frf_figures.best_linear(result), plot)
     if json:
         common.print_json(_best_linear_json(result))
     else:
@@ -160,33 +162,19 @@ def fit(
         motors = (1, 2) if both else (motor,)
         return [e for m in motors for e in experiment.multisine(config, realisations, motor=m, rms=_volts(rms))]
 
-    records = _records(source, set_, out, json, plan)
+    records = sources.records(source, set_, out, json, plan)
     frfs = _responses(records)
     start = common.load_config(model, None) if model is not None else _config(records)
     result = model_fit.fit(frfs, start, free, _band(band))
     if plot is not None:
         from rtctl.identify import frf_figures
+        from rtctl.trace.plot import save
 
-        frf_figures.save(frf_figures.model_fit(result), plot)
+        save(frf_figures.model_fit(result), plot)
     if json:
         common.print_json(_fit_json(result))
     else:
         typer.echo("\n".join(_fit_table(result)))
-
-
-def _records(source: list[str], set_: list[str] | None, out: Any, json: bool, plan: Any) -> list[Any]:
-    """Bundles loaded, or the experiments of a config played."""
-    from rtctl.cli import identify_source as sources
-    from rtctl.config.errors import UserError
-    from rtctl.identify.records import take_all
-
-    if sources.are_bundles(source):
-        for option, given in (("--set", set_), ("--out", out)):
-            if given:
-                raise UserError(f"{option} goes with a CONFIG, not with recordings")
-        return take_all(sources.load(source))
-    config = common.load_config(source[0], set_)
-    return take_all(sources.play(config, plan(config), out, sources.say_on_stderr(json)))
 
 
 def _config(records: list[Any]) -> Any:
@@ -231,10 +219,8 @@ def _volts(text: str | None) -> float | None:
 
 
 def _speed(config: Any, text: str | None) -> float | None:
-    unit = "rad/s" if config.machine == "ivu" else "m/s"
-    return (
-        None if text is None else positive_si(text, "--speed", unit, "2rad/s" if config.machine == "ivu" else "5mm/s")
-    )
+    unit, example = ("rad/s", "2rad/s") if config.machine == "ivu" else ("m/s", "5mm/s")
+    return None if text is None else positive_si(text, "--speed", unit, example)
 
 
 def _pick(f: Any) -> Any:

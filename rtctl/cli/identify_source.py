@@ -79,6 +79,25 @@ def say_on_stderr(json: bool) -> Callable[[str], None]:
     return (lambda text: None) if json else (lambda text: typer.echo(text, err=True))
 
 
+def records(
+    words: list[str], set_: list[str] | None, out: Path | None, json: bool, plan: Callable[[Any], list[Any]]
+) -> list[Any]:
+    """Records of bundles, or of the experiments (config, seconds) that `plan` makes of one config, played.
+
+    Raises UserError where an option of a CONFIG is given with recordings.
+    """
+    from rtctl.config.errors import UserError
+    from rtctl.identify.records import take_all
+
+    if are_bundles(words):
+        for option, given in (("--set", set_), ("--out", out)):
+            if given:
+                raise UserError(f"{option} goes with a CONFIG, not with recordings")
+        return take_all(load(words))
+    config = common.load_config(words[0], set_)
+    return take_all(play(config, plan(config), out, say_on_stderr(json)))
+
+
 def positive_si(text: str, option: str, unit: str, example: str) -> float:
     """A quantity above 0 with its unit, in SI. Raises UserError with the option and an example of what is right."""
     from rtctl.config.errors import UserError

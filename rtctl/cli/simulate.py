@@ -102,8 +102,8 @@ def _draw(result: "Comparison", path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from rtctl.config.errors import UserError
     from rtctl.diagnose.measure import NAMES
+    from rtctl.trace.plot import save
 
     count = len(result.channels)
     figure = Figure(figsize=(11, 1.0 + 2.4 * count), dpi=110, layout="constrained")
@@ -125,7 +125,4 @@ def _draw(result: "Comparison", path: Path) -> None:
     panels[0].legend(loc="upper left", fontsize=9, ncols=2)
     panels[0].set_title(f"Free run, {NAMES[result.mode]}", loc="left", fontsize=12, fontweight="bold")
     panels[-1].set_xlabel("time [s]")
-    try:
-        figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise UserError(f"--plot {path}: cannot be written ({error})") from None
+    save(figure, path)

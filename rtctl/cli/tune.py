@@ -98,10 +98,11 @@ def write(file: Path, text: str) -> None:
 def draw(settings: Any, found: Any, pictures: list[Path]) -> None:
     """Loops before and after, and beside it the maps over the radii where there are any."""
     from rtctl.design import figures
+    from rtctl.trace.plot import save
 
-    figures.save(figures.loops({"before": settings, "after": found.config}), pictures[0])
+    save(figures.loops({"before": settings, "after": found.config}), pictures[0])
     for path in pictures[1:]:
-        figures.save(figures.radii(found.maps), path)
+        save(figures.radii(found.maps), path)
 
 
 def as_json(found: Any, file: Path, pictures: list[Path]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Loading a config: YAML, overrides, validation, each mistake in one line that says where and what would be right."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,13 @@ def set_path(settings: Any, path: str, value: Any) -> Any:
         return model.model_validate(data)
     except ValidationError as error:
         raise UserError(sentences(error, model, data)) from error
+
+
+def set_paths(settings: Any, values: Mapping[str, Any]) -> Any:
+    """As `set_path`, one after the other: every step on the way has to fit."""
+    for path, value in values.items():
+        settings = set_path(settings, path, value)
+    return settings
 
 
 def to_yaml(settings: Any, full: bool = False) -> str:

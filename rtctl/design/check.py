@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import NoAnswer
-from rtctl.config.load import set_path
+from rtctl.config.load import set_path, set_paths
 from rtctl.design import margins, response
 from rtctl.design.margins import Margins
 from rtctl.loop import fused, safety
@@ -51,8 +51,7 @@ def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None
     values: dict[str, Any] = {**NO_FRICTION[config.machine], "loop.mode": "fused", "loop.write": config.loop.write}
     if config.machine == "ivu":
         values["law.allocation.kind"] = "motor1"
-    for path, value in values.items():
-        config = set_path(config, path, value)
+    config = set_paths(config, values)
     f_max = f_max or 0.4 * config.loop.rate
     config = set_path(config, "reference", {})
     return set_path(
@@ -71,7 +70,7 @@ def measure(config: Any, rms: float, period: float = 2.0, f_max: float | None = 
     played = experiment(config, rms, period, f_max)
     run = fused.run(played, (PERIODS + 1) * period + 2.0)
     if run.tripped:
-        raise NoAnswer(f"the run tripped ({run.tripped}) at {run['t'][np.argmax(run['trip'] > 0)]:.3g} s; lower rms")
+        raise NoAnswer(f"the run tripped ({run.tripped}) at {run.trip_time:.3g} s; lower rms")
     n = round(period * played.loop.rate)
     first = int(np.argmax(run["state"] == safety.RUNNING)) + n
     rows = run.rows[first : first + PERIODS * n]

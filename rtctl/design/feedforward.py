@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.config.load import set_path
+from rtctl.config.load import set_path, set_paths
 from rtctl.design import mechanics
 from rtctl.drivers import ldu_amplifier
 from rtctl.loop import fused
@@ -51,9 +51,7 @@ def design(config: Any, share: float = SHARE) -> list[Value]:
 
 def applied(config: Any, values: list[Value]) -> Any:
     """The config with these values."""
-    for value in values:
-        config = set_path(config, value.path, value.value)
-    return config
+    return set_paths(config, {value.path: value.value for value in values})
 
 
 def without(config: Any) -> Any:
@@ -62,9 +60,7 @@ def without(config: Any) -> Any:
         "ivu": ("law.friction.motor1.tau_C", "law.friction.motor2.tau_C", "law.inertia.share"),
         "ldu": ("law.friction.F_c", "law.inertia.volts"),
     }
-    for path in off[config.machine]:
-        config = set_path(config, path, 0.0)
-    return config
+    return set_paths(config, dict.fromkeys(off[config.machine], 0.0))
 
 
 def computed_torque(config: Any) -> float:
@@ -88,7 +84,7 @@ def _played(config: Any, seconds: float) -> tuple[float, float, float]:
     config = set_path(config, "loop.mode", "fused")
     run = fused.run(config, seconds)
     if run.tripped:
-        raise NoAnswer(f"the run tripped ({run.tripped}) at {run['t'][np.argmax(run['trip'] > 0)]:.3g} s")
+        raise NoAnswer(f"the run tripped ({run.tripped}) at {run.trip_time:.3g} s")
     rows = run.between(0.0, seconds)
     error = rows["capstan_error" if config.machine == "ivu" else "position_error"]
     still = _rests(rows["target"], round(0.2 * config.loop.rate))

@@ -1,6 +1,5 @@
 """Pictures of designs: Bode, Nyquist and step response of a loop before and after, and maps over the reel radii."""
 
-from pathlib import Path
 from typing import Any
 
 import control
@@ -10,7 +9,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from rtctl.config.errors import UserError
 from rtctl.design import margins, response, systems
 from rtctl.design.margins import Margins
 from rtctl.design.robustness import Map
@@ -71,14 +69,6 @@ def radii(maps: dict[str, Map]) -> Figure:
         axes.set_title(f"{title}: at least {found.worst[0]:.1f} dB", fontsize=10)
         figure.colorbar(drawn, ax=axes, label="gain margin [dB]")
     return figure
-
-
-def save(figure: Figure, path: Path, option: str = "--plot") -> None:
-    """Write the picture. Raises UserError where it cannot be written."""
-    try:
-        figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise UserError(f"{option} {path}: cannot be written ({error})") from None
 
 
 def _loop(grid: dict[str, Axes], config: Any, label: str, color: str, motor: int) -> None:

@@ -74,12 +74,12 @@ def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
     wandering through that random forces make and that a small difference between two hypotheses drowns in; but only
     if what is missing still shows.
     """
-    sim = Simulator(record)
+    progress("fitting the owner's parameters")
+    held = base_of(Simulator(record))
     if record.plant == "axis" and record.case.controller.kind == "none":
-        problem, fitted = base_of(sim)
-        smooth = base_of(Simulator(record, held=False))
-        sim = sim if fitted.cost <= smooth[1].cost else smooth[0].sim
-    found = find(sim, Problem(sim), progress)
+        held = min(held, base_of(Simulator(record, held=False)), key=lambda pair: pair[1].cost)
+    sim = held[0].sim
+    found = find(sim, held[0], progress, held[1])
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or record.case.controller.kind == "none" or faster <= sim.follow:
         return sim, found
@@ -89,7 +89,7 @@ def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
     quick, fitted = base_of(Simulator(record, follow=faster))
     if fitted.rms < SHOWS * quick.floor:
         return sim, found
-    return quick.sim, find(quick.sim, quick, progress)
+    return quick.sim, find(quick.sim, quick, progress, fitted)
 
 
 def base_of(sim: Simulator) -> tuple[Problem, Fit]:

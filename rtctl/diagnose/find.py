@@ -44,10 +44,11 @@ def quiet(text: str) -> None:
     """Say nothing."""
 
 
-def find(sim: Simulator, problem: Problem, progress: Progress = quiet) -> Found:
-    """Base fit, search, and the rivals of what it found."""
-    progress("fitting the owner's parameters")
-    base = base_fit(sim, problem)
+def find(sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit | None = None) -> Found:
+    """Base fit, unless it is given, search, and the rivals of what it found."""
+    if base is None:
+        progress("fitting the owner's parameters")
+        base = base_fit(sim, problem)
     off = jitter(sim, base.model, problem.rows)
     if off is not None:
         problem = allowed_for(problem, base.model, off)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.config.load import set_path
+from rtctl.config.load import set_path, set_paths
 from rtctl.identify.records import Record, take
 
-ARMING = {"given": 1.0, "measured": 14.0}  # s, at most, until the reference plays
+ARMING = {"given": 1.0, "measured": 14.0}  # s, by where the radii come from
 REST = 0.5  # s, behind the end of the reference
 
 
@@ -23,9 +23,7 @@ def changed(config: Any, changes: Mapping[str, Any]) -> Any:
 
     Raises UserError where the machine does not know a key or the value is out of bounds.
     """
-    for path, value in {"excitation": {"kind": "none"}, **changes}.items():
-        config = set_path(config, path, value)
-    return config
+    return set_paths(config, {"excitation": {"kind": "none"}, **changes})
 
 
 def need(machine: str, name: str, *machines: str) -> None:
@@ -41,7 +39,12 @@ def seconds(config: Any) -> float:
         end, at = step.at + (abs(step.to - at) / step.ramp if step.ramp else 0.0), step.to
     if reference.knots:
         end = reference.knots[-1][0]
-    return end + REST + ARMING[config.radius.source if config.machine == "ivu" else "given"]
+    return end + REST + arming(config)
+
+
+def arming(config: Any) -> float:
+    """s, at most, until the reference plays."""
+    return ARMING[config.radius.source if config.machine == "ivu" else "given"]
 
 
 def play(config: Any, length: float | None = None) -> Record:

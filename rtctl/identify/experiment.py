@@ -15,13 +15,13 @@ from math import ceil
 from typing import Any, NamedTuple
 
 from rtctl.config.errors import UserError
-from rtctl.config.load import set_path
+from rtctl.config.load import set_path, set_paths
+from rtctl.identify.bench import arming
 from rtctl.identify.sensitivity import AVERAGES, SETTLE, WINDOW
 from rtctl.laws.excitation import MOST
 
 PERIOD = 4.096  # s: lines 0.24 Hz apart, every other one excited
 START = 0.2  # s at rest before the first leg
-ARMING = {"given": 1.0, "measured": 14.0}  # s until the reference plays
 
 
 class Experiment(NamedTuple):
@@ -138,8 +138,7 @@ def check_size(config: Any, rms: float) -> None:
 def _prepared(config: Any, usual: Usual, motor: int, keep_law: bool) -> Any:
     if motor not in (1, 2) or (motor == 2 and config.machine != "ivu"):
         raise UserError(f"{config.name}: motor {motor}: the {config.machine} has no such motor")
-    for key, value in ({} if keep_law else usual.law).items():
-        config = set_path(config, key, value)
+    config = set_paths(config, {} if keep_law else usual.law)
     if config.machine == "ivu":
         config = set_path(config, "law.allocation.kind", f"motor{motor}")
         if config.safety.following_error:
@@ -158,5 +157,4 @@ def _to_and_fro(config: Any, legs: int, leg: float, speed: float) -> tuple[Any, 
         steps.append({"at": round(t, 9), "to": to, "ramp": speed})
         t += abs(to - x) / speed + dt
         t, x = ceil(t / dt - 1e-6) * dt, to
-    source = config.radius.source if config.machine == "ivu" else "given"
-    return set_path(config, "reference", {"steps": steps}), t + ARMING[source]
+    return set_path(config, "reference", {"steps": steps}), t + arming(config)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import UserError
-from rtctl.drivers import l292
+from rtctl.drivers import l292, ldu_amplifier
 from rtctl.identify.records import Record
 
 CIRCLE_95 = 1.7308  # radius in standard deviations of a complex number that holds 95 % of it: sqrt(-ln 0.05)
@@ -78,7 +78,7 @@ def drive(config: Any, f: np.ndarray) -> np.ndarray:
         return K * (1 + s * zero) / (1 + 2 * zeta * s / w + (s / w) ** 2)
     if config.machine == "ldu":
         w = 2 * np.pi * config.plant.bandwidth
-        return 0.1 / (1 + 2 * config.plant.damping * s / w + (s / w) ** 2)
+        return ldu_amplifier.AMPERE_PER_VOLT / (1 + 2 * config.plant.damping * s / w + (s / w) ** 2)
     raise UserError(f"{config.machine}: volts are force there, no drive is known to be divided out")
 
 

@@ -1,6 +1,5 @@
 """Pictures of frequency responses: sensitivity with coherence, best linear approximation with its levels, model fit."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rtctl.config.errors import UserError
 from rtctl.identify.best_linear import BestLinear
 from rtctl.identify.frf import Frf
 from rtctl.identify.model_fit import Fit
@@ -71,14 +69,6 @@ def model_fit(result: Fit) -> Figure:
     off.set_ylabel("misfit / deviation")
     _legends(above)
     return figure
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure. Raises UserError where the file cannot be written."""
-    try:
-        figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise UserError(f"--plot {path}: cannot be written ({error})") from None
 
 
 def _panels(count: int, title: str, heights: tuple[float, ...]) -> tuple[Figure, Any]:

@@ -66,7 +66,7 @@ def steps(record: Record, by: str | None = None) -> Steps:
     Raises NoAnswer where the reference makes no step.
     """
     machine = record.kind
-    by = by or {"ivu": "capstan", "ldu": "position", "axis": "x"}[machine]
+    by = by or record.signals.position
     mm, rad = scales({"plant": machine, "parameters": {"R_c": radius(record.config)}})
     # three counts of the encoder are at rest: a step need not settle closer
     floor = {"ivu": 3 * 2 * np.pi / 10_000, "ldu": 4e-6, "axis": 0.0}[machine]

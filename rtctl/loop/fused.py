@@ -40,6 +40,12 @@ class Run:
         cause = int(self.rows["trip"][-1])
         return "" if cause == safety.NONE else safety.TRIPS[cause][0]
 
+    @property
+    def trip_time(self) -> float:
+        """Controller clock at the trip that ended it, s; nan for none."""
+        causes = np.flatnonzero(self.rows["trip"])
+        return float(self.rows["t"][causes[0]]) if len(causes) else float("nan")
+
 
 def run(config: Any, seconds: float) -> Run:
     """Arm and play a config from the first tick on, for `seconds`; `loop.mode` has to be fused.

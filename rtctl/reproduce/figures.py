@@ -1,5 +1,6 @@
 """What the figures share: a small figure with its axes, in the colours of the other pictures, and saving it."""
 
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from rtctl.trace.plot import BLUE, GREEN, GREY, INK, ORANGE, RED, envelope
 
 __all__ = [
     "BLUE", "COLORS", "GREEN", "GREY", "INK", "ORANGE", "RED",
-    "db", "degrees", "legend", "line", "panels", "save", "title",
+    "db", "degrees", "legend", "line", "loop", "panels", "save", "title",
 ]  # fmt: skip
 
 COLORS = (BLUE, ORANGE, GREEN, RED)
@@ -53,6 +54,14 @@ def title(axes: Axes, words: str) -> None:
 def legend(axes: Axes, **more: Any) -> None:
     """A legend without a frame."""
     axes.legend(**{"frameon": False, "fontsize": 8, **more})
+
+
+def loop(axes: Sequence[Axes], f: np.ndarray, L: np.ndarray, share: Any, color: str, style: str, words: str) -> None:
+    """|L|, |T| = share |L / (1 + L)| and |S| of a loop (n,) at `f` (n,) Hz on three axes; `words` go to the first."""
+    opened, closed, S = axes
+    opened.semilogx(f, db(L), style, color=color, linewidth=1.0, label=words)
+    closed.semilogx(f, db(share * L / (1 + L)), style, color=color, linewidth=1.0)
+    S.semilogx(f, db(1 / (1 + L)), style, color=color, linewidth=1.0)
 
 
 def db(x: Any) -> np.ndarray:

@@ -86,11 +86,8 @@ def figure_8_5(short: bool) -> Picture:
     f = np.geomspace(got.f[0], got.f[-1], 600)
     L = ch.model_loop(short, f)
     figure, (opened, closed, S, nyquist) = fig.panels(2, 2, height=2.4)
-    for x, y, color, style in ((got.f, got.L, fig.BLUE, "-"), (f, L, fig.INK, "--")):
-        label = "measured" if style == "-" else "model"
-        opened.semilogx(x, fig.db(y), style, color=color, linewidth=1.0, label=label)
-        closed.semilogx(x, fig.db(y / (1 + y)), style, color=color, linewidth=1.0)
-        S.semilogx(x, fig.db(1 / (1 + y)), style, color=color, linewidth=1.0)
+    fig.loop((opened, closed, S), got.f, got.L, 1.0, fig.BLUE, "-", "measured")
+    fig.loop((opened, closed, S), f, L, 1.0, fig.INK, "--", "model")
     nyquist.plot(L.real, L.imag, "--", color=fig.INK, linewidth=1.0)
     nyquist.plot([-1], [0], "+", color=fig.RED)
     nyquist.set(xlim=(-3, 1.5), ylim=(-2.5, 1.5), aspect="equal", xlabel="real part", ylabel="imaginary part")

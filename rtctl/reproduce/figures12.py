@@ -164,11 +164,8 @@ def _loop(made: Any, which: str) -> Any:
     law.semilogx(f, fig.db(response.law_response(parts, f)), color=fig.INK, linewidth=1.0)
     share_got, share = (response.law_response(parts, x, "reference") / response.law_response(parts, x)
                         for x in (got.f, f))  # fmt: skip
-    for x, y, k, color, style, words in ((got.f, got.L, share_got, fig.BLUE, "-", "measured"),
-                                         (f, L, share, fig.INK, "--", "model")):  # fmt: skip
-        opened.semilogx(x, fig.db(y), style, color=color, linewidth=1.0, label=words)
-        closed.semilogx(x, fig.db(k * y / (1 + y)), style, color=color, linewidth=1.0)
-        S.semilogx(x, fig.db(1 / (1 + y)), style, color=color, linewidth=1.0)
+    fig.loop((opened, closed, S), got.f, got.L, share_got, fig.BLUE, "-", "measured")
+    fig.loop((opened, closed, S), f, L, share, fig.INK, "--", "model")
     for axes, words in ((law, "controller [dB, V/m]"), (opened, "|L| [dB]"), (closed, "|T| [dB]"), (S, "|S| [dB]")):
         axes.set_ylabel(words)
     for axes in (closed, S):

@@ -7,7 +7,7 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.config.errors import NoAnswer
-from rtctl.config.load import load_settings, set_path
+from rtctl.config.load import load_settings, set_paths
 from rtctl.config.yaml_file import find
 from rtctl.loop.fused import Run, run
 
@@ -15,9 +15,7 @@ from rtctl.loop.fused import Run, run
 def config(name: str, changes: Mapping[str, Any] | None = None) -> Any:
     """A shipped config in fused mode, with other values at dotted keys. Raises UserError for a wrong key."""
     made = load_settings(find(name), machines.CONFIGS[name.partition("_")[0]])
-    for path, value in {"loop.mode": "fused", **(changes or {})}.items():
-        made = set_path(made, path, value)
-    return made
+    return set_paths(made, {"loop.mode": "fused", **(changes or {})})
 
 
 def reels(R1: float, R2: float, changes: Mapping[str, Any] | None = None) -> Any:
@@ -31,8 +29,7 @@ def play(made: Any, seconds: float) -> Run:
     """A run of a config from the first tick on. Raises NoAnswer where the machine trips."""
     done = run(made, seconds)
     if done.tripped:
-        when = float(done["t"][(done["trip"] > 0).argmax()])
-        raise NoAnswer(f"{made.name}: the run tripped, {done.tripped} at {when:.3f} s")
+        raise NoAnswer(f"{made.name}: the run tripped, {done.tripped} at {done.trip_time:.3f} s")
     return done
 
 

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from rtctl.config.errors import UserError
 from rtctl.trace.bundle import Bundle
 
 BUCKETS = 1500  # about the pixels of a panel's width
@@ -114,6 +115,14 @@ def plot_run(
         every[0].set_title(summary(metrics), loc="left", fontsize=10, color="#444444")
     figure.savefig(path)
     return Path(path)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write what `--plot` asked for. Raises UserError where the file cannot be written."""
+    try:
+        figure.savefig(path)
+    except (OSError, ValueError) as error:
+        raise UserError(f"--plot {path}: cannot be written ({error})") from None
 
 
 def summary(metrics: Sequence[Mapping[str, Any]]) -> str:

@@ -11,6 +11,7 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import load_settings
 from rtctl.design import figures, margins, robustness, shaping, tune
 from rtctl.laws.sections import SectionsSettings
+from rtctl.trace import plot
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +97,7 @@ def test_wishes_that_make_no_sense(wish, words):
 
 def test_picture_has_the_loops_and_their_margins(ldu, tmp_path):
     figure = figures.loops({"before": fused.config("ldu"), "after": ldu.config})
-    figures.save(figure, tmp_path / "loop.png")
+    plot.save(figure, tmp_path / "loop.png")
     assert (tmp_path / "loop.png").stat().st_size > 20_000
     gain, nyquist, phase, closed, step = figure.axes
     assert len(gain.lines) == 3 and len(step.lines) == 2
@@ -111,7 +112,7 @@ def test_picture_of_the_radii(ivu, tmp_path):
     assert len(figure.axes) == 4
     assert "scheduled: at least" in figure.axes[1].get_title()
     with pytest.raises(UserError, match="cannot be written"):
-        figures.save(figure, tmp_path / "nowhere" / "map.png")
+        plot.save(figure, tmp_path / "nowhere" / "map.png")
 
 
 def test_unstable_loop_is_drawn_without_a_step_response():

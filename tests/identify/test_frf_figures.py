@@ -7,6 +7,7 @@ import pytest
 
 from rtctl.config.errors import UserError
 from rtctl.identify import frf_figures, model_fit, sensitivity
+from rtctl.trace import plot
 
 
 def labels(figure: Any) -> list[str]:
@@ -21,10 +22,10 @@ def test_the_sensitivity(tmp_path):
     result = sensitivity.identify(frf_runs.noise())
     figure = frf_figures.sensitivity(result, model=result.S)
     assert labels(figure) == ["|S| [dB]", "phase of S [deg]", "coherence", "|H| [dB, rad/V]"]
-    frf_figures.save(figure, tmp_path / "s.png")
+    plot.save(figure, tmp_path / "s.png")
     assert (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
     with pytest.raises(UserError, match="cannot be written"):
-        frf_figures.save(figure, tmp_path / "none" / "s.png")
+        plot.save(figure, tmp_path / "none" / "s.png")
 
 
 def test_the_best_linear_approximation():
