@@ -1,11 +1,13 @@
 """Friction: what resists motion at a node, dry (up to a limit, opposing) or viscous (in proportion to speed).
 
+Drag by the square of speed has no name in the exchange format: it is here so that viscous friction is not named for it.
+
 Dry terms add to the limit of the node's dry friction and the solver finds the force, so that a node that sticks
 stands still; a sum of limits below zero counts as none. Viscous terms add a force. Sizes may be negative where the
 base model has more than the machine: the sum is what must not feed energy in.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, A survey of models, analysis tools and compensation methods for
-the control of machines with friction, Automatica 30 (1994); thesis (8.3).
+the control of machines with friction, Automatica 30 (1994); thesis (8.3); Hoerner, Fluid-dynamic drag (1965).
 """
 
 import math
@@ -68,6 +70,29 @@ def build_viscous(settings: ViscousSettings, h: float) -> ViscousParams:
 def viscous(p, v):
     """Force on the node at speed `v`, Nm or N."""
     return -p.B * v
+
+
+class QuadraticSettings(Settings):
+    """Q is the size."""
+
+    term: Literal["friction.quadratic"] = "friction.quadratic"
+    node: str
+    Q: float = quantity(unit="", ge=0, le=1e6, help="drag by the square of speed, Nms^2/rad^2 or Ns^2/m^2 by node")
+
+
+class QuadraticParams(NamedTuple):
+    Q: float
+
+
+def build_quadratic(settings: QuadraticSettings, h: float) -> QuadraticParams:
+    """Nothing to discretise."""
+    return QuadraticParams(settings.Q)
+
+
+@tick
+def quadratic(p, v):
+    """Force on the node at speed `v`, Nm or N."""
+    return -p.Q * abs(v) * v
 
 
 class StribeckSettings(Settings):
@@ -146,6 +171,20 @@ VISCOUS = Term(
     },
     typical={"B": (0.1, 0.5)},
     scale={"B": "force/speed"},
+)
+QUADRATIC = Term(
+    name="friction.quadratic",
+    words="drag by the square of speed, as of a fan or of churned oil",
+    equation="F = -Q |v| v",
+    source="Hoerner 1965",
+    settings=QuadraticSettings,
+    build=build_quadratic,
+    act={"force": "{m}.f[{i}] += {r} * friction.quadratic({p}, {r} * {m}.vm[{i}])"},
+    nodes=SHAFTS,
+    look_alikes={"friction.viscous": "constant speeds over a decade: viscous friction only doubles with speed"},
+    typical={"Q": (0.2, 1.0)},
+    scale={"Q": "force/speed^2"},
+    tabled=False,
 )
 STRIBECK = Term(
     name="friction.stribeck",

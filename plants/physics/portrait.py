@@ -117,7 +117,8 @@ def typical(term: Term, kind: str, node: str) -> Settings:
     """Settings in the middle of what is met in practice."""
     of = SCALES[kind]
     of = of | {
-        "": 1.0, "dry": of["force"], "force/speed": of["force"] / of["speed"], "sample period": SAMPLE,
+        "": 1.0, "dry": of["force"], "force/speed": of["force"] / of["speed"],
+        "force/speed^2": of["force"] / of["speed"] ** 2, "sample period": SAMPLE,
         "force/travel": of["force"] / of["travel"], "largest command": VOLTS,
         "stiffness/stretch^2": 3.0 * of["stiffness"] / of["travel"] ** 2,
     }  # fmt: skip

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Effect, Evidence, Interval, Located
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet, with_fewer
 from rtctl.diagnose.fit import Fit, Problem, fit
@@ -26,6 +26,7 @@ from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
 from rtctl.diagnose.verdict import Verdict, judge, of_factor, of_jitter, proven, with_known
+from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.timing import JitterSettings
 
 QUICK = 10 / 3  # times the usual bandwidth of the correction
@@ -115,6 +116,8 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     has been refused."""
     problem, base, best = found.problem, found.base, found.best
     verdict = judge(problem, base, best, found.rivals, problem.block)
+    if found.beyond is not None and verdict.verdict in (NAMED, AMBIGUOUS):
+        verdict = Verdict(UNNAMED, (), verdict.explained)
     named = {e.name for e in with_known(verdict, known).effects}
     taken = best if any(h.term in named for h in best.space.hypotheses) else base
     if found.factor is not None and "sensor.scale" in named:
@@ -165,7 +168,14 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         experiment=_experiment(sim, found) if verdict.verdict == AMBIGUOUS else None,
         fit_rows=(problem.rows.start or 0, cut_of(record)),
         seconds=0.0,
+        resembles=resembled(found) if verdict.verdict == UNNAMED else None,
     )
+
+
+def resembled(found: Found) -> tuple[str, str] | None:
+    """The law without a name that does better than what was found, and its node."""
+    terms = () if found.beyond is None else found.beyond.space.hypotheses
+    return next(((h.term, h.node) for h in terms if not TERMS[h.term].tabled), None)
 
 
 def scaled(found: Factor) -> Hypothesis:

@@ -106,7 +106,7 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
 
 def nodes(name: str, config: Any) -> list[str]:
     """Where an effect can be hidden in a machine without its loop running away at once."""
-    found = TERMS[name].nodes.get(config.machine, ())
+    found = TERMS[name].nodes.get(config.machine, ()) if TERMS[name].tabled else ()
     if name == "sensor.rectified":
         found = tuple(node for node in found if node not in FEEDBACK[config.machine])
     return [node for node in found if name != "structure.stiffening" or use(node, config).stiffness > 0.0]

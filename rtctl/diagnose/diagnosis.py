@@ -75,6 +75,7 @@ class Diagnosis(NamedTuple):
     experiment: dict[str, Any] | None
     fit_rows: tuple[int, int]  # first and last row fitted
     seconds: float
+    resembles: tuple[str, str] | None = None  # term that the table has no name for and its node, where it explains more
 
 
 def as_json(d: Diagnosis) -> dict[str, Any]:
@@ -100,6 +101,7 @@ def as_json(d: Diagnosis) -> dict[str, Any]:
             "heldout_nrmse_after": d.heldout_after,
             "noise_floor": d.noise_floor,
         },
+        "resembles": None if d.resembles is None else dict(zip(("name", "node"), d.resembles, strict=True)),
         "cannot_test": list(d.cannot_test),
         "hides": {k: {"value": v.value, "unit": v.unit} for k, v in d.hides.items()},
         "separating_experiment": d.experiment,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
-from rtctl.diagnose import decide
+from rtctl.diagnose import beyond, decide
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.hints import hints
@@ -38,6 +38,7 @@ class Found(NamedTuple):
     best: Fit
     search: Search
     rivals: tuple[tuple[Alternative, ...], ...]  # for each hypothesis of the best, fits with another in its place
+    beyond: Fit | None = None  # in which a law without a name does better than names that it resembles
 
 
 def quiet(text: str) -> None:
@@ -77,7 +78,7 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit
     best, near = usual_nodes(sim.record.plant, best, near)
     other = any(h.term in LOSES_WAY for h in best.space.hypotheses)
     scale = None if other else factor(sim, best.model, base.space.owner)
-    return Found(problem, off, scale, base, best, looked, near)
+    return Found(problem, off, scale, base, best, looked, near, beyond.nameless(problem, best, progress))
 
 
 def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:

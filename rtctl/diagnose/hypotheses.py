@@ -176,6 +176,10 @@ FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in 
     "drive.supply_sag": ("form", ("current", "power", "drawn")),
     "drive.deadband": ("form", ("shift", "cut", "floor")),
 }
+BEYOND: dict[str, tuple[Part, ...]] = {  # what has no name in the table, looked for where a name may stand for it
+    "friction.quadratic": (Size("Q", "drag2", 0.1),),
+}
+ALL = SEARCH | BEYOND
 HINTED = tuple(name for name, parts in SEARCH.items() if any(isinstance(part, Hint | Jumps | At) for part in parts))
 
 
@@ -200,7 +204,7 @@ def hypotheses(
     out = []
     for name, term in TERMS.items():
         if (
-            name in SEARCH
+            (name in SEARCH or name in only)
             and not (name in ALONE and len(record.y) < 2 and record.plant == "ldu")
             and (not only or name in only)
         ):
@@ -212,7 +216,7 @@ def hypotheses(
                     or (name == "friction.stribeck" and not measures.dry(node))
                 ):  # falls to what the base has
                     continue
-                out += _starts(name, node, (slides and SLIDING.get(name)) or SEARCH[name], measures)
+                out += _starts(name, node, (slides and SLIDING.get(name)) or ALL[name], measures)
     return out
 
 

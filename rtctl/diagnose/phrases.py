@@ -51,6 +51,8 @@ PHRASES: dict[str, Phrase] = {name: Phrase(*words) for name, words in {
                            "forwards and {a:%} {a:smaller|larger} backwards", BOTH),
     "friction.presliding": ("a spring before sliding", "{here} gives like a spring before it slides", "it springs over "
                             "{z_s}", "standstills and slow reversals"),
+    "friction.quadratic": ("drag by the square of speed", "{here} drags by the square of its speed", "{Q} of it",
+                           "moves at several speeds"),
     "load.spring": ("a spring force", "something pulls {here} like a spring", "{k} {k:back to|away from} one place",
                     "long moves"),
     "load.cable_chain": ("a cable chain", "a cable chain pulls {here}", "{k} by position and {F_h} of drag",

@@ -297,6 +297,12 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
     left, noise = heldout_error(d, d.heldout_after), heldout_error(d, d.noise_floor)
     one, two = both(left, noise, unit)
     amount = f"the error on the part that was not fitted is {one} where noise leaves {two}"
+    if d.resembles is not None:
+        name, node = d.resembles
+        return (
+            f"Something is missing at {node_words(node)} that has no name in the table: it looks like {noun(name)}.",
+            f"{_capital(amount)}.",
+        )
     if d.located is None:
         return "Something is missing that no known effect explains.", f"It has no clear place: {amount}."
     at = node_words(d.located.node)

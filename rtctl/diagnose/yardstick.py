@@ -37,6 +37,7 @@ class Measures:
             "span": s.span,
             "low": s.low,
             "drag": s.force / s.speed,
+            "drag2": s.force / s.speed**2,
             "stiff": s.force / s.span,
             "twist": s.force / self.stiffness(node),
             "cubic": self.stiffness(node) ** 3 / s.force**2,

@@ -206,6 +206,7 @@ def usual(term: str, kind: str, node: str | None = None, **changes: Any) -> Sett
     values: dict[str, dict[str, Any]] = {
         "friction.coulomb": {"F_C": 0.3 * F},
         "friction.viscous": {"B": 0.2 * F / V},
+        "friction.quadratic": {"Q": 0.3 * F / V**2},
         "friction.stribeck": {"F_s": 1.3 * F, "v_s": 0.2 * V},
         "friction.asymmetry": {"a": 0.2, "B_a": 0.05 * F / V},
         "friction.load": {"mu": 0.1},
@@ -243,6 +244,7 @@ NOTHING: dict[str, dict[str, float]] = {  # the size at which each is not there
     "transmission.slip": {"F_max": 1e6},
     "transmission.creep": {"kappa": 0.0},
     "structure.resonance": {"mass": 0.0},
+    "friction.quadratic": {"Q": 0.0},
     "structure.stiffening": {"c3": 0.0},
     "tape.viscoelastic": {"c_branch": 0.0},
     "tape.slack": {"share": 0.0},

@@ -1,0 +1,43 @@
+"""Looks for what the table has no name for, where names that it resembles have been found.
+
+The names of the table are not all that a machine can do: drag by the square of speed looks like viscous friction with
+some sticking. A name that gives way to such a law is not to be told.
+"""
+
+from collections.abc import Callable
+
+from rtctl.diagnose import decide
+from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.name import dropped, look_alikes, polish
+from rtctl.diagnose.screen import screen
+
+IMITATED = {  # by which names of the table
+    "friction.quadratic": ("friction.viscous", "friction.stribeck", "friction.coulomb", "drive.supply_sag"),
+}
+SURELY = 0.02  # chance of explaining as well, below which a name gives way to one law in its place
+AS_GOOD = 1.02  # times the merit of several names: one law that does as well is likelier
+
+
+def nameless(problem: Problem, best: Fit, progress: Callable[[str], None] = lambda text: None) -> Fit | None:
+    """The model in which a law without a name takes the place of names that it does better than; None if there is none.
+
+    In the place of one name it has to be ahead by more than chance, in the place of several it has to do as well.
+    """
+    for term, imitated in IMITATED.items():
+        out = [i for i, h in enumerate(best.space.hypotheses) if h.term in imitated]
+        nodes = {best.space.hypotheses[i].node for i in out}
+        if not out:
+            continue
+        progress(f"{term} in the place of {' and '.join(best.space.hypotheses[i].term for i in out)}")
+        rest = best
+        for i in reversed(out):
+            rest = dropped(problem, rest, i, 4)
+        candidates = hypotheses(problem.sim.record, rest.model.base, only=(term,))
+        there = [h for h in candidates if h.node in nodes] or candidates
+        for fitted in look_alikes(problem, rest, screen(problem, rest, there), {term}, best.cost):
+            trial = polish(problem, fitted) if fitted.cost < 2 * best.cost else fitted
+            surely = decide.p_value(trial, best, problem.block) < SURELY
+            if (len(out) > 1 and trial.merit < AS_GOOD * best.merit) or (surely and decide.better(best, trial)):
+                return trial
+    return None
