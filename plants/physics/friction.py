@@ -181,7 +181,10 @@ QUADRATIC = Term(
     build=build_quadratic,
     act={"force": "{m}.f[{i}] += {r} * friction.quadratic({p}, {r} * {m}.vm[{i}])"},
     nodes=SHAFTS,
-    look_alikes={"friction.viscous": "constant speeds over a decade: viscous friction only doubles with speed"},
+    look_alikes={
+        "friction.viscous": "constant speeds over a decade: viscous friction only doubles with speed",
+        "friction.stribeck": "constant speeds from crawl to full: sticking falls at the start, this drag grows",
+    },
     typical={"Q": (0.2, 1.0)},
     scale={"Q": "force/speed^2"},
     tabled=False,

@@ -72,7 +72,7 @@ def test_the_tables_speak_of_what_there_is(config):
             assert 0 <= span.low <= span.high
             if name in TERMS and TERMS[name].nodes.get(config.machine):
                 assert measure(span.measure, TERMS[name].nodes[config.machine][0], config) > 0
-    for term in TERMS.values():
+    for term in (term for term in TERMS.values() if term.tabled):
         assert all(term.scale.get(key, "") in TYPICAL for key in term.typical if key not in OWN.get(term.name, {}))
     for name, words in WORDS.items():
         assert set(words) <= set(TERMS[name].settings.model_fields)
