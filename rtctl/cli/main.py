@@ -36,6 +36,7 @@ COMMANDS = {
     "prove": "prove",
     "physics": "physics",
     "trace": "trace",
+    "doctor": "doctor",
     "keys": "keys",
 }
 USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]  # typer's own, which it does not export

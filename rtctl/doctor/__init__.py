@@ -1,0 +1,1 @@
+"""What this machine can promise for a loop at a fixed rate: what its kernel says, and what a measurement says."""

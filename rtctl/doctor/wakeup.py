@@ -1,0 +1,112 @@
+"""The empty loop: our wake-up with nothing behind it, in a process of its own that may turn real-time.
+
+    python -m rtctl.doctor.wakeup CPU PRIORITY
+
+It answers with one JSON object a line: first what this machine refused, then, for each line "PERIOD_NS SECONDS" on
+standard input, the window that it measured. It ends with its standard input.
+"""
+
+import json
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+
+from rtctl.idiom import state, tick
+from rtctl.loop import clock, histogram
+from rtctl.loop.memory import borrowed
+from rtctl.loop.realtime import RealTime
+
+WINDOW = state(late=int, skipped=int, lateness=histogram.HISTOGRAM)
+
+
+@tick
+def empty_loop(window, period, ticks):
+    """Sleep, wake, count; as `rtctl.loop.runner.run_real` does, without link, law and ring. `ticks` are those due."""
+    window = borrowed(window)
+    w = window[0]
+    wake = clock.now() + period
+    due = 0
+    while due < ticks:
+        clock.sleep_until(wake)
+        woke = clock.now()
+        while woke < wake:  # sleeps cut short by a signal
+            woke = clock.now()
+        lateness = woke - wake
+        skipped = lateness // period  # a late tick is counted and never made up for
+        histogram.add(w.lateness, lateness)
+        w.late += 1 if 2 * lateness > period else 0
+        w.skipped += skipped
+        due += skipped + 1
+        wake += (skipped + 1) * period
+
+
+def main(argv: list[str]) -> int:
+    cpu, priority = int(argv[1]), int(argv[2])
+    empty_loop(np.zeros(1, WINDOW), 1000, 0)  # compile before we are in anybody's way
+    realtime = RealTime(priority, cpu)
+    print(json.dumps({"lacks": [str(lack) for lack in realtime.lacks]}), flush=True)
+    for line in sys.stdin:
+        period, seconds = map(int, line.split())
+        window = np.zeros(1, WINDOW)
+        empty_loop(window, period, seconds * clock.SECOND // period)
+        print(json.dumps(_answer(window[0])), flush=True)
+    realtime.close()
+    return 0
+
+
+def _answer(w: np.void) -> dict[str, Any]:
+    h = w["lateness"]
+    filled = np.flatnonzero(h["bucket"])
+    return {
+        "late": int(w["late"]),
+        "skipped": int(w["skipped"]),
+        "max": int(h["max"]),
+        "bucket": filled.tolist(),
+        "count": h["bucket"][filled].tolist(),
+    }
+
+
+class Sleeper:
+    """The process above, from outside: `with Sleeper(cpu, priority) as s: s.window(100_000, 1)`.
+
+    `lacks` is what the machine refused it. Raises RuntimeError where it ended, with what it said last.
+    """
+
+    def __init__(self, cpu: int, priority: int):
+        command = (sys.executable, "-m", "rtctl.doctor.wakeup", str(cpu), str(priority))
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def __enter__(self) -> "Sleeper":
+        try:
+            self.lacks: list[str] = self._read()["lacks"]
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._process.kill()  # nothing of it outlives it
+        self._process.communicate()
+
+    def window(self, period_ns: int, seconds: int) -> dict[str, Any]:
+        """One window: wake-ups by bucket of `rtctl.loop.histogram`, `late` and `skipped` of them, `max` in ns."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{period_ns} {seconds}\n")
+        self._process.stdin.flush()
+        return self._read()
+
+    def _read(self) -> dict[str, Any]:
+        assert self._process.stdout is not None and self._process.stderr is not None
+        line = self._process.stdout.readline()
+        if not line:
+            said = self._process.stderr.read().strip().splitlines()
+            raise RuntimeError(f"the empty loop ended: {said[-1] if said else 'it did not say why'}")
+        return json.loads(line)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv))
