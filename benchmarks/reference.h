@@ -24,7 +24,7 @@ enum { IDLE, ARMED, RUNNING, TRIPPED };
 enum { NONE, LINK, FROZEN, FOLLOWING, TENSION, CURRENT, NOT_A_NUMBER, MISSED, COMMANDER };
 
 struct command {
-    int64_t arm, disarm, reset, gains, play, commander_lost, setpoint;
+    int64_t arm, disarm, reset, gains, play, commander_lost, setpoint, order;
     double target, rate;
 };
 
@@ -158,6 +158,22 @@ static void count_time(struct histogram *h, int64_t ns)
     frexp((double)ns, &exponent);
     int octave = exponent - 6;
     h->bucket[ns < 32 ? ns : 32 * octave + (ns >> octave)]++;
+}
+
+static struct {
+    int on;
+    int64_t begun, read, law;
+    struct histogram reading, deciding, writing, publishing, whole;
+} timing;
+
+static void count_stages(int64_t wrote)
+{
+    int64_t done = now();
+    count_time(&timing.reading, timing.read - timing.begun);
+    count_time(&timing.deciding, timing.law - timing.read);
+    count_time(&timing.writing, wrote - timing.law);
+    count_time(&timing.publishing, done - wrote);
+    count_time(&timing.whole, done - timing.begun);
 }
 
 /* ---- laws ---- */

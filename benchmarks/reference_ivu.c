@@ -44,7 +44,7 @@ const char wholes[] = WHOLES(NAME);
 
 struct row {
     int64_t tick;
-    double t, period, lateness, state, trip, link_age, target, ref, w, u1, u2, capstan_counts, reel1_counts,
+    double t, period, lateness, state, trip, link_age, order, target, ref, w, u1, u2, capstan_counts, reel1_counts,
         reel2_counts, capstan, capstan_error, capstan_speed, u_c, R1, R2, gain_factor, tension1_estimate,
         tension2_estimate, truth_tension1, truth_tension2, truth_capstan, truth_motor1, truth_motor2, truth_R1,
         truth_R2;
@@ -69,7 +69,6 @@ static int64_t n_rows;
 static _Atomic int64_t head;
 static struct mailbox box;
 static struct command command;
-static struct histogram times;
 
 static struct {
     struct safety safety;
@@ -138,6 +137,8 @@ static void tick(int64_t k)
     y->capstan = counts * p.capstan_radians_per_count;
     y->reel1_counts = count_edges(p.reel1_low, p.reel1_high, &loop.reel1, in.ai[0] * p.input1_volts_per_code);
     y->reel2_counts = count_edges(p.reel2_low, p.reel2_high, &loop.reel2, in.ai[1] * p.input2_volts_per_code);
+    if (timing.on)
+        timing.read = now();
 
     /* state */
     obey(safety, &command);
@@ -214,6 +215,8 @@ static void tick(int64_t k)
     if (safety->slack > p.safety_tension)
         trip(safety, TENSION, k);
     fade(&safety_limits, safety);
+    if (timing.on)
+        timing.law = now();
 
     /* outputs */
     codes[0] = to_codes(gate(safety, u1, 0) / p.output1_volts_per_code, p.output1_code_min, p.output1_code_max);
@@ -223,6 +226,7 @@ static void tick(int64_t k)
     y->state = safety->state;
     y->trip = safety->trip;
     y->link_age = safety->silent;
+    y->order = command.order;
     y->truth_tension1 = in.truth[0];
     y->truth_tension2 = in.truth[1];
     y->truth_capstan = in.truth[2];
@@ -326,7 +330,7 @@ void prepare(const struct parameters *given, const double *Phi_T, const double *
     memset(&command, 0, sizeof command);
     memset(codes, 0, sizeof codes);
     memset(held, 0, sizeof held);
-    box = (struct mailbox){.count = 2, .command = {.arm = 1, .play = 1}};
+    box = (struct mailbox){.count = 2, .command = {.arm = 1, .play = 1, .order = 1}};
     safety_limits = (struct safety_limits){
         p.safety_link, p.safety_frozen, p.safety_tension, p.safety_current_time, p.safety_missed,
         p.safety_frozen_effort, p.safety_following, p.safety_tension_min, p.safety_tension_max, p.safety_current,
@@ -360,15 +364,17 @@ int64_t run(int64_t ticks, int64_t substeps, double dt, int64_t ahead)
         loop.row.t = k * dt;
         loop.row.period = dt;
         loop.row.lateness = 0.0;
-        int64_t begun = k % 16 ? 0 : now();
+        timing.on = k % 16 == 0;
+        timing.begun = timing.on ? now() : 0;
         tick(k);
-        if (k % 16 == 0)
-            count_time(&times, now() - begun);
+        int64_t wrote = timing.on ? now() : 0;
         if (!ahead || (loop.safety.state != was && (was == ARMED || was == RUNNING)))
             memcpy(held, codes, sizeof held);
         int64_t n = atomic_load_explicit(&head, memory_order_relaxed);
         rows[n % n_rows] = loop.row;
         atomic_store_explicit(&head, n + 1, memory_order_release);
+        if (timing.on)
+            count_stages(wrote);
         for (int64_t i = 0; i < substeps; i++)
             substep();
         sample();

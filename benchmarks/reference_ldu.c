@@ -31,7 +31,7 @@ const char wholes[] = WHOLES(NAME);
 
 struct row {
     int64_t tick;
-    double t, period, lateness, state, trip, link_age, target, ref, w, u, encoder_counts, scale_counts, position,
+    double t, period, lateness, state, trip, link_age, order, target, ref, w, u, encoder_counts, scale_counts, position,
         scale, position_error, speed, u_c, truth_x, truth_speed, truth_current;
 };
 
@@ -43,7 +43,6 @@ static int64_t n_rows;
 static _Atomic int64_t head;
 static struct mailbox box;
 static struct command command;
-static struct histogram times;
 
 static struct {
     struct safety safety;
@@ -97,6 +96,8 @@ static void tick(int64_t k)
     y->scale_counts = read_counter(&loop.scale, in.counters[1]);
     y->scale = y->scale_counts * p.scale_metres_per_count;
     y->position = p.machine_R_c * (counts * p.encoder_radians_per_count);
+    if (timing.on)
+        timing.read = now();
 
     /* state */
     obey(safety, &command);
@@ -138,6 +139,8 @@ static void tick(int64_t k)
     /* safety */
     check_motion(&safety_limits, safety, y->position_error, counts, u, fabs(u) * p.machine_amp_per_volt, k);
     fade(&safety_limits, safety);
+    if (timing.on)
+        timing.law = now();
 
     /* outputs */
     u = gate(safety, u, 0);
@@ -149,6 +152,7 @@ static void tick(int64_t k)
     y->state = safety->state;
     y->trip = safety->trip;
     y->link_age = safety->silent;
+    y->order = command.order;
     y->truth_x = in.truth[0];
     y->truth_speed = in.truth[1];
     y->truth_current = in.truth[2];
@@ -194,7 +198,7 @@ void prepare(const struct parameters *given, const double *Phi_T, const double *
     memset(&command, 0, sizeof command);
     memset(&out, 0, sizeof out);
     memset(&held, 0, sizeof held);
-    box = (struct mailbox){.count = 2, .command = {.arm = 1, .play = 1}};
+    box = (struct mailbox){.count = 2, .command = {.arm = 1, .play = 1, .order = 1}};
     safety_limits = (struct safety_limits){
         p.safety_link, p.safety_frozen, p.safety_tension, p.safety_current_time, p.safety_missed,
         p.safety_frozen_effort, p.safety_following, p.safety_tension_min, p.safety_tension_max, p.safety_current,
@@ -224,15 +228,17 @@ int64_t run(int64_t ticks, int64_t substeps, double dt, int64_t ahead)
         loop.row.t = k * dt;
         loop.row.period = dt;
         loop.row.lateness = 0.0;
-        int64_t begun = k % 16 ? 0 : now();
+        timing.on = k % 16 == 0;
+        timing.begun = timing.on ? now() : 0;
         tick(k);
-        if (k % 16 == 0)
-            count_time(&times, now() - begun);
+        int64_t wrote = timing.on ? now() : 0;
         if (!ahead || (loop.safety.state != was && (was == ARMED || was == RUNNING)))
             held = out;
         int64_t n = atomic_load_explicit(&head, memory_order_relaxed);
         rows[n % n_rows] = loop.row;
         atomic_store_explicit(&head, n + 1, memory_order_release);
+        if (timing.on)
+            count_stages(wrote);
         for (int64_t i = 0; i < substeps; i++)
             substep();
         sample();

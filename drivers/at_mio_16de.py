@@ -19,6 +19,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from pydantic import Field, model_validator
 
+from rtctl.counted import mixed, nth
 from rtctl.idiom import Settings, quantity, state, tick
 
 INTERNAL_VOLTS = 10.0
@@ -202,13 +203,9 @@ def codes_to_input_volts(p, codes):
 def _noise(seed, n):
     """The n-th of a sequence of mean 0, rms 1, nearly Gaussian: four uniforms summed, so never beyond 3.5.
 
-    The uniforms are the four 16-bit parts of a hash of seed and n (splitmix64), so the state is a count and nothing
-    else. Source: Steele, Lea & Flood, Fast splittable pseudorandom number generators, OOPSLA 2014.
+    The uniforms are the four 16-bit parts of a hash of seed and n, so the state is a count and nothing else.
     """
-    z = np.uint64(seed) + np.uint64(n + 1) * np.uint64(0x9E3779B97F4A7C15)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
+    z = mixed(nth(seed, n))
     total = 0.0
     for _ in range(4):
         total += (float(z & np.uint64(0xFFFF)) + 0.5) / 65536.0

@@ -21,7 +21,7 @@ READER_STATE = state(n=int, previous=int, position=int)
 def counter_step(s, pulses, up):
     """Count `pulses` (not negative) up or down as the DIO line says (`up` 1 or 0); returns codes, 0 to 2^24 - 1."""
     s.n += pulses if up != 0 else -pulses
-    return (INITIAL_COUNT + s.n) & (SIZE - 1)
+    return wrapped(INITIAL_COUNT + s.n)
 
 
 @tick
@@ -31,10 +31,22 @@ def counter_reset(s):
 
 
 @tick
+def wrapped(counts):
+    """Code that a counter shows at `counts`, which may lie beyond its ends."""
+    return counts & (SIZE - 1)
+
+
+@tick
+def difference(codes, previous):
+    """Counts from one code to another, by the shorter way."""
+    return wrapped(codes - previous + INITIAL_COUNT) - INITIAL_COUNT
+
+
+@tick
 def counter_position(s, codes):
     """Signed continuous counts since the initial count, from codes that wrap."""
     previous = s.previous if s.n != 0 else INITIAL_COUNT
-    s.position += ((codes - previous + INITIAL_COUNT) & (SIZE - 1)) - INITIAL_COUNT
+    s.position += difference(codes, previous)
     s.previous = codes
     s.n += 1
     return s.position

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import UserError
+from rtctl.counted import uniform
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics.term import Term
@@ -100,15 +101,6 @@ def late(p, t):
         x = math.sqrt(12.0) * (one - 0.5)
     half = 0.5 / p.rate
     return min(max(p.sigma * x, -half), half)
-
-
-@tick
-def uniform(z):
-    """A number between 0 and 1 from the 64 bits of `z` (splitmix64, Steele et al. 2014)."""
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return (float(z >> np.uint64(11)) + 0.5) * 2.0**-53
 
 
 @tick

@@ -10,11 +10,14 @@ from rtctl.config.units import convert
 from rtctl.daemon.protocol import Args
 from rtctl.idiom import fill_record
 from rtctl.loop import generate, safety
+from rtctl.machines import Machine
 
 if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
-SWITCHED = ("loop", "link", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation")
+SWITCHED = (
+    "loop", "link", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation", "faults"
+)  # fmt: skip
 
 
 class Commands:
@@ -43,7 +46,7 @@ class Commands:
             for name, value in fields.items():
                 command[name] = value
 
-        self._of.mailbox.post(write)
+        self._of.order(write)
         return {"tick": int(self._of.status["tick"])}
 
     def _count(self, name: str) -> dict[str, Any]:
@@ -95,7 +98,7 @@ class Commands:
             command["setpoint"]["rate"] = rate
             command["setpoint"]["seq"] = seq
 
-        self._of.mailbox.post(write)
+        self._of.order(write)
         return {"tick": int(self._of.status["tick"]), "target": target, "unit": self._of.machine.unit, "rate": rate}
 
     def _refuse_when_off(self) -> None:
@@ -133,6 +136,11 @@ class Commands:
             raise UserError(
                 f"{path} changes the structure of the tick; stop the machine and start it with --set {path}=..."
             )
+        self.take_over(config, machine, {path: value})
+        return {"path": path, "value": value, "tick": int(self._of.status["tick"])}
+
+    def take_over(self, config: Any, machine: Machine, changed: dict[str, Any]) -> None:
+        """Put a machine of the same structure in force, all of it at one tick; `changed` are its settings by path."""
         gains = int(self._of.segment["mailbox"][0]["command"]["gains"]) + 1
 
         def write(params: Any, command: Any) -> None:
@@ -141,10 +149,13 @@ class Commands:
                     fill_record(params[block.name], block.params)
             command["gains"] = gains
 
-        self._of.mailbox.post(write)
+        self._of.order(write, changed)
         self._of.config, self._of.machine = config, machine
-        self._of.note_change(path, value)
-        return {"path": path, "value": value, "tick": int(self._of.status["tick"])}
+        for path, value in changed.items():
+            self._of.note_change(path, value)
+
+    def _fault(self, action: str, fault: dict[str, Any] | None = None) -> dict[str, Any]:
+        return self._of.faults.handle(action, fault)
 
     def _capture(
         self, seconds: float, pre: float = 0.0, trigger: str | None = None, out: str | None = None

@@ -12,7 +12,7 @@ import difflib
 import math
 import os
 from collections.abc import Iterable
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgpack
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
@@ -101,6 +101,13 @@ class CaptureIdArgs(Args):
     id: Text
 
 
+class FaultArgs(Args):
+    """`add` takes a `fault` as it would stand in the config's list, its `at` counted from now."""
+
+    action: Literal["add", "list", "clear"]
+    fault: dict[str, Any] | None = None
+
+
 OPS: dict[str, type[Args]] = {
     "ping": NoArgs,
     "status": NoArgs,
@@ -113,6 +120,7 @@ OPS: dict[str, type[Args]] = {
     "reset": NoArgs,
     "play": NoArgs,
     "stop": NoArgs,
+    "fault": FaultArgs,
     "capture": CaptureArgs,
     "capture_status": CaptureIdArgs,
     "capture_stop": CaptureIdArgs,

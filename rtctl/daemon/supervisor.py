@@ -24,15 +24,19 @@ from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
 from rtctl.daemon.children import ChildProcess
 from rtctl.daemon.commands import Commands
+from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
+from rtctl.daemon.notify import Service
+from rtctl.daemon.reload import reload
 from rtctl.daemon.server import CommandServer, default_endpoint, runtime_dir
 from rtctl.daemon.telemetry import Telemetry
-from rtctl.loop import generate, safety
+from rtctl.loop import faults, generate, safety
 from rtctl.loop.histogram import percentiles
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.memory import Segment
-from rtctl.loop.records import layout
+from rtctl.loop.records import STAGES, late_ticks, layout
 from rtctl.loop.ring import Reader
+from rtctl.trace.orders import Journal
 from rtctl.trace.recorder import Recorder
 
 log = structlog.get_logger()
@@ -59,6 +63,9 @@ class Supervisor:
         self.lacks: list[str] = []
         self.armed_at_start = False
         self.interrupted = False  # set by a signal handler; looked at between turns, never in the middle of one
+        self.hung_up = False  # so is this, by SIGHUP: read the config again
+        self.reread: Callable[[], Any] | None = None  # gives the settings as the config file has them now
+        self.service = Service()
         self.changes: list[dict[str, Any]] = []
         self._ended = False
         self._stack = contextlib.ExitStack()
@@ -88,11 +95,15 @@ class Supervisor:
         self.mailbox = Mailbox(self.segment)
         self.reader = Reader(self.segment)
         generate.fill(self.segment["mailbox"][0]["params"], self.machine.diagram.blocks)
+        faults.fill(self.segment["mailbox"][0]["command"], self.machine.faults)
         generate.fill_tables(self.segment["tables"][0], (self.machine.reference, self.machine.excitation))
+        self.journal = Journal()
+        stack.callback(self.journal.close)
         if self.armed_at_start:
-            self.mailbox.post(_arm_and_play)  # there before the first tick, so that a virtual run repeats to the bit
+            self.order(_arm_and_play)  # there before the first tick, so that a virtual run repeats to the bit
         context = zmq.Context()
         stack.callback(context.destroy, linger=100)
+        self.faults = Faults(self)
         self.commands = Commands(self)
         curve = keys.server_curve() if config.commands.keys else None
         self.server = CommandServer(
@@ -117,6 +128,7 @@ class Supervisor:
         if self.out is not None:
             try:
                 self.recorder = Recorder(self.out, made.columns, made.row, self.case)
+                self.journal.open(self.out)
             except OSError as error:
                 raise UserError(f"{self.out}: cannot record here: {error.strerror}") from error
         self._start_children(stack, rows)
@@ -185,6 +197,10 @@ class Supervisor:
         self.commands.watch_commander()
         if not self._ended:
             self._hear()
+        if self.service.listens:
+            self._tell_service()
+        if self.hung_up:
+            self._reload()
         if ended and not self._ended:
             self._ended = True
             self._drain()
@@ -233,6 +249,30 @@ class Supervisor:
             yield
             poller.poll(1 if virtual else TURN_MS)
 
+    # the service manager
+
+    def _tell_service(self) -> None:
+        s = self.status
+        self.service.observe(int(s["tick"]), int(s["late"]) + int(s["missed"]))
+        trip = f": {safety.TRIPS[int(s['trip'])][1]}" if s["trip"] else ""
+        lacks = "".join(f"; {lack.partition(':')[0]}" for lack in self.lacks)
+        self.service.status(f"{safety.STATES[int(s['state'])]}{trip}{lacks}")
+
+    def _reload(self) -> None:
+        """Read the config again. Whatever is wrong with it is told, and the old values stay."""
+        self.hung_up = False  # first: a SIGHUP from now on means a file that we have not read yet
+        self.service.reloading()
+        try:
+            if self.reread is None:
+                raise UserError("this machine has no config file to read again")
+            taken, refused = reload(self, self.reread())
+        except UserError as error:
+            taken, refused = [], [f"the config is not taken over, all old values stay: {error}"]
+        for sentence in refused:
+            log.warning("reload", refused=sentence)
+        log.info("reload", taken=taken)
+        self.service.reloaded()
+
     # what others ask
 
     def snapshot(self) -> dict[str, Any]:
@@ -256,6 +296,8 @@ class Supervisor:
             "lateness_us": percentiles(s["lateness"]),
             "tick_us": percentiles(s["ticks"]),
             "exchange_us": percentiles(s["exchange"]),
+            "stages_us": {name: percentiles(s[field]) for name, field in STAGES.items()},
+            "late_ticks": late_ticks(s),
             "link_latency_us": percentiles(s["round_trip"]),
             "sample_age_us": percentiles(s["age"]),
             "frames": {"received": int(s["link_frames"]), "not_sent": int(s["link_dropped"])},
@@ -264,6 +306,11 @@ class Supervisor:
             "refused_commands": dict(self.server.refused),
             "lacks": self.lacks,
         }
+
+    def order(self, write: Callable[[Any, Any], None], changed: dict[str, Any] | None = None) -> None:
+        """Post what `write(params, command)` changes and keep it for a replay; `changed` are settings by their path."""
+        self.mailbox.post(write)
+        self.journal.note(self.segment["mailbox"][0]["command"], changed or {})
 
     def note_change(self, path: str, value: Any) -> None:
         """Remember a setting that was changed while running, for the bundle."""
@@ -287,6 +334,7 @@ class Supervisor:
 
     def stop(self) -> None:
         """End the loop with its outputs at zero and take in what it still wrote."""
+        self.service.stopping()
         if hasattr(self, "status"):
             self.status["stop"] = 1
         deadline = time.monotonic() + 5.0

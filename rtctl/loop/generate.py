@@ -39,7 +39,7 @@ import numpy as np
 from numba import njit
 
 from rtctl.idiom import tick as compiled
-from rtctl.loop import clock, histogram, mailbox, ring
+from rtctl.loop import clock, faults, histogram, mailbox, ring
 from rtctl.loop import {link}_link as link
 from rtctl.loop.memory import borrowed
 from {machine} import {machine_name} as machine
@@ -47,6 +47,9 @@ from {machine} import {machine_name} as machine
 
 entry = njit(nogil=True, error_model="numpy", fastmath=False, cache=True)
 '''
+
+
+Stages = tuple[tuple[str, tuple[str, ...]], ...]
 
 
 class Generated(NamedTuple):
@@ -85,19 +88,32 @@ def source(machine: Machine, link: str) -> str:
             imports=imports,
         ),
         _function(
-            "tick", "p, s, t, c, rx, tx, y, k, fresh, late", "One tick of the loop.", (*loop.stages, *_extras(machine))
+            "tick",
+            "p, s, t, c, rx, tx, y, m, k, fresh, late",
+            "One tick of the loop.",
+            (*timed(loop.stages), *_extras(machine)),
         ),
         _function("start", "p, s", "The emulated machine at rest.", (("", plant.start),)),
         _advance(plant.advance, machine.substeps),
         _function("sample", "p, s, rx", "What the board reads now.", plant.sample),
     ]
-    parts += [_runner(f) for f in (runner.send, runner.account, runner.answer, runner.virtual)]
+    parts += [_runner(f) for f in (runner.post, runner.send, runner.account, runner.stages, runner.note_late)]
+    parts += [_runner(f) for f in (runner.answer, runner.virtual)]
     parts += [_runner(f, "entry") for f in (runner.run_real, runner.run_lockstep, runner.run_fused)]
     parts += [_runner(f, "entry") for f in (runner.plant_real, runner.plant_lockstep)]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
 
 
-def _extras(machine: Machine) -> tuple[tuple[str, tuple[str, ...]], ...]:
+def timed(stages: Stages) -> Stages:
+    """The stages with the clock read behind those that are timed, where `m` asks for it."""
+    marks = {"read": "read", "safety": "law"}
+    return tuple(
+        (name, (*lines, f"if m.on != 0:\n        m.{marks[name]} = clock.now()") if name in marks else lines)
+        for name, lines in stages
+    )
+
+
+def _extras(machine: Machine) -> Stages:
     """Emulator's truth and traced state fields, into the row."""
     truth = tuple(f"y.{c.name} = rx.truth[{i}]" for i, c in enumerate(machine.truth))
     traced = tuple(f"y.{_traced(path)} = s.{path}" for path in machine.config.record.trace)

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.loop import generate, mailbox
+from rtctl.loop import faults, generate, mailbox
 from rtctl.loop.memory import Segment
+from rtctl.loop.records import MARKS
 from rtctl.machines import Machine
 
 STRETCH = 20_000  # ticks of virtual time between two looks at the ring's reader
@@ -23,34 +24,31 @@ class Loop:
         self.out, self.inp = out, inp
         frame = generate.new_frames()
         self.tx, self.rx, self.rx_staged, self.held = frame["tx"], frame["rx"], frame["rx_staged"], frame["tx_held"]
+        self.m, self.f = np.zeros(1, MARKS), np.zeros(1, faults.FAULTS_STATE)
+        self.f["seed"] = machine.config.loop.seed
         self.p, self.s = np.zeros(1, made.params), np.zeros(1, made.state)
         self.c, self.y = np.zeros(1, mailbox.COMMAND), np.zeros(1, made.row)
+        faults.fill(self.c[0], machine.faults)
         self.staged = np.zeros(1, mailbox.mailbox_dtype(made.params))
         self.pp, self.ps = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
         generate.fill(self.p[0], machine.diagram.blocks)
         generate.fill(self.pp[0], machine.plant_diagram.blocks)
         self.status = segment["status"]
         self.shared = (self.status, segment["mailbox"], segment["tables"], segment["ring"], segment["rows"])
-        self.own = (self.p, self.s, self.c, self.staged, self.y, self.tx, self.rx)
+        self.own = (self.p, self.s, self.c, self.staged, self.y, self.m, self.f, self.tx, self.rx, self.held)
         self.period = round(SECOND / machine.rate)
         self.ahead = int(machine.config.loop.write == "next_tick")
 
     def entry(self) -> tuple[Any, tuple[Any, ...]]:
         """The compiled function of this mode and its arguments, but for the last two of a virtual one."""
         loop, module = self.machine.config.loop, self.made.module
+        timing = (self.period, int(loop.late * self.period), self.ahead)
+        if loop.mode == "fused":
+            return module.run_fused, (*self.shared, *self.own, self.pp, self.ps, *timing, 0, 0)
+        linked = (*self.shared, *self.own, self.rx_staged, self.out, self.inp, *timing)
         if loop.mode == "real":
-            late = int(loop.late * self.period)
-            return module.run_real, (
-                *self.shared, *self.own, self.rx_staged, self.out, self.inp, self.period, int(loop.spin * SECOND), late,
-                self.ahead, 0,
-            )  # fmt: skip
-        if loop.mode == "lockstep":
-            return module.run_lockstep, (
-                *self.shared, *self.own, self.rx_staged, self.held, self.out, self.inp, self.period, self.ahead, 0, 0
-            )  # fmt: skip
-        return module.run_fused, (
-            *self.shared, *self.own, self.held, self.pp, self.ps, self.period, self.ahead, 0, 0
-        )  # fmt: skip
+            return module.run_real, (*linked, int(loop.spin * SECOND), 0)
+        return module.run_lockstep, (*linked, 0, 0)
 
     def warm(self) -> None:
         """Compile, before anything waits for us."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from rtctl.idiom import state, tick
 from rtctl.laws.reference import SETPOINT
+from rtctl.loop.faults import FAULT, SLOTS
 from rtctl.loop.memory import Segment, fence
 
 COMMAND = state(
@@ -23,6 +24,9 @@ COMMAND = state(
     table=int,  # which of the two tables is in force
     commander_lost=int,  # 1 while `require_commander` finds nobody
     setpoint=SETPOINT,
+    order=int,  # number of this post, which every row carries
+    faulty=int,  # faults in the slots below
+    faults=(FAULT, SLOTS),
 )
 
 
@@ -55,10 +59,14 @@ class Mailbox:
         self._box = segment["mailbox"][0]
 
     def post(self, write: Callable[[Any, Any], None]) -> int:
-        """Let `write(params, command)` change the records; returns the count that `seen` will reach."""
+        """Let `write(params, command)` change the records; returns the count that `seen` will reach.
+
+        The post gets a number, `command.order`.
+        """
         self._box["count"] += 1
         fence_python()
         write(self._box["params"], self._box["command"])
+        self._box["command"]["order"] += 1
         fence_python()
         self._box["count"] += 1
         return int(self._box["count"])

@@ -8,6 +8,9 @@ from rtctl.loop.mailbox import mailbox_dtype
 from rtctl.loop.ring import RING
 from rtctl.loop.shm_link import INPUTS_SLOT, OUTPUTS_SLOT
 
+LATEST = 64  # late ticks that are remembered
+LATE = state(tick=int, lateness=int)  # ns
+MARKS = state(on=int, read=int, law=int)  # clock at the end of these stages, ns, where `on`
 STATUS = state(
     # written by the loop
     pid=int,
@@ -19,6 +22,7 @@ STATUS = state(
     trip_tick=int,
     missed=int,  # periods that went by without a tick
     late=int,  # ticks that woke later than `late` of a period
+    late_ticks=(LATE, LATEST),  # the latest of them, in a circle
     overruns=int,  # ticks that were not done when the next was due
     first_ns=int,  # clock at the first tick
     link_frames=int,
@@ -26,7 +30,11 @@ STATUS = state(
     lost_counts=int,  # by the emulated quadrature converters
     failed=int,  # 1 where the plant stopped answering in lockstep
     lateness=HISTOGRAM,
-    ticks=HISTOGRAM,  # driver, law, safety and ring
+    ticks=HISTOGRAM,  # read, law, write and publish
+    read=HISTOGRAM,  # counters and inputs to what the law sees
+    law=HISTOGRAM,  # states, estimates, reference, law and safety
+    write=HISTOGRAM,  # converters, and the row of the trace
+    publish=HISTOGRAM,  # the row into the ring, and these counts
     exchange=HISTOGRAM,  # the link: sending and receiving
     age=HISTOGRAM,  # of the newest sample, when the tick reads it
     round_trip=HISTOGRAM,
@@ -52,3 +60,15 @@ def layout(params: np.dtype, tables: np.dtype, row: np.dtype, rows: int) -> dict
         "ring": (RING, 1),
         "rows": (row, rows),
     }
+
+
+STAGES = {  # of a tick, in their order -> histogram of STATUS
+    "wake": "lateness", "read": "read", "law": "law", "write": "write", "publish": "publish", "link": "exchange",
+}  # fmt: skip
+
+
+def late_ticks(status: np.void) -> list[dict[str, float]]:
+    """The latest late ticks, oldest first, with how late each woke in us."""
+    count = int(status["late"])
+    kept = [status["late_ticks"][n % LATEST] for n in range(max(count - LATEST, 0), count)]
+    return [{"tick": int(t["tick"]), "lateness_us": round(float(t["lateness"]) / 1000.0, 1)} for t in kept]

@@ -5,10 +5,10 @@ What stands here is the loop as it runs; `tick`, `start`, `advance`, `sample` an
 
 from typing import Any
 
-from rtctl.loop import clock, histogram, mailbox, ring
+from rtctl.loop import clock, faults, histogram, mailbox, ring
 from rtctl.loop.memory import borrowed
 
-tick: Any = None  # the generated tick: tick(p, s, t, c, rx, tx, y, k, fresh, late)
+tick: Any = None  # the generated tick: tick(p, s, t, c, rx, tx, y, m, k, fresh, late)
 start: Any = None  # the generated plant: start(p, s), advance(p, s, tx), sample(p, s, rx)
 advance: Any = None
 sample: Any = None
@@ -26,21 +26,26 @@ def run_real(
     c,
     staged,
     y,
+    m,
+    f,
     tx,
     rx,
+    held,
     rx_staged,
     out,
     inp,
     period,
-    spin,
     late_ns,
     ahead,
+    spin,
     most,
 ):
     """Wake, tick, sleep, on the wall clock, until told to stop or `most` ticks are done."""
     box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
-    p, s, c, staged, y = borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y)
-    tx, rx, rx_staged = borrowed(tx), borrowed(rx), borrowed(rx_staged)
+    p, s, c, staged, y, m, f = (
+        borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y), borrowed(m), borrowed(f)
+    )  # fmt: skip
+    tx, rx, held, rx_staged = borrowed(tx), borrowed(rx), borrowed(held), borrowed(rx_staged)
     st = status[0]
     for _ in range(1000):  # samples that waited for us are old
         if link.receive_newest(inp, rx, rx_staged) == 0:
@@ -48,32 +53,37 @@ def run_real(
     wake = clock.now() + period
     st.first_ns = wake
     before = wake
+    m[0].on = 1
     for k in range(most):
         if st.stop != 0:
             break
-        clock.sleep_until(wake - spin)
+        due = wake + faults.lateness(c[0], k) if c[0].faulty != 0 else wake
+        clock.sleep_until(due - spin)
         woke = clock.now()
-        while woke < wake:  # short spin, and sleeps cut short by a signal
+        while woke < due:  # short spin, and sleeps cut short by a signal
             woke = clock.now()
         lateness = woke - wake
         skipped = lateness // period  # a late tick is counted and never made up for
         late = 1 if lateness > late_ns else 0
         if ahead != 0:
-            send(st, out, tx, woke)
+            send(st, out, c[0], f[0], tx, held, k, woke)
         fresh = link.receive_newest(inp, rx, rx_staged)
         begun = clock.now()
         mailbox.take(box, staged, p, c)
+        if c[0].faulty != 0:
+            fresh = faults.receive(c[0], f[0], rx, fresh, k)
         y[0].tick = k
         y[0].t = (woke - st.first_ns) * 1e-9
         y[0].period = (woke - before) * 1e-9
         y[0].lateness = lateness * 1e-9
         was = st.state
-        tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], k, fresh, late)
+        tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late)
+        wrote = clock.now()
         ring.put(ring_[0], rows, y)
         account(st, s[0].safety, k, rx[0].lost_counts)
         ticked = clock.now()
         if ahead == 0 or (st.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
-            send(st, out, tx, ticked)
+            send(st, out, c[0], f[0], tx, held, k, ticked)
         done = clock.now()
         if fresh > 0:
             st.link_frames += fresh
@@ -81,31 +91,56 @@ def run_real(
             if rx[0].outputs_seq > 0:
                 histogram.add(st.round_trip, begun - rx[0].outputs_t_ns)
         histogram.add(st.lateness, lateness)
-        histogram.add(st.ticks, ticked - begun)
+        stages(st, m[0], begun, wrote, ticked)
         histogram.add(st.exchange, begun - woke + done - ticked)
         st.missed += skipped
-        st.late += late
+        if late != 0:
+            note_late(st, k, lateness)
         before = woke
         wake += (skipped + 1) * period
         if done > wake:
             st.overruns += 1
         if st.supervisor_lost != 0:
             break
-    tx[0].ao_codes[:] = 0
-    tx[0].dio_lines = 0
-    tx[0].state = 0
+    held[0].ao_codes[:] = 0
+    held[0].dio_lines = 0
+    held[0].state = 0
     for _ in range(3):  # a lost frame must not leave the outputs on
-        send(st, out, tx, clock.now())
+        post(st, out, held, clock.now())
         clock.sleep_until(clock.now() + period)
     st.ended = 1
 
 
 def run_lockstep(
-    status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, rx_staged, held, out, inp, period, ahead, first, most
+    status,
+    box,
+    tables,
+    ring_,
+    rows,
+    p,
+    s,
+    c,
+    staged,
+    y,
+    m,
+    f,
+    tx,
+    rx,
+    held,
+    rx_staged,
+    out,
+    inp,
+    period,
+    late_ns,
+    ahead,
+    first,
+    most,
 ):
     """Loop and plant take turns on a virtual clock: wait for a sample, tick, send what acts until the next."""
     box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
-    p, s, c, staged, y = borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y)
+    p, s, c, staged, y, m, f = (
+        borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y), borrowed(m), borrowed(f)
+    )  # fmt: skip
     tx, rx, rx_staged, held = borrowed(tx), borrowed(rx), borrowed(rx_staged), borrowed(held)
     st = status[0]
     for k in range(first, first + most):
@@ -115,14 +150,39 @@ def run_lockstep(
             st.failed = 1
             break
         st.link_frames += 1
-        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, period, ahead, k)
-        send(st, out, held, clock.now())
+        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, m, f, tx, rx, held, period, late_ns, ahead, k)
+        post(st, out, held, clock.now())
 
 
-def run_fused(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, pp, ps, period, ahead, first, most):
+def run_fused(
+    status,
+    box,
+    tables,
+    ring_,
+    rows,
+    p,
+    s,
+    c,
+    staged,
+    y,
+    m,
+    f,
+    tx,
+    rx,
+    held,
+    pp,
+    ps,
+    period,
+    late_ns,
+    ahead,
+    first,
+    most,
+):
     """Loop and plant in one process on a virtual clock, as fast as they go; to the bit as in lockstep."""
     box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
-    p, s, c, staged, y = borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y)
+    p, s, c, staged, y, m, f = (
+        borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y), borrowed(m), borrowed(f)
+    )  # fmt: skip
     tx, rx, held, pp, ps = borrowed(tx), borrowed(rx), borrowed(held), borrowed(pp), borrowed(ps)
     st = status[0]
     if first == 0:
@@ -131,38 +191,69 @@ def run_fused(status, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held
     for k in range(first, first + most):
         if st.stop != 0 or st.supervisor_lost != 0:
             break
-        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, period, ahead, k)
+        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, m, f, tx, rx, held, period, late_ns, ahead, k)
         advance(pp[0], ps[0], held[0])
         sample(pp[0], ps[0], rx[0])
 
 
-def virtual(st, box, tables, ring_, rows, p, s, c, staged, y, tx, rx, held, period, ahead, k):
+def virtual(st, box, tables, ring_, rows, p, s, c, staged, y, m, f, tx, rx, held, period, late_ns, ahead, k):
     """One tick on the virtual clock; `held` then has the outputs that act until the next."""
     mailbox.take(box, staged, p, c)
     if ahead != 0:
-        held[0] = tx[0]
+        faults.transmit(c[0], f[0], tx, held, k)
+    fresh, late, lateness = 1, 0, 0
+    if c[0].faulty != 0:
+        fresh = faults.receive(c[0], f[0], rx, fresh, k)
+        lateness = faults.lateness(c[0], k)
+        if lateness > late_ns:
+            late = 1
+            note_late(st, k, lateness)
     y[0].tick = k
     y[0].t = k * (period * 1e-9)
     y[0].period = period * 1e-9
-    y[0].lateness = 0.0
+    y[0].lateness = lateness * 1e-9
     was = st.state
-    timed = k % 16 == 0  # reading the clock would cost a fused tick a tenth of its time
-    begun = clock.now() if timed else 0
-    tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], k, 1, 0)
-    if timed:
-        histogram.add(st.ticks, clock.now() - begun)
+    m[0].on = 1 if k % 16 == 0 else 0  # reading the clock would cost a fused tick a tenth of its time
+    begun = clock.now() if m[0].on != 0 else 0
+    tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late)
+    wrote = clock.now() if m[0].on != 0 else 0
     if ahead == 0 or (s[0].safety.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
-        held[0] = tx[0]
+        faults.transmit(c[0], f[0], tx, held, k)
     ring.put(ring_[0], rows, y)
     account(st, s[0].safety, k, rx[0].lost_counts)
+    if m[0].on != 0:
+        stages(st, m[0], begun, wrote, clock.now())
 
 
-def send(st, out, frame, now):
-    """Send the outputs with a number and the time on them."""
+def send(st, out, c, f, tx, wire, k, now):
+    """Send the outputs, or what a fault leaves of them."""
+    if faults.transmit(c, f, tx, wire, k) != 0:
+        post(st, out, wire, now)
+
+
+def post(st, out, frame, now):
+    """Send a frame with a number and the time on it."""
     frame[0].seq += 1
     frame[0].t_ns = now
     if not link.send(out, frame):
         st.link_dropped += 1
+
+
+def stages(st, m, begun, wrote, ticked):
+    """Count how long the stages of a tick took."""
+    histogram.add(st.read, m.read - begun)
+    histogram.add(st.law, m.law - m.read)
+    histogram.add(st.write, wrote - m.law)
+    histogram.add(st.publish, ticked - wrote)
+    histogram.add(st.ticks, ticked - begun)
+
+
+def note_late(st, k, lateness):
+    """Count a late tick, and remember the latest of them."""
+    last = st.late_ticks[st.late % len(st.late_ticks)]
+    last.tick = k
+    last.lateness = lateness
+    st.late += 1
 
 
 def account(st, safety, k, lost_counts):

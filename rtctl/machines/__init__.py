@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 from rtctl.laws import excitation, reference
+from rtctl.loop import faults
 from rtctl.machines import axis, ivu, ldu
 from rtctl.machines.base import Column, Diagram, MachineSettings, PlantDiagram
 
@@ -27,6 +28,7 @@ class Machine(NamedTuple):
     plant_diagram: PlantDiagram
     reference: reference.ReferenceParams
     excitation: excitation.ExcitationParams
+    faults: tuple[faults.Fault, ...]
     truth: tuple[Column, ...]
     unit: str  # of position and reference, rad or m
     metres_per_unit: float
@@ -53,6 +55,7 @@ def build(config: Any) -> Machine:
         plant_diagram=plant,
         reference=reference.build(config.reference, dt),
         excitation=excitation.build(config.excitation, dt),
+        faults=tuple(faults.build(settings, dt) for settings in config.faults),
         truth=plant.truth if config.record.truth else (),
         unit=module.UNIT,
         metres_per_unit=module.metres_per_unit(config),

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from rtctl.idiom import Settings, quantity
+from rtctl.loop.faults import FaultSettings
 from rtctl.loop.safety import SafetySettings
 
 
@@ -108,6 +109,7 @@ class MachineSettings(Settings):
     safety: SafetySettings = SafetySettings()
     record: RecordSettings = RecordSettings()
     commands: CommandSettings = CommandSettings()
+    faults: list[FaultSettings] = Field(default=[], description="faults to inject; `rtctl fault list` explains them")
 
 
 COMMON_COLUMNS = (
@@ -118,6 +120,7 @@ COMMON_COLUMNS = (
     Column("state", "", "0 idle, 1 armed, 2 running, 3 tripped"),
     Column("trip", "", "cause of the trip, 0 for none"),
     Column("link_age", "ticks", "ticks since plant or board last sent a frame"),
+    Column("order", "", "number of the newest order that the tick had taken in; see orders.jsonl"),
 )
 STATE_LINES = (
     "safety.command(s.safety, c)",
@@ -127,6 +130,7 @@ TRACE_LINES = (
     "y.state = s.safety.state",
     "y.trip = s.safety.trip",
     "y.link_age = s.safety.silent",
+    "y.order = c.order",
 )
 
 

@@ -18,8 +18,8 @@ def loop(config: Callable[..., Any], bench: Callable[..., Any]) -> Callable[...,
     def run(period: int, ticks: int = TICKS, late: int = 0, spin: int = SPIN) -> tuple[np.ndarray, np.void]:
         made = bench(config(mode="real"))
         entry, arguments = made.loop.entry()
-        *head, _period, _spin, _late, ahead, _most = arguments
-        entry(*head, period, spin, late, ahead, ticks)
+        *head, _period, _late, ahead, _spin, _most = arguments
+        entry(*head, period, late, ahead, spin, ticks)
         return made.reader.take(), made.status
 
     return run

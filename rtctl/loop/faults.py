@@ -1,0 +1,287 @@
+"""Faults between the loop and its machine: what a bad cable, a broken encoder or a hot amplifier would do to it.
+
+They act on frames, after they have come in and before they go out, so that a real board, an emulator over a link and
+one inside the process have them alike, and a recording holds what the law was made to believe. The truth of an
+emulator stays the truth. In a run without faults one comparison a tick is all that this costs.
+
+A fault lasts from tick `begin` to before tick `end`. What it has cost stays: counts that were missed are not found
+again.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import model_validator
+
+from rtctl import counted
+from rtctl.drivers import daq_stc
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.loop import frames
+
+SLOTS = 16  # faults at a time
+DEPTH = 1024  # ticks that a link may be late
+FOR_EVER = 2**62
+CODES = 2048  # of a bipolar 12-bit converter, to either side
+
+(
+    NONE, LINK_DELAY, LINK_LOSS, LINK_REORDER, LINK_SILENT, ENCODER_FREEZE, ENCODER_MISSED, ENCODER_NOISE, ADC_OPEN,
+    DAC_STUCK, DRIVER_HOT, SUPPLY_SAG, LOOP_STALL,
+) = range(13)  # fmt: skip
+
+
+class Kind(NamedTuple):
+    """What a fault is: its number in the tick, what it does, and what its size means ("" for one that has none)."""
+
+    number: int
+    words: str
+    size: str = ""
+    unit: str = ""
+    usual: float = 0.0
+    low: float = 0.0
+    high: float = 0.0
+    channels: int = 1
+
+
+KINDS: dict[str, Kind] = {
+    "link.delay": Kind(LINK_DELAY, "frames arrive late, both ways", "how late", "s", 4e-3, 0.0, 2.0),
+    "link.loss": Kind(LINK_LOSS, "frames are lost at random, both ways", "share lost", "", 0.3, 0.0, 1.0),
+    "link.reorder": Kind(
+        LINK_REORDER, "frames are overtaken by the next; the newest wins", "share overtaken", "", 0.3, 0.0, 1.0
+    ),
+    "link.silent": Kind(LINK_SILENT, "nothing comes and nothing arrives, as with the plant dead or the cable out"),
+    "encoder.freeze": Kind(ENCODER_FREEZE, "the counter stands still", channels=frames.COUNTERS),
+    "encoder.missed": Kind(
+        ENCODER_MISSED, "a share of the counts is missed, for good", "share", "", 0.1, 0.0, 1.0, frames.COUNTERS
+    ),
+    "encoder.noise": Kind(
+        ENCODER_NOISE, "the count jumps about at random", "largest jump", "counts", 200.0, 1.0, 1e6, frames.COUNTERS
+    ),
+    "adc.open": Kind(ADC_OPEN, "an analog input hangs open and drifts to its rail", channels=frames.AI_CHANNELS),
+    "dac.stuck": Kind(
+        DAC_STUCK, "a bit of an analog output is stuck at one", "which bit", "", 9.0, 0.0, 11.0, frames.AO_CHANNELS
+    ),
+    "driver.hot": Kind(
+        DRIVER_HOT, "an amplifier is too hot and has switched itself off", channels=frames.AO_CHANNELS
+    ),
+    "supply.sag": Kind(
+        SUPPLY_SAG, "the supply sags: no output gives more than a share of its full scale", "share left", "", 0.02,
+        0.0, 1.0,
+    ),
+    "loop.stall": Kind(LOOP_STALL, "the loop wakes late, as with a CPU hog or a machine asleep", "how late", "s",
+                       1e-3, 0.0, 10.0),
+}  # fmt: skip
+
+
+class FaultSettings(Settings):
+    """One fault. Times count from the start of the loop."""
+
+    fault: Literal[*KINDS]  # type: ignore[valid-type]
+    at: float = quantity(0.0, unit="s", ge=0, help="when it begins")
+    lasts: float | None = quantity(None, unit="s", gt=0, help="how long it lasts; for good if absent")
+    channel: int = quantity(0, unit="", ge=0, help="counter, analog input or output, from 0")
+    size: float | None = quantity(None, unit="", help="see `rtctl fault list`; a usual one if absent")
+
+    @model_validator(mode="after")
+    def _fits(self) -> "FaultSettings":
+        kind = KINDS[self.fault]
+        if self.size is not None and not kind.size:
+            raise ValueError(f"{self.fault} has no size")
+        if self.size is not None and not kind.low <= self.size <= kind.high:
+            raise ValueError(
+                f"size of {self.fault} ({kind.size}) is {self.size:g}; {kind.low:g} to {kind.high:g} is possible"
+            )
+        if not self.channel < kind.channels:
+            raise ValueError(f"{self.fault} has no channel {self.channel}; it has 0 to {kind.channels - 1}")
+        return self
+
+
+class Fault(NamedTuple):
+    kind: int
+    channel: int
+    begin: int  # ticks
+    end: int
+    size: float  # in ticks where it is a time
+
+
+FAULT = np.dtype([("kind", "i8"), ("channel", "i8"), ("begin", "i8"), ("end", "i8"), ("size", "f8")], align=True)
+FAULTS_STATE = state(
+    seed=int,
+    raw=frames.INPUTS,  # the newest that the board has sent
+    last=frames.INPUTS,  # the newest that has come through
+    past=(frames.INPUTS, DEPTH),
+    came=(int, DEPTH),  # how many were new
+    gone=(frames.OUTPUTS, DEPTH),
+    frozen=(int, frames.COUNTERS),  # 1 while a counter stands still, at these counts
+    held=(int, frames.COUNTERS),
+    known=int,  # 1 once there was a frame before
+    before=(int, frames.COUNTERS),  # its counts
+    missed=(float, frames.COUNTERS),  # so far
+    overtaken=int,  # 1 while a frame comes with the next one
+)
+
+
+def build(settings: FaultSettings, dt: float, now: int = 0) -> Fault:
+    """In ticks of `dt` s from tick `now` on. Raises ValueError for a delay that is longer than the line."""
+    kind = KINDS[settings.fault]
+    size = kind.usual if settings.size is None else settings.size
+    if settings.fault == "link.delay":
+        size = float(round(size / dt))
+        if size >= DEPTH:
+            raise ValueError(f"link.delay: {size * dt:g} s is {size:.0f} ticks; {DEPTH - 1} is the most")
+    begin = now + round(settings.at / dt)
+    end = FOR_EVER if settings.lasts is None else begin + max(round(settings.lasts / dt), 1)
+    return Fault(kind.number, settings.channel, begin, end, size)
+
+
+def fill(command: Any, wanted: Sequence[Fault]) -> None:
+    """Write the faults of a run into its command record. Raises ValueError for more than there are slots."""
+    if len(wanted) > SLOTS:
+        raise ValueError(f"{len(wanted)} faults; {SLOTS} is the most in a run")
+    for j, fault in enumerate(wanted):
+        command["faults"][j] = fault
+    command["faulty"] = len(wanted)
+
+
+@tick
+def active(fault, k):
+    """Whether a fault is on in tick `k`."""
+    return fault.begin <= k and k < fault.end
+
+
+@tick
+def chance(f, slot, k):
+    """A number in (0, 1) of its own for each slot and tick."""
+    return counted.uniform(counted.nth(f.seed * SLOTS + slot, k))
+
+
+@tick
+def lateness(c, k):
+    """How late tick `k` wakes beyond what the machine makes of it, ns."""
+    most = 0.0
+    for j in range(c.faulty):
+        if c.faults[j].kind == LOOP_STALL and active(c.faults[j], k):
+            most = max(most, c.faults[j].size)
+    return int(most * 1e9)
+
+
+@tick
+def receive(c, f, rx, fresh, k):
+    """What of the frame `rx` (1,), of which `fresh` are new, tick `k` gets to see. Returns how many it is told of."""
+    if fresh > 0:
+        f.raw = rx[0]
+    rx[0] = f.raw
+    misread(c, f, rx[0], k)
+    f.past[k % DEPTH] = rx[0]
+    f.came[k % DEPTH] = fresh
+    fresh = link_in(c, f, rx, k)
+    rx[0].truth[:] = f.raw.truth
+    return fresh
+
+
+@tick
+def link_in(c, f, rx, k):
+    """The frame that comes through in tick `k`: the one of now, an older one, or again the last."""
+    late, lost = 0, False
+    came = f.overtaken
+    f.overtaken = 0
+    for j in range(c.faulty):
+        fault = c.faults[j]
+        if not active(fault, k):
+            continue
+        if fault.kind == LINK_DELAY:
+            late = max(late, min(int(fault.size), k))
+        elif fault.kind == LINK_SILENT or (fault.kind == LINK_LOSS and chance(f, j, k) < fault.size):
+            lost = True
+        elif fault.kind == LINK_REORDER and came == 0 and chance(f, j, k) < fault.size:
+            f.overtaken = 1
+    if not lost and f.overtaken == 0:
+        came += f.came[(k - late) % DEPTH]
+        f.last = f.past[(k - late) % DEPTH]
+    elif lost:
+        came = 0
+        f.overtaken = 0
+    rx[0] = f.last
+    return came
+
+
+@tick
+def misread(c, f, rx, k):
+    """Counters and analog inputs as a broken sensor or wire gives them."""
+    frozen = np.uint64(0)
+    for n in range(frames.COUNTERS):
+        if f.known == 0:
+            f.before[n] = rx.counter_codes[n]
+    f.known = 1
+    for j in range(c.faulty):
+        fault, n = c.faults[j], c.faults[j].channel
+        if not active(fault, k):
+            continue
+        if fault.kind == ENCODER_MISSED:
+            f.missed[n] += fault.size * daq_stc.difference(rx.counter_codes[n], f.before[n])
+        elif fault.kind == ENCODER_FREEZE:
+            frozen |= np.uint64(1) << np.uint64(n)
+        elif fault.kind == ADC_OPEN:
+            rx.ai_codes[n] = CODES - 1
+    for n in range(frames.COUNTERS):
+        f.before[n] = rx.counter_codes[n]
+        counts = daq_stc.wrapped(rx.counter_codes[n] - int(f.missed[n]))
+        if (frozen >> np.uint64(n)) & np.uint64(1):
+            if f.frozen[n] == 0:
+                f.held[n] = counts
+            f.frozen[n] = 1
+            counts = f.held[n]
+        else:
+            f.frozen[n] = 0
+        rx.counter_codes[n] = counts
+    for j in range(c.faulty):
+        fault, n = c.faults[j], c.faults[j].channel
+        if fault.kind == ENCODER_NOISE and active(fault, k):
+            jump = int(fault.size * (2.0 * chance(f, j, k) - 1.0))
+            rx.counter_codes[n] = daq_stc.wrapped(rx.counter_codes[n] + jump)
+
+
+@tick
+def transmit(c, f, tx, wire, k):
+    """What of the outputs `tx` (1,) leaves in tick `k`, into `wire` (1,). Returns 0 where nothing does."""
+    if c.faulty == 0:
+        put(wire[0], tx[0])
+        return 1
+    f.gone[k % DEPTH] = tx[0]
+    late = 0
+    for j in range(c.faulty):
+        fault = c.faults[j]
+        if not active(fault, k):
+            continue
+        if fault.kind == LINK_DELAY:
+            late = max(late, min(int(fault.size), k))
+        elif fault.kind == LINK_SILENT or (fault.kind == LINK_LOSS and chance(f, SLOTS + j, k) < fault.size):
+            return 0
+    put(wire[0], f.gone[(k - late) % DEPTH])
+    distort(c, wire[0], k)
+    return 1
+
+
+@tick
+def put(wire, tx):
+    """Copy the outputs, and leave number and time of the frame alone."""
+    wire.ao_codes[:] = tx.ao_codes
+    wire.dio_lines = tx.dio_lines
+    wire.state = tx.state
+
+
+@tick
+def distort(c, wire, k):
+    """Outputs as a broken converter, amplifier or supply gives them."""
+    for j in range(c.faulty):
+        fault, n = c.faults[j], c.faults[j].channel
+        if not active(fault, k):
+            continue
+        if fault.kind == DAC_STUCK:
+            wire.ao_codes[n] = ((wire.ao_codes[n] + CODES) | (1 << int(fault.size))) - CODES
+        elif fault.kind == SUPPLY_SAG:
+            most = int(fault.size * CODES)
+            for i in range(frames.AO_CHANNELS):
+                wire.ao_codes[i] = min(max(wire.ao_codes[i], -most), most)
+        elif fault.kind == DRIVER_HOT:
+            wire.ao_codes[n] = 0

@@ -1,0 +1,58 @@
+"""The journal: what was told is read back as it was, and a torn line at its end costs no more than itself."""
+
+import numpy as np
+import pytest
+
+from rtctl.config.errors import UserError
+from rtctl.loop import faults
+from rtctl.loop.mailbox import COMMAND
+from rtctl.trace.orders import ORDERS, Journal, orders, restore
+
+
+def command(order, target=0.0):
+    record = np.zeros(1, COMMAND)[0]
+    record["order"], record["arm"], record["setpoint"]["target"] = order, 1, target
+    faults.fill(record, [faults.Fault(faults.LINK_LOSS, 0, 10, faults.FOR_EVER, 0.1 + order)])
+    return record
+
+
+def test_every_order_comes_back_to_the_bit(tmp_path):
+    journal = Journal()
+    journal.note(command(1), {})
+    journal.open(tmp_path)
+    journal.note(command(2, 0.1 + 0.2), {"law.position.gain": 20.0})
+    journal.close()
+    found = orders(tmp_path)
+    assert list(found) == [1, 2] and found[2].changed == {"law.position.gain": 20.0}
+    for number, target in ((1, 0.0), (2, 0.1 + 0.2)):
+        back = np.zeros(1, COMMAND)[0]
+        restore(back, found[number].command)
+        assert back == command(number, target)
+
+
+def test_a_recording_without_a_journal_has_no_orders(tmp_path):
+    assert orders(tmp_path) == {}
+
+
+def test_a_torn_last_line_is_left_out_and_any_other_is_named(tmp_path):
+    journal = Journal()
+    journal.open(tmp_path)
+    journal.note(command(1), {})
+    journal.note(command(2), {})
+    journal.close()
+    path = tmp_path / ORDERS
+    text = path.read_text()
+    path.write_text(text[:-40])
+    assert list(orders(tmp_path)) == [1]
+    path.write_text("{}\n" + text)
+    with pytest.raises(UserError, match=r"orders.jsonl, line 1: not an order"):
+        orders(tmp_path)
+
+
+def test_a_full_disk_costs_the_journal_and_not_the_run(tmp_path):
+    journal = Journal()
+    journal.open(tmp_path)
+    journal._file.close()
+    journal._file = open("/dev/full", "wb", buffering=0)  # noqa: SIM115, PTH123
+    journal.note(command(1), {})
+    journal.note(command(2), {})
