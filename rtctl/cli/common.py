@@ -1,6 +1,7 @@
 """Options and conversions that commands share."""
 
 import math
+import os
 import re
 from pathlib import Path
 from typing import Annotated, Any
@@ -165,7 +166,10 @@ def client(name: str | None) -> Any:
         near = nearest(name, names)
         there = f"there is {', '.join(names)}" if names else "start it with `rtctl run`"
         raise UserError(f"no machine '{name}' runs here; " + (f"did you mean '{near}'?" if near else there))
-    return Client(find_endpoint(name, "command"))
+    where = find_endpoint(name, "command")
+    if not os.access(where.removeprefix("ipc://"), os.W_OK):
+        raise UserError(f"'{name}' runs, but this account may not command it: {where} is not writable for it")
+    return Client(where)
 
 
 def running() -> list[str]:
@@ -190,6 +194,8 @@ def listens(endpoint: str) -> bool:
         probe.settimeout(1.0)
         try:
             probe.connect(address)
+        except PermissionError:
+            return True  # somebody else's
         except OSError:
             return False
         return True

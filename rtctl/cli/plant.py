@@ -67,6 +67,7 @@ def plant(
     if conceal is not None and seal is not None:
         machine = _hide(settings, conceal, seal)
 
+    from rtctl.daemon.notify import from_environment
     from rtctl.daemon.plant_process import alone
     from rtctl.daemon.server import runtime_dir
     from rtctl.loop import generate
@@ -74,7 +75,14 @@ def plant(
     where = endpoint or settings.link.endpoint or f"ipc://{runtime_dir() / f'{settings.name}.plant'}"
     if not generate.is_warm(generate.write(machine, "zmq"), f"plant_{settings.loop.mode}"):
         typer.echo("compiling the plant, once for this config structure ...", err=True)
-    alone(machine, where, lambda: typer.echo(f"{settings.name}: plant listens at {where}"))
+    service = from_environment()
+
+    def announce() -> None:
+        typer.echo(f"{settings.name}: plant listens at {where}")
+        service.ready(f"listens at {where}")
+
+    alone(machine, where, announce)
+    service.stopping()
 
 
 def _hide(settings: Any, seed: int, seal: Path) -> Any:

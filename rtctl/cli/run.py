@@ -39,14 +39,23 @@ def run(
 
       rtctl run ivu.yaml --set law.position.gain=20 --set radius.source=measured
     """
+    import sys
+
+    import structlog
+
     from rtctl.daemon.session import Session
 
-    settings = common.load_config(config, set_)
-    settings = common.with_loop(common.with_reference(settings, reference), mode, link)
+    structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(sys.stderr))  # standard output is the JSON's
+
+    def read() -> Any:
+        settings = common.load_config(config, set_)
+        return common.with_loop(common.with_reference(settings, reference), mode, link)
+
+    settings = read()
     length = common.seconds(duration, "--for")
     folder = out if out is not None else common.default_folder(settings.name)
     console = _console(json)
-    session = Session(settings, folder, length, arm=arm, say=console.say)
+    session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
     with console.live(session):
         result = session.run(console.update)
     if plot:

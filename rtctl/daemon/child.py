@@ -65,7 +65,7 @@ def watch_parent(on_lost: Callable[[], None], on_stop: Callable[[], None], inter
     os.set_blocking(write_end, False)
     # Ctrl-C goes to the whole group: a child leaves it to the supervisor, a process of its own (`interrupt`) stops
     signal.signal(signal.SIGINT, (lambda *_: None) if interrupt else signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: None)
+    signal.signal(signal.SIGTERM, lambda *_: on_stop())  # here too: a wait that it cuts short is no fault
     signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
 
     def watch() -> None:

@@ -1,7 +1,12 @@
-"""One daemon a machine: a lock file with the pid of who holds it. The kernel drops the lock with its holder."""
+"""One daemon a machine: a lock file with the pid of who holds it. The kernel drops the lock with its holder.
+
+So no lock is ever stale, however its holder died, and a pid that is used again by another process says nothing: the
+pid in the file is for people only.
+"""
 
 import fcntl
 import os
+import pwd
 from pathlib import Path
 from typing import Any
 
@@ -9,26 +14,78 @@ from rtctl.config.errors import UserError
 
 
 class MachineLock:
-    """Held while a daemon runs. Raises UserError where another one does; a stale file is taken over silently."""
+    """Held while a daemon runs. Raises UserError where another one does, or where the file cannot be had."""
 
     def __init__(self, path: Path, name: str):
         self._path, self._name, self._fd = path, name, -1
 
     def __enter__(self) -> "MachineLock":
-        self._fd = os.open(self._path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            pid = os.read(self._fd, 32).decode(errors="replace").strip() or "unknown"
-            os.close(self._fd)
-            raise UserError(
-                f"'{self._name}' is run by another daemon (pid {pid}); stop it with `rtctl stop --name {self._name}`, "
-                "or give this config another `name`"
-            ) from None
+        while True:
+            self._fd = self._open()
+            try:
+                self._take()
+                if self._in_place():
+                    break
+            except BaseException:
+                self._close()
+                raise
+            self._close()  # its last holder has removed it between our opening and locking it: take the next
         os.ftruncate(self._fd, 0)
         os.write(self._fd, f"{os.getpid()}\n".encode())
         return self
 
     def __exit__(self, *_: Any) -> None:
-        os.ftruncate(self._fd, 0)
+        if self._in_place():  # removed while it is held, so that nothing is left that another user could not open
+            self._path.unlink(missing_ok=True)
+        self._close()
+
+    def _open(self) -> int:
+        try:
+            return os.open(self._path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+        except OSError as error:
+            owner = _owner(self._path)
+            hint = (
+                f"it belongs to {owner}, who runs '{self._name}' or was killed doing so: have {owner} stop it, then "
+                "remove the file"
+                if isinstance(error, PermissionError) and owner
+                else "the folder must exist and be writable by whoever runs the daemon; XDG_RUNTIME_DIR names another"
+            )
+            raise UserError(f"{self._path}: no lock for '{self._name}': {error.strerror}; {hint}") from None
+
+    def _take(self) -> None:
+        try:
+            fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            pid = os.read(self._fd, 32).decode(errors="replace").strip() or "unknown"
+            raise UserError(
+                f"'{self._name}' is run by another daemon (pid {pid}); stop it with `rtctl stop --name {self._name}`, "
+                "or give this config another `name`"
+            ) from None
+        except OSError as error:
+            raise UserError(
+                f"{self._path}: this file system locks no files ({error.strerror}); set XDG_RUNTIME_DIR to another"
+            ) from None
+
+    def _in_place(self) -> bool:
+        """Whether the file that we hold is still the one at its path."""
+        try:
+            there = self._path.lstat()
+        except OSError:
+            return False
+        return os.path.samestat(os.fstat(self._fd), there)
+
+    def _close(self) -> None:
         os.close(self._fd)
+        self._fd = -1
+
+
+def _owner(path: Path) -> str | None:
+    """The name of a file's owner; None where there is no file to be seen."""
+    try:
+        uid = path.lstat().st_uid
+    except OSError:
+        return None
+    try:
+        return pwd.getpwuid(uid).pw_name
+    except KeyError:
+        return f"uid {uid}"

@@ -62,7 +62,7 @@ def main(argv: list[str]) -> int:
                     raise UserError("loop.realtime is 'required' and this machine does not allow it: "
                                     + "; ".join(map(str, realtime.lacks)))  # fmt: skip
             run.real(ticks)
-    if status[0]["failed"]:
+    if status[0]["failed"] and not status[0]["stop"]:
         raise UserError(f"the plant at {order['endpoint']} stopped answering at tick {status[0]['tick']}")
     child.report("ended", tick=int(status[0]["tick"]))
     if socket is not None:

@@ -8,12 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from rtctl.config.errors import UserError
+from rtctl.daemon.notify import from_environment
 from rtctl.daemon.supervisor import Supervisor
 from rtctl.machines import MODULES
 
 
 class Session:
-    """One `rtctl run`. `length` in s ends it; None leaves that to `stop`, Ctrl-C or a trip."""
+    """One `rtctl run`. `length` in s ends it; None leaves that to `stop`, Ctrl-C or a trip.
+
+    `reread()` gives the settings as their file has them now; a service manager asks for that with SIGHUP.
+    """
 
     def __init__(
         self,
@@ -22,12 +26,15 @@ class Session:
         length: float | None,
         arm: bool = True,
         say: Callable[[str], None] = lambda _: None,
+        reread: Callable[[], Any] | None = None,
     ):
         ticks = 0 if length is None else max(1, round(length * config.loop.rate))
         if config.loop.mode == "fused" and not ticks:
             raise UserError("a fused run has no wall clock to follow: say how long with --for")
         self.config, self.arm, self.say = config, arm, say
         self.supervisor = Supervisor(config, out, ticks, say)
+        self.supervisor.reread = reread
+        self.supervisor.service = from_environment(rate=config.loop.rate)
         self.bundle: Path | None = None
         self.steps: list[dict[str, Any]] = []
 
@@ -109,10 +116,16 @@ def _signals(supervisor: Supervisor) -> Iterator[None]:
             raise KeyboardInterrupt
         supervisor.interrupted = True
 
+    def hung_up(*_: Any) -> None:
+        supervisor.hung_up = True
+
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    handlers = dict.fromkeys((signal.SIGINT, signal.SIGTERM), note)
+    if supervisor.service.listens:  # by a person's terminal it would mean that the terminal is gone
+        handlers[signal.SIGHUP] = hung_up
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield
     finally:

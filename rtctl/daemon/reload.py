@@ -1,0 +1,82 @@
+"""A config that is read again while its machine runs: what `rtctl set` could change is taken over, the rest refused."""
+
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from rtctl import machines
+from rtctl.config.errors import UserError
+from rtctl.config.fields import written
+from rtctl.config.load import get_path
+from rtctl.daemon.commands import SWITCHED
+from rtctl.loop import generate
+
+if TYPE_CHECKING:
+    from rtctl.daemon.supervisor import Supervisor
+
+
+def reload(supervisor: "Supervisor", fresh: Any) -> tuple[list[str], list[str]]:
+    """Take over what may change, all of it at one tick. Returns paths taken over, and sentences about what was refused.
+
+    `fresh` are the settings as the file has them now. Raises UserError where the new values do not go together: then
+    all old ones stay.
+    """
+    old = supervisor.config
+    if fresh.machine != old.machine:
+        raise UserError(f"machine: '{fresh.machine}' instead of '{old.machine}' needs a restart")
+    changed = differences(old, fresh)
+    refused = [path for path in changed if path.split(".")[0] in SWITCHED]
+    free = [path for path in changed if path not in refused]
+    fixed: list[str] = []
+    if _rebuilds(supervisor, fresh, free):
+        fixed = [path for path in free if _rebuilds(supervisor, fresh, [path])]
+    taken = [path for path in free if path not in fixed]
+    if taken:
+        config = mixed(old, fresh, taken)
+        machine = _built(config)
+        if generate.source(machine, supervisor.link) != generate.source(supervisor.machine, supervisor.link):
+            raise UserError(f"{', '.join(taken)}: together they need another tick; restart the machine")
+        supervisor.commands.take_over(config, machine, {path: written(get_path(fresh, path)) for path in taken})
+    sentences = [f"{path} cannot change while the machine runs; restart it" for path in refused]
+    sentences += [f"{path} changes the structure of the tick; restart the machine" for path in fixed]
+    return taken, sentences
+
+
+def differences(old: Any, new: Any, at: str = "") -> list[str]:
+    """Dotted paths whose values differ; a choice of another kind, and a list, count as one."""
+    if type(old) is not type(new) or not hasattr(type(old), "model_fields"):
+        return [] if type(old) is type(new) and old == new else [at]
+    names = type(old).model_fields
+    return [p for n in names for p in differences(getattr(old, n), getattr(new, n), f"{at}.{n}" if at else n)]
+
+
+def mixed(old: Any, new: Any, paths: list[str]) -> Any:
+    """Settings `old` with the values that `new` has at `paths`. Raises UserError where they do not go together."""
+    config = old
+    for path in paths:
+        config = _with(config, path.split("."), get_path(new, path))
+    try:
+        return type(old).model_validate(written(config))
+    except ValidationError as error:
+        raise UserError("; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())) from error
+
+
+def _with(settings: Any, parts: list[str], value: Any) -> Any:
+    fresh = value if len(parts) == 1 else _with(getattr(settings, parts[0]), parts[1:], value)
+    return settings.model_copy(update={parts[0]: fresh})
+
+
+def _rebuilds(supervisor: "Supervisor", fresh: Any, paths: list[str]) -> bool:
+    """Whether these values need another tick. Some that do not fit by themselves may still fit with others."""
+    try:
+        machine = _built(mixed(supervisor.config, fresh, paths))
+    except UserError:
+        return False
+    return generate.source(machine, supervisor.link) != generate.source(supervisor.machine, supervisor.link)
+
+
+def _built(config: Any) -> Any:
+    try:
+        return machines.build(config)
+    except ValueError as error:
+        raise UserError(str(error)) from error

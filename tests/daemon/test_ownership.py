@@ -1,0 +1,205 @@
+"""What belongs to whom: what a daemon that was killed leaves to the next one, and what other users may do."""
+
+import json
+import os
+import pwd
+import signal
+import socket
+import stat
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zmq
+
+from rtctl.daemon.server import CommandServer, runtime_dir
+from rtctl.daemon.session import Session
+from rtctl.daemon.supervisor import SHM, Supervisor
+from rtctl.daemon.telemetry import Telemetry
+from rtctl.loop.memory import Segment
+from rtctl.loop.records import STATUS
+from rtctl.trace.bundle import load_bundle
+from rtctl.trace.repair import repair
+
+RUN = """
+import json, sys
+from pathlib import Path
+from rtctl import machines
+from rtctl.daemon.session import Session
+order = json.loads(sys.argv[1])
+config = machines.CONFIGS[order["config"]["machine"]].model_validate(order["config"])
+Session(config, Path(order["out"]), order["length"]).run()
+"""
+LONG = 1e6  # s of virtual time: more than it can be through before it is killed
+
+
+def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
+    deadline = time.monotonic() + seconds
+    while not (found := what()):
+        assert time.monotonic() < deadline, "it did not come about"
+        time.sleep(0.01)
+    return found
+
+
+def segment_path(config: Any) -> Path:
+    return SHM / f"rtctl-{os.getuid()}-{config.name}"
+
+
+def left(config: Any) -> list[Path]:
+    """All that a machine has in shared memory and in the folder of sockets."""
+    return [p for p in [segment_path(config), *runtime_dir().glob(f"{config.name}.*")] if p.exists()]
+
+
+def gone(pid: int) -> bool:
+    """Whether a process has ended; one that waits to be reaped has."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return True
+
+
+def status_of(path: Path) -> Any:
+    """The loop's counters: they stand first in a segment."""
+    return np.memmap(path, STATUS, "r", shape=(1,))[0]
+
+
+@pytest.fixture
+def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]]:
+    """`killed(config)` starts a run, kills its supervisor in the middle of it, and gives the pids of its children."""
+    made: list[subprocess.Popen] = []
+
+    def kill(config: Any) -> list[int]:
+        data = config.model_dump(mode="json", exclude_unset=True)
+        order = {"config": data, "out": str(tmp_path / "killed"), "length": LONG}
+        made.append(subprocess.Popen([sys.executable, "-c", RUN, json.dumps(order)]))
+        pid, path = made[-1].pid, segment_path(config)
+        wait_for(path.exists)
+        wait_for(lambda: status_of(path)["tick"] > 1000, 200)
+        wait_for(lambda: any((tmp_path / "killed").iterdir()))
+        children = [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+        assert children and not any(map(gone, children))
+        made[-1].send_signal(signal.SIGKILL)
+        made[-1].wait()
+        return children
+
+    yield kill
+    for each in made:
+        each.kill()
+        each.wait()
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "fused"])
+def test_after_sigkill_nothing_runs_on_and_the_next_start_takes_it_all_over(
+    config: Callable[..., Any], killed: Callable[[Any], list[int]], tmp_path: Path, mode: str
+) -> None:
+    settings = config(mode=mode, link="shm", set={"record.seconds": 2.0})
+    children = killed(settings)
+    wait_for(lambda: all(map(gone, children)), 10)
+    assert {p.suffix for p in left(settings)} >= {".lock", ".command", ".telemetry"}  # nobody was there to clean up
+    assert segment_path(settings) in left(settings)  # with the last seconds of the trace
+    assert Session(settings, tmp_path / "next", 2.0).run()["ticks"] == 1000
+    assert left(settings) == []
+    kept, first = load_bundle(tmp_path / "next").columns, repair(tmp_path / "killed")
+    before = load_bundle(tmp_path / "killed").columns
+    assert first.rows > 0 and (kept["tick"] == np.arange(1000)).all()
+    both = min(first.rows, 1000)
+    assert (before["u1"][:both] == kept["u1"][:both]).all()  # as if the other had never been
+
+
+def test_two_machines_of_other_names_have_nothing_in_common(
+    config: Callable[..., Any], runtime: Path, tmp_path: Path
+) -> None:
+    first, second = config(), config()
+    with Supervisor(first, None, 50) as supervisor:
+        assert Session(second, tmp_path / "second", 0.1).run()["ticks"] == 50
+        assert left(second) == [] and len(left(first)) == 4
+        for _ in supervisor.run():
+            pass
+        assert supervisor.snapshot()["ticks"] == 50
+    assert left(first) == []
+
+
+def test_shared_memory_is_the_owners_alone(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        made = Segment.create(tmp_path / "segment", {"status": (STATUS, 1)})
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(made.path.stat().st_mode) == 0o600
+
+
+# other users
+
+
+class Nothing:
+    def handle(self, op: str, args: Any) -> dict[str, Any]:
+        return {}
+
+
+@pytest.fixture
+def served(runtime: Path) -> Iterator[dict[str, Path]]:
+    """Both sockets as rtctl@.service has them: UMask=0027, in a folder of mode 0750. Paths by socket."""
+    folder = runtime / f"service-{time.monotonic_ns()}"
+    folder.mkdir()
+    folder.chmod(0o750)
+    context = zmq.Context()
+    before = os.umask(0o027)
+    try:
+        command = CommandServer(f"ipc://{folder}/ivu.command", Nothing(), context)
+        telemetry = Telemetry(f"ipc://{folder}/ivu.telemetry", "ivu", ["x"], context)
+    finally:
+        os.umask(before)
+    yield {name: folder / f"ivu.{name}" for name in ("command", "telemetry")}
+    command.close()
+    telemetry.close()
+    context.destroy(linger=0)
+
+
+def test_the_owner_commands_and_the_group_may_only_listen(served: dict[str, Path]) -> None:
+    """Linux asks for the right to write of whoever connects to a socket."""
+    modes = {name: stat.S_IMODE(path.stat().st_mode) for name, path in served.items()}
+    assert modes["command"] & 0o222 == 0o200
+    assert modes["telemetry"] & 0o222 == 0o220
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+def test_what_another_user_can_connect_to(served: dict[str, Path], runtime: Path) -> None:
+    nobody = pwd.getpwnam("nobody")
+    group = nobody.pw_gid
+    for path in (served["command"].parent, *served.values()):
+        os.chown(path, 0, group)
+    mode = runtime.stat().st_mode
+    runtime.chmod(0o755)
+    try:
+        member = {name: connects(path, nobody.pw_uid, group) for name, path in served.items()}
+        stranger = {name: connects(path, nobody.pw_uid, group + 1) for name, path in served.items()}
+    finally:
+        runtime.chmod(mode)
+    assert member == {"command": False, "telemetry": True}
+    assert stranger == {"command": False, "telemetry": False}
+
+
+def connects(path: Path, uid: int, gid: int) -> bool:
+    """Whether a process of that user and group can connect to a unix socket."""
+    child = os.fork()
+    if child == 0:
+        code = 2
+        try:
+            os.setgroups([])
+            os.setgid(gid)
+            os.setuid(uid)
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+                probe.connect(str(path))
+            code = 0
+        except PermissionError:
+            code = 1
+        finally:
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    assert code in (0, 1)
+    return code == 0

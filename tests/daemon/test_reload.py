@@ -1,0 +1,101 @@
+"""A config that is read again: what is taken over, what is refused, and that nothing happens by halves."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtctl import machines
+from rtctl.config.errors import UserError
+from rtctl.config.load import set_paths
+from rtctl.daemon.reload import differences, mixed, reload
+
+
+class Supervisor:
+    """As much of one as a reload sees."""
+
+    def __init__(self, config: Any):
+        self.config, self.machine, self.link = config, machines.build(config), "shm"
+        self.commands = self
+        self.changes: list[tuple[str, Any]] = []
+        self.taken = 0
+
+    def take_over(self, config: Any, machine: Any, changed: dict[str, Any]) -> None:
+        self.config, self.machine = config, machine
+        self.changes += changed.items()
+        self.taken += 1
+
+
+@pytest.fixture
+def supervised(config: Callable[..., Any]) -> Callable[..., tuple[Supervisor, Any]]:
+    """`supervised("ivu", {...})` is a supervisor and the settings that its file has by now."""
+
+    def make(kind: str, values: dict[str, Any]) -> tuple[Supervisor, Any]:
+        settings = config(kind)
+        return Supervisor(settings), set_paths(settings, values)
+
+    return make
+
+
+def test_nothing_changed_does_nothing(supervised: Callable[..., Any]) -> None:
+    supervisor, fresh = supervised("ivu", {})
+    assert reload(supervisor, fresh) == ([], [])
+    assert supervisor.taken == 0
+
+
+def test_gains_and_limits_go_over_together_and_the_rest_is_refused(supervised: Callable[..., Any]) -> None:
+    values = {"law.position.gain": 20.0, "safety.current": 0.5, "loop.rate": 250.0, "record.seconds": 5.0}
+    supervisor, fresh = supervised("ivu", values)
+    taken, refused = reload(supervisor, fresh)
+    assert taken == ["safety.current", "law.position.gain"]  # in the order of the settings
+    assert refused == [
+        f"{path} cannot change while the machine runs; restart it" for path in ("loop.rate", "record.seconds")
+    ]
+    assert supervisor.taken == 1  # all at one tick
+    config = supervisor.config
+    assert (config.law.position.gain, config.safety.current) == (20.0, 0.5)
+    assert (config.loop.rate, config.record.seconds) == (500.0, 20.0)
+    assert supervisor.changes == [("safety.current", 0.5), ("law.position.gain", 20.0)]
+
+
+def test_another_structure_is_refused_and_what_is_beside_it_taken(supervised: Callable[..., Any]) -> None:
+    values = {"law.position": {"kind": "pd", "gain": 2000.0, "tau_d": 0.01}, "safety.current": 0.2}
+    supervisor, fresh = supervised("ldu", values)
+    taken, refused = reload(supervisor, fresh)
+    assert taken == ["safety.current"]
+    assert refused == ["law.position changes the structure of the tick; restart the machine"]
+    assert supervisor.config.law.position.kind == "pi_velocity"
+
+
+def test_another_machine_is_refused_as_a_whole(supervised: Callable[..., Any], config: Callable[..., Any]) -> None:
+    supervisor, _ = supervised("ivu", {})
+    with pytest.raises(UserError, match="machine: 'axis' instead of 'ivu' needs a restart"):
+        reload(supervisor, config("axis"))
+    assert supervisor.taken == 0
+
+
+def test_a_second_reload_finds_only_what_is_still_refused(supervised: Callable[..., Any]) -> None:
+    supervisor, fresh = supervised("ivu", {"law.position.gain": 20.0, "loop.rate": 250.0})
+    reload(supervisor, fresh)
+    assert reload(supervisor, fresh) == ([], ["loop.rate cannot change while the machine runs; restart it"])
+
+
+def test_values_that_need_each_other_go_together(supervised: Callable[..., Any]) -> None:
+    """Each by itself would have the lower limit above the upper one."""
+    supervisor, fresh = supervised("ivu", {"safety.tension_max": 20.0, "safety.tension_min": 10.0})
+    taken, refused = reload(supervisor, fresh)
+    assert sorted(taken) == ["safety.tension_max", "safety.tension_min"] and refused == []
+
+
+def test_differences_are_paths(config: Callable[..., Any]) -> None:
+    old = config("ivu")
+    assert differences(old, old) == []
+    new = set_paths(
+        old,
+        {
+            "law.friction.motor1.tau_C": 3e-3,
+            "plant.physics": [{"term": "friction.viscous", "node": "motor1", "B": 1e-4}],
+        },
+    )
+    assert differences(old, new) == ["law.friction.motor1.tau_C", "plant.physics"]
+    assert differences(old, mixed(old, new, ["plant.physics"])) == ["plant.physics"]
