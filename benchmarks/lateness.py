@@ -25,11 +25,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from rtctl.doctor.cyclictest import LONGEST_NS, SHARES, counted  # noqa: F401, peers.py takes it from here
+from rtctl.doctor.cyclictest import missing as why_no_cyclictest
+from rtctl.doctor.cyclictest import run as run_cyclictest
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 RATES = {"ivu": 500.0, "ldu": 10_000.0}
-SHARES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
 PRIORITY = 80
 TITLES = {
     "lateness_us": "ours",
@@ -39,7 +40,6 @@ TITLES = {
     "ratio_to_bare_cyclictest": "ratio, alone",
     "tick_us": "tick",
 }
-LONGEST_NS = 1_000_000  # buckets of cyclictest, its most; what is later is counted as this late
 
 
 def rtctl_command() -> tuple[str, ...]:
@@ -48,10 +48,8 @@ def rtctl_command() -> tuple[str, ...]:
     return (str(beside),) if beside.exists() else ("rtctl",)
 
 
-def why_not() -> str | None:
-    """What keeps this machine from measuring, in a sentence; None where nothing does."""
-    if shutil.which("cyclictest") is None:
-        return "cyclictest is not installed here; it comes with rt-tests"
+def why_no_realtime() -> str | None:
+    """What keeps this machine from measuring our own loop, in a sentence; None where nothing does."""
     if len(os.sched_getaffinity(0)) < 2:
         return "one CPU only: the plant needs another than the loop's"
     try:
@@ -102,32 +100,14 @@ def plant(machine: str, rate: float, folder: Path) -> Iterator[None]:
 
 
 def cyclictest(rate: float, seconds: float, folder: Path) -> dict[str, float]:
-    """One window of cyclictest: percentiles in us, from a histogram with a bucket per nanosecond."""
-    report = folder / "cyclictest.json"
-    cpu = max(os.sched_getaffinity(0))
-    command = (
-        "cyclictest", "-m", "-p", str(PRIORITY), "-i", str(round(1e6 / rate)), "-a", str(cpu), "-t", "1",
-        "-h", str(LONGEST_NS), "-N", "-q", "-D", str(max(1, round(seconds))), f"--json={report}",
-    )  # fmt: skip
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    thread = json.loads(report.read_text())["thread"]["0"]
-    return {**percentiles(thread["histogram"], int(thread["cycles"])), "max": round(thread["max"] / 1000, 3)}
+    """One window of cyclictest on the last CPU: percentiles in us, from a histogram with a bucket per nanosecond."""
+    return run_cyclictest(rate, seconds, max(os.sched_getaffinity(0)), PRIORITY, folder).percentiles()
 
 
 def percentiles(histogram: dict[str, int], cycles: int) -> dict[str, float]:
     """Percentiles in us, linear within the bucket that holds them; later than all buckets counts as LONGEST_NS."""
-    at = np.array(sorted(int(ns) for ns in histogram))
-    count = np.array([histogram[key] for key in sorted(histogram, key=int)])
-    if cycles > count.sum():
-        at, count = np.append(at, LONGEST_NS), np.append(count, cycles - count.sum())
-    cumulative = np.cumsum(count)
-    out = {}
-    for name, share in SHARES.items():
-        wanted = share * cumulative[-1]
-        i = int(np.searchsorted(cumulative, wanted))
-        before = cumulative[i] - count[i]
-        out[name] = round(float(at[i] + (wanted - before) / count[i]) / 1000, 3)
-    return out
+    told = counted(histogram, cycles).percentiles()
+    return {name: told[name] for name in SHARES}
 
 
 def median_of(values: list[dict[str, float]]) -> dict[str, float]:
@@ -196,7 +176,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=5.0, help="length of a window, whole seconds for cyclictest")
     parser.add_argument("--rounds", type=int, default=5)
     given = parser.parse_args()
-    reason = why_not()
+    reason = why_no_cyclictest() or why_no_realtime()
     if reason is not None:
         print(json.dumps({"skipped": reason}) if given.json else f"skipped: {reason}")
         return 3

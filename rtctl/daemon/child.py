@@ -28,6 +28,9 @@ from rtctl.machines import Machine
 # Frames a link may hold. ZeroMQ learns what has left its queue only now and then, every 100 frames received at the
 # latest: fewer than twice that, and in lockstep a frame could find a queue full that has long been empty.
 LINK_WAITING = 256
+# TCP tries again after intervals that double, and would be silent after a cut for as long as the cut was. What has not
+# been acknowledged for this long is given up, and a new connection is made; shorter cuts cost nothing but time.
+CUT_MS = 1000
 
 
 def orders(argv: list[str]) -> dict[str, Any]:
@@ -86,6 +89,9 @@ def link_socket(context: zmq.Context, endpoint: str, bind: bool, timeout: float,
     socket = context.socket(zmq.DEALER)
     socket.set(zmq.LINGER, 100)
     socket.set(zmq.RECONNECT_IVL, 10)
+    socket.set(zmq.TCP_MAXRT, CUT_MS)
+    socket.set(zmq.CONNECT_TIMEOUT, CUT_MS)
+    socket.set(zmq.HANDSHAKE_IVL, CUT_MS)
     socket.set(zmq.SNDHWM, LINK_WAITING)
     socket.set(zmq.RCVHWM, LINK_WAITING)
     socket.set(zmq.RCVTIMEO, int(timeout * 1000))

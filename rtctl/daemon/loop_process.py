@@ -51,7 +51,7 @@ def main(argv: list[str]) -> int:
     if loop.mode == "fused":
         run.virtual(ticks)
     else:
-        _wait_for_plant(socket, run, order["patience"], order["endpoint"], loop.mode)
+        _wait_for_plant(socket, run, order["patience"], order["endpoint"], loop.mode, machine.config.link.keys)
         if loop.mode == "lockstep":
             run.virtual(ticks)
         else:
@@ -71,7 +71,9 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoint: str, mode: str) -> None:
+def _wait_for_plant(
+    socket: zmq.Socket | None, run: Loop, timeout: float, endpoint: str, mode: str, key_name: str | None
+) -> None:
     """Say hello until the plant answers. Raises UserError where it does not."""
     deadline = time.monotonic() + timeout
     hello = generate.new_frames()["tx"]
@@ -96,6 +98,8 @@ def _wait_for_plant(socket: zmq.Socket | None, run: Loop, timeout: float, endpoi
     raise UserError(
         f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, "
         "or leave link.endpoint out to have one started"
+        + (f"; if it runs, its folder `authorized` lacks our {key_name}.key or our server.key is not its own"
+           if key_name else "")
     )
 
 

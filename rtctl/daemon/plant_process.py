@@ -32,7 +32,8 @@ class Plant:
             self._entry = made.module.plant_lockstep
         else:
             self._entry = made.module.plant_real
-            arguments = (*arguments, round(machine.plant_period * SECOND), MOST_BEHIND)
+            hold = round(machine.config.safety.link_timeout * SECOND)
+            arguments = (*arguments, round(machine.plant_period * SECOND), MOST_BEHIND, hold)
         self._arguments = arguments
         generate.warm(self._entry, self._arguments)
 

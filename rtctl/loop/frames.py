@@ -8,7 +8,7 @@ import numpy as np
 from rtctl.idiom import tick
 
 MAGIC = 0x4C544352  # "RCTL"
-VERSION = 1
+VERSION = 2
 HELLO = -1  # sequence number of the frame with which a loop wakes a plant that waits for it
 AO_CHANNELS, COUNTERS, AI_CHANNELS, TRUTHS = 2, 2, 16, 8
 
@@ -18,6 +18,7 @@ OUTPUTS = np.dtype(
         ("version", "<u4"),
         ("seq", "<i8"),  # counts up with every frame
         ("t_ns", "<i8"),  # sender's clock
+        ("inputs_t_ns", "<i8"),  # plant's clock at the sample that these outputs answer; old ones are not acted on
         ("ao_codes", "<i4", (AO_CHANNELS,)),
         ("dio_lines", "<u4"),  # digital lines, bit per line
         ("state", "<u4"),  # of the safety machine; 0 means outputs off

@@ -78,6 +78,7 @@ def run_real(
         y[0].lateness = lateness * 1e-9
         was = st.state
         tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late)
+        tx[0].inputs_t_ns = rx[0].t_ns
         wrote = clock.now()
         ring.put(ring_[0], rows, y)
         account(st, s[0].safety, k, rx[0].lost_counts)
@@ -266,8 +267,12 @@ def account(st, safety, k, lost_counts):
     st.ready = 1
 
 
-def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind):
-    """The emulated machine on its own clock: newest outputs in, one period on, sample out."""
+def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind, hold):
+    """The emulated machine on its own clock: newest outputs in, one period on, sample out.
+
+    Its board has a watchdog: outputs that answer a sample older than `hold` ns, by the plant's own clock, are off. So a
+    loop that is gone leaves nothing on, and what waited in a cut cable does nothing when it comes.
+    """
     p, s, tx, tx_staged, rx = borrowed(p), borrowed(s), borrowed(tx), borrowed(tx_staged), borrowed(rx)
     st = status[0]
     start(p[0], s[0])
@@ -278,6 +283,9 @@ def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind):
         woke = clock.now()
         if link.receive_newest(inp, tx, tx_staged) > 0:
             st.frames += 1
+        if woke - tx[0].inputs_t_ns > hold:
+            tx[0].ao_codes[:] = 0
+            tx[0].dio_lines = 0
         periods = 1 + (woke - wake) // period  # a machine does not stop because its emulator was late
         if periods > 1:
             st.catch_ups += 1

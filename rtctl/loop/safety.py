@@ -163,8 +163,9 @@ def check_motion(p, s, error, counts, effort, amperes, k):
         trip(s, NOT_A_NUMBER, k)
     if p.following > 0.0 and abs(error) > p.following:
         trip(s, FOLLOWING, k)
-    s.still = s.still + 1 if counts == s.counts and abs(effort) > p.frozen_effort else 0
-    s.counts = counts
+    if s.silent == 0:  # an old sample says nothing of the encoder: a silent link is no frozen one
+        s.still = s.still + 1 if counts == s.counts and abs(effort) > p.frozen_effort else 0
+        s.counts = counts
     if p.frozen > 0 and s.still > p.frozen:
         trip(s, FROZEN, k)
     s.over = s.over + 1 if amperes > p.current else 0
