@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from rtctl import machines
+from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path
 from rtctl.loop import generate
 from rtctl.loop.loop import Loop
@@ -20,6 +21,7 @@ from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
+from rtctl.trace.replay import replay
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 number = itertools.count(1)
@@ -30,6 +32,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.xdist_group("realtime"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def every_recording_replays(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Whatever the tests have recorded comes out of its own law once more, to the bit."""
+    yield
+    for journal in sorted(tmp_path_factory.getbasetemp().rglob("orders.jsonl")):
+        try:
+            found = replay(journal.parent)
+        except (UserError, NoAnswer):
+            continue  # cut short, damaged or changed on purpose
+        assert found.identical, f"{journal.parent}: {found.differences[0]}"
 
 
 @pytest.fixture(scope="session")

@@ -56,21 +56,20 @@ def get_path(settings: Any, path: str) -> Any:
 
 def set_path(settings: Any, path: str, value: Any) -> Any:
     """New settings with `value`, SI or text with a unit, at a dotted path. Raises UserError where it does not fit."""
+    return set_paths(settings, {path: value})
+
+
+def set_paths(settings: Any, values: Mapping[str, Any]) -> Any:
+    """As `set_path`, several at once: they have to fit together, and need not one by one."""
     model = type(settings)
     data = written(settings)
-    put(data, Shape(model, model=model), path, value)
+    for path, value in values.items():
+        put(data, Shape(model, model=model), path, value)
     data = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(data)
     except ValidationError as error:
         raise UserError(sentences(error, model, data)) from error
-
-
-def set_paths(settings: Any, values: Mapping[str, Any]) -> Any:
-    """As `set_path`, one after the other: every step on the way has to fit."""
-    for path, value in values.items():
-        settings = set_path(settings, path, value)
-    return settings
 
 
 def to_yaml(settings: Any, full: bool = False) -> str:

@@ -42,6 +42,7 @@ def describe(machine: Machine, made: generate.Generated) -> dict[str, Any]:
             "python": sys.version.split()[0],
             "machine": platform.machine(),
             "tick": made.path.stem,
+            "sources": generate.sources_hash(),
         },
     }
     return {**common, **{"ivu": _ivu, "ldu": _ldu, "axis": _axis}[machine.kind](config)}

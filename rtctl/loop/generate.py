@@ -12,7 +12,7 @@ import os
 import platform
 import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -40,9 +40,8 @@ from numba import njit
 
 from rtctl.idiom import tick as compiled
 from rtctl.loop import clock, faults, histogram, mailbox, ring
-from rtctl.loop import {link}_link as link
 from rtctl.loop.memory import borrowed
-from {machine} import {machine_name} as machine
+from rtctl.machines import {machine} as machine
 {imports}
 
 entry = njit(nogil=True, error_model="numpy", fastmath=False, cache=True)
@@ -76,32 +75,31 @@ def cache_folder() -> Path:
 def source(machine: Machine, link: str) -> str:
     """The module's text, for `rtctl build --show`."""
     loop, plant = machine.diagram, machine.plant_diagram
-    modules = sorted({*loop.uses, *plant.uses})
-    imports = "\n".join(f"from {m.rpartition('.')[0]} import {m.rpartition('.')[2]}" for m in modules)
+    uses = (*loop.uses, *plant.uses, f"rtctl.loop.{link}_link")
+    title = f"The tick of {machine.kind}: {len(loop.stages)} stages, and its emulated plant."
     parts = [
-        HEADER.format(
-            title=f"The tick of {machine.kind}: {len(loop.stages)} stages, and its emulated plant.",
-            version=__version__,
-            link=link,
-            machine="rtctl.machines",
-            machine_name=machine.kind,
-            imports=imports,
-        ),
-        _function(
+        header(machine, title, uses).replace(f"import {link}_link", f"import {link}_link as link"),
+        function(
             "tick",
             "p, s, t, c, rx, tx, y, m, k, fresh, late",
             "One tick of the loop.",
-            (*timed(loop.stages), *_extras(machine)),
+            (*timed(loop.stages), *extras(machine)),
         ),
-        _function("start", "p, s", "The emulated machine at rest.", (("", plant.start),)),
+        function("start", "p, s", "The emulated machine at rest.", (("", plant.start),)),
         _advance(plant.advance, machine.substeps),
-        _function("sample", "p, s, rx", "What the board reads now.", plant.sample),
+        function("sample", "p, s, rx", "What the board reads now.", plant.sample),
     ]
-    parts += [_runner(f) for f in (runner.post, runner.send, runner.account, runner.stages, runner.note_late)]
-    parts += [_runner(f) for f in (runner.answer, runner.virtual)]
-    parts += [_runner(f, "entry") for f in (runner.run_real, runner.run_lockstep, runner.run_fused)]
-    parts += [_runner(f, "entry") for f in (runner.plant_real, runner.plant_lockstep)]
+    parts += [copied(f) for f in (runner.post, runner.send, runner.account, runner.stages, runner.note_late)]
+    parts += [copied(f) for f in (runner.answer, runner.virtual)]
+    parts += [copied(f, "entry") for f in (runner.run_real, runner.run_lockstep, runner.run_fused)]
+    parts += [copied(f, "entry") for f in (runner.plant_real, runner.plant_lockstep)]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
+
+
+def header(machine: Machine, title: str, uses: Sequence[str]) -> str:
+    """Head of a generated module that uses these modules."""
+    imports = "\n".join(f"from {m.rpartition('.')[0]} import {m.rpartition('.')[2]}" for m in sorted(set(uses)))
+    return HEADER.format(title=title, version=__version__, machine=machine.kind, imports=imports)
 
 
 def timed(stages: Stages) -> Stages:
@@ -113,7 +111,7 @@ def timed(stages: Stages) -> Stages:
     )
 
 
-def _extras(machine: Machine) -> Stages:
+def extras(machine: Machine) -> Stages:
     """Emulator's truth and traced state fields, into the row."""
     truth = tuple(f"y.{c.name} = rx.truth[{i}]" for i, c in enumerate(machine.truth))
     traced = tuple(f"y.{_traced(path)} = s.{path}" for path in machine.config.record.trace)
@@ -124,7 +122,8 @@ def _traced(path: str) -> str:
     return path.replace(".", "_")
 
 
-def _function(name: str, arguments: str, doc: str, stages: Any) -> str:
+def function(name: str, arguments: str, doc: str, stages: Any) -> str:
+    """Text of a compiled function of these stages."""
     lines = ["@compiled", f"def {name}({arguments}):", f'    """{doc}"""']
     for stage, body in stages:
         lines += [f"    # {stage}"] if stage else []
@@ -134,7 +133,7 @@ def _function(name: str, arguments: str, doc: str, stages: Any) -> str:
 
 def _advance(stages: Any, substeps: int) -> str:
     """The plant over one period: drivers, physics and encoder in each of its substeps."""
-    text = _function("substep", "p, s, tx", "One substep of the emulated machine.", stages)
+    text = function("substep", "p, s, tx", "One substep of the emulated machine.", stages)
     return text + textwrap.dedent(f'''
 
         @compiled
@@ -145,7 +144,8 @@ def _advance(stages: Any, substeps: int) -> str:
         ''')
 
 
-def _runner(function: Callable[..., Any], decorator: str = "compiled") -> str:
+def copied(function: Callable[..., Any], decorator: str = "compiled") -> str:
+    """The source of a function, decorated."""
     return f"@{decorator}\n{textwrap.dedent(inspect.getsource(function))}"
 
 
@@ -178,9 +178,13 @@ def _cpu() -> str:
 
 def write(machine: Machine, link: str) -> Path:
     """Write the module where it is not there yet; returns its path."""
-    text = source(machine, link)
+    return write_text(machine.kind, source(machine, link))
+
+
+def write_text(kind: str, text: str) -> Path:
+    """Write a module under the hash of its text and of all that it is compiled from; returns its path."""
     name = hashlib.sha256((text + sources_hash()).encode()).hexdigest()[:16]
-    path = cache_folder() / f"{machine.kind}_{name}.py"
+    path = cache_folder() / f"{kind}_{name}.py"
     if not path.exists():
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -218,24 +222,30 @@ def warm(entry: Any, arguments: tuple[Any, ...]) -> None:
 def generate(machine: Machine, link: str) -> Generated:
     """Write and load the tick of a machine for a link, `zmq` or `shm`."""
     path = write(machine, link)
-    columns = (
-        *machine.diagram.columns,
-        *machine.truth,
-        *(Column(_traced(n), "", f"state {n}") for n in machine.config.record.trace),
-    )
-    row = np.dtype([(c.name, np.int64 if c.name == "tick" else np.float64) for c in columns], align=True)
     return Generated(
         machine=machine,
         module=load(path),
         path=path,
-        columns=columns,
+        columns=columns_of(machine),
         params=params_dtype(machine.diagram.blocks),
         state=state_dtype(machine.diagram.blocks),
-        row=row,
+        row=row_dtype(machine),
         tables=tables_dtype(machine),
         plant_params=params_dtype(machine.plant_diagram.blocks),
         plant_state=state_dtype(machine.plant_diagram.blocks),
     )
+
+
+def columns_of(machine: Machine) -> tuple[Column, ...]:
+    """Signals of a machine's trace."""
+    traced_ = (Column(_traced(n), "", f"state {n}") for n in machine.config.record.trace)
+    return (*machine.diagram.columns, *machine.truth, *traced_)
+
+
+def row_dtype(machine: Machine) -> np.dtype:
+    """Record of one tick in the trace."""
+    names = (c.name for c in columns_of(machine))
+    return np.dtype([(name, np.int64 if name == "tick" else np.float64) for name in names], align=True)
 
 
 def params_dtype(blocks: tuple[Block, ...]) -> np.dtype:

@@ -1,0 +1,156 @@
+"""Gives a recording to the law that made it, once more, and compares what it writes with what was written.
+
+A recording from the first tick on holds all that went into the law: what was read, when frames came, how late ticks
+woke, and, in the journal beside it, what it was told. So the same law writes the same voltages, to the bit.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import ValidationError
+
+from rtctl import machines
+from rtctl.config.complaints import sentences
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.load import set_paths
+from rtctl.loop import generate
+from rtctl.loop.replay import Replay, read_columns, written_columns
+from rtctl.trace.bundle import Bundle, load_bundle
+from rtctl.trace.orders import orders, restore
+
+GIVEN = ("tick", "t", "period", "lateness")  # of a row, beside what was read
+
+
+class Difference(NamedTuple):
+    """Where a signal first came out otherwise."""
+
+    column: str
+    tick: int
+    t: float  # s
+    recorded: float
+    replayed: float
+    ticks: int  # that differ
+    largest: float
+
+
+class Replayed(NamedTuple):
+    """What came of it. `rows` (n,) are those of the replay, `recorded` (n,) those of the recording."""
+
+    bundle: Bundle
+    recorded: np.ndarray
+    rows: np.ndarray
+    compared: tuple[str, ...]
+    written: tuple[str, ...]  # of them, what is written to the drives
+    differences: tuple[Difference, ...]  # of each column that differs, first tick first
+    stopped: str  # why not all rows were replayed, "" for all
+    changed: dict[str, Any]  # settings that are others than they were
+    same_program: bool  # whether the recording was made by this version of everything
+
+    @property
+    def identical(self) -> bool:
+        """To the bit, in every column."""
+        return not self.differences
+
+
+def replay(folder: Path | str, changed: Mapping[str, Any] | None = None) -> Replayed:
+    """Replay the bundle in `folder`, with settings `changed` by their dotted path.
+
+    Raises UserError for a bundle that is none or whose settings do not fit, NoAnswer for one that does not hold what a
+    replay needs.
+    """
+    bundle = load_bundle(folder)
+    config, changed = _config(bundle), dict(changed or {})
+    config = set_paths(config, changed)
+    machine = _machine(config)
+    recorded, stopped = _rows(bundle, machine)
+    told = orders(bundle.folder)
+    made = Replay(machine)
+    rows = np.empty(len(recorded), made.row)
+    at = 0
+    for number, count in _stretches(recorded["order"]):
+        config = _obey(made, config, told, int(number), changed)
+        rows[at : at + count] = made.over(recorded[at : at + count])
+        at += count
+    given = {*GIVEN, *read_columns(machine)}
+    compared = tuple(name for name in made.row.names or () if name not in given)
+    written = written_columns(machine)
+    found = [_difference(name, recorded, rows) for name in compared]
+    different = sorted((d for d in found if d is not None), key=lambda d: d.tick)
+    same = bundle.case.get("versions", {}).get("sources") == generate.sources_hash()
+    return Replayed(bundle, recorded, rows, compared, written, tuple(different), stopped, changed, same)
+
+
+def _config(bundle: Bundle) -> Any:
+    """The settings that the recording started with."""
+    given = bundle.case.get("config")
+    if not isinstance(given, dict) or given.get("machine") not in machines.CONFIGS:
+        raise NoAnswer(f"{bundle.folder}: its case has no rtctl `config`, so nobody knows the law to replay")
+    model = machines.CONFIGS[given["machine"]]
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        raise UserError(f"{bundle.folder}/case.json, config: {sentences(error, model, given)}") from error
+
+
+def _machine(config: Any) -> machines.Machine:
+    try:
+        return machines.build(config)
+    except ValueError as error:
+        raise UserError(f"{config.name}: {error}") from error
+
+
+def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
+    """Recorded rows (n,) up to the first that is missing, and why there are no more."""
+    row = generate.row_dtype(machine)
+    lacking = [name for name in row.names or () if name not in bundle.columns]
+    lacking = [name for name in lacking if name in (*GIVEN, *read_columns(machine), "order", "link_age")]
+    if lacking:
+        raise NoAnswer(f"{bundle.folder}: column '{lacking[0]}' is missing; a replay needs all that the law has read")
+    ticks = bundle.columns["tick"].astype(np.int64)
+    if ticks[0] != 0:
+        raise NoAnswer(
+            f"{bundle.folder} begins at tick {ticks[0]}: what the law remembered then is not in it; "
+            "replay the recording of the run itself, which begins at 0"
+        )
+    gaps = np.flatnonzero(np.diff(ticks) != 1)
+    count = int(gaps[0]) + 1 if len(gaps) else len(ticks)
+    rows = np.zeros(count, row)
+    for name in row.names or ():
+        rows[name] = bundle.columns[name][:count] if name in bundle.columns else np.nan
+    return rows, f"rows behind tick {ticks[count - 1]} are missing" if len(gaps) else ""
+
+
+def _stretches(order: np.ndarray) -> list[tuple[float, int]]:
+    """Number of the order in force and for how many rows, one after the other."""
+    starts = np.flatnonzero(np.diff(order, prepend=np.nan) != 0)
+    return [(float(order[a]), int(b - a)) for a, b in zip(starts, [*starts[1:], len(order)], strict=True)]
+
+
+def _obey(made: Replay, config: Any, told: dict[int, Any], number: int, changed: Mapping[str, Any]) -> Any:
+    """Give order `number`, and the changes of those before it that no tick saw. Returns the settings then in force."""
+    last = int(made.c["order"][0])
+    new = {path: value for n in range(last + 1, number + 1) if n in told for path, value in told[n].changed.items()}
+    if number and number not in told:
+        raise NoAnswer(f"order {number} is not in the journal: the recording cannot be replayed beyond it")
+    if number:
+        restore(made.c[0], told[number].command)
+    new = {path: value for path, value in new.items() if path not in changed}
+    if new:
+        config = set_paths(config, new)
+        made.use(_machine(config))
+    return config
+
+
+def _difference(name: str, recorded: np.ndarray, rows: np.ndarray) -> Difference | None:
+    one, two = recorded[name], rows[name]
+    other = one.view(np.int64) != two.view(np.int64)
+    if not other.any():
+        return None
+    at = int(np.argmax(other))
+    with np.errstate(invalid="ignore"):
+        largest = float(np.nanmax(np.abs(one - two))) if np.isfinite(one - two).any() else float("nan")
+    return Difference(
+        name, int(rows["tick"][at]), float(rows["t"][at]), float(one[at]), float(two[at]), int(other.sum()), largest
+    )
