@@ -1,5 +1,6 @@
 """Captures: pieces of the running trace, from now or from a trigger, each a bundle of its own."""
 
+from collections import deque
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,8 @@ class Captures:
         self._rate, self._columns, self._dtype, self._case = rate, columns, dtype, case
         self._running: dict[str, tuple[Capture, Recorder]] = {}
         self._done: dict[str, dict[str, Any]] = {}
-        self._history: list[np.ndarray] = []
+        self._history: deque[np.ndarray] = deque()
+        self._held = 0  # rows in it
         self._number = 0
 
     def start(self, seconds: float, pre: float, trigger: str | None, out: str | None, name: str) -> dict[str, Any]:
@@ -54,10 +56,9 @@ class Captures:
         for identity in list(self._running):
             self._take(identity, rows)
         self._history.append(rows)
-        most = PRE_SECONDS * self._rate
-        held = sum(map(len, self._history))
-        while len(self._history) > 1 and held - len(self._history[0]) >= most:
-            held -= len(self._history.pop(0))
+        self._held += len(rows)
+        while len(self._history) > 1 and self._held - len(self._history[0]) >= PRE_SECONDS * self._rate:
+            self._held -= len(self._history.popleft())
 
     def note_lost(self, first: int, count: int) -> None:
         """Rows that the ring lost are missing in every capture that runs."""

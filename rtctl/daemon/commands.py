@@ -31,7 +31,7 @@ class Commands:
     def handle(self, op: str, args: Args) -> dict[str, Any]:
         """Carry out `op`. Raises UserError where the request makes no sense now."""
         self._last_heard = time.monotonic()
-        return getattr(self, f"_{op}")(**args.model_dump(exclude_none=True))
+        return getattr(self, f"_{op}")(**args.model_dump(exclude_unset=True))
 
     def watch_commander(self) -> None:
         """Tell the loop when nobody has talked to the command socket for too long, where the config requires it."""

@@ -10,6 +10,7 @@ import ipaddress
 import itertools
 import os
 import re
+import struct
 import threading
 from pathlib import Path
 from typing import NamedTuple
@@ -201,12 +202,12 @@ def _write(path: Path, mode: int, comment: str, keys: dict[str, bytes]) -> None:
 def _read(path: Path) -> tuple[bytes, bytes | None]:
     try:
         public, secret = load_certificate(path)
-    except (OSError, ValueError):
+    except (OSError, ValueError, IndexError):
         raise UserError(f"no key in {path}; copy it there, or make keys with `rtctl keys new`") from None
     for key in (public, secret):
         try:
             if key is not None and len(z85.decode(key)) != 32:
                 raise ValueError
-        except (ValueError, KeyError, ArithmeticError, IndexError):
+        except (ValueError, KeyError, ArithmeticError, IndexError, struct.error):
             raise UserError(f"{path} is damaged: a key in it is not 40 characters of Z85") from None
     return public, secret

@@ -12,6 +12,8 @@ from rtctl.daemon.notify import from_environment
 from rtctl.daemon.supervisor import Supervisor
 from rtctl.machines import MODULES
 
+MOST_ROWS = 3_000_000  # read back for steps and picture; of a longer run, draw a part with `rtctl trace plot`
+
 
 class Session:
     """One `rtctl run`. `length` in s ends it; None leaves that to `stop`, Ctrl-C or a trip.
@@ -70,7 +72,7 @@ class Session:
         return 0 if recorder is None else recorder.stats().rows_written
 
     def _metrics(self) -> list[dict[str, Any]]:
-        if self.bundle is None or not self._rows():
+        if self.bundle is None or not 0 < self._rows() <= MOST_ROWS:
             return []
         from rtctl.trace.bundle import load_bundle
         from rtctl.trace.metrics import step_metrics
@@ -94,7 +96,7 @@ class Session:
 
     def draw(self) -> str | None:
         """Draw the run beside its bundle; returns the picture's path."""
-        if self.bundle is None or not self._rows():
+        if self.bundle is None or not 0 < self._rows() <= MOST_ROWS:
             return None
         from rtctl.trace.bundle import load_bundle
         from rtctl.trace.plot import plot_run

@@ -38,6 +38,7 @@ from rtctl.loop.records import STAGES, late_ticks, layout
 from rtctl.loop.ring import Reader
 from rtctl.trace.orders import Journal
 from rtctl.trace.recorder import Recorder
+from rtctl.trace.rotation import Rotation
 
 log = structlog.get_logger()
 TURN_MS = 10  # between two turns of the supervisor on the wall clock
@@ -127,7 +128,10 @@ class Supervisor:
         self.recorder: Recorder | None = None
         if self.out is not None:
             try:
-                self.recorder = Recorder(self.out, made.columns, made.row, self.case)
+                self.recorder = Recorder(
+                    self.out, made.columns, made.row, self.case, batch=max(config.record.batch - 2e-3 * TURN_MS, 0.0),
+                    rotation=Rotation(config.record.rotate_mb, config.record.rotate_minutes),
+                )  # fmt: skip
                 self.journal.open(self.out)
             except OSError as error:
                 raise UserError(f"{self.out}: cannot record here: {error.strerror}") from error
@@ -193,6 +197,7 @@ class Supervisor:
         """Drain, record, publish, answer. Returns False once the loop has ended and all of it is taken in."""
         ended = bool(self.status["ended"]) or not self.loop.running()
         self._drain()
+        self.faults.act()
         self.server.process()
         self.commands.watch_commander()
         if not self._ended:
@@ -247,7 +252,13 @@ class Supervisor:
         poller.register(self.server.socket, zmq.POLLIN)
         while self.turn() and not self.interrupted:
             yield
-            poller.poll(1 if virtual else TURN_MS)
+            self._answer(poller, 1 if virtual else TURN_MS)
+
+    def _answer(self, poller: zmq.Poller, wait_ms: float) -> None:
+        """Commands are answered as they come, but a thousand of them a second do not make a thousand turns."""
+        end = time.monotonic() + wait_ms / 1000
+        while not self.interrupted and (left := end - time.monotonic()) > 0 and poller.poll(left * 1000):
+            self.server.process()
 
     # the service manager
 
@@ -305,6 +316,7 @@ class Supervisor:
             "rows": {"lost_in_ring": self.reader.lost, **self._recorded()},
             "refused_commands": dict(self.server.refused),
             "lacks": self.lacks,
+            "faults": self.faults.told,
         }
 
     def order(self, write: Callable[[Any, Any], None], changed: dict[str, Any] | None = None) -> None:
@@ -337,6 +349,8 @@ class Supervisor:
         self.service.stopping()
         if hasattr(self, "status"):
             self.status["stop"] = 1
+        if hasattr(self, "faults"):
+            self.faults.clear()
         deadline = time.monotonic() + 5.0
         while hasattr(self, "loop") and not self._ended and time.monotonic() < deadline:
             try:

@@ -8,7 +8,9 @@ parser a list of rows since February 2026 (1285); before that, one row a message
 version with that part drops the payload (1416).
 """
 
+import stat
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import msgpack
@@ -19,6 +21,7 @@ from rtctl.daemon.keys import ServerCurve
 from rtctl.daemon.server import bind, release
 
 MESSAGES_WAITING = 20  # for each subscriber: a few tenths of a second
+LONGEST_TOPIC = 1024  # bytes that a subscriber may ask for; who sends more is cut off
 
 
 class Telemetry:
@@ -52,8 +55,12 @@ class Telemetry:
         self._batch = batch
         self.socket = context.socket(zmq.PUB)
         self.socket.linger = 0
+        self.socket.maxmsgsize = LONGEST_TOPIC
         self.socket.sndhwm = MESSAGES_WAITING * (1 if batch else max_rows_per_message)
         self.endpoint = bind(self.socket, endpoint, curve)
+        if self.endpoint.startswith("ipc://"):  # a group that may enter the folder may listen, if not command
+            path = Path(self.endpoint.removeprefix("ipc://"))
+            path.chmod(path.stat().st_mode | stat.S_IRGRP | stat.S_IWGRP)
 
     def publish(self, rows: np.ndarray) -> int:
         """Send an array (rows, 1 + columns) whose first column is the time in s; returns how many rows went out.

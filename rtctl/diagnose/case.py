@@ -34,7 +34,8 @@ TERMS = {  # parameters that are terms of their own: absent means 0
     "ldu": ("F_c", "B_c", "B_m", "K_m2"),
     "axis": ("F_v", "F_c", "k"),
 }
-FROM_ELSEWHERE = ("config", "seed", "versions", "run", "changes", "rows", "losses", "complete", "recorded_at")
+FROM_ELSEWHERE = ("config", "seed", "versions", "run", "changes", "rows", "losses", "complete", "recorded_at",
+                  "part", "parts", "repaired", "discarded_bytes", "recording_error")  # fmt: skip
 KEYS = (
     "format", "plant", "sample_rate", "parameters", "sensors", "drive", "delay_samples", "controller",
     "controller_known", "reaches", "notes",
@@ -149,7 +150,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     """The checked case of the bundle in `folder`. Raises UserError that names the key and what would be right."""
     where = Path(folder) / "case.json"
     plant = case.get("plant")
-    if plant not in PARAMETERS:
+    if not isinstance(plant, str) or plant not in PARAMETERS:
         hint = nearest(str(plant), PARAMETERS)
         raise UserError(f"{where}: plant is {plant!r}; it should be ivu, ldu or axis" + _or(hint))
     warnings = [_strange(where, key, "", KEYS) for key in case if key not in (*KEYS, *FROM_ELSEWHERE)]
@@ -304,7 +305,8 @@ def _controller(where: Path, plant: str, given: Any, rate: float | None, warning
         return _part(where, "controller", SectionsLaw, {"kind": kind, "sections": given["sections"]}, warnings)
     if plant != "ivu" and kind == "pd" and rate is not None and "P" in given and "D" in given:
         law: PdLaw = _part(where, "controller", PdLaw, given, warnings)
-        return SectionsLaw(kind="pd", sections=(pd_section(law.P, law.D, law.derivative_filter_hz, 1 / rate),))
+        section = pd_section(law.P, law.D, law.derivative_filter_hz, 1 / rate)
+        return _part(where, "controller", SectionsLaw, {"kind": "pd", "sections": [section]}, warnings)
     return UnknownLaw(kind=kind)
 
 

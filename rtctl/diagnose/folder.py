@@ -169,6 +169,7 @@ def done(task: Task) -> Outcome | None:
     try:
         made = path.stat().st_mtime_ns
         sources = [folder / name for folder in (task.bundle, task.other) if folder for name in (PARQUET, CASE)]
+        sources = [source for source in sources if source.exists()]  # of a long recording the case on top
         if any(source.stat().st_mtime_ns > made for source in sources):
             return None
         diagnosis = json.loads(path.read_text("utf-8"))

@@ -37,6 +37,13 @@ class Machine(NamedTuple):
 
 def build(config: Any) -> Machine:
     """Diagrams and params for a config. Raises ValueError where the settings contradict each other."""
+    try:
+        return _build(config)
+    except ArithmeticError as error:  # 1e308 s, 1e-320 ohm
+        raise ValueError(f"a value is too large or too small to compute with ({error})") from error
+
+
+def _build(config: Any) -> Machine:
     module = MODULES[config.machine]
     dt = 1.0 / config.loop.rate
     if config.loop.mode == "real":

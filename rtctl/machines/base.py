@@ -88,6 +88,10 @@ class LoopSettings(Settings):
 class RecordSettings(Settings):
     seconds: float = quantity(20.0, unit="s", gt=0, help="length of the ring between loop and supervisor")
     batch: float = quantity(0.1, unit="s", gt=0, le=10, help="longest time until a row is on disk")
+    rotate_mb: float | None = Field(
+        default=None, gt=0, description="MB of rows, before compression, that fill a part of a long recording"
+    )
+    rotate_minutes: float | None = Field(default=None, gt=0, description="minutes that do; one piece without either")
     truth: bool = Field(default=True, description="record what the emulator knows beside what sensors say")
     trace: list[str] = Field(default=[], description="state fields to record besides, e.g. position.d")
 

@@ -2,6 +2,8 @@
 
 While a recording runs, the folder holds `recording.arrows` instead; `finish` makes the one from the other. At every
 moment in between the folder holds all the data in a form that `rtctl.trace.repair` understands.
+
+A long recording is in parts: `part-0001`, `part-0002` and so on are bundles, and `case.json` beside them is of all.
 """
 
 import json
@@ -20,6 +22,7 @@ from rtctl.trace.columns import columns_of
 ARROWS = "recording.arrows"
 PARQUET = "recording.parquet"
 CASE = "case.json"
+PART = "part-{:04d}"
 FORMAT = 1
 ROW_GROUP = 65_536  # rows; what a conversion holds in memory
 
@@ -32,20 +35,14 @@ class Bundle(NamedTuple):
 
 
 def load_bundle(folder: Path | str) -> Bundle:
-    """Read a finished bundle. Raises UserError that names the file and says what would be right."""
+    """Read a finished bundle, all parts as one. Raises UserError that names the file and says what would be right."""
     folder = Path(folder)
     if not folder.is_dir():
         raise UserError(f"{folder} is not a folder; a bundle is a folder with {PARQUET} and {CASE}")
-    path = folder / PARQUET
-    if not path.is_file():
-        if (folder / ARROWS).exists():
-            raise UserError(f"{folder} holds a recording that was not finished; run: rtctl trace repair {folder}")
-        raise UserError(f"{path} is missing; a bundle holds {PARQUET} and {CASE}")
+    paths = _recordings(folder)
     case = load_case(folder)
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise UserError(f"{path} cannot be read as Parquet: {_first_line(error)}") from None
+    path = paths[0]
+    table = _table(paths)
     columns = {name: _numbers(path, name, table.column(name)) for name in table.column_names}
     if "t" not in columns:
         hint = nearest("t", columns) or nearest("time", columns)
@@ -55,6 +52,64 @@ def load_bundle(folder: Path | str) -> Bundle:
     if not np.isfinite(columns["t"]).all():
         raise UserError(f"{path}: column 't' is not finite in row {int(np.argmin(np.isfinite(columns['t'])))}")
     return Bundle(columns, case, folder, {c.name: c.unit for c in columns_of(table.schema) if c.unit})
+
+
+def part_folders(folder: Path) -> list[Path]:
+    """The parts of a long recording, in order; none where it is in one piece."""
+    found = [part for part in folder.glob("part-*") if part.is_dir() and part.name[5:].isdecimal()]
+    return sorted(found, key=lambda part: int(part.name[5:]))
+
+
+def index(folder: Path) -> dict[str, Any]:
+    """What the case on top says of its parts: `parts`, each with its rows and its first and last `tick` and `t`."""
+    return {"parts": [entry for part in part_folders(folder) if (entry := _entry(part)) is not None]}
+
+
+def _entry(part: Path) -> dict[str, Any] | None:
+    try:
+        found = pq.read_metadata(part / PARQUET)
+    except (pa.ArrowException, OSError):
+        return None  # not made yet, or damaged
+    entry: dict[str, Any] = {"folder": part.name, "rows": found.num_rows}
+    groups = [found.row_group(g) for g in (0, found.num_row_groups - 1)] if found.num_row_groups else []
+    for k, name in enumerate(found.schema.names):
+        ends = [group.column(k).statistics for group in groups]
+        if name in ("tick", "t") and ends and all(end is not None and end.has_min_max for end in ends):
+            entry[name] = [ends[0].min + 0, ends[1].max + 0]  # -0.0 is 0
+    return entry
+
+
+def _recordings(folder: Path) -> list[Path]:
+    """The Parquet files of a finished bundle: its own, or those of its parts."""
+    if (folder / PARQUET).is_file():
+        return [folder / PARQUET]
+    parts = part_folders(folder)
+    if (folder / ARROWS).exists() or any((part / ARROWS).exists() for part in parts):
+        raise UserError(f"{folder} holds a recording that was not finished; run: rtctl trace repair {folder}")
+    if not parts:
+        raise UserError(f"{folder / PARQUET} is missing; a bundle holds {PARQUET} and {CASE}")
+    told = load_case(folder).get("parts")
+    there = [part.name for part in parts if (part / PARQUET).is_file()]
+    if not isinstance(told, list) or [e.get("folder") for e in told if isinstance(e, dict)] != there:
+        raise UserError(
+            f"{folder / CASE} lists other parts than are there ({', '.join(there[:20]) or 'none'}); "
+            f"run: rtctl trace repair {folder}"
+        )
+    return [folder / name / PARQUET for name in there]
+
+
+def _table(paths: list[Path]) -> pa.Table:
+    """The rows of all files, one after the other."""
+    tables: list[pa.Table] = []
+    for path in paths:
+        try:
+            tables.append(pq.read_table(path))
+            tables[-1].column_names  # noqa: B018  names that are no text are told only when asked for
+        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+            raise UserError(f"{path} cannot be read as Parquet: {_first_line(error)}") from None
+        if not tables[-1].schema.equals(tables[0].schema):
+            raise UserError(f"{path} has other columns than {paths[0]}; they are not parts of one recording")
+    return pa.concat_tables(tables)
 
 
 def load_case(folder: Path) -> dict[str, Any]:

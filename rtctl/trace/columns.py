@@ -46,4 +46,4 @@ def columns_of(schema: pa.Schema) -> list[Column]:
 
 
 def _text(field: pa.Field, key: bytes) -> str:
-    return (field.metadata or {}).get(key, b"").decode()
+    return (field.metadata or {}).get(key, b"").decode(errors="replace")

@@ -45,6 +45,14 @@ class Losses:
                 joined.append([first, count])
         return joined
 
+    def between(self, first: int, end: int) -> "Losses":
+        """Those of the ticks from `first` to before `end`, as far as they are listed."""
+        found = Losses()
+        for tick, count in self.gaps:
+            start = max(tick, first)
+            found.add(start, min(tick + count, end) - start)
+        return found
+
     def as_dict(self) -> dict[str, Any]:
         """What case.json says under "losses"."""
         told: dict[str, Any] = {"rows": self.rows, "gaps": self.gaps}

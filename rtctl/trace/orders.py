@@ -69,15 +69,18 @@ def plain(record: np.void) -> dict[str, Any]:
 def restore(record: Any, fields: dict[str, Any]) -> None:
     """Put the fields of an order back into a command record; what the record does not have is left out."""
     for name, value in fields.items():
-        if name not in record.dtype.names:
+        if name not in (record.dtype.names or ()):
             continue
         if isinstance(value, dict):
             restore(record[name], value)
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
+        elif isinstance(value, list) and record[name].shape and all(isinstance(item, dict) for item in value):
             for item, fields_ in zip(record[name], value, strict=False):
                 restore(item, fields_)
         else:
-            record[name] = value
+            try:
+                record[name] = value
+            except (TypeError, ValueError, OverflowError) as error:
+                raise UserError(f"'{name}' of an order is {value!r:.60}: {error}") from None
 
 
 def orders(folder: Path) -> dict[int, Order]:
@@ -86,12 +89,12 @@ def orders(folder: Path) -> dict[int, Order]:
     if not path.exists():
         return {}
     out = {}
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = path.read_bytes().splitlines()
     for at, line in enumerate(lines, 1):
         try:
             found = json.loads(line)
             order = Order(int(found["order"]), dict(found["command"]), dict(found["changed"]))
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             if at == len(lines):
                 break
             raise UserError(f"{path}, line {at}: not an order ({error})") from error

@@ -2,8 +2,11 @@
 
 A thread writes the stream; a bounded queue stands in front of it. Rows that find the queue full, or a disk that has
 failed, are lost, and the bundle says how many and which: rows put = rows written + rows queued + rows lost.
+
+Memory is flat, however long it records: the queue is bounded, and so is the list of gaps.
 """
 
+import itertools
 import threading
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -13,11 +16,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.config.errors import UserError
-from rtctl.trace.bundle import ARROWS, FORMAT, PARQUET, as_json, save_case, write_parquet
+from rtctl.trace.bundle import FORMAT
 from rtctl.trace.columns import Column
 from rtctl.trace.losses import Losses
-from rtctl.trace.stream import StreamReader, StreamWriter
+from rtctl.trace.part import Part
+from rtctl.trace.rotation import Parts, Rotation
+
+ENOUGH = 1 << 20  # bytes that are written without waiting for more
 
 
 class RecorderStats(NamedTuple):
@@ -33,8 +38,9 @@ class RecorderStats(NamedTuple):
 class Recorder:
     """Records into `folder`, which must not hold a recording yet. The case is on disk before the first row.
 
-    `max_queued_bytes` bounds the memory that a slow disk may take. Raises UserError where the folder is taken, OSError
-    where it cannot be written to.
+    `max_queued_bytes` bounds the memory that a slow disk may take. `batch` is how long rows may wait for others to be
+    written with, in s: at low rates it makes the stream smaller, and it is what a crash may cost. `rotation` makes
+    parts. Raises UserError where the folder is taken, OSError where it cannot be written to.
     """
 
     def __init__(
@@ -44,23 +50,27 @@ class Recorder:
         dtype: np.dtype,
         case: Mapping[str, Any],
         max_queued_bytes: int = 64 << 20,
+        batch: float = 0.0,
+        rotation: Rotation | None = None,
     ):
         self.folder = Path(folder)
-        self._refuse_a_taken_folder()
-        self.folder.mkdir(parents=True, exist_ok=True)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         self.case = {"format": FORMAT, "recorded_at": now, **case}
-        save_case(self.folder, {**self.case, "complete": False})
-        self._writer = StreamWriter(self.folder / ARROWS, columns, dtype, {"case": as_json(self.case)})
+        self._losses = Losses()
+        self._changed = threading.Condition()  # guards all that follows; never held during I/O
+        self._bundle: Part | Parts
+        if rotation is None or rotation == Rotation():
+            self._bundle = Part(self.folder, columns, dtype, self.case)
+        else:
+            self._bundle = Parts(self.folder, columns, dtype, self.case, rotation, self._lost)
         self._most = max_queued_bytes
+        self._batch = batch
         self._queue: deque[np.ndarray] = deque()
         self._queued = 0  # bytes
         self._written = 0  # rows
-        self._losses = Losses()
         self._error: Exception | None = None
         self._closing = False
         self._finished: Path | None = None
-        self._changed = threading.Condition()  # guards all of the above; never held during I/O
         self._thread = threading.Thread(target=self._write_queue, name="recorder", daemon=True)
         self._thread.start()
 
@@ -92,7 +102,7 @@ class Recorder:
                 rows_written=self._written,
                 rows_queued=sum(map(len, self._queue)),
                 rows_lost=self._losses.rows,
-                bytes_written=self._writer.bytes,
+                bytes_written=self._bundle.bytes,
                 bytes_queued=self._queued,
                 gaps=self._losses.gaps,
                 error=str(self._error) if self._error else None,
@@ -110,50 +120,55 @@ class Recorder:
             self._changed.notify_all()
         self._thread.join()
         try:
-            self._writer.close()
+            self._bundle.close()
         except OSError as error:
             self._error = self._error or error
-        reader = StreamReader(self.folder / ARROWS)
-        case = {**self.case, **(extra or {}), "rows": self._writer.rows, "losses": self._losses.as_dict()}
-        case["complete"] = not self._losses.rows and not self._error
-        if self._error:
-            case["recording_error"] = str(self._error)
-        try:
-            write_parquet(self.folder, reader, self._writer.schema, expect=self._writer.rows)
-        except OSError:
-            save_case(self.folder, {**case, "complete": False})  # the losses are known only here
-            raise
-        save_case(self.folder, case)
-        reader.path.unlink()  # last: until now everything can be made from it
+        self._bundle.finish(extra or {}, self._losses, self._error)
         self._finished = self.folder
         return self.folder
+
+    def _lost(self, first_tick: int, end: int) -> Losses:
+        with self._changed:
+            return self._losses.between(first_tick, end)
 
     def _write_queue(self) -> None:
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._queue or self._closing)
+                if self._batch:
+                    self._changed.wait_for(lambda: self._closing or self._queued >= ENOUGH, self._batch)
                 if not self._queue:
                     return
-                rows = self._queue[0]  # stays queued, and counted, until it is written
+                batch = self._next_batch()
+            rows = batch[0] if len(batch) == 1 else np.concatenate(batch)
+            error: Exception | None = None
             try:
-                self._writer.write(rows)
-            except Exception as error:  # a full disk, mostly; whatever it is, the rows must be counted
-                self._give_up(error)
-                continue
+                self._bundle.write(rows)
+            except Exception as failure:  # a full disk, mostly; whatever it is, the rows must be counted
+                error = failure
             with self._changed:
-                self._queue.popleft()
+                for _ in batch:
+                    self._queue.popleft()
                 self._queued -= rows.nbytes
-                self._written += len(rows)
+                taken = self._bundle.rows - self._written
+                self._written += taken
+                if error is not None:
+                    self._give_up(error, rows[taken:])
 
-    def _give_up(self, error: Exception) -> None:
-        with self._changed:
-            self._error = error
-            for rows in self._queue:
-                self._losses.add_ticks(rows["tick"])
-            self._queue.clear()
-            self._queued = 0
+    def _next_batch(self) -> list[np.ndarray]:
+        """What is written at once; it stays queued, and counted, until it is written."""
+        batch = [self._queue[0]]
+        size = batch[0].nbytes
+        for rows in itertools.islice(self._queue, 1, None) if self._batch else ():
+            size += rows.nbytes
+            if size > ENOUGH:
+                break
+            batch.append(rows)
+        return batch
 
-    def _refuse_a_taken_folder(self) -> None:
-        for name in (ARROWS, PARQUET):
-            if (self.folder / name).exists():
-                raise UserError(f"{self.folder} already holds {name}; choose another folder")
+    def _give_up(self, error: Exception, rest: np.ndarray) -> None:
+        self._error = error
+        for rows in (rest, *self._queue):
+            self._losses.add_ticks(rows["tick"])
+        self._queue.clear()
+        self._queued = 0

@@ -5,6 +5,7 @@ recorder was given. Doing it again changes nothing.
 """
 
 import json
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,9 +14,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.trace.bundle import ARROWS, CASE, FORMAT, PARQUET, load_case, save_case, write_parquet
+from rtctl.trace.bundle import ARROWS, CASE, FORMAT, PARQUET, index, load_case, part_folders, save_case, write_parquet
 from rtctl.trace.losses import Losses
-from rtctl.trace.stream import StreamReader
+from rtctl.trace.stream import StreamReader, lock
 
 BROKEN = CASE + ".broken"
 
@@ -37,10 +38,19 @@ class RepairReport(NamedTuple):
 def repair(folder: Path | str) -> RepairReport:
     """Make `recording.parquet` and `case.json` whole.
 
-    Raises UserError where there is no recording or it is still being written, NoAnswer where it was killed before the
-    first bytes that could be read (its file is left as it is), OSError where the disk does not take the result.
+    Of a long recording, all parts. Raises UserError where there is no recording or it is still being written, NoAnswer
+    where it was killed before the first bytes that could be read (its file is left as it is), OSError where the disk
+    does not take the result.
     """
     folder = Path(folder)
+    parts = part_folders(folder)
+    if parts and not any((folder / name).exists() for name in (ARROWS, PARQUET)):
+        return _parts(folder, parts)
+    return _piece(folder)
+
+
+def _piece(folder: Path) -> RepairReport:
+    """A recording in one piece, or one part."""
     stream = folder / ARROWS
     rows = _rows_in(folder / PARQUET)
     if stream.is_file():
@@ -55,6 +65,66 @@ def repair(folder: Path | str) -> RepairReport:
     return report
 
 
+def _parts(folder: Path, parts: list[Path]) -> RepairReport:
+    guard = os.open(folder, os.O_RDONLY)
+    try:
+        lock(guard, folder)
+        reports, notes = [], []
+        for part in parts:
+            try:
+                reports.append(_piece(part))
+            except (NoAnswer, UserError) as error:  # killed when it had just been made
+                notes.append(str(error))
+        changed = any(report.changed for report in reports)
+        notes += [note for report in reports for note in report.notes]
+        rows = sum(report.rows for report in reports)
+        discarded = sum(report.discarded_bytes for report in reports)
+        if not rows:
+            raise NoAnswer(f"{folder}: killed before its first row was written: " + "; ".join(notes))
+        return RepairReport(folder, rows, discarded, _on_top(folder, rows, notes) or changed, tuple(notes))
+    finally:
+        os.close(guard)
+
+
+def _on_top(folder: Path, rows: int, notes: list[str]) -> bool:
+    """The case of all parts: as it is where it tells of them, else made again. Returns whether it was."""
+    found = index(folder)
+    try:
+        case = load_case(folder)
+        if (case.get("parts"), case.get("rows")) == (found["parts"], rows):
+            return False
+    except UserError:
+        newest = folder / found["parts"][-1]["folder"]  # it knows of all changes
+        case = {**load_case(newest), "losses": {}}
+        case.pop("part", None)
+        notes.append(f"{folder / CASE} was made again from that of {newest.name}")
+    losses, last = Losses(), None
+    cases = [load_case(folder / entry["folder"]) for entry in found["parts"]]
+    for entry, part in zip(found["parts"], cases, strict=True):
+        first_tick, last_tick = entry.get("tick", (None, None))
+        if last is not None and first_tick is not None:
+            losses.add(last + 1, first_tick - last - 1)
+        for tick, count in _gaps(part):
+            if first_tick is not None and first_tick <= tick < last_tick:
+                losses.add(tick, count)
+        last = last_tick if last_tick is not None else last
+    _save(folder, {**case, **found}, rows, losses, sum(_discarded(case) for case in cases))
+    return True
+
+
+def _discarded(case: dict[str, Any]) -> int:
+    told = case.get("discarded_bytes", 0)
+    return told if isinstance(told, int) else 0
+
+
+def _gaps(case: dict[str, Any]) -> list[tuple[int, int]]:
+    """[first tick, count] as the case of a part lists them."""
+    losses = case.get("losses")
+    gaps = losses.get("gaps") if isinstance(losses, dict) else None
+    pairs = [gap for gap in gaps if isinstance(gap, list) and len(gap) == 2] if isinstance(gaps, list) else []
+    return [(tick, count) for tick, count in pairs if isinstance(tick, int) and isinstance(count, int)]
+
+
 def _from_stream(folder: Path, in_parquet: int | None) -> RepairReport:
     reader = StreamReader(folder / ARROWS)
     losses = Losses()
@@ -64,7 +134,10 @@ def _from_stream(folder: Path, in_parquet: int | None) -> RepairReport:
     if made:
         if reader.schema is None:
             raise NoAnswer(f"{reader.path} ends before its list of columns: killed before its first row was written")
-        rows = write_parquet(folder, reader, reader.schema, expect=rows)
+        try:
+            rows = write_parquet(folder, reader, reader.schema, expect=rows)
+        except pa.ArrowException as error:
+            raise UserError(f"{reader.path} is damaged and cannot be made whole: {error}") from None
     else:
         rows = in_parquet or 0
     case, notes = _case(folder)
@@ -77,26 +150,31 @@ def _case_only(folder: Path, rows: int) -> RepairReport:
     case, notes = _case(folder)
     if notes:
         _save(folder, case, rows, Losses(), 0)
-    return RepairReport(folder, rows, int(case.get("discarded_bytes", 0)), bool(notes), notes)
+    return RepairReport(folder, rows, _discarded(case), bool(notes), notes)
 
 
 def _save(folder: Path, case: dict[str, Any], rows: int, losses: Losses, discarded: int) -> None:
-    known = case.get("losses", {})
-    if known.get("rows", 0) < losses.rows:  # what the recorder counted is better: it knows what is lost at the end, too
-        known = losses.as_dict()
-    case = {**case, "rows": rows, "losses": known or losses.as_dict(), "complete": False}
-    save_case(folder, {**case, "repaired": True, "discarded_bytes": discarded})
+    known = case.get("losses")
+    counted = known.get("rows") if isinstance(known, dict) else None
+    if not isinstance(counted, int) or counted < losses.rows:
+        known = losses.as_dict()  # else what the recorder counted is better: it knows what is lost at the end, too
+    case = {**case, "rows": rows, "losses": known, "complete": False}
+    try:
+        save_case(folder, {**case, "repaired": True, "discarded_bytes": discarded})
+    except ValueError:  # read all the same, but nothing that we write
+        raise UserError(f"{folder / CASE} holds NaN or Infinity, which JSON does not know; write null there") from None
 
 
 def _tally(reader: StreamReader, losses: Losses) -> None:
     """Read all that is whole; ticks that are missing in between were lost."""
     last: int | None = None
     for batch in reader:
-        if "tick" in batch.schema.names and batch.num_rows:
+        numbered = batch.schema.get_field_index("tick") >= 0 and pa.types.is_int64(batch.column("tick").type)
+        if batch.num_rows and numbered:
             ticks = batch.column("tick").to_numpy()
             ticks = ticks if last is None else np.concatenate(([last], ticks))
             for k in np.flatnonzero(np.diff(ticks) > 1):
-                losses.add(int(ticks[k]) + 1, int(ticks[k + 1] - ticks[k]) - 1)
+                losses.add(int(ticks[k]) + 1, int(ticks[k + 1]) - int(ticks[k]) - 1)
             last = int(ticks[-1])
 
 

@@ -20,6 +20,7 @@ from rtctl.config.errors import UserError
 from rtctl.trace.columns import Column, record_batch, schema
 
 END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
+NOT_WHOLE = (StopIteration, pa.ArrowException, UnicodeDecodeError)  # what Arrow raises at the end and at damage
 
 
 class StreamWriter:
@@ -97,8 +98,9 @@ class StreamReader:
         self.rows = 0
         self.bytes = 0
         self.schema: pa.Schema | None = None
-        with pa.OSFile(str(path)) as file, contextlib.suppress(pa.ArrowInvalid, OSError, StopIteration):
-            self.schema = pa.ipc.open_stream(file).schema
+        with pa.OSFile(str(path)) as file, contextlib.suppress(*NOT_WHOLE, OSError):
+            schema = pa.ipc.open_stream(file).schema
+            self.schema = schema if schema.names else None  # names that are no text are told only when asked for
 
     def __iter__(self) -> Iterator[pa.RecordBatch]:
         self.rows = self.bytes = 0
@@ -119,8 +121,10 @@ class StreamReader:
     @staticmethod
     def _next(stream: pa.RecordBatchReader) -> pa.RecordBatch | None:
         try:
-            return stream.read_next_batch()
-        except (StopIteration, pa.ArrowInvalid):  # the end, or a message that is not whole
+            batch = stream.read_next_batch()
+            batch.validate()  # a damaged message may tell of more rows than it holds
+            return batch
+        except NOT_WHOLE:  # the end, or a message that is not whole
             return None
         except OSError as error:
             if error.errno:  # the disk's error, not Arrow's word for a file that is too short

@@ -6,6 +6,7 @@ parsed and evaluated here, column by column; nothing in it is ever run as Python
 
 import ast
 import operator
+import warnings
 from collections.abc import Callable, Iterable
 from functools import reduce
 from typing import Any, NamedTuple
@@ -65,7 +66,9 @@ class Trigger:
         if len(expression) > LONGEST:
             raise UserError(f"the trigger is {len(expression)} characters long; at most {LONGEST} are allowed")
         try:
-            tree = ast.parse(expression.strip(), mode="eval")
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # "invalid decimal literal", about a text that is refused anyway
+                tree = ast.parse(expression.strip(), mode="eval")
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             where = f" near column {error.offset}" if isinstance(error, SyntaxError) and error.offset else ""
             raise UserError(

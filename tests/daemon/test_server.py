@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from rtctl.config.errors import UserError
 from rtctl.daemon import protocol, server
+from rtctl.daemon.child import link_socket
 from rtctl.daemon.protocol import decode_reply, encode_request
 from rtctl.daemon.server import CommandServer, default_endpoint, find_endpoint, runtime_dir
 
@@ -183,6 +184,15 @@ def test_tcp_in_use_names_the_daemon_or_says_another_program(serving, context, e
 def test_bad_endpoints(context, echo, endpoint, words):
     with pytest.raises(UserError, match=words):
         CommandServer(endpoint, echo, context)
+
+
+@pytest.mark.parametrize("bind", [True, False], ids=["plant", "loop"])
+@pytest.mark.parametrize(
+    "endpoint", ["tcp://192.0.2.7:9873", "tcp://*:9873", "tcp://eth0:9873", "tcp://plant.local:9873"]
+)
+def test_the_link_off_the_host_needs_keys(context, endpoint, bind):
+    with pytest.raises(UserError, match=r"can be reached from other machines and needs keys: run `rtctl keys new`"):
+        link_socket(context, endpoint, bind, 1.0, None)
 
 
 def test_runtime_dir_follows_xdg(monkeypatch, tmp_path):

@@ -1,3 +1,5 @@
+import shutil
+
 import msgpack
 import numpy as np
 import pytest
@@ -6,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtctl.config.errors import UserError
+from rtctl.daemon.keys import apply_client, client_curve, new_keys, server_curve
 from rtctl.daemon.telemetry import MESSAGES_WAITING, Telemetry, thin
 
 ROWS = np.array([[0.0, 1.0, 2.0], [0.1, 3.0, np.nan]])
@@ -31,6 +34,15 @@ def subscriber(context, telemetry, publish, hwm=1000):
                 socket.recv_multipart()
             return socket
     raise AssertionError("the subscription never arrived")
+
+
+def next_message(socket, telemetry):
+    """Publish until one comes. libzmq looks only every other millisecond whether a queue has room again."""
+    for _ in range(500):
+        telemetry.publish(ROWS)
+        if socket.poll(20):
+            return socket.recv_multipart()
+    raise AssertionError("no message within 10 s")
 
 
 def test_sends_topic_and_rows_as_plotjuggler_reads_them(context, made):
@@ -82,6 +94,67 @@ def test_a_slow_subscriber_loses_messages_and_blocks_nobody(context, made):
         socket.recv_multipart()
         received += 1
     assert 1 <= received < 50 * MESSAGES_WAITING
+
+
+def test_who_never_reads_takes_nothing_from_others(context, made):
+    deaf = [subscriber(context, made, lambda: made.publish(ROWS), hwm=1) for _ in range(3)]
+    reader = subscriber(context, made, lambda: made.publish(ROWS))
+    for _ in range(5 * MESSAGES_WAITING):  # the deaf are long full
+        next_message(reader, made)
+    assert len(deaf) == 3
+
+
+def test_who_asks_for_too_long_a_topic_is_cut_off(context, made):
+    greedy = context.socket(zmq.SUB)
+    greedy.linger = 0
+    greedy.subscribe("x" * 100_000)
+    greedy.subscribe("ivu")
+    greedy.connect(made.endpoint)
+    reader = subscriber(context, made, lambda: made.publish(ROWS))
+    for _ in range(20):
+        next_message(reader, made)
+    assert not greedy.poll(0)
+
+
+def test_a_subscriber_needs_a_key_that_is_known(tmp_path):
+    """What comes off the host is for those who have a key in `authorized`."""
+    for name in ("server", "alice", "mallory"):
+        new_keys(name, tmp_path)
+    shutil.copy(tmp_path / "alice.key", tmp_path / "authorized")
+    with zmq.Context() as own:  # ZAP is a matter of the whole context
+        telemetry = Telemetry("tcp://127.0.0.1:*", "ivu", ["v", "u"], own, curve=server_curve(tmp_path))
+        with zmq.Context() as far:
+            others = []
+            for name in ("mallory", None):
+                others.append(far.socket(zmq.SUB))
+                others[-1].linger = 0
+                others[-1].subscribe("ivu")
+                if name:
+                    curve = client_curve(name, tmp_path)
+                    apply_client(others[-1], curve.keys, curve.server)
+                others[-1].connect(telemetry.endpoint)
+            alice = far.socket(zmq.SUB)
+            alice.linger = 0
+            alice.subscribe("ivu")
+            curve = client_curve("alice", tmp_path)
+            apply_client(alice, curve.keys, curve.server)
+            alice.connect(telemetry.endpoint)
+            for _ in range(500):
+                telemetry.publish(ROWS)
+                if alice.poll(20):
+                    break
+            for _ in range(20):
+                telemetry.publish(ROWS)
+            assert alice.recv_multipart()[0] == b"ivu"
+            assert not any(other.poll(0) for other in others)
+            for socket in (alice, *others):
+                socket.close()
+        telemetry.close()
+
+
+def test_nobody_off_the_host_without_keys(context):
+    with pytest.raises(UserError, match=r"tcp://0\.0\.0\.0:9872 can be reached from other machines and needs keys"):
+        Telemetry("tcp://0.0.0.0:9872", "ivu", ["v"], context)
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 2), (2, 4)])

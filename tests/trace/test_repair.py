@@ -86,6 +86,38 @@ def test_zeros_after_the_last_batch_are_no_rows(tmp_path, recording):
     assert is_truth(load_bundle(folder).columns, range(sum(SIZES[:3])))
 
 
+def test_a_message_that_claims_more_rows_than_it_holds_is_not_whole(tmp_path, recording):
+    stream, _, ends = recording
+    begin = ends[2]  # of the message of 300 rows; its length stands in its header
+    where = stream.index((300).to_bytes(8, "little"), begin)
+    folder = killed(tmp_path / "run", stream[:where] + (3000).to_bytes(8, "little") + stream[where + 8 :])
+    assert repair(folder).rows == sum(SIZES[:3])
+    assert is_truth(load_bundle(folder).columns, range(sum(SIZES[:3])))
+
+
+def test_column_names_that_are_no_text(tmp_path, recording):
+    stream, head, _ = recording
+    folder = killed(
+        tmp_path / "run", stream[:head].replace(b"\x05\0\0\0state", b"\x05\0\0\0\xff\xfeate") + stream[head:]
+    )
+    with pytest.raises(NoAnswer, match="ends before its list of columns"):
+        repair(folder)
+
+
+def test_a_case_that_json_cannot_hold_is_told(tmp_path, recording):
+    folder = killed(tmp_path / "run", recording[0], b'{"format": 1, "sample_rate": NaN}')
+    with pytest.raises(UserError, match="holds NaN or Infinity"):
+        repair(folder)
+    assert (folder / "recording.arrows").exists()
+
+
+@pytest.mark.parametrize("losses", [[], {"rows": "many"}, {"rows": None, "gaps": 7}])
+def test_losses_that_make_no_sense_are_counted_again(tmp_path, recording, losses):
+    folder = killed(tmp_path / "run", recording[0], json.dumps({**CASE, "losses": losses}).encode())
+    repair(folder)
+    assert load_bundle(folder).case["losses"] == {"rows": 0, "gaps": []}
+
+
 @pytest.mark.parametrize("case", [None, b"", b'{"format": 1, "pla', b"[]"])
 def test_a_lost_case_comes_out_of_the_recording(tmp_path, recording, case):
     folder = killed(tmp_path / "run", recording[0], case)

@@ -127,3 +127,9 @@ def test_any_text_is_either_a_trigger_or_a_user_error(text):
         return
     data = np.zeros(3, [("e", "f8"), ("u1", "f8")])
     assert -1 <= trigger(data) < 3
+
+
+def test_a_wrong_expression_is_told_once_and_not_as_a_warning_too(recwarn):
+    with pytest.raises(UserError):
+        Trigger("abs(x) > 1in", ["x"])
+    assert not recwarn.list

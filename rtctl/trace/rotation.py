@@ -1,0 +1,163 @@
+"""Long recordings: a bundle in numbered parts, each a bundle of its own, with one case.json on top.
+
+    run/case.json                 of all parts: what the owner believes, rows, losses, and `parts`, the list of them
+    run/part-0001/case.json, recording.parquet
+    run/part-0002/case.json, recording.arrows      the one that is being written
+
+A part that is full is made into Parquet by a thread of its own while the next one is written, so that the rows go on
+reaching the disk and the end of a long run does not wait for hours of rows to be compressed.
+"""
+
+import os
+import queue
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.trace.bundle import PART, index, load_case, save_case
+from rtctl.trace.columns import Column
+from rtctl.trace.losses import Losses
+from rtctl.trace.part import Part, refuse_taken, told
+from rtctl.trace.stream import lock
+
+MEGABYTE = 1_000_000
+BEGINNING, END = -(2**63), 2**63 - 1  # before the first tick, after the last
+
+
+class Rotation(NamedTuple):
+    """When a part is full: what comes first. None: never."""
+
+    megabytes: float | None = None  # of the stream, which is some times larger than the Parquet file
+    minutes: float | None = None  # of the column t
+
+
+class _Full(NamedTuple):
+    part: Part
+    losses: Losses
+
+
+class Parts:
+    """Writes rows, which have `tick` and `t`, into parts of `folder`; it is locked while it is recorded into.
+
+    The same methods as a `Part`, which has only itself. `lost(first, end)` tells the losses from one tick to before
+    another. Raises UserError where the folder is taken, OSError where it cannot be written to.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        columns: Sequence[Column],
+        dtype: np.dtype,
+        case: Mapping[str, Any],
+        rotation: Rotation,
+        lost: Callable[[int, int], Losses],
+    ):
+        refuse_taken(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder, self.case, self._of, self._lost = folder, dict(case), (columns, dtype), lost
+        self._bytes = float("inf") if rotation.megabytes is None else rotation.megabytes * MEGABYTE
+        self._seconds = float("inf") if rotation.minutes is None else rotation.minutes * 60.0
+        self._failed: list[_Full] = []
+        self._before = (0, 0)  # rows and bytes of the parts that are full
+        self._number = 0
+        self._lock = os.open(folder, os.O_RDONLY)
+        try:
+            lock(self._lock, folder)
+            save_case(folder, {**case, "complete": False, "parts": []})
+            self._part = self._next()
+        except BaseException:
+            self._unlock()
+            raise
+        self._first_tick = BEGINNING
+        self._end = self._seconds  # t at which the part is full
+        self._full: queue.SimpleQueue[_Full | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._make_bundles, name="parts", daemon=True)
+        self._thread.start()
+
+    @property
+    def rows(self) -> int:
+        return self._before[0] + self._part.rows
+
+    @property
+    def bytes(self) -> int:
+        return self._before[1] + self._part.bytes
+
+    def write(self, rows: np.ndarray) -> int:
+        """Append `rows` to the part that is open, or to as many as it takes. Raises OSError as a `Part` does."""
+        written = 0
+        while len(rows):
+            if self._part.rows and (self._part.bytes >= self._bytes or rows["t"][0] >= self._end):
+                self._rotate(int(rows["tick"][0]))
+            if not self._part.rows:
+                self._end = float(rows["t"][0]) + self._seconds
+            now = max(1, int(np.searchsorted(rows["t"], self._end)))
+            written += self._part.write(rows[:now])
+            rows = rows[now:]
+        return written
+
+    def close(self) -> None:
+        """No more rows. Raises OSError where the disk does not take the end."""
+        self._part.close()
+
+    def finish(self, extra: Mapping[str, Any], losses: Losses, error: Exception | None) -> None:
+        """Make the last part, wait for the others, write the case on top, and tell each part what is known now.
+
+        Raises OSError where the disk does not take all of it; the streams that it did not take then stay, for `repair`
+        or for another call.
+        """
+        if self._thread.is_alive():
+            self._full.put(_Full(self._part, self._lost(self._first_tick, END)))
+            self._full.put(None)
+            self._thread.join()
+        again, self._failed = self._failed, []
+        for full in again:  # somebody may have made room since
+            self._make(full)
+        known = {**self.case, **extra, "rows": self.rows, **told(losses, error), **index(self.folder)}
+        try:
+            save_case(self.folder, {**known, "complete": known["complete"] and not self._failed})
+            for entry in known["parts"]:
+                part = self.folder / entry["folder"]
+                save_case(part, {**load_case(part), **_until(entry.get("tick", [0, END])[1], extra)})
+        finally:
+            self._unlock()
+        if self._failed:
+            raise OSError(f"{len(self._failed)} parts could not be made whole, {self._failed[0].part.folder} first")
+
+    def _unlock(self) -> None:
+        if self._lock >= 0:
+            os.close(self._lock)
+        self._lock = -1
+
+    def _rotate(self, tick: int) -> None:
+        part = self._next()  # first: where the disk is full, the part that is open stays what it is
+        self._before = (self.rows, self.bytes)
+        self._full.put(_Full(self._part, self._lost(self._first_tick, tick)))
+        self._part, self._first_tick = part, tick
+
+    def _next(self) -> Part:
+        self._number += 1
+        return Part(self.folder / PART.format(self._number), *self._of, {**self.case, "part": self._number})
+
+    def _make_bundles(self) -> None:
+        while (full := self._full.get()) is not None:
+            self._make(full)
+
+    def _make(self, full: _Full) -> None:
+        try:
+            full.part.close()
+            full.part.finish({}, full.losses, None)
+        except Exception:  # a full disk, mostly; the stream stays, and `finish` tries again and tells
+            self._failed.append(full)
+
+
+def _until(tick: int, extra: Mapping[str, Any]) -> dict[str, Any]:
+    """`extra` as it was at a tick: lists of what happened, such as `changes`, end there."""
+    return {key: [each for each in value if not _after(each, tick)] if isinstance(value, list) else value
+            for key, value in extra.items()}  # fmt: skip
+
+
+def _after(event: Any, tick: int) -> bool:
+    return isinstance(event, dict) and isinstance(event.get("tick"), int) and event["tick"] > tick
