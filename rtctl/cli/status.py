@@ -93,6 +93,11 @@ def table(found: dict[str, Any], units: dict[str, str]) -> Any:
     if found["mode"] == "real":
         out.add_row("lateness", _times(late))
     out.add_row("tick time", _times(tick))
+    stages = [f"{name} {found['stages_us'][name]['p50']:.2f}" for name in ("read", "law", "write", "publish")]
+    out.add_row("stages", ", ".join(stages) + " us at p50")
+    if found["late_ticks"]:
+        last = found["late_ticks"][-1]
+        out.add_row("last late", f"tick {last['tick']}, by {last['lateness_us']:.0f} us")
     frames = found["frames"]
     out.add_row("link", f"{found['link']}, {frames['received']} frames, {frames['not_sent']} not sent")
     if found["mode"] == "real":

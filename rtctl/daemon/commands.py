@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
 SWITCHED = (
-    "loop", "link", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation", "faults"
+    "loop", "link", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation", "faults",
+    "metrics",
 )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ from rtctl.daemon.reload import reload
 from rtctl.daemon.server import CommandServer, default_endpoint, runtime_dir
 from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop import faults, generate, safety
-from rtctl.loop.histogram import percentiles
+from rtctl.loop.histogram import account, percentiles
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import STAGES, late_ticks, layout
@@ -135,6 +135,10 @@ class Supervisor:
                 self.journal.open(self.out)
             except OSError as error:
                 raise UserError(f"{self.out}: cannot record here: {error.strerror}") from error
+        if config.metrics.port is not None:
+            from rtctl.daemon import metrics  # here: few want it, and it takes its time to load
+
+            stack.callback(metrics.serve(self, config.metrics.port))
         self._start_children(stack, rows)
 
     def _start_children(self, stack: contextlib.ExitStack, rows: int) -> None:
@@ -313,7 +317,7 @@ class Supervisor:
             "sample_age_us": percentiles(s["age"]),
             "frames": {"received": int(s["link_frames"]), "not_sent": int(s["link_dropped"])},
             "lost_counts": int(s["lost_counts"]),
-            "rows": {"lost_in_ring": self.reader.lost, **self._recorded()},
+            "rows": self.rows_counted(),
             "refused_commands": dict(self.server.refused),
             "lacks": self.lacks,
             "faults": self.faults.told,
@@ -328,11 +332,14 @@ class Supervisor:
         """Remember a setting that was changed while running, for the bundle."""
         self.changes.append({"tick": int(self.status["tick"]), "path": path, "value": value})
 
-    def _recorded(self) -> dict[str, Any]:
+    def rows_counted(self) -> dict[str, Any]:
+        """What became of the rows of the trace."""
+        lost = {"lost_in_ring": self.reader.lost}
         if self.recorder is None:
-            return {}
+            return lost
         stats = self.recorder.stats()
         return {
+            **lost,
             "recorded": stats.rows_written,
             "queued": stats.rows_queued,
             "lost": stats.rows_lost,
@@ -365,7 +372,8 @@ class Supervisor:
         """Close the recording; returns the bundle's folder. Raises OSError where the disk does not take it."""
         if self.recorder is None:
             return None
-        return self.recorder.finish({"run": self.snapshot(), "changes": self.changes})
+        timing = {stage: account(self.status[field]) for stage, field in STAGES.items()}
+        return self.recorder.finish({"run": self.snapshot(), "timing": timing, "changes": self.changes})
 
     def _stop_children(self) -> None:
         self.segment["plant_status"][0]["stop"] = 1

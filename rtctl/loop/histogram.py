@@ -7,6 +7,7 @@ Source: the bucket layout of HdrHistogram (G. Tene).
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -54,3 +55,26 @@ def _middle(index: int) -> float:
         return float(index)
     octave = index // SUB - 1
     return (index - SUB * octave + 0.5) * 2.0**octave
+
+
+def octaves(h: np.void) -> list[tuple[int, int]]:
+    """Pairs of 2^k ns and how many times were shorter, from 64 ns to the octave of the longest."""
+    cumulative = np.cumsum(h["bucket"])
+    longest = max(int(h["max"]), 64).bit_length()
+    return [(1 << k, int(cumulative[SUB * (k - 4) - 1])) for k in range(6, min(longest, 36) + 1)]
+
+
+def total(h: np.void) -> float:
+    """Sum of all times, ns, as exact as the buckets are."""
+    counted = np.flatnonzero(h["bucket"])
+    return float(sum(_middle(int(i)) * int(h["bucket"][i]) for i in counted))
+
+
+def account(h: np.void) -> dict[str, Any]:
+    """A histogram to keep: percentiles and max in us, counted buckets as pairs of their middle in ns and count."""
+    counted = np.flatnonzero(h["bucket"])
+    return {
+        "count": int(h["count"]),
+        **percentiles(h),
+        "buckets": [[_middle(int(i)), int(h["bucket"][i])] for i in counted],
+    }

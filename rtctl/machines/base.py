@@ -104,6 +104,12 @@ class CommandSettings(Settings):
     keys: str | None = Field(default=None, description="name of the CURVE keys, needed for anything but this machine")
 
 
+class MetricsSettings(Settings):
+    port: int | None = Field(
+        default=None, ge=1, le=65535, description="where Prometheus may ask, on 127.0.0.1 alone; nowhere if absent"
+    )
+
+
 class MachineSettings(Settings):
     """Keys that every machine's config has."""
 
@@ -113,6 +119,7 @@ class MachineSettings(Settings):
     safety: SafetySettings = SafetySettings()
     record: RecordSettings = RecordSettings()
     commands: CommandSettings = CommandSettings()
+    metrics: MetricsSettings = MetricsSettings()
     faults: list[FaultSettings] = Field(default=[], description="faults to inject; `rtctl fault list` explains them")
 
 

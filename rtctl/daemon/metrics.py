@@ -1,0 +1,94 @@
+"""What a machine counts, for Prometheus: opt-in, on the loopback interface alone, read off shared memory by its thread.
+
+Source: prometheus_client's custom collectors; the names follow Prometheus' rules (base units, `_total`).
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from prometheus_client import CollectorRegistry, start_http_server
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from rtctl.config.errors import UserError
+from rtctl.loop import safety
+from rtctl.loop.histogram import octaves, total
+from rtctl.loop.records import STAGES
+
+if TYPE_CHECKING:
+    from rtctl.daemon.supervisor import Supervisor
+
+ADDRESS = "127.0.0.1"
+COUNTS = {  # field of the status record -> what it counts
+    "tick": ("ticks", "ticks of the loop"),
+    "missed": ("missed_ticks", "periods that went by without a tick"),
+    "late": ("late_ticks", "ticks that woke late"),
+    "overruns": ("overruns", "ticks that were not done when the next was due"),
+    "link_frames": ("link_frames", "frames from plant or board"),
+    "link_dropped": ("link_frames_not_sent", "frames that could not be sent"),
+    "lost_counts": ("lost_counts", "counts lost by the quadrature converters"),
+}
+
+
+class MachineCollector(Collector):
+    """All counts of one machine, as they stand when they are asked for."""
+
+    def __init__(self, name: str, status: Any, rows: Callable[[], Mapping[str, Any]]):
+        self._name, self._status, self._rows = name, status, rows
+
+    def collect(self) -> Iterator[Metric]:
+        """The metrics, one family after the other."""
+        s = self._status
+        for field, (name, words) in COUNTS.items():
+            yield self._count(name, words, int(s[field]))
+        for name, value in self._rows().items():
+            if isinstance(value, int):
+                yield self._count(f"rows_{name}", f"rows of the trace: {name.replace('_', ' ')}", value)
+        state = GaugeMetricFamily("rtctl_state", "1 for the state that the machine is in", labels=["machine", "state"])
+        for number, name in enumerate(safety.STATES):
+            state.add_metric([self._name, name], float(int(s["state"]) == number))
+        yield state
+        trip = GaugeMetricFamily("rtctl_trip", "1 for the trip that is latched", labels=["machine", "trip"])
+        for number, (name, _) in safety.TRIPS.items():
+            if number != safety.NONE:
+                trip.add_metric([self._name, name], float(int(s["trip"]) == number))
+        yield trip
+        stages = HistogramMetricFamily(
+            "rtctl_stage_seconds", "time that each stage of a tick took", labels=["machine", "stage"]
+        )
+        for stage, field in STAGES.items():
+            stages.add_metric([self._name, stage], *_buckets(s[field]))
+        yield stages
+        age = HistogramMetricFamily(
+            "rtctl_sample_age_seconds", "age of the sample that a tick reads", labels=["machine"]
+        )
+        age.add_metric([self._name], *_buckets(s["age"]))
+        yield age
+
+    def _count(self, name: str, words: str, value: int) -> Metric:
+        family = CounterMetricFamily(f"rtctl_{name}", words, labels=["machine"])
+        family.add_metric([self._name], value)
+        return family
+
+
+def _buckets(histogram: Any) -> tuple[list[tuple[str, float]], float]:
+    """Counts up to each power of two, and the sum, in seconds."""
+    pairs = [(repr(ns * 1e-9), float(count)) for ns, count in octaves(histogram)]
+    return [*pairs, ("+Inf", float(histogram["count"]))], total(histogram) * 1e-9
+
+
+def serve(supervisor: "Supervisor", port: int) -> Callable[[], None]:
+    """Answer GET /metrics on loopback; returns what ends it. Raises UserError where the port is taken."""
+    registry = CollectorRegistry()
+    registry.register(MachineCollector(supervisor.config.name, supervisor.status, supervisor.rows_counted))
+    try:
+        server, thread = start_http_server(port, addr=ADDRESS, registry=registry)
+    except OSError as error:
+        raise UserError(f"metrics.port {port}: {error.strerror}; choose a free one") from error
+
+    def close() -> None:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+    return close

@@ -1,0 +1,78 @@
+"""Prometheus: what is counted is what the machine counted, and nobody but this machine may ask."""
+
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from rtctl.config.errors import UserError
+from rtctl.daemon import metrics
+from rtctl.daemon.supervisor import Supervisor
+from rtctl.loop import histogram
+
+TICKS = 3000
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((metrics.ADDRESS, 0))
+        return int(probe.getsockname()[1])
+
+
+def read(port: int) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
+    """Samples by name and labels."""
+    text = urlopen(f"http://{metrics.ADDRESS}:{port}/metrics").read().decode()
+    out: dict[str, dict[tuple[tuple[str, str], ...], float]] = {}
+    for family in text_string_to_metric_families(text):
+        for sample in family.samples:
+            labels = tuple(sorted((k, v) for k, v in sample.labels.items() if k != "machine"))
+            out.setdefault(sample.name, {})[labels] = sample.value
+    return out
+
+
+def test_it_tells_what_the_machine_counts(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> None:
+    port = free_port()
+    with Supervisor(config(set={"metrics.port": port}), tmp_path / "run", TICKS) as machine:
+        for _ in machine.run():
+            pass
+        found, status = read(port), machine.status
+        assert found["rtctl_ticks_total"][()] == TICKS == status["tick"]
+        assert found["rtctl_rows_recorded_total"][()] + machine.rows_counted()["queued"] == TICKS
+        assert found["rtctl_state"][(("state", "idle"),)] == 1.0 and sum(found["rtctl_state"].values()) == 1.0
+        assert not any(found["rtctl_trip"].values())
+        for stage in ("read", "law", "write", "publish"):
+            assert found["rtctl_stage_seconds_count"][(("stage", stage),)] == status[stage]["count"] > 0
+            assert 0 < found["rtctl_stage_seconds_sum"][(("stage", stage),)] < 1.0
+        machine.finish()
+    with pytest.raises(OSError, match="refused"):
+        read(port)
+
+
+def test_a_port_that_is_taken_is_named(runtime: Path, config: Callable[..., Any]) -> None:
+    with socket.socket() as taken:
+        taken.bind((metrics.ADDRESS, 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with (
+            pytest.raises(UserError, match=f"metrics.port {port}"),
+            Supervisor(config(set={"metrics.port": port}), None, 10),
+        ):
+            pass
+
+
+def test_buckets_are_cumulative_and_hold_all_that_was_counted() -> None:
+    h = np.zeros(1, histogram.HISTOGRAM)[0]
+    times = np.random.default_rng(1).lognormal(8.0, 2.0, 5000).astype(int)
+    for ns in times:
+        histogram.add(h, ns)
+    pairs = histogram.octaves(h)
+    assert [count for _, count in pairs] == [int((times < edge).sum()) for edge, _ in pairs]
+    assert pairs[-1][1] == len(times)
+    assert histogram.total(h) == pytest.approx(times.sum(), rel=0.02)
+    kept = histogram.account(h)
+    assert sum(count for _, count in kept["buckets"]) == kept["count"] == len(times)
