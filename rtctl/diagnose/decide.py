@@ -23,6 +23,7 @@ QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
+SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 CLEAR = 0.15  # share of the cost that it must take off
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
@@ -42,7 +43,7 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         return False
     share = MATERIAL
     if complete(problem, base, before):
-        chance = p_value(after, before, problem.block)
+        chance = p_value(after, before, max(problem.block, round(SPANS * memory(after.r, LONGEST))))
         if problem.louder > 1.0:
             return False  # of a machine that is known to be louder nobody knows what is noise
         if before.bound() and not after.bound() and chance < RELEASED and after.cost < (1.0 - FREE) * before.cost:

@@ -100,6 +100,7 @@ class Choice(NamedTuple):
 
 
 USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
+SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
 Part = Size | Limit | Shape | Turn | At | Hint | Where | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
@@ -213,7 +214,7 @@ def hypotheses(
                 if (
                     (node == "sensor" and name in ALONE and not (slides and name == "guide.thickness"))
                     or (record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ()))
-                    or (name == "friction.stribeck" and not measures.dry(node))
+                    or (name == "friction.stribeck" and measures.dry(node) <= SLIGHT * measures.of("force", node))
                 ):  # falls to what the base has
                     continue
                 out += _starts(name, node, (slides and SLIDING.get(name)) or ALL[name], measures)
