@@ -27,7 +27,8 @@ FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # 
 TOLL = 0.08  # share of the cost that a further number of a term must take off
 FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
 THREADS = 2
-LOUDEST = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, of what random forces leave
+LOUDEST = 12.0  # times the floor, of what random forces leave
+EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond which that has to have their very pattern
 IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
 TOGETHER = 100.0  # errors that count as one
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
@@ -119,9 +120,11 @@ class Problem:
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
         main = r[: len(r) // len(self.channels)]
-        if rms(main) > LOUDEST[self.sim.record.plant] * self.floor:
+        loud = rms(main) / self.floor
+        if loud > LOUDEST:
             return False
-        return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.floor)
+        exact = loud > EXACTLY[self.sim.record.plant]
+        return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.floor, exact)
 
 
 def means(x: np.ndarray, count: int) -> np.ndarray:

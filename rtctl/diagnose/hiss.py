@@ -1,25 +1,31 @@
 """Whether what is left is hiss: forces without any pattern, which a machine makes and no hypothesis explains.
 
 The correction that keeps a model on track lets a force d (per unit of inertia) through to the error e by
-e'' + 1.4 w e' + w^2 e = d. Where d is white and the sensor's own noise is white beside it, the spectrum of e has that
-shape, with one unknown level. Friction, drifts and ripples have another: a peak, a rise to low frequencies, or more
-error than that level accounts for, are no hiss.
+e'' + 1.4 w e' + w^2 e = d. Where d is white, or white noise through a lag that is shorter than the correction's own,
+and the sensor's noise is white beside it, the spectrum of e has that shape, with a level and a lag that are unknown.
+Friction, drifts and ripples have another: a peak, a rise to low frequencies, or more error than that level accounts
+for, are no hiss.
 
-Source: Bartlett, An introduction to stochastic processes (1955), for the cumulative periodogram and its bound.
+Source: Bartlett, An introduction to stochastic processes (1955), for the cumulative periodogram and its bound; Whittle,
+Arkiv for Matematik 2 (1953), for the likelihood of a spectrum.
 """
 
 import numpy as np
 
 FROM = 4.0  # periods in the record, of the lowest frequency looked at
 UPTO = 3.0  # of the correction's bandwidth
-BOUND = 2.4  # of the cumulative periodogram's distance times the root of the count; 1.63 is one in a hundred
+BOUND, EXACT = 2.4, 1.63  # of the cumulative periodogram's distance times the root of the count
 MORE = 1.6  # times the error that the level accounts for
 FEWEST = 20  # frequencies
 ROUNDS = 20
+LAGS = (0.1, 0.2, 0.4, 0.7, 1.0)  # of the correction's own time
 
 
-def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float) -> bool:
-    """Of the error e (n,), `dt` s apart, of a model that follows at `follow` rad/s and whose sensor leaves `floor`."""
+def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float, exact: bool = False) -> bool:
+    """Of the error e (n,), `dt` s apart, of a model that follows at `follow` rad/s and whose sensor leaves `floor`.
+
+    `exact`: with no more deviation than chance makes in one of a hundred.
+    """
     n = len(e)
     taper = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.05 * n))
     w = 2 * np.pi * np.fft.rfftfreq(n, dt)
@@ -29,15 +35,29 @@ def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float) -> bool:
     count = int(band.sum())
     if count < FEWEST:
         return False
-    power, passed = power[band], through[band]
+    best: tuple[float, float, np.ndarray] | None = None
+    for lag in (0.0, *np.array(LAGS) / follow):
+        shape = through / (1.0 + (lag * w) ** 2)
+        level = _level(power[band], shape[band], floor)
+        expected = level * shape[band] + floor**2
+        unlikely = float(np.sum(np.log(expected) + power[band] / expected))  # Whittle's likelihood
+        if best is None or unlikely < best[0]:
+            best = unlikely, level, shape
+    assert best is not None
+    _, level, through = best
+    likely = power[band] / (level * through[band] + floor**2)
+    rising = np.cumsum(likely) / likely.sum()
+    if np.abs(rising - np.arange(1, count + 1) / count).max() * np.sqrt(count) > (EXACT if exact else BOUND):
+        return False
+    accounted = level * float(np.sum(through[1:])) * 2 / n
+    return float(np.var(e)) < MORE * (accounted + floor**2)
+
+
+def _level(power: np.ndarray, passed: np.ndarray, floor: float) -> float:
+    """Of forces whose noise of unit power comes through as `passed`, beside the floor."""
     level = 0.0
     for _ in range(ROUNDS):  # the likelihood of a periodogram weighs each frequency by what it expects there
         expected = level * passed + floor**2 if level else passed / passed.max() * power.max()
         gain = passed / expected**2
         level = max(float(gain @ (power - floor**2)) / float(gain @ passed), 0.0)
-    likely = power / (level * passed + floor**2)
-    rising = np.cumsum(likely) / likely.sum()
-    if np.abs(rising - np.arange(1, count + 1) / count).max() * np.sqrt(count) > BOUND:
-        return False
-    accounted = level * float(np.sum(through[1:])) * 2 / n
-    return float(np.var(e)) < MORE * (accounted + floor**2)
+    return level

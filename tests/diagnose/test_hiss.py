@@ -28,6 +28,19 @@ def test_white_forces_are(seed, size):
     assert is_hiss(e, DT, W, 0.3)
 
 
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10**6), st.floats(3.0, 30.0), st.floats(1e-3, 0.03))
+def test_so_are_forces_behind_a_short_lag(seed, size, lag):
+    pole = np.exp(-DT / lag)
+    force = lfilter([1.0], [1.0, -pole], noise(seed)) * np.sqrt(1.0 - pole**2)
+    assert is_hiss(error(size * force) + 0.3 * noise(seed + 1), DT, W, 0.3)
+
+
+def test_a_reading_that_wanders_is_not():
+    walk = np.cumsum(noise(3))
+    assert not is_hiss(walk - error(walk) + 0.3 * noise(4), DT, W, 0.3, exact=True)
+
+
 @pytest.mark.parametrize("what", ["drift", "reversals", "ripple", "vibration"])
 def test_what_has_a_pattern_is_not(what):
     t = DT * np.arange(N)
