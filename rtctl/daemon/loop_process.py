@@ -98,8 +98,10 @@ def _wait_for_plant(
     raise UserError(
         f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, "
         "or leave link.endpoint out to have one started"
-        + (f"; if it runs, its folder `authorized` lacks our {key_name}.key or our server.key is not its own"
-           if key_name else "")
+        + (
+            f"; if it runs, its folder `authorized` lacks our {key_name}.key or our server.key is not its own"
+            * bool(key_name)
+        )
     )
 
 

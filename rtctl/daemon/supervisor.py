@@ -7,6 +7,7 @@ Its own loop takes a turn every few milliseconds. It never holds up the loop: wh
 """
 
 import contextlib
+import math
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -258,10 +259,10 @@ class Supervisor:
             yield
             self._answer(poller, 1 if virtual else TURN_MS)
 
-    def _answer(self, poller: zmq.Poller, wait_ms: float) -> None:
+    def _answer(self, poller: zmq.Poller, wait_ms: int) -> None:
         """Commands are answered as they come, but a thousand of them a second do not make a thousand turns."""
         end = time.monotonic() + wait_ms / 1000
-        while not self.interrupted and (left := end - time.monotonic()) > 0 and poller.poll(left * 1000):
+        while not self.interrupted and (left := end - time.monotonic()) > 0 and poller.poll(math.ceil(left * 1000)):
             self.server.process()
 
     # the service manager
