@@ -86,6 +86,7 @@ static void obey(struct safety *s, const struct command *c)
             s->state = ARMED;
             s->on = 1;
             s->gate = 1.0;
+            s->hold[0] = s->hold[1] = 0.0;
             s->armed_for = s->silent = s->still = s->over = s->slack = s->late = 0;
         }
     }

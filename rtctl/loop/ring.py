@@ -39,7 +39,11 @@ class Reader:
         self.gaps = []
         first = max(tail, head - capacity)
         last = head if most is None else min(head, first + most)
-        rows = self._rows[np.arange(first, last) % capacity]
+        begin, end = first % capacity, last % capacity
+        if first == last or begin < end:
+            rows = self._rows[begin : begin + last - first].copy()
+        else:
+            rows = np.concatenate((self._rows[begin:], self._rows[:end]))
         torn = int(self._ring["head"]) - capacity + 1  # rows below may have been overwritten while they were copied
         if torn > first:
             skip = min(torn, last) - first

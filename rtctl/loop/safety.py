@@ -133,6 +133,7 @@ def command(s, c):
             s.on = 1
             s.armed_for = 0
             s.gate = 1.0
+            s.hold[:] = 0.0  # a trip in this very tick has nothing to fade
             s.silent = 0
             s.still = 0
             s.over = 0

@@ -251,3 +251,14 @@ def test_every_cause_has_a_code_and_a_sentence() -> None:
 def test_an_empty_range_of_tension_is_refused() -> None:
     with pytest.raises(ValueError, match="tension_min 5 N is not below tension_max 5 N"):
         safety.build(SafetySettings(tension_min=5.0, tension_max=5.0), DT)
+
+
+def test_a_trip_in_the_tick_of_arming_has_nothing_of_the_last_session_to_fade():
+    machine = Machine(P._replace(fade=0.1))
+    assert machine.tick(u=9.0) == 9.0
+    machine.tick(lost=1, u=9.0)
+    assert machine.s["state"] == TRIPPED
+    for _ in range(20):
+        machine.tick()
+    assert machine.tick(reset=1) == 0.0
+    assert machine.tick(arm=1, lost=1, u=9.0) == 0.0 and machine.s["state"] == TRIPPED

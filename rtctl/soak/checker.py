@@ -1,0 +1,190 @@
+"""Rows in, violations out: the compiled pass with its two records, and a bundle of the rows around what it found."""
+
+import shutil
+from collections import deque
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.config.errors import UserError
+from rtctl.loop import generate, safety
+from rtctl.machines import Machine
+from rtctl.soak import invariants, ranges
+from rtctl.soak.invariants import NAMES, NEVER
+
+MOST_KEPT = 20  # violations with a bundle
+BEFORE, AFTER = 2.0, 0.5  # s of rows in it
+
+
+class Violation(NamedTuple):
+    """One invariant that did not hold, from `tick` on."""
+
+    name: str
+    tick: int
+    event: int
+    seed: int
+    value: float
+    bound: float
+    signals: dict[str, float]  # of the row; empty where there was none
+    bundle: str | None  # folder
+
+    def as_json(self) -> dict[str, Any]:
+        return self._asdict()
+
+
+class Checker:
+    """Checks every row that it is fed. `windows` is where the player of the day says what to expect.
+
+    `lost` counts rows that the ring lost; the sum of both must be the ticks of the loop.
+    """
+
+    def __init__(self, machine: Machine, made: generate.Generated, out: Path, seed: int):
+        self.machine, self.made, self.out, self.seed = machine, made, out, seed
+        self.range = ranges.range_of(machine)
+        self.w, self.s = np.zeros(1, invariants.WINDOWS), np.zeros(1, invariants.CARRY)
+        self._found = np.zeros(invariants.MOST_FOUND, invariants.FOUND)
+        self._fill(self.w[0])
+        self.s["last_bad"] = -NEVER
+        self.event = 0
+        self.count = 0
+        self.kept: list[Violation] = []
+        self.captures: list[str] = []
+        self.last: Any = None
+        self._history: deque[np.ndarray] = deque()
+        self._waiting: list[tuple[int, int, Path]] = []  # first and last tick of a bundle, and its folder
+
+    @property
+    def windows(self) -> Any:
+        """What the player says of the ticks to come: a record of WINDOWS."""
+        return self.w[0]
+
+    @property
+    def carry(self) -> Any:
+        return self.s[0]
+
+    def _fill(self, w: Any) -> None:
+        machine, r = self.machine, self.range
+        config, limits = machine.config, machine.config.safety
+        p = safety.build(limits, machine.dt)
+        names = list(self.made.row.names or ())
+        place = {name: i for i, name in enumerate(names)}
+        for field, column in (
+            ("state", "state"), ("trip", "trip"), ("age", "link_age"), ("lateness", "lateness"), ("order", "order"),
+            ("position", r.position), ("error", r.error), ("counts", r.counts),
+        ):  # fmt: skip
+            w[field] = place[column]
+        per_unit = ranges.counts_per_unit(config)
+        knows = r.truth in place and np.isfinite(per_unit)
+        w["truth"] = place[r.truth] if knows else -1
+        w["per_unit"] = per_unit if knows else 0.0
+        w["counts_off"] = r.stretch
+        w["n_outputs"] = len(r.outputs)
+        w["outputs"][: len(r.outputs)] = [place[name] for name in r.outputs]
+        tensions = [*r.tensions, *(r.truth_tensions if all(n in place for n in r.truth_tensions) else ())]
+        w["n_tensions"] = len(tensions)
+        w["tensions"][: len(tensions)] = [place[name] for name in tensions]
+        w["low"], w["high"] = ranges.volts(config)
+        w["rounding"] = ranges.rounding(config)
+        w["fade"] = p.fade
+        w["tension_min"], w["tension_max"], w["tension_ticks"] = p.tension_min, p.tension_max, p.tension
+        w["link_ticks"] = min(p.link, round(invariants.LONGEST_LINK * machine.rate))
+        w["following"], w["missed"] = p.following, p.missed
+        w["late"] = config.loop.late * machine.dt
+        w["tolerance"] = r.tolerance
+        w["settled_from"] = w["must_by"] = NEVER
+        w["quiet_from"] = w["counts_from"] = NEVER if machine.faults else 0
+
+    def feed(self, rows: np.ndarray) -> None:
+        """Check rows, in order; they are kept for a while and must not change."""
+        if not len(rows):
+            return
+        width = rows.dtype.itemsize // 8
+        flat = rows.view(np.float64).reshape(len(rows), width)  # tick is an integer: tiny as a float, and finite
+        self.s["found"] = 0
+        invariants.check(flat, rows["tick"], self.w, self.s, self._found)
+        self.last = rows[-1]
+        self._remember(rows)
+        for found in self._found[: int(self.s["found"][0])]:
+            at = np.searchsorted(rows["tick"], found["tick"])
+            self._keep(NAMES[found["code"]], int(found["tick"]), float(found["value"]), float(found["bound"]),
+                       rows[min(at, len(rows) - 1)])  # fmt: skip
+        self._finish_bundles(int(self.s["tick"][0]))
+        self.count = int(self.s["episodes"].sum())
+
+    def note_lost(self, first: int, count: int) -> None:
+        """Rows that the ring gave up are accounted for: not a hole."""
+        self.s["lost"] += count
+        self.s["tick"] = first + count
+
+    def account(self, ticks: int) -> None:
+        """`ticks` are those that the loop says it has done: all of them must be here, or counted as lost."""
+        seen = int(self.s["rows"][0] + self.s["lost"][0])
+        if seen != ticks:
+            self.note("ring", ticks, float(seen), float(ticks))
+
+    def note(self, name: str, tick: int, value: float, bound: float) -> None:
+        """A violation that no single row shows."""
+        self.s["episodes"][0, NAMES.index(name)] += 1
+        self.count += 1
+        self._keep(name, tick, value, bound, self.last)
+
+    def checked(self, name: str, ticks: int = 1) -> None:
+        """Count ticks for an invariant that is checked here and not in the pass."""
+        self.s["checked"][0, NAMES.index(name)] += ticks
+
+    def capture(self, first: int, last: int, name: str) -> None:
+        """A bundle of rows that are to come or that have just been, as a person would capture them."""
+        folder = self.out / name
+        self.captures.append(folder.name)
+        self._waiting.append((first, last, folder))
+
+    def flush(self) -> None:
+        """Write what still waits for rows, with those that there are."""
+        self._finish_bundles(NEVER)
+
+    def _keep(self, name: str, tick: int, value: float, bound: float, row: Any) -> None:
+        if len(self.kept) >= MOST_KEPT:
+            return
+        folder = self.out / f"violation-{len(self.kept) + 1:02d}-{name}"
+        signals = {} if row is None else {n: float(row[n]) for n in row.dtype.names}
+        self.kept.append(Violation(name, tick, self.event, self.seed, value, bound, signals, folder.name))
+        rate = self.machine.rate
+        self._waiting.append((tick - round(BEFORE * rate), tick + round(AFTER * rate), folder))
+
+    def _remember(self, rows: np.ndarray) -> None:
+        self._history.append(rows)
+        most = (BEFORE + AFTER) * self.machine.rate
+        held = sum(map(len, self._history))
+        while len(self._history) > 1 and held - len(self._history[0]) >= most:
+            held -= len(self._history.popleft())
+
+    def _finish_bundles(self, tick: int) -> None:
+        if not self._waiting:
+            return
+        from rtctl.daemon.case import describe
+        from rtctl.trace.recorder import Recorder
+
+        for first, last, folder in [b for b in self._waiting if tick > b[1]]:
+            rows = np.concatenate(self._history) if self._history else np.zeros(0, self.made.row)
+            rows = rows[(rows["tick"] >= first) & (rows["tick"] <= last)]
+            case = {**describe(self.machine, self.made), "soak": {"seed": self.seed, "name": folder.name}}
+            if _of_a_soak(folder):  # one that was killed after its last progress file, and is played again from there
+                shutil.rmtree(folder)
+            try:
+                recorder = Recorder(folder, self.made.columns, self.made.row, case)
+                recorder.put(rows)
+                recorder.finish()
+            except OSError as error:
+                raise UserError(f"{folder}: the disk did not take it: {error.strerror or error}") from error
+        self._waiting = [b for b in self._waiting if tick <= b[1]]
+
+
+def _of_a_soak(folder: Path) -> bool:
+    """Whether a folder is a bundle that a soak has written."""
+    from rtctl.trace.bundle import load_case
+
+    try:
+        return "soak" in load_case(folder)
+    except UserError:
+        return False

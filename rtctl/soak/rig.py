@@ -1,0 +1,136 @@
+"""A machine that a day is played on, in this process and on virtual time: what a command socket can ask, and rows.
+
+The same few calls are made on a running daemon by `rtctl.soak.live`.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from rtctl import machines
+from rtctl.config.load import set_path
+from rtctl.loop import faults, generate
+from rtctl.loop.loop import Loop
+from rtctl.loop.mailbox import Mailbox
+from rtctl.loop.records import layout
+from rtctl.loop.ring import Reader
+from rtctl.machines import Machine
+from rtctl.soak.checker import Checker
+
+STRETCH = 4096  # ticks: their rows fit into the cache
+
+
+class Rig(Protocol):
+    """What the day needs of a machine."""
+
+    machine: Machine
+    checker: Checker
+    slack: int  # ticks that a command may be under way
+
+    @property
+    def tick(self) -> int: ...
+    @property
+    def lost_counts(self) -> int: ...
+    def ask(self, request: str) -> None: ...
+    def setpoint(self, target: float, rate: float) -> None: ...
+    def set(self, path: str, value: float) -> None: ...
+    def fault(self, settings: faults.FaultSettings) -> faults.Fault: ...
+    def run(self, ticks: int) -> None: ...
+    def finish(self) -> None: ...
+
+
+class Fused:
+    """Loop and emulated machine in this process. The rows go through ring and reader, as in a daemon."""
+
+    slack = 0
+
+    def __init__(self, config: Any, out: Any, seed: int):
+        self.config = config
+        self.machine = machines.build(config)
+        self.made = generate.generate(self.machine, "shm")
+        self.segment: dict[str, Any] = {
+            name: np.zeros(count, dtype)
+            for name, (dtype, count) in layout(self.made.params, self.made.tables, self.made.row, 2 * STRETCH).items()
+        }
+        generate.fill(self.segment["mailbox"][0]["params"], self.machine.diagram.blocks)
+        faults.fill(self.segment["mailbox"][0]["command"], self.machine.faults)
+        generate.fill_tables(self.segment["tables"][0], (self.machine.reference, self.machine.excitation))
+        self.loop = Loop(self.machine, self.made, self.segment, self.segment["outputs"], self.segment["inputs"])
+        self.loop.warm()
+        self._entry, self._arguments = self.loop.entry()
+        shared: Any = self.segment
+        self.mailbox, self.reader = Mailbox(shared), Reader(shared)
+        self.checker = Checker(self.machine, self.made, out, seed)
+        self.status = self.segment["status"][0]
+        self._built: dict[tuple[str, float], Machine] = {}
+
+    @property
+    def tick(self) -> int:
+        return int(self.status["tick"])
+
+    @property
+    def lost_counts(self) -> int:
+        """Counts that the emulated quadrature converter has lost since the start."""
+        return int(self.status["lost_counts"])
+
+    def _post(self, write: Any) -> int:
+        self.mailbox.post(write)
+        order = int(self.segment["mailbox"][0]["command"]["order"])
+        self.checker.windows["newest"] = order
+        return order
+
+    def ask(self, request: str) -> None:
+        """arm, disarm, reset or play."""
+
+        def write(_: Any, command: Any) -> None:
+            command[request] += 1
+
+        order = self._post(write)
+        if request != "play":
+            self.checker.windows[request] = order
+
+    def setpoint(self, target: float, rate: float) -> None:
+        """A new target in the unit of the reference, at `rate` a second; a jump where that is 0."""
+
+        def write(_: Any, command: Any) -> None:
+            command["setpoint"]["target"], command["setpoint"]["rate"] = target, rate
+            command["setpoint"]["seq"] += 1
+
+        self._post(write)
+
+    def set(self, path: str, value: float) -> None:
+        """One setting of the law, the others as the config has them; swapped in at a tick, without a jump."""
+        key = (path, value)
+        if key not in self._built:
+            self._built[key] = machines.build(set_path(self.config, path, value))
+        blocks = self._built[key].diagram.blocks
+
+        def write(params: Any, command: Any) -> None:
+            generate.fill(params, blocks)
+            command["gains"] += 1
+
+        self._post(write)
+
+    def fault(self, settings: faults.FaultSettings) -> faults.Fault:
+        """Add a fault, its time counted from now; those that are over leave their slots."""
+        made = faults.build(settings, self.machine.dt, self.tick)
+        command = self.segment["mailbox"][0]["command"]
+        kept = [faults.Fault(*(v.item() for v in row)) for row in command["faults"][: int(command["faulty"])]]
+        kept = [f for f in kept if f.end > self.tick]
+        self._post(lambda _, c: faults.fill(c, [*kept, made]))
+        return made
+
+    def run(self, ticks: int) -> None:
+        """Virtual time goes on, and every row of it is checked."""
+        while ticks > 0:
+            most = min(ticks, STRETCH)
+            self._entry(*self._arguments[:-2], self.tick, most)
+            rows = self.reader.take()
+            for first, count in self.reader.gaps:
+                self.checker.note_lost(first, count)
+            self.checker.feed(rows)
+            ticks -= most
+        self.checker.account(self.tick)
+
+    def finish(self) -> None:
+        """Nothing is left over: `run` has checked every row."""

@@ -1,0 +1,220 @@
+"""Every gate can fail: a regression planted for each invariant, and the soak says so by name."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rtctl.loop import safety
+from rtctl.soak.events import Day
+from rtctl.soak.invariants import INVARIANTS
+from rtctl.soak.memory import MOST_MB, Memory
+from rtctl.soak.rig import Fused
+
+Make = Callable[..., Fused]
+Only = Callable[..., None]
+
+
+def play(rig: Fused, events: int, with_faults: bool = True) -> Day:
+    """Some events of a day."""
+    day = Day(rig, 1, with_faults)
+    for _ in range(events):
+        day.step()
+    rig.checker.flush()
+    return day
+
+
+def names(rig: Fused) -> set[str]:
+    """Invariants of which a violation is on record."""
+    return {v.name for v in rig.checker.kept}
+
+
+def params(rig: Fused, block: str, **values: float) -> None:
+    """Parameters that the tick takes over with the next post, and that the config knows nothing of."""
+    for name, value in values.items():
+        rig.segment["mailbox"][0]["params"][block][name] = value
+
+
+def tampered(rig: Fused, change: Callable[[np.ndarray], np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the ring gives out is changed on its way."""
+    take = rig.reader.take
+    monkeypatch.setattr(rig.reader, "take", lambda: change(take()))
+
+
+def test_nothing_is_found_where_nothing_is_wrong(rig: Make, only: Only) -> None:
+    only("move", "ramp", "switch", "fault")
+    found = rig()
+    play(found, 12)
+    assert not found.checker.kept and found.checker.count == 0
+
+
+def test_an_output_limit_that_is_off(rig: Make, only: Only) -> None:
+    only("move")
+    found = rig(set={"law.limit.high": 0.5})
+    params(found, "limit", high=10.0, low=-10.0)
+    play(found, 3)
+    assert "output_limits" in names(found)
+    worst = next(v for v in found.checker.kept if v.name == "output_limits")
+    assert abs(worst.value) > 0.5 > abs(worst.bound) - 0.01 and worst.signals["tick"] == worst.tick
+
+
+def test_outputs_that_stay_on_after_a_trip(rig: Make, only: Only) -> None:
+    only("fault", faults=["encoder.freeze", "link.silent"])
+    found = rig()
+    params(found, "safety", fade=0.0)
+    play(found, 12)
+    assert "outputs_off" in names(found)
+
+
+def test_outputs_that_fade_may_do_so(rig: Make, only: Only) -> None:
+    only("fault", faults=["encoder.freeze", "link.silent"])
+    found = rig(set={"safety.ramp": 0.5})
+    day = play(found, 12)
+    assert sum(day.tripped.values()) > 0 and not names(found)
+
+
+def test_a_nan_in_one_row(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
+    def break_one(rows: np.ndarray) -> np.ndarray:
+        rows["w"][(rows["tick"] == 1000) | (rows["tick"] == 2000)] = np.nan
+        return rows
+
+    only("move")
+    found = rig()
+    tampered(found, break_one, monkeypatch)
+    play(found, 3)
+    assert [(v.name, v.tick) for v in found.checker.kept] == [("finite", 1000), ("finite", 2000)]
+
+
+def test_a_tension_that_does_not_trip(rig: Make, only: Only) -> None:
+    only("move")
+    found = rig(set={"safety.tension_max": 0.12})
+    params(found, "safety", tension_max=1e9)
+    play(found, 2)
+    assert "tension" in names(found)
+
+
+def test_an_encoder_that_loses_counts(rig: Make, only: Only) -> None:
+    only("ramp")
+    found = rig(set={"sensors.capstan.pulse_width": 1e-3})
+    play(found, 4)
+    assert "counters" in names(found)
+
+
+def test_a_hole_in_the_ring(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
+    only("move")
+    found = rig()
+    tampered(found, lambda rows: rows[rows["tick"] != 1000], monkeypatch)
+    play(found, 2)
+    assert names(found) == {"ring"}
+    assert (found.checker.kept[0].tick, found.checker.kept[0].bound) == (1001, 1000)
+
+
+def test_a_reader_that_is_late_loses_rows_and_counts_them(rig: Make) -> None:
+    found = rig()
+    found.ask("arm")
+    found.run(500)
+    found.loop.stretch(found.tick, 3 * len(found.segment["rows"]))  # nobody reads meanwhile
+    found.run(500)
+    carry = found.checker.carry
+    assert carry["lost"] > 0 and carry["rows"] + carry["lost"] == found.tick == carry["tick"]
+    assert "ring" not in names(found)
+
+
+def test_a_machine_that_arms_by_itself(rig: Make) -> None:
+    def arm(_: Any, command: Any) -> None:
+        command["arm"] += 1
+
+    found = rig()
+    found.run(100)
+    found.mailbox.post(arm)
+    found.run(100)
+    assert {"state_machine", "order"} == names(found)
+
+
+def test_a_trip_that_forgets_its_cause(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forget(rows: np.ndarray) -> np.ndarray:
+        tripped = np.flatnonzero(rows["state"] == safety.TRIPPED)
+        rows["trip"][tripped[2:]] = safety.CURRENT
+        return rows
+
+    only("fault", faults=["link.silent"])
+    found = rig()
+    tampered(found, forget, monkeypatch)
+    play(found, 6)
+    assert names(found) == {"trip_latched"}
+
+
+def test_a_trip_out_of_nothing(rig: Make, only: Only) -> None:
+    only("move")
+    found = rig()
+    params(found, "safety", following=1e-3)
+    play(found, 2)
+    assert "trip_without_cause" in names(found)
+
+
+def test_a_link_timeout_of_a_day(rig: Make, only: Only) -> None:
+    only("fault", faults=["link.silent"])
+    found = rig(set={"safety.link_timeout": 86400.0, "safety.following_error": 0.0, "safety.frozen_time": 0.0})
+    play(found, 25)
+    assert "must_trip" in names(found)
+
+
+@pytest.mark.parametrize(
+    ("fault", "block"),
+    [("loop.stall", {"missed": 0}), ("encoder.freeze", {"following": 0.0, "frozen": 0})],
+)
+def test_a_trip_that_is_switched_off_behind_the_config(
+    rig: Make, only: Only, fault: str, block: dict[str, float]
+) -> None:
+    only("fault", faults=[fault])
+    found = rig()
+    params(found, "safety", **block)
+    play(found, 12)
+    assert "must_trip" in names(found)
+
+
+def test_a_setpoint_that_is_taken_wrong(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
+    only("move")
+    found = rig()
+    setpoint = found.setpoint
+    monkeypatch.setattr(found, "setpoint", lambda target, rate: setpoint(target + 0.2, rate))
+    play(found, 2)
+    assert names(found) == {"settled"}
+
+
+def test_an_order_number_that_falls(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
+    def older(rows: np.ndarray) -> np.ndarray:
+        rows["order"][rows["tick"] == 3000] -= 1
+        return rows
+
+    only("move")
+    found = rig()
+    tampered(found, older, monkeypatch)
+    play(found, 3)
+    assert [(v.name, v.tick) for v in found.checker.kept] == [("order", 3000)]
+
+
+def test_a_reset_that_does_nothing(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
+    only("fault", faults=["link.silent"])
+    found = rig()
+    ask = found.ask
+    monkeypatch.setattr(found, "ask", lambda request: None if request == "reset" else ask(request))
+    play(found, 6)
+    assert names(found) == {"recovery"}
+
+
+def test_a_leak(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
+    only("wait")
+    found = rig()
+    memory, kept = Memory(), []
+    for k in range(20):
+        kept.append(np.ones(round(MOST_MB / 10 * 2**17)))
+        memory.sample(k / 20, found.checker, k)
+    assert names(found) == {"memory"} and found.checker.count == 1
+
+
+def test_each_invariant_has_a_gate_here() -> None:
+    text = Path(__file__).read_text(encoding="utf-8")
+    assert not [name for name in INVARIANTS if f'"{name}"' not in text]

@@ -1,0 +1,62 @@
+"""The table of what a day may ask: it names signals and settings that there are, and bounds that hold."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rtctl import machines
+from rtctl.config.load import get_path, set_path
+from rtctl.loop import generate
+from rtctl.soak import ranges
+
+
+@pytest.fixture(params=sorted(machines.CONFIGS))
+def settings(request: pytest.FixtureRequest, config: Callable[..., Any]) -> Any:
+    return config(request.param)
+
+
+def test_signals_are_columns_of_the_row(settings: Any) -> None:
+    names = generate.generate(machines.build(settings), "shm").row.names or ()
+    r = ranges.RANGES[settings.machine]
+    told = (r.position, r.error, *r.outputs, r.counts, r.truth, *r.tensions, *r.truth_tensions)
+    assert not set(told) - set(names)
+    assert len(r.tensions) == len(r.truth_tensions)
+
+
+def test_gains_are_settings_that_may_change_while_it_runs(settings: Any) -> None:
+    gains = ranges.gains_of(settings)
+    assert gains
+    source = generate.source(machines.build(settings), "shm")
+    for path, bounds in gains.items():
+        assert bounds[0] < bounds[1] and get_path(settings, path) > 0
+        for value in bounds:
+            changed = set_path(settings, path, value)
+            assert generate.source(machines.build(changed), "shm") == source
+
+
+def test_a_law_of_another_kind_has_other_gains(config: Callable[..., Any]) -> None:
+    pd = config("axis", set={"law.position": {"kind": "pd", "gain": 30000.0, "tau_d": 0.01}})
+    assert set(ranges.gains_of(pd)) == {"law.position.gain"}
+
+
+def test_output_bounds_are_those_of_law_and_converter(config: Callable[..., Any]) -> None:
+    half = 10.0 / 4096
+    assert ranges.volts(config("ldu")) == pytest.approx((-3.0 - half, 3.0 + half), abs=half)
+    assert ranges.volts(config("ivu", set={"law.limit": {"high": 4.0, "low": -1.0}})) == (-1.0 - half, 4.0 + half)
+    assert ranges.volts(config("axis", set={"law.limit": {"high": 40.0}})) == (-10.0 - half, 10.0 + half)
+
+
+def test_counts_are_compared_unless_a_term_stands_between(config: Callable[..., Any]) -> None:
+    assert ranges.counts_per_unit(config("axis")) == pytest.approx(1e6)
+    terms = [{"term": "ripple.encoder", "node": "sensor", "A": 1e-6}]
+    assert np.isnan(ranges.counts_per_unit(config("axis", set={"plant.physics": terms})))
+
+
+def test_a_config_keeps_its_own_reference(settings: Any) -> None:
+    given = ranges.with_reference(settings)
+    assert len(given.reference.knots) > 1
+    assert ranges.with_reference(given) is given
+    own = set_path(settings, "reference", {"steps": [{"at": 1.0, "to": 0.1}]})
+    assert ranges.with_reference(own) is own
