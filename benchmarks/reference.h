@@ -21,7 +21,7 @@ static inline double clamp(double x, double low, double high) { return lower(hig
 /* ---- command and safety ---- */
 
 enum { IDLE, ARMED, RUNNING, TRIPPED };
-enum { NONE, LINK, FROZEN, FOLLOWING, TENSION, CURRENT, NOT_A_NUMBER, MISSED, COMMANDER };
+enum { NONE, LINK, FROZEN, FOLLOWING, TENSION, CURRENT, NOT_A_NUMBER, MISSED, COMMANDER, START_UP, SUPERVISOR, SENSORS };
 
 struct command {
     int64_t arm, disarm, reset, gains, play, commander_lost, setpoint, order;
@@ -36,12 +36,12 @@ struct mailbox {
 
 struct safety_limits {
     int64_t link, frozen, tension, current_time, missed;
-    double frozen_effort, following, tension_min, tension_max, current, fade;
+    double frozen_effort, following, tension_min, tension_max, current, disagreement, fade;
 };
 
 struct safety {
     int64_t state, trip, trip_tick, arm, disarm, reset, armed_for, silent, still, over, slack, late, counts, on;
-    double hold[2], gate;
+    double hold[2], gate, apart;
 };
 
 static void take(struct mailbox *box, struct command *c)
@@ -105,6 +105,14 @@ static void check_timing(const struct safety_limits *p, struct safety *s, const 
         trip(s, MISSED, k);
     if (c->commander_lost)
         trip(s, COMMANDER, k);
+}
+
+static void check_sensors(const struct safety_limits *p, struct safety *s, double apart, int64_t k)
+{
+    if (s->on)
+        s->apart = apart;
+    if (p->disagreement > 0.0 && fabs(apart - s->apart) > p->disagreement)
+        trip(s, SENSORS, k);
 }
 
 static void check_motion(const struct safety_limits *p, struct safety *s, double error, int64_t counts, double effort,

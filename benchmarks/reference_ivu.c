@@ -11,13 +11,13 @@ enum { MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 };
 #define REALS(X) \
     X(capstan_radians_per_count) X(input1_volts_per_code) X(input2_volts_per_code) X(reel1_low) X(reel1_high) \
     X(reel2_low) X(reel2_high) X(machine_R1) X(machine_R2) X(machine_grow) X(machine_trail_speed) \
-    X(machine_hand_over) X(velocity_a) X(velocity_dt) X(reference_speed_a) X(reference_speed_dt) \
+    X(machine_hand_over) X(machine_R_c) X(machine_fast) X(reel1_radians_per_count) X(reel2_radians_per_count) X(velocity_a) X(velocity_dt) X(reference_speed_a) X(reference_speed_dt) \
     X(tension_estimate_torque_per_volt) X(tension_estimate_J) X(tension_estimate_tau_F) X(tension_estimate_R_c) \
     X(tension_estimate_v_min) X(tension_estimate_a) X(shaper_a) X(shaper_w) X(position_gain) X(position_tau_d) X(position_a) \
     X(position_dt) X(bumpless_decay) X(friction1_volts) X(friction2_volts) X(inertia_volts) X(tension_F_t) \
     X(tension_torque_per_volt) X(tension_ramp) X(limit_low) X(limit_high) X(limit_most) X(drive_amp_per_volt) \
     X(output1_volts_per_code) X(output2_volts_per_code) X(safety_frozen_effort) X(safety_following) \
-    X(safety_tension_min) X(safety_tension_max) X(safety_current) X(safety_fade) X(reference_dt) \
+    X(safety_tension_min) X(safety_tension_max) X(safety_current) X(safety_disagreement) X(safety_fade) X(reference_dt) \
     X(excitation_amplitude) \
     X(plant_plant_h) X(plant_plant_R1) X(plant_plant_R2) X(plant_plant_R_c) X(plant_plant_R_min) \
     X(plant_plant_J_1) X(plant_plant_J_2) X(plant_plant_c1) X(plant_plant_c2) X(plant_plant_k1) X(plant_plant_k2) \
@@ -80,7 +80,8 @@ static struct {
     struct direction friction1, friction2;
     struct limit limit1, limit2;
     double R1_0, R2_0, phi_0, R1, R2, tension_share, offset, u_fb;
-    int64_t k_run, gains, play;
+    double phi_1;
+    int64_t k_run, gains, play, direction, n1, n2;
     struct row row;
 } loop;
 
@@ -124,6 +125,23 @@ static void switch_on(double phi)
     loop.R1_0 = p.machine_R1;
     loop.R2_0 = p.machine_R2;
     loop.phi_0 = phi;
+}
+
+static double tape_apart(double phi, double speed, int64_t n1, int64_t n2, double R1, double R2)
+{
+    double tape = fabs(phi - loop.phi_1) * p.machine_R_c;
+    int direction = speed > 0.3 ? 1 : speed < -0.3 ? -1 : 0;
+    int blind = fabs(speed) * p.machine_R_c > p.machine_fast * lower(R1, R2);
+    if (!direction || direction != loop.direction || blind || tape > 0.05 || loop.safety.state != RUNNING) {
+        loop.direction = direction;
+        loop.phi_1 = phi;
+        loop.n1 = n1;
+        loop.n2 = n2;
+        return 0.0;
+    }
+    double apart1 = (n1 - loop.n1) * p.reel1_radians_per_count * R1 - tape;
+    double apart2 = (n2 - loop.n2) * p.reel2_radians_per_count * R2 - tape;
+    return higher(fabs(apart1), fabs(apart2));
 }
 
 static void tick(int64_t k)
@@ -209,6 +227,8 @@ static void tick(int64_t k)
     /* safety */
     double amperes = higher(fabs(u1), fabs(u2)) * p.drive_amp_per_volt;
     check_motion(&safety_limits, safety, y->capstan_error, counts, y->u_c, amperes, k);
+    double apart = tape_apart(y->capstan, y->capstan_speed, y->reel1_counts, y->reel2_counts, y->R1, y->R2);
+    check_sensors(&safety_limits, safety, apart, k);
     int out = lower(y->tension1_estimate, y->tension2_estimate) < p.safety_tension_min ||
               higher(y->tension1_estimate, y->tension2_estimate) > p.safety_tension_max;
     safety->slack = out && safety->state == RUNNING ? safety->slack + 1 : 0;
@@ -334,7 +354,7 @@ void prepare(const struct parameters *given, const double *Phi_T, const double *
     safety_limits = (struct safety_limits){
         p.safety_link, p.safety_frozen, p.safety_tension, p.safety_current_time, p.safety_missed,
         p.safety_frozen_effort, p.safety_following, p.safety_tension_min, p.safety_tension_max, p.safety_current,
-        p.safety_fade};
+        p.safety_disagreement, p.safety_fade};
     table_t = t;
     table_r = r;
     waveform = wave;

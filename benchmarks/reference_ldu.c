@@ -13,7 +13,7 @@ enum { MOTOR, WHEEL, CAPSTAN, ENCODER };
     X(shaper_w) X(velocity_a) X(velocity_dt) X(position_gain) X(position_integral) X(position_velocity_gain) \
     X(position_tracking) X(bumpless_decay) X(friction_volts) X(limit_low) X(limit_high) X(limit_most) \
     X(amplifier_limit) X(output_volts_per_code) X(safety_frozen_effort) X(safety_following) X(safety_tension_min) \
-    X(safety_tension_max) X(safety_current) X(safety_fade) X(reference_dt) X(excitation_amplitude) \
+    X(safety_tension_max) X(safety_current) X(safety_disagreement) X(safety_fade) X(reference_dt) X(excitation_amplitude) \
     X(plant_plant_h) X(plant_plant_R_c) X(plant_plant_F_c) X(plant_output_volts_per_code) X(plant_output_delay) \
     X(plant_output_settling) X(plant_encoder_quarters_per_radian) X(plant_encoder_highest_rate) \
     X(plant_scale_counts_per_metre)
@@ -138,6 +138,7 @@ static void tick(int64_t k)
 
     /* safety */
     check_motion(&safety_limits, safety, y->position_error, counts, u, fabs(u) * p.machine_amp_per_volt, k);
+    check_sensors(&safety_limits, safety, p.machine_R_c * (counts * p.encoder_radians_per_count) - y->scale, k);
     fade(&safety_limits, safety);
     if (timing.on)
         timing.law = now();
@@ -202,7 +203,7 @@ void prepare(const struct parameters *given, const double *Phi_T, const double *
     safety_limits = (struct safety_limits){
         p.safety_link, p.safety_frozen, p.safety_tension, p.safety_current_time, p.safety_missed,
         p.safety_frozen_effort, p.safety_following, p.safety_tension_min, p.safety_tension_max, p.safety_current,
-        p.safety_fade};
+        p.safety_disagreement, p.safety_fade};
     table_t = t;
     table_r = r;
     waveform = wave;

@@ -6,6 +6,8 @@ emulator stays the truth. In a run without faults one comparison a tick is all t
 
 A fault lasts from tick `begin` to before tick `end`. What it has cost stays: counts that were missed are not found
 again.
+
+Faults of processes (`PROCESSES`) are in the same catalogue; the supervisor carries them out, rtctl/daemon/faults.py.
 """
 
 from collections.abc import Sequence
@@ -50,7 +52,9 @@ KINDS: dict[str, Kind] = {
         LINK_REORDER, "frames are overtaken by the next; the newest wins", "share overtaken", "", 0.3, 0.0, 1.0
     ),
     "link.silent": Kind(LINK_SILENT, "nothing comes and nothing arrives, as with the plant dead or the cable out"),
-    "encoder.freeze": Kind(ENCODER_FREEZE, "the counter stands still", channels=frames.COUNTERS),
+    "encoder.freeze": Kind(
+        ENCODER_FREEZE, "the counter stands still; what it did not count is lost", channels=frames.COUNTERS
+    ),
     "encoder.missed": Kind(
         ENCODER_MISSED, "a share of the counts is missed, for good", "share", "", 0.1, 0.0, 1.0, frames.COUNTERS
     ),
@@ -70,7 +74,16 @@ KINDS: dict[str, Kind] = {
     ),
     "loop.stall": Kind(LOOP_STALL, "the loop wakes late, as with a CPU hog or a machine asleep", "how late", "s",
                        1e-3, 0.0, 10.0),
+    "plant.kill": Kind(NONE, "the emulator's process is killed; a new one comes when the fault has passed"),
+    "supervisor.kill": Kind(NONE, "the supervisor is killed"),
+    "recorder.stall": Kind(NONE, "the recorder stands still, as on a disk that does not answer"),
+    "disk.full": Kind(NONE, "the disk takes no more of the recording, for good"),
+    "clock.step": Kind(
+        NONE, "the wall clock is set to another time under the supervisor", "by how much", "s", 3600.0, -1e9, 1e9
+    ),
+    "cpu.hog": Kind(NONE, "busy processes of normal priority on all CPUs", "how many", "", 4.0, 1.0, 256.0),
 }  # fmt: skip
+PROCESSES = tuple(name for name, kind in KINDS.items() if kind.number == NONE)
 
 
 class FaultSettings(Settings):
@@ -112,9 +125,8 @@ FAULTS_STATE = state(
     past=(frames.INPUTS, DEPTH),
     came=(int, DEPTH),  # how many were new
     gone=(frames.OUTPUTS, DEPTH),
-    frozen=(int, frames.COUNTERS),  # 1 while a counter stands still, at these counts
-    held=(int, frames.COUNTERS),
-    known=int,  # 1 once there was a frame before
+    known=int,  # 1 from the first tick on that came through here
+    since=int,  # that tick
     before=(int, frames.COUNTERS),  # its counts
     missed=(float, frames.COUNTERS),  # so far
     overtaken=int,  # 1 while a frame comes with the next one
@@ -135,12 +147,18 @@ def build(settings: FaultSettings, dt: float, now: int = 0) -> Fault:
 
 
 def fill(command: Any, wanted: Sequence[Fault]) -> None:
-    """Write the faults of a run into its command record. Raises ValueError for more than there are slots."""
+    """Write the faults of a run into its command record. Raises ValueError for more than there are slots.
+
+    Those of processes are left out. Where there have been faults one slot stays in use: missed counts stay missed.
+    """
+    wanted = [fault for fault in wanted if fault.kind != NONE]
     if len(wanted) > SLOTS:
-        raise ValueError(f"{len(wanted)} faults; {SLOTS} is the most in a run")
+        raise ValueError(f"{len(wanted)} faults; {SLOTS} is the most at a time")
+    slots = max(len(wanted), min(int(command["faulty"]), 1))
+    command["faults"] = 0
     for j, fault in enumerate(wanted):
         command["faults"][j] = fault
-    command["faulty"] = len(wanted)
+    command["faulty"] = slots
 
 
 @tick
@@ -168,8 +186,11 @@ def lateness(c, k):
 @tick
 def receive(c, f, rx, fresh, k):
     """What of the frame `rx` (1,), of which `fresh` are new, tick `k` gets to see. Returns how many it is told of."""
-    if fresh > 0:
+    if fresh > 0 or f.known == 0:
         f.raw = rx[0]
+    if f.known == 0:
+        f.known, f.since, f.last = 1, k, f.raw
+        f.before[:] = f.raw.counter_codes
     rx[0] = f.raw
     misread(c, f, rx[0], k)
     f.past[k % DEPTH] = rx[0]
@@ -183,18 +204,20 @@ def receive(c, f, rx, fresh, k):
 def link_in(c, f, rx, k):
     """The frame that comes through in tick `k`: the one of now, an older one, or again the last."""
     late, lost = 0, False
+    begun = f.since
     came = f.overtaken
     f.overtaken = 0
     for j in range(c.faulty):
         fault = c.faults[j]
         if not active(fault, k):
             continue
-        if fault.kind == LINK_DELAY:
-            late = max(late, min(int(fault.size), k))
+        if fault.kind == LINK_DELAY and int(fault.size) > late:
+            late, begun = int(fault.size), max(fault.begin, f.since)
         elif fault.kind == LINK_SILENT or (fault.kind == LINK_LOSS and chance(f, j, k) < fault.size):
             lost = True
         elif fault.kind == LINK_REORDER and came == 0 and chance(f, j, k) < fault.size:
             f.overtaken = 1
+    lost = lost or k - late < begun  # what was sent before has arrived; the first that is late is on its way
     if not lost and f.overtaken == 0:
         came += f.came[(k - late) % DEPTH]
         f.last = f.past[(k - late) % DEPTH]
@@ -208,37 +231,24 @@ def link_in(c, f, rx, k):
 @tick
 def misread(c, f, rx, k):
     """Counters and analog inputs as a broken sensor or wire gives them."""
-    frozen = np.uint64(0)
     for n in range(frames.COUNTERS):
-        if f.known == 0:
-            f.before[n] = rx.counter_codes[n]
-    f.known = 1
-    for j in range(c.faulty):
-        fault, n = c.faults[j], c.faults[j].channel
-        if not active(fault, k):
-            continue
-        if fault.kind == ENCODER_MISSED:
-            f.missed[n] += fault.size * daq_stc.difference(rx.counter_codes[n], f.before[n])
-        elif fault.kind == ENCODER_FREEZE:
-            frozen |= np.uint64(1) << np.uint64(n)
-        elif fault.kind == ADC_OPEN:
-            rx.ai_codes[n] = CODES - 1
-    for n in range(frames.COUNTERS):
+        share, jump = 0.0, 0
+        for j in range(c.faulty):
+            fault = c.faults[j]
+            if fault.channel != n or not active(fault, k):
+                continue
+            if fault.kind == ENCODER_FREEZE:
+                share = 1.0
+            elif fault.kind == ENCODER_MISSED:
+                share += fault.size
+            elif fault.kind == ENCODER_NOISE:
+                jump += int(fault.size * (2.0 * chance(f, j, k) - 1.0))
+        f.missed[n] += min(share, 1.0) * daq_stc.difference(rx.counter_codes[n], f.before[n])
         f.before[n] = rx.counter_codes[n]
-        counts = daq_stc.wrapped(rx.counter_codes[n] - int(f.missed[n]))
-        if (frozen >> np.uint64(n)) & np.uint64(1):
-            if f.frozen[n] == 0:
-                f.held[n] = counts
-            f.frozen[n] = 1
-            counts = f.held[n]
-        else:
-            f.frozen[n] = 0
-        rx.counter_codes[n] = counts
+        rx.counter_codes[n] = daq_stc.wrapped(rx.counter_codes[n] - int(f.missed[n]) + jump)
     for j in range(c.faulty):
-        fault, n = c.faults[j], c.faults[j].channel
-        if fault.kind == ENCODER_NOISE and active(fault, k):
-            jump = int(fault.size * (2.0 * chance(f, j, k) - 1.0))
-            rx.counter_codes[n] = daq_stc.wrapped(rx.counter_codes[n] + jump)
+        if c.faults[j].kind == ADC_OPEN and active(c.faults[j], k):
+            rx.ai_codes[c.faults[j].channel] = CODES - 1
 
 
 @tick
@@ -248,15 +258,17 @@ def transmit(c, f, tx, wire, k):
         put(wire[0], tx[0])
         return 1
     f.gone[k % DEPTH] = tx[0]
-    late = 0
+    late, begun = 0, 0
     for j in range(c.faulty):
         fault = c.faults[j]
         if not active(fault, k):
             continue
-        if fault.kind == LINK_DELAY:
-            late = max(late, min(int(fault.size), k))
+        if fault.kind == LINK_DELAY and int(fault.size) > late:
+            late, begun = int(fault.size), max(fault.begin, f.since if f.known != 0 else k)
         elif fault.kind == LINK_SILENT or (fault.kind == LINK_LOSS and chance(f, SLOTS + j, k) < fault.size):
             return 0
+    if k - late < begun:
+        return 0
     put(wire[0], f.gone[(k - late) % DEPTH])
     distort(c, wire[0], k)
     return 1
@@ -265,6 +277,7 @@ def transmit(c, f, tx, wire, k):
 @tick
 def put(wire, tx):
     """Copy the outputs, and leave number and time of the frame alone."""
+    wire.inputs_t_ns = tx.inputs_t_ns
     wire.ao_codes[:] = tx.ao_codes
     wire.dio_lines = tx.dio_lines
     wire.state = tx.state

@@ -32,7 +32,8 @@ from rtctl.machines.base import Block, Column
 
 # folders whose sources no tick can come from
 NEVER_COMPILED = {
-    "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "identify", "proof", "reproduce", "soak", "trace",
+    "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "identify", "proof", "reproduce", "soak",
+    "trace",
 }  # fmt: skip
 HEADER = '''"""{title}
 

@@ -71,9 +71,10 @@ class Loop:
         done = 0
         while done < ticks and not status["stop"] and not status["supervisor_lost"] and not status["failed"]:
             free = room - int(ring["head"] - ring["tail"])
-            most = min(ticks - done, STRETCH, free)
+            hold = int(status["hold"])
+            most = min(ticks - done, STRETCH, free, hold - done if hold else STRETCH)
             if most <= 0:
-                time.sleep(0.0005)  # the reader is behind; virtual time waits for it
+                time.sleep(0.0005)  # the reader is behind, or something is to be done first; virtual time waits for it
                 continue
             self.stretch(done, most)
             done = int(status["tick"])

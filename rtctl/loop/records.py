@@ -40,6 +40,7 @@ STATUS = state(
     round_trip=HISTOGRAM,
     # written by the supervisor
     stop=int,  # 1: end at once, outputs to zero
+    hold=int,  # virtual time waits before this tick until the supervisor moves it; 0 for never
     supervisor_lost=int,  # written by the loop's watch on the supervisor's pipe
 )
 

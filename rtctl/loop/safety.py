@@ -19,7 +19,9 @@ from rtctl.idiom import Settings, quantity, state, tick
 IDLE, ARMED, RUNNING, TRIPPED = range(4)
 STATES = ("idle", "armed", "running", "tripped")
 
-NONE, LINK, FROZEN, FOLLOWING, TENSION, CURRENT, NOT_A_NUMBER, MISSED, COMMANDER, START_UP, SUPERVISOR = range(11)
+(
+    NONE, LINK, FROZEN, FOLLOWING, TENSION, CURRENT, NOT_A_NUMBER, MISSED, COMMANDER, START_UP, SUPERVISOR, SENSORS,
+) = range(12)  # fmt: skip
 TRIPS = {
     NONE: ("none", "no trip"),
     LINK: ("link_lost", "the plant or board has sent nothing for too long: is it running, is the cable in?"),
@@ -32,6 +34,7 @@ TRIPS = {
     COMMANDER: ("commander_lost", "nobody has talked to the command socket for too long, and the config requires it"),
     START_UP: ("start_up", "the start-up routine did not find the reel radii"),
     SUPERVISOR: ("supervisor_lost", "the supervisor has died"),
+    SENSORS: ("sensors_disagree", "two sensors of one motion disagree: dead encoder, missed counts, slip or torn tape"),
 }
 
 
@@ -48,6 +51,9 @@ class SafetySettings(Settings):
     missed_ticks: int = Field(default=10, ge=0, description="late ticks in a row that trip; 0 switches it off")
     require_commander: bool = Field(default=False, description="trip where nobody talks to the command socket")
     commander_timeout: float = quantity(1.0, unit="s", gt=0, help="how long the command socket may be silent")
+    disagreement: float = quantity(
+        0.0, unit="m", ge=0, help="most that two sensors of one motion may come apart after arming; 0 switches it off"
+    )
     ramp: float = quantity(0.0, unit="s", ge=0, help="time in which a trip takes the outputs to zero; 0 is at once")
 
 
@@ -62,6 +68,7 @@ class SafetyParams(NamedTuple):
     current: float
     current_time: int
     missed: int
+    disagreement: float  # m
     fade: float  # share of the output that a trip takes away each tick
 
 
@@ -79,6 +86,7 @@ SAFETY_STATE = state(
     slack=int,
     late=int,
     counts=int,
+    apart=float,  # of two sensors in the tick in which the outputs came on, m
     hold=(float, 2),  # outputs of the last tick before the trip, V
     gate=float,  # share of them that is still written: 1, falling to 0 after a trip
     on=int,  # 1 in the tick in which the outputs come on
@@ -100,6 +108,7 @@ def build(settings: SafetySettings, dt: float) -> SafetyParams:
         current=settings.current,
         current_time=round(settings.current_time / dt),
         missed=settings.missed_ticks,
+        disagreement=settings.disagreement,
         fade=1.0 if settings.ramp <= dt else dt / settings.ramp,
     )
 
@@ -154,6 +163,15 @@ def check_timing(p, s, c, fresh, late, k):
         trip(s, MISSED, k)
     if c.commander_lost != 0:
         trip(s, COMMANDER, k)
+
+
+@tick
+def check_sensors(p, s, apart, k):
+    """Two sensors of one motion, which stand `apart` m from each other."""
+    if s.on != 0:
+        s.apart = apart
+    if p.disagreement > 0.0 and abs(apart - s.apart) > p.disagreement:
+        trip(s, SENSORS, k)
 
 
 @tick

@@ -43,6 +43,8 @@ __all__ = ["IvuConfig", "diagram", "plant_diagram", "substeps"]
 
 PLANT_RATE = 2000.0  # Hz, of the free-running emulator: a sample is at most half a millisecond old
 UNIT = "rad"
+SLOW = 0.3  # rad/s of the capstan, below which the reels may swing to and fro: they count either way
+STRETCH = 0.05  # m, after which tape by capstan and by reels is compared anew: radii are not known to the last percent
 SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
 
 
@@ -64,11 +66,14 @@ class IvuParams(NamedTuple):
     trail_speed: float
     hand_over: float
     settle: int  # ticks from arming to running
+    R_c: float
+    fast: float  # rad/s of a reel near which its sensor misses edges
 
 
 IVU_STATE = state(
-    R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float, k_run=int, gains=int, play=int, prepared=int, u_fb=float
-)
+    R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float, k_run=int, gains=int, play=int, prepared=int, u_fb=float,
+    direction=int, phi_1=float, n1=int, n2=int,  # where the stretch in one direction began
+)  # fmt: skip
 
 
 @tick
@@ -134,6 +139,21 @@ def play(t, s, c, k):
     elif s.safety.state == safety.RUNNING and c.play != s.machine.play:
         reference.start(t.reference, s.reference, k)
         s.machine.play = c.play
+
+
+@tick
+def tape_apart(p, s, phi, speed, n1_counts, n2_counts, R1, R2):
+    """How far, in m, the tape by a reel's sensor is from the tape by the capstan, over a stretch in one direction."""
+    m = s.machine
+    tape = abs(phi - m.phi_1) * p.machine.R_c
+    direction = 1 if speed > SLOW else (-1 if speed < -SLOW else 0)
+    blind = abs(speed) * p.machine.R_c > p.machine.fast * min(R1, R2)
+    if direction == 0 or direction != m.direction or blind or tape > STRETCH or s.safety.state != safety.RUNNING:
+        m.direction, m.phi_1, m.n1, m.n2 = direction, phi, n1_counts, n2_counts
+        return 0.0
+    apart1 = (n1_counts - m.n1) * p.reel1.radians_per_count * R1 - tape
+    apart2 = (n2_counts - m.n2) * p.reel2.radians_per_count * R2 - tape
+    return max(abs(apart1), abs(apart2))
 
 
 COLUMNS = (
@@ -235,6 +255,8 @@ STAGES = (
         (
             "amperes = max(abs(u1), abs(u2)) * p.drive.amp_per_volt",
             "safety.check_motion(p.safety, s.safety, y.capstan_error, y.capstan_counts, y.u_c, amperes, k)",
+            "apart = machine.tape_apart(p, s, y.capstan, y.capstan_speed, y.reel1_counts, y.reel2_counts, y.R1, y.R2)",
+            "safety.check_sensors(p.safety, s.safety, apart, k)",
             "safety.check_tension(p.safety, s.safety, y.tension1_estimate, y.tension2_estimate, k)",
             "safety.fade(p.safety, s.safety)",
         ),
@@ -331,4 +353,6 @@ def _machine_params(config: IvuConfig, dt: float) -> IvuParams:
         trail_speed=config.law.friction.speed,
         hand_over=config.law.friction.hand_over,
         settle=round(config.law.tension.ramp / dt) + round(0.1 / dt),
+        R_c=config.R_c,
+        fast=0.8 * min(optical_sensor.highest_speed(reel, dt) for reel in (config.sensors.reel1, config.sensors.reel2)),
     )

@@ -215,7 +215,7 @@ LAWS: dict[str, tuple[Any, Any]] = {
 def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Lines of the tick for the law and the feedback of this config."""
     step, reset = LAW_LINES[config.law.position.kind]
-    position = "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
+    encoder = position = "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
     if config.sensors.feedback == "scale":
         position = "y.scale"
     elif config.sensors.correction is not None:
@@ -272,6 +272,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
             (
                 "amperes = abs(u) * p.machine.amp_per_volt",
                 "safety.check_motion(p.safety, s.safety, y.position_error, y.encoder_counts, u, amperes, k)",
+                f"safety.check_sensors(p.safety, s.safety, {encoder} - y.scale, k)",
                 "safety.fade(p.safety, s.safety)",
             ),
         ),

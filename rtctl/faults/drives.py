@@ -1,0 +1,132 @@
+"""Two ways to drive a machine through its run, tick by tick exact: inside this process, and as the daemon's processes.
+
+Both stop before any tick that they are told to, so that an order reaches the loop at that very tick.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from rtctl import machines
+from rtctl.daemon.plant_process import Plant
+from rtctl.daemon.supervisor import Supervisor
+from rtctl.loop import faults, generate
+from rtctl.loop.loop import Loop
+from rtctl.loop.mailbox import Mailbox
+from rtctl.loop.records import layout
+from rtctl.trace.bundle import load_bundle
+
+Write = Callable[[Any, Any], None]
+PATIENCE = 300.0  # s for a stretch of virtual time, on however busy a machine
+
+
+def again(_: Any, command: Any) -> None:
+    """Reset, arm and play."""
+    for name in ("reset", "arm", "play"):
+        command[name] += 1
+
+
+class Inside:
+    """Loop and emulator in this process, `fused` or in turns between two threads (`lockstep`)."""
+
+    def __init__(self, config: Any, ticks: int):
+        machine = machines.build(config)
+        made = generate.generate(machine, "shm")
+        records = layout(made.params, made.tables, made.row, ticks + 1)
+        segment = cast(Any, {name: np.zeros(count, dtype) for name, (dtype, count) in records.items()})
+        self._segment: Any = segment
+        self._plant: threading.Thread | None = None
+        box = self._segment["mailbox"][0]
+        generate.fill(box["params"], machine.diagram.blocks)
+        faults.fill(box["command"], machine.faults)
+        self.post = Mailbox(segment).post
+        self.post(again)
+        self._loop = Loop(machine, made, self._segment, self._segment["outputs"], self._segment["inputs"])
+        generate.fill_tables(self._segment["tables"][0], (machine.reference, machine.excitation))
+        self._lockstep = config.loop.mode == "lockstep"
+
+    def __enter__(self) -> "Inside":
+        if self._lockstep:
+            plant = Plant(*self._plant_arguments())
+            self._loop.warm()  # the emulator waits five seconds at most
+            self._plant = threading.Thread(target=plant.run)
+            self._plant.start()
+        return self
+
+    def _plant_arguments(self) -> tuple[Any, ...]:
+        s = self._segment
+        return self._loop.machine, self._loop.made, s["plant_status"], s["inputs"], s["outputs"]
+
+    def __exit__(self, *_: Any) -> None:
+        if self._plant is not None:
+            self._segment["plant_status"]["stop"] = 1
+            self.to(self._tick + 1)  # it waits for outputs
+            self._plant.join()
+
+    @property
+    def _tick(self) -> int:
+        return int(self._segment["status"][0]["tick"])
+
+    def to(self, tick: int) -> None:
+        """Run until the next tick is `tick`."""
+        self._loop.stretch(self._tick, tick - self._tick)
+
+    def wire(self) -> list[int]:
+        """Codes that the machine has at its outputs."""
+        return self._loop.held[0]["ao_codes"].tolist()
+
+    def rows(self) -> Any:
+        """The rows so far, by column."""
+        return self._segment["rows"][: self._tick]
+
+
+class _Held(Supervisor):
+    """Waits before tick 1 until it is told how far to go."""
+
+    def _start_children(self, stack: ExitStack, rows: int) -> None:
+        self.status["hold"] = 1
+        super()._start_children(stack, rows)
+
+
+class Processes:
+    """Supervisor, loop and emulator as `rtctl run` has them; `out` takes the recording."""
+
+    def __init__(self, config: Any, ticks: int, out: Path):
+        self._supervisor = _Held(config, out, ticks)
+        self._supervisor.armed_at_start = True
+        self._out = out
+
+    def __enter__(self) -> "Processes":
+        self._supervisor.__enter__()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._supervisor.__exit__()
+
+    def post(self, write: Write) -> None:
+        self._supervisor.order(write)
+
+    def to(self, tick: int) -> None:
+        """Run until the next tick is `tick`."""
+        status, deadline = self._supervisor.status, time.monotonic() + PATIENCE
+        status["hold"] = tick
+        while int(status["tick"]) < tick:
+            self._supervisor.turn()
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"the loop stands at tick {int(status['tick'])}, on its way to {tick}")
+            time.sleep(0.001)
+
+    def wire(self) -> list[int]:
+        """Codes that the machine has at its outputs."""
+        return self._supervisor.segment["outputs"][0]["frame"]["ao_codes"].tolist()
+
+    def rows(self) -> Any:
+        """The recording, by column; nothing comes after that."""
+        self._supervisor.stop()
+        self._supervisor.finish()
+        return load_bundle(self._out).columns

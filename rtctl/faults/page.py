@@ -1,0 +1,80 @@
+"""docs/faults.md, made from a table run: no clock time in it, so that it comes out the same bit for bit."""
+
+from rtctl.faults.cases import STANDS
+from rtctl.faults.notes import NOTES
+from rtctl.faults.play import Outcome
+from rtctl.faults.processes import Survived
+from rtctl.faults.table import Table
+from rtctl.loop.faults import KINDS
+
+HEAD = """# Faults
+
+Every fault that `rtctl` can inject, on every shipped machine, written by `rtctl fault table --markdown docs/faults.md`.
+
+    rtctl fault list                                  # what there is
+    rtctl fault add encoder.freeze --at 3s --for 200ms
+    rtctl fault clear
+
+or in a config:
+
+    faults:
+      - {fault: encoder.freeze, at: 3 s, lasts: 200 ms}
+
+The machine plays a move at constant speed, as processes of the daemon in lockstep, with the limits of its shipped
+config. Numbers are ticks. *Detected* counts from the fault to the trip, *zero written* from the fault to the first tick
+from which on nothing but zero is written; a trip writes zero in its own tick. *Reaches the machine* says whether those
+zeros were at the machine's outputs while the fault was still there. In every run all rows before the fault are bit
+for bit those of the undisturbed run, no row is lost, and the machine runs again after `reset`, `arm` and
+`play` once the fault has gone; a run that failed in that would say so in its last column.
+"""
+UNITS = {"ivu": ("rad", 1.0), "ldu": ("mm", 1e3)}
+
+
+def text(table: Table) -> str:
+    """The page."""
+    parts = [HEAD]
+    for name, stand in STANDS.items():
+        outcomes = [o for o in table.outcomes if o.machine == name]
+        survived = [s for s in table.survived if s.machine == name]
+        if not outcomes:
+            continue
+        rate = stand.config().loop.rate
+        parts.append(f"\n## {name}, {rate:g} Hz: faults between loop and machine\n\n")
+        parts.append("| fault | size | detected | zero written | reaches the machine | largest error | |\n")
+        parts.append("|---|---|---|---:|---|---:|---|\n")
+        parts += [_outcome(o, rate) for o in outcomes]
+        parts.append(f"\n## {name}: faults of processes\n\n")
+        parts.append("| fault | mode | seen | outputs | what is lost | |\n|---|---|---|---|---|---|\n")
+        parts += [_survived(s) for s in survived]
+    parts.append("\n## What each is, and what to do\n")
+    parts += [_note(name) for name in KINDS]
+    return "".join(parts)
+
+
+def _outcome(o: Outcome, rate: float) -> str:
+    kind, (unit, factor) = KINDS[o.fault], UNITS[o.machine]
+    size = f"{o.size:g} {kind.unit}".strip() if kind.size else ""
+    size = f"{kind.size} {size}".strip()
+    name = f"{o.fault}, channel {o.channel}" if kind.channels > 1 else o.fault
+    seen = "not detected" if o.detected is None else f"`{o.trip}` after {o.detected} ({o.detected / rate * 1e3:g} ms)"
+    reaches = {True: "yes", False: "not while it lasts", None: ""}[o.wire]
+    zero = "" if o.safe is None else f"{o.safe}"
+    wrong = [word for bad, word in ((o.lost, f"{o.lost} rows lost"), (not o.same, "differs before the fault"),
+                                    (not o.again, "does not run again")) if bad]  # fmt: skip
+    error = f"{o.error * factor:.3g} of {o.allowed * factor:.3g} {unit}"
+    return f"| {name} | {size} | {seen} | {zero} | {reaches} | {error} | {', '.join(wrong) or 'ok'} |\n"
+
+
+def _survived(s: Survived) -> str:
+    return f"| {s.fault} | {s.mode} | {s.seen} | {s.outputs} | {s.lost} | {'ok' if s.ok else 'FAILED'} |\n"
+
+
+def _note(name: str) -> str:
+    kind, note = KINDS[name], NOTES[name]
+    size = (
+        f" Size: {kind.size}{f', {kind.unit}' if kind.unit else ''}; {kind.usual:g} if not given." if kind.size else ""
+    )
+    return (
+        f"\n### {name}\n\n{kind.words[0].upper()}{kind.words[1:]}.{size}\n\n"
+        f"- imitates: {note.imitates}\n- detected by: {note.detected}\n- what to do: {note.do}\n"
+    )

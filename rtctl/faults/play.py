@@ -1,0 +1,93 @@
+"""A fault played on a machine, and what came of it."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.faults.cases import Case, Stand
+from rtctl.faults.drives import Inside, Processes, again
+from rtctl.loop import safety
+from rtctl.loop.faults import KINDS
+
+
+class Outcome(NamedTuple):
+    """What a fault did to a run. Ticks; None for what did not happen."""
+
+    machine: str
+    fault: str
+    channel: int
+    size: float
+    trip: str | None
+    detected: int | None  # from the fault to the trip
+    safe: int | None  # from the fault until zero is written, and stays
+    safe_from_trip: int | None
+    wire: bool | None  # whether the machine had zeros at its outputs before the fault went; None where nothing tripped
+    error: float  # largest while the fault was there and nothing had tripped, rad or m
+    allowed: float
+    late: int  # ticks that were late
+    lost: int  # rows
+    same: bool  # bit for bit the undisturbed run, up to the fault
+    again: bool  # ran again, and moved, after reset and arm
+
+
+def undisturbed(stand: Stand) -> Any:
+    """The rows of the run without a fault, bit for bit the same in every mode of virtual time."""
+    with Inside(stand.config(loop__mode="fused"), stand.ticks(stand.last)) as drive:
+        drive.to(stand.ticks(stand.last))
+        return drive.rows().copy()
+
+
+def play(stand: Stand, case: Case, drive: Inside | Processes, truth: Any) -> Outcome:
+    """Play the run of a stand with a fault in its config; `truth` are the rows of the undisturbed run."""
+    begin, end = stand.ticks(stand.begin), stand.ticks(stand.begin + stand.lasts)
+    restart, last = stand.ticks(stand.again), stand.ticks(stand.last)
+    drive.to(end - 1)
+    wire = not any(drive.wire())
+    drive.to(restart)
+    drive.post(again)
+    drive.to(last)
+    rows = drive.rows()
+    trips = np.flatnonzero(np.asarray(rows["state"][begin:restart]) == safety.TRIPPED)
+    k = begin + int(trips[0]) if trips.size else None
+    error = np.abs(rows[stand.error][begin : k if k is not None else end])
+    config = stand.config([stand.fault(case)])
+    quiet = None if k is None else k + _quiet(stand, rows, k, restart)
+    ticks = np.asarray(rows["tick"])
+    return Outcome(
+        machine=stand.name,
+        fault=case.fault,
+        channel=case.channel,
+        size=KINDS[case.fault].usual if case.size is None else case.size,
+        trip=None if k is None else safety.TRIPS[int(rows["trip"][k])][0],
+        detected=None if k is None else k - begin,
+        safe=None if quiet is None else quiet - begin,
+        safe_from_trip=None if k is None or quiet is None else quiet - k,
+        wire=None if k is None or k >= end - 1 else wire,
+        error=float(error.max()) if error.size else 0.0,
+        allowed=float(config.safety.following_error),
+        late=int(np.count_nonzero(np.asarray(rows["lateness"]) > 0.0)),
+        lost=last - len(ticks),
+        same=same(rows, truth, begin),
+        again=_runs(stand, rows, restart, last),
+    )
+
+
+def same(rows: Any, truth: Any, ticks: int) -> bool:
+    """Whether the first `ticks` rows are bit for bit those of the undisturbed run, every column."""
+    return len(rows["tick"]) >= ticks and all(
+        np.array_equal(rows[name][:ticks], truth[name][:ticks], equal_nan=True) for name in truth.dtype.names
+    )
+
+
+def _quiet(stand: Stand, rows: Any, first: int, end: int) -> int:
+    """Ticks from `first` until zero is written and stays until `end`."""
+    on = np.any([np.asarray(rows[name][first:end]) != 0.0 for name in stand.outputs], axis=0)
+    return int(np.flatnonzero(on)[-1]) + 1 if on.any() else 0
+
+
+def _runs(stand: Stand, rows: Any, restart: int, last: int) -> bool:
+    """Whether the machine runs to the end and has moved since the restart, as its reference has."""
+    moved = np.ptp(np.asarray(rows["ref"][restart:last]) - np.asarray(rows[stand.error][restart:last]))
+    following = math.fabs(float(rows[stand.error][last - 1])) < stand.config().safety.following_error
+    return bool(rows["state"][last - 1] == safety.RUNNING and moved > stand.move and following)

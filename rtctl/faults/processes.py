@@ -1,0 +1,205 @@
+"""Faults of processes, on those of the daemon: each has its run, or a part of one, that proves it was survived."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl import machines
+from rtctl.config.errors import UserError
+from rtctl.config.load import to_yaml
+from rtctl.daemon.supervisor import SHM, Supervisor
+from rtctl.faults.cases import Stand
+from rtctl.faults.drives import again
+from rtctl.faults.play import same
+from rtctl.loop import generate, safety
+from rtctl.loop.memory import Segment
+from rtctl.loop.records import layout
+from rtctl.trace.bundle import load_bundle
+from rtctl.trace.repair import repair
+
+PATIENCE = 120.0  # s, of a busy machine
+NO_LIMITS = {  # on the wall clock of a busy machine nothing but the fault may trip
+    "safety__link_timeout": 3.0, "safety__missed_ticks": 0, "safety__following_error": 0.0, "safety__frozen_time": 0.0,
+    "safety__current_time": 0.0, "safety__disagreement": 0.0, "safety__tension_min": -1e9, "safety__tension_max": 1e9,
+    "loop__realtime": "off",
+}  # fmt: skip
+
+
+class Survived(NamedTuple):
+    """A fault of a process, in words that its run has proved where `ok`."""
+
+    machine: str
+    fault: str
+    mode: str
+    seen: str  # where a person sees it
+    outputs: str
+    lost: str
+    ok: bool
+
+
+@contextmanager
+def _running(config: Any, out: Path, ticks: int) -> Iterator[Supervisor]:
+    supervisor = Supervisor(config, out, ticks)
+    supervisor.armed_at_start = True
+    with supervisor:
+        yield supervisor
+
+
+def side_by_side(stand: Stand, folder: Path, truth: Any) -> list[Survived]:
+    """Recorder, disk, clock and CPUs, one after the other in one run in lockstep: none of them may reach the loop."""
+    third, last = stand.last / 3, stand.ticks(stand.last)
+    faults = [
+        {"fault": "recorder.stall", "at": 0.5 * third, "lasts": third},
+        {"fault": "clock.step", "at": 0.6 * third, "lasts": third},
+        {"fault": "cpu.hog", "at": 0.7 * third, "lasts": third, "size": 2.0},
+        {"fault": "disk.full", "at": 2.0 * third},
+    ]
+    full = stand.ticks(2.0 * third)
+    queued = 0
+    with _running(config(stand, faults), folder / "bundle", last) as supervisor:
+        for _ in supervisor.run():
+            assert supervisor.recorder is not None
+            active = [f["fault"] for f in supervisor.faults.handle("list", None)["faults"] if f["active"]]
+            stalled = "recorder.stall" in active
+            queued = max(queued, supervisor.recorder.stats().rows_queued if stalled else 0)
+        supervisor.stop()
+        supervisor.finish()
+        found = supervisor.snapshot()
+    rows = load_bundle(folder / "bundle").columns
+    kept = len(rows["tick"])
+    whole = found["ticks"] == last and found["trip"] is None and same(rows, truth, full)
+    exact = kept == full and found["rows"]["lost"] == last - full
+
+    def row(fault: str, seen: str, lost: str, ok: bool) -> Survived:
+        done = any(told["fault"] == fault for told in found["faults"])
+        return Survived(stand.name, fault, "lockstep", seen, "untouched: the run goes on", lost, done and whole and ok)
+
+    return [
+        row("recorder.stall", "`status`: `rows.queued` grows", "nothing: 64 MB of rows wait for the disk", queued > 0),
+        row("clock.step", "nowhere", "nothing: all runs on CLOCK_MONOTONIC", True),
+        row("cpu.hog", "in real time: late ticks, at worst `missed_ticks`", "nothing", True),
+        row("disk.full", f"`status`: `rows.error` is \"{found['rows']['error']}\"", "what came after it, counted",
+             exact and "space" in str(found["rows"]["error"])),
+    ]  # fmt: skip
+
+
+def plant_killed(stand: Stand, folder: Path, truth: Any) -> Survived:
+    """In lockstep there is no time without the plant: the run ends, and says why."""
+    begin = stand.ticks(stand.begin)
+    made = config(stand, [{"fault": "plant.kill", "at": stand.begin}])
+    with _running(made, folder / "bundle", stand.ticks(stand.last)) as supervisor:
+        for _ in supervisor.run():
+            pass
+        supervisor.stop()
+        supervisor.finish()
+        found = supervisor.snapshot()
+    rows = load_bundle(folder / "bundle").columns
+    ok = found["ticks"] == len(rows["tick"]) == begin and same(rows, truth, begin)
+    said = found["faults"][-1]["what"]
+    return Survived(stand.name, "plant.kill", "lockstep", said, "there is no machine any more", "nothing", ok)
+
+
+def plant_back(stand: Stand, folder: Path, link: str = "shm") -> Survived:
+    """On the wall clock the loop trips, the plant comes back with its counters at zero, and is taken up again."""
+    made = config(
+        stand, [{"fault": "plant.kill", "at": 1.0, "lasts": 4.0}], loop__mode="real", link__kind=link, **NO_LIMITS
+    )
+    with _running(made, folder / "bundle", 0) as supervisor:
+        turns, status = supervisor.run(), supervisor.status
+        first = supervisor.plant
+        until(lambda: status["trip"] and supervisor.plant is not first, turns)
+        until(lambda: supervisor.last_row["link_age"] == 0.0, turns)  # the new one answers
+        came = int(status["tick"])
+        supervisor.order(again)
+        until(lambda: status["state"] == safety.RUNNING, turns)
+        moving = int(status["tick"]) + stand.ticks(1.0)
+        until(lambda: int(status["tick"]) > moving or status["state"] == safety.TRIPPED, turns)
+        supervisor.stop()
+        supervisor.finish()
+    rows = load_bundle(folder / "bundle").columns
+    return Survived(
+        stand.name,
+        "plant.kill",
+        "real",
+        f"`link_lost` after {_limit(made)} ticks without a frame (`safety.link_timeout`)",
+        "zero in the tick of the trip; after reset and arm it holds where the new plant stands, and moves again",
+        "nothing",
+        _back(stand, rows, came, _limit(made)),
+    )
+
+
+def _back(stand: Stand, rows: Any, came: int, limit: int) -> bool:
+    k = int(np.argmax(rows["state"] == safety.TRIPPED))
+    on = int(np.argmax((rows["tick"] > rows["tick"][k]) & (rows["state"] == safety.ARMED)))
+    off = slice(k, on)
+    return bool(
+        safety.TRIPS[int(rows["trip"][k])][0] == "link_lost"
+        and rows["link_age"][k] == limit + 1
+        and not any(rows[name][off].any() for name in stand.outputs)
+        and rows["tick"][on] >= came
+        and rows[stand.error][on] == 0.0
+        and rows["state"][-1] == safety.RUNNING
+    )
+
+
+def _limit(config: Any) -> int:
+    return round(config.safety.link_timeout * config.loop.rate)
+
+
+def supervisor_killed(stand: Stand, folder: Path, truth: Any) -> Survived:
+    """SIGKILL: what the recording lacks is in shared memory, to the last tick."""
+    begin = stand.ticks(stand.begin)
+    made = config(stand, [{"fault": "supervisor.kill", "at": stand.begin}])
+    path, bundle = folder / "config.yaml", folder / "bundle"
+    path.write_text(to_yaml(made))
+    order = [sys.executable, "-m", "rtctl.cli.main", "run", str(path), "--for", f"{stand.last}s"]
+    code = subprocess.run([*order, "--out", str(bundle), "--no-plot", "--json"], capture_output=True).returncode
+    left = _left(made)
+    ended = left is not None and code == -signal.SIGKILL
+    recorded = repair(bundle).rows if ended else 0
+    found = np.asarray([]) if left is None else left
+    ok = ended and recorded <= begin and len(found) == begin and same(found, truth, begin)
+    ok = ok and (not recorded or same(load_bundle(bundle).columns, truth, recorded))
+    return Survived(
+        stand.name, "supervisor.kill", "lockstep", "nobody answers the command socket",
+        "the loop ends; on the wall clock it writes zeros first", "at most the last batch, which shared memory has", ok,
+    )  # fmt: skip
+
+
+def _left(config: Any) -> Any:
+    """The rows in the shared memory of a machine whose supervisor was killed, once its loop has ended; removed then."""
+    machine = machines.build(config)
+    made = generate.generate(machine, "shm")
+    rows = max(int(config.record.seconds * machine.rate), 1000)
+    where = SHM / f"rtctl-{os.getuid()}-{config.name}"
+    try:
+        segment = Segment.open(where, layout(made.params, made.tables, made.row, rows))
+    except FileNotFoundError:
+        return None
+    deadline = time.monotonic() + PATIENCE
+    while not segment["status"][0]["ended"] and time.monotonic() < deadline:
+        time.sleep(0.01)
+    ticks = int(segment["ring"][0]["head"])
+    segment.unlink()
+    return segment["rows"][:ticks].copy() if segment["status"][0]["ended"] and ticks <= rows else None
+
+
+def config(stand: Stand, faults: list[dict[str, Any]], **changes: Any) -> Any:
+    name = f"faults-{stand.name}-{time.monotonic_ns() % 10**9}"
+    return stand.config(faults, **{"name": name, "loop__mode": "lockstep", "record__seconds": 20.0, **changes})
+
+
+def until(what: Callable[[], Any], turns: Iterator[None]) -> None:
+    """Take turns until it has come about. Raises UserError where it does not."""
+    deadline = time.monotonic() + PATIENCE
+    while not what():
+        if next(turns, turns) is turns or time.monotonic() > deadline:
+            raise UserError("the run ended before what was waited for came about")
