@@ -68,6 +68,7 @@ def driver_config(config: Any, highest: float = 3.0, step: float = 0.1) -> Any:
         "plant.parameters.F_c": HELD,
         "safety.frozen_time": 0,
         "safety.following_error": 0,
+        "safety.disagreement": 0,
         "safety.current_time": 0,
         "reference": {"steps": steps},
     }

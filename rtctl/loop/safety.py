@@ -34,7 +34,10 @@ TRIPS = {
     COMMANDER: ("commander_lost", "nobody has talked to the command socket for too long, and the config requires it"),
     START_UP: ("start_up", "the start-up routine did not find the reel radii"),
     SUPERVISOR: ("supervisor_lost", "the supervisor has died"),
-    SENSORS: ("sensors_disagree", "two sensors of one motion disagree: dead encoder, missed counts, slip or torn tape"),
+    SENSORS: (
+        "sensors_disagree",
+        "two sensors of one motion disagree: dead encoder, missed counts, slip, torn tape, or reels of other radii",
+    ),
 }
 
 

@@ -73,6 +73,7 @@ class IvuParams(NamedTuple):
 IVU_STATE = state(
     R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float, k_run=int, gains=int, play=int, prepared=int, u_fb=float,
     direction=int, phi_1=float, n1=int, n2=int,  # where the stretch in one direction began
+    R1_given=float, R2_given=float,  # radii that these go back to
 )  # fmt: skip
 
 
@@ -94,8 +95,10 @@ def switch_on(p, s, phi):
     limit.reset(p.limit, s.limit1, 0.0)
     limit.reset(p.limit, s.limit2, 0.0)
     s.machine.prepared = 0
-    if s.machine.R1 == 0.0 or p.machine.measure == 0:
-        _set_radii(s.machine, p.machine.R1, p.machine.R2, phi)
+    m = s.machine
+    if m.R1_given != p.machine.R1 or m.R2_given != p.machine.R2:  # else they have been followed since
+        m.R1_given, m.R2_given = p.machine.R1, p.machine.R2
+        _set_radii(m, p.machine.R1, p.machine.R2, phi)
 
 
 @tick

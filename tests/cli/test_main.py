@@ -10,6 +10,7 @@ from rtctl.cli.main import COMMANDS
 GROUPS = {
     "trace": ("info", "plot", "repair"),
     "keys": ("new",),
+    "fault": ("add", "list", "clear", "table"),
     "identify": ("frf", "multisine", "fit", "friction", "radius", "driver", "scale", "steps"),
 }
 LEAVES = [(c,) for c in COMMANDS if c not in GROUPS] + [(g, c) for g, commands in GROUPS.items() for c in commands]

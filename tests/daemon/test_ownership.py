@@ -68,6 +68,9 @@ def status_of(path: Path) -> Any:
     return np.memmap(path, STATUS, "r", shape=(1,))[0]
 
 
+SOME_ROWS = 50_000  # bytes
+
+
 @pytest.fixture
 def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]]:
     """`killed(config)` starts a run, kills its supervisor in the middle of it, and gives the pids of its children."""
@@ -80,7 +83,8 @@ def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]
         pid, path = made[-1].pid, segment_path(config)
         wait_for(path.exists)
         wait_for(lambda: status_of(path)["tick"] > 1000, 200)
-        wait_for(lambda: any((tmp_path / "killed").iterdir()))
+        stream = tmp_path / "killed" / "recording.arrows"
+        wait_for(lambda: stream.exists() and stream.stat().st_size > SOME_ROWS)
         children = [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
         assert children and not any(map(gone, children))
         made[-1].send_signal(signal.SIGKILL)
@@ -97,7 +101,7 @@ def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]
 def test_after_sigkill_nothing_runs_on_and_the_next_start_takes_it_all_over(
     config: Callable[..., Any], killed: Callable[[Any], list[int]], tmp_path: Path, mode: str
 ) -> None:
-    settings = config(mode=mode, link="shm", set={"record.seconds": 2.0})
+    settings = config(mode=mode, link="shm", set={"record.seconds": 2.0, "record.batch": 0.001})
     children = killed(settings)
     wait_for(lambda: all(map(gone, children)), 10)
     assert {p.suffix for p in left(settings)} >= {".lock", ".command", ".telemetry"}  # nobody was there to clean up

@@ -105,6 +105,20 @@ def test_radii_follow_the_tape():
     assert np.ptp(run["truth_R1"]) > 1e-4
 
 
+def test_radii_are_followed_while_the_outputs_are_off(config, bench):
+    """A setting is where they start. What has been wound since is not forgotten by arming again, unless it changes."""
+    steps = [{"at": 0.2, "to": 3.0, "ramp": 3.0}]
+    machine = bench(config("ivu", set={"reference.steps": steps}))
+    first = machine.ask("arm", "play").run(2.5)
+    off = machine.ask("disarm").run(0.5)
+    again = machine.ask("arm").run(0.5)
+    assert first["R1"][0] == 0.038 and abs(off["R1"][-1] - 0.038) > 1e-6
+    np.testing.assert_allclose(again["R1"], off["R1"][-1], rtol=1e-5)
+    machine.ask("disarm").run(0.1)
+    machine.take_over(config("ivu", set={"radius.R1": 0.0375}))
+    assert machine.ask("arm").run(0.1)["R1"][0] == pytest.approx(0.0375, rel=1e-4)
+
+
 def test_encoder_reads_the_capstan():
     run = fused.shipped("ivu", "steps", 13.5)
     off = run["truth_capstan"] - run["capstan"]

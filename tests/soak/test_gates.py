@@ -1,5 +1,6 @@
 """Every gate can fail: a regression planted for each invariant, and the soak says so by name."""
 
+import mmap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -210,7 +211,8 @@ def test_a_leak(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
     found = rig()
     memory, kept = Memory(), []
     for k in range(20):
-        kept.append(np.ones(round(MOST_MB / 10 * 2**17)))
+        kept.append(mmap.mmap(-1, size := round(MOST_MB / 10 * 2**20)))  # not of what the allocator has had before
+        kept[-1].write(bytes(size))
         memory.sample(k / 20, found.checker, k)
     assert names(found) == {"memory"} and found.checker.count == 1
 
