@@ -38,6 +38,7 @@ COMMANDS = {
     "prove": "prove",
     "physics": "physics",
     "trace": "trace",
+    "import": "import_",
     "soak": "soak",
     "doctor": "doctor",
     "keys": "keys",

@@ -39,7 +39,7 @@ def load_bundle(folder: Path | str) -> Bundle:
     folder = Path(folder)
     if not folder.is_dir():
         raise UserError(f"{folder} is not a folder; a bundle is a folder with {PARQUET} and {CASE}")
-    paths = _recordings(folder)
+    paths = recordings(folder)
     case = load_case(folder)
     path = paths[0]
     table = _table(paths)
@@ -79,7 +79,7 @@ def _entry(part: Path) -> dict[str, Any] | None:
     return entry
 
 
-def _recordings(folder: Path) -> list[Path]:
+def recordings(folder: Path) -> list[Path]:
     """The Parquet files of a finished bundle: its own, or those of its parts."""
     if (folder / PARQUET).is_file():
         return [folder / PARQUET]

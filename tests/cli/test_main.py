@@ -8,7 +8,7 @@ from rtctl.cli import common
 from rtctl.cli.main import COMMANDS
 
 GROUPS = {
-    "trace": ("info", "plot", "repair"),
+    "trace": ("info", "plot", "repair", "export", "compare"),
     "keys": ("new",),
     "fault": ("add", "list", "clear", "table"),
     "identify": ("frf", "multisine", "fit", "friction", "radius", "driver", "scale", "steps"),

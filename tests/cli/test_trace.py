@@ -1,9 +1,12 @@
+import csv
 import json
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+
+from rtctl.cli import main
 
 
 @pytest.fixture
@@ -47,3 +50,94 @@ def test_what_is_no_bundle(rtctl, command, tmp_path):
     code, out, err = rtctl("trace", command, tmp_path)
     assert (code, out) == (2, "")
     assert str(tmp_path) in err
+
+
+@pytest.fixture
+def recorded(bundle):
+    """The same with what a run leaves: its timing, an order, and parts in the case."""
+    case = json.loads((bundle / "case.json").read_text())
+    stage = {"count": 100, "p50": 1.25, "p99": 3.5, "p999": 8.0, "max": 9.0, "buckets": [[1250.0, 100]]}
+    case["timing"] = {"read": stage, "wake": {**stage, "count": 0}}
+    case["parts"] = [{"folder": "part-0001", "rows": 100, "tick": [0, 99], "t": [0.0, 0.99]}]
+    (bundle / "case.json").write_text(json.dumps(case))
+    order = {"order": 1, "command": {"order": 1}, "changed": {"law.position.gain": 20}}
+    (bundle / "orders.jsonl").write_text(json.dumps(order) + "\n")
+    return bundle
+
+
+def test_info_tells_timing_orders_and_parts(rtctl, recorded):
+    lines = [line.split() for line in rtctl("trace", "info", recorded).out.splitlines()]
+    assert ["timing", "[us]", "p50", "p99", "max", "ticks"] in lines
+    assert ["read", "1.25", "3.5", "9", "100"] in lines and not any(line[0] == "wake" for line in lines)
+    assert ["orders", "1,", "which", "changed", "law.position.gain"] in lines
+    assert ["part-0001", "100", "rows,", "0", "s", "to", "0.99", "s"] in lines
+    found = json.loads(rtctl("trace", "info", recorded, "--json").out)
+    assert found["timing_us"]["read"] == {"count": 100, "p50": 1.25, "p99": 3.5, "max": 9.0}
+    assert (found["orders"], found["settings_changed"], len(found["parts"])) == (1, ["law.position.gain"], 1)
+
+
+def test_export(rtctl, bundle, tmp_path):
+    assert rtctl("trace", "export", bundle, "--to", "csv") == (0, f"{bundle / 'trace.csv'}\n", "")
+    words = ("--columns", "ref, x", "--from", "0s", "--to-time", "500ms", "--every", 10, "--json")
+    done = json.loads(rtctl("trace", "export", bundle, "--to", "csv", "-o", tmp_path / "a.csv", *words).out)
+    assert (done["path"], done["rows"], done["columns"]) == (str(tmp_path / "a.csv"), 6, ["t", "ref", "x"])
+    with (tmp_path / "a.csv").open(newline="") as file:
+        assert [row[0] for row in csv.reader(file)] == ["t", "0", "0.1", "0.2", "0.3", "0.4", "0.5"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--to", "xls"], "no format 'xls'"),
+        (["--to", "csv", "--from", "soon"], "--from soon: not a duration"),
+        (["--to", "csv", "--every", "0"], "invalid value for '--every'"),
+        (["--to", "csv", "--from", "-2s", "--to-time", "-1s"], "holds no rows from -2 s to -1 s"),
+        ([], "missing option '--to'"),
+    ],
+)
+def test_export_refuses(rtctl, bundle, words, message):
+    code, out, err = rtctl("trace", "export", bundle, *words)
+    assert (code, out) == (2, "") and message in err and err.count("\n") == 1
+
+
+def test_compare(rtctl, bundle, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    table = pq.read_table(bundle / "recording.parquet")
+    x = table.column("x").to_numpy() * 1.25
+    pq.write_table(table.set_column(3, "x", pa.array(x)), other / "recording.parquet")
+    (other / "case.json").write_bytes((bundle / "case.json").read_bytes())
+    code, out, _ = rtctl("trace", "compare", bundle, other, "--plot", tmp_path / "a.png")
+    assert code == 0 and "tick 50 (0.5 s)" in out and "the same to the bit: tick, t, ref" in out
+    assert [line.split() for line in out.splitlines()][-1] == ["1", "0", "-0.25", "0", "25", "0", "-"]
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert rtctl("trace", "compare", bundle, other, "--same").code == 1
+    assert rtctl("trace", "compare", bundle, other, "--same", "--columns", "ref").code == 0
+    assert rtctl("trace", "compare", bundle, bundle, "--same").code == 0
+    found = json.loads(rtctl("trace", "compare", bundle, other, "--json").out)
+    assert (found["same"], found["aligned"], found["ticks"]) == (False, "tick", 100)
+    assert rtctl("trace", "compare", bundle, other, "--align", "eye").code == 2
+
+
+def test_import(rtctl, monkeypatch, tmp_path):
+    monkeypatch.setitem(main.COMMANDS, "import", "import_")
+    t = np.arange(3000) * 0.001
+    rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), np.cos(t).tolist(), np.sin(t).tolist(), strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,vir,qm", *rows]))
+    words = ("--map", "t=time,u=vir", "--map", "x=qm", "--unit", "x=mm", "--plant", "axis", "--parameter", "M=95 kg")
+    code, out, _ = rtctl("import", tmp_path / "a.csv", "--out", tmp_path / "b", *words)
+    assert code == 0 and out.startswith("3000 rows at 1000 Hz: t [s], u [V], x [m], w [V]\n")
+    assert "diagnose would say" not in out
+    found = json.loads(rtctl("trace", "info", tmp_path / "b", "--json").out)
+    assert (found["plant"], found["sample_rate_hz"], found["columns"]["x"]) == ("axis", 1000.0, "m")
+    code, out, err = rtctl("import", tmp_path / "a.csv", "--out", tmp_path / "b", *words)
+    assert (code, out) == (2, "") and "already holds" in err
+    code, _, err = rtctl("import", tmp_path / "a.csv", "--out", tmp_path / "c", "--map", "x=qmm", "--plant", "axis")
+    assert code == 2 and "no column 'qmm' (wanted as x); is it 'qm'?" in err
+
+
+def test_import_says_what_a_diagnosis_would_lack(rtctl, monkeypatch, tmp_path):
+    monkeypatch.setitem(main.COMMANDS, "import", "import_")
+    np.savez(tmp_path / "a.npz", t=np.arange(10) * 0.1, x=np.arange(10.0), u=np.arange(10.0))
+    found = json.loads(rtctl("import", tmp_path / "a.npz", "--out", tmp_path / "b", "--plant", "axis", "--json").out)
+    assert found["rows"] == 10 and "needs 500" in found["lacks"]

@@ -1,0 +1,85 @@
+"""`rtctl import FILE`: a recording of another program as a bundle."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rtctl.cli import common
+from rtctl.cli.common import JsonOption
+
+app = typer.Typer(add_completion=False)
+
+
+@app.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="csv, txt, tsv, mat, npz, parquet or mcap.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="BUNDLE", help="Folder of the bundle to make.")],
+    map_: Annotated[
+        list[str] | None,
+        typer.Option("--map", metavar="OURS=THEIRS,...", help="Which column is which, e.g. u=vir,x=qm. Repeatable."),
+    ] = None,
+    map_file: Annotated[
+        Path | None, typer.Option("--map-file", metavar="YAML", help="All of this in a file; see docs/traces.md.")
+    ] = None,
+    unit: Annotated[
+        list[str] | None, typer.Option("--unit", metavar="OURS=UNIT", help="Unit in the file, e.g. x=mm. Repeatable.")
+    ] = None,
+    rate: Annotated[
+        str | None, typer.Option("--rate", metavar="HZ", help="Rows a second, where no column is the time.")
+    ] = None,
+    plant: Annotated[str | None, typer.Option("--plant", metavar="KIND", help="axis, ivu or ldu.")] = None,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--parameter", metavar="NAME=VALUE", help="Of the machine, SI or with a unit, e.g. M=95."),
+    ] = None,
+    case: Annotated[
+        list[str] | None,
+        typer.Option("--case", metavar="KEY=VALUE", help="Further key of case.json, e.g. drive.newton_per_volt=35.15."),
+    ] = None,
+    uneven: Annotated[bool, typer.Option("--uneven", help="The rows are at uneven times, and stay so.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Make a bundle of a recording from elsewhere, in SI units, so that plot, compare and diagnose work on it.
+
+    Units are those of --unit, else those that the file names (a csv in brackets behind a column's name), else SI.
+    Without --map, columns that have our names already are taken.
+
+    Examples:
+
+      rtctl import emps.mat --out emps --plant axis --map u=vir,x=qm --parameter M=95
+
+      rtctl import log.csv --out bench --plant axis --map u=volts --unit x=mm --rate 1kHz
+
+      rtctl import log.parquet --out bench --map-file log.yaml
+    """
+    from rtctl.trace.imports import read
+    from rtctl.trace.imports.make import make_bundle
+    from rtctl.trace.imports.plan import Plan, load_plan, with_options
+
+    plan = load_plan(map_file) if map_file is not None else Plan()
+    plan = with_options(plan, plant, map_ or [], unit or [], rate, parameter or [], case or [], uneven)
+    made = make_bundle(read(file), plan, out)
+    lacks = _diagnosable(out)
+    if json:
+        common.print_json({**made._asdict(), "folder": str(made.folder), "notes": list(made.notes), "lacks": lacks})
+        return
+    at = f"at {made.rate:g} Hz" if made.rate else "at uneven times"
+    typer.echo(f"{made.rows} rows {at}: {', '.join(f'{n} [{u}]' if u else n for n, u in made.columns.items())}")
+    for note in made.notes:
+        typer.echo(f"note: {note}")
+    if lacks:
+        typer.echo(f"note: it can be drawn and compared; diagnose would say: {lacks}")
+    typer.echo(f"bundle {made.folder}")
+
+
+def _diagnosable(folder: Path) -> Any:
+    """What `rtctl diagnose` would refuse it for; None where it would not."""
+    from rtctl.config.errors import NoAnswer, UserError
+    from rtctl.diagnose.record import load_record
+
+    try:
+        load_record(folder)
+    except (UserError, NoAnswer) as error:
+        return str(error)
+    return None

@@ -1,0 +1,87 @@
+"""A recording in the formats of other programs, one file here for each."""
+
+import importlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pyarrow as pa
+
+from rtctl.config.errors import UserError, nearest
+from rtctl.trace.export.source import ALL, Selection, Source
+
+__all__ = ["ALL", "FORMATS", "Exported", "Format", "Selection", "export", "format_of"]
+
+
+class Format(NamedTuple):
+    """One format: its module here, how its files end, who reads them, and the package and extra that it needs."""
+
+    module: str
+    suffix: str
+    reader: str
+    package: str = ""
+    extra: str = ""
+
+
+FORMATS = {
+    "csv": Format("csv_file", ".csv", "spreadsheets, PlotJuggler"),
+    "mat": Format("mat_file", ".mat", "MATLAB, Octave, scipy"),
+    "parquet": Format("parquet_file", ".parquet", "pandas, DuckDB, Polars"),
+    "mcap": Format("mcap_file", ".mcap", "Foxglove, PlotJuggler", "mcap"),
+    "mf4": Format("mf4_file", ".mf4", "CANape, asammdf", "asammdf", "mf4"),
+    "tdms": Format("tdms_file", ".tdms", "LabVIEW, DIAdem", "nptdms", "tdms"),
+}
+
+
+class Exported(NamedTuple):
+    path: Path
+    to: str
+    rows: int
+    columns: tuple[str, ...]
+    bytes: int
+
+
+def format_of(name: str) -> Format:
+    """The format of this name. Raises UserError."""
+    if name not in FORMATS:
+        near = nearest(name, FORMATS)
+        raise UserError(
+            f"no format '{name}'; " + (f"did you mean '{near}'?" if near else f"there is {', '.join(FORMATS)}")
+        )
+    return FORMATS[name]
+
+
+def export(folder: Path | str, to: str, out: Path | str | None = None, selection: Selection = ALL) -> Exported:
+    """Write the bundle in `folder` as `to` (csv, mat, parquet, mcap, mf4, tdms) into `out`, `trace.*` in it if None.
+
+    The file is there whole or not at all. Raises UserError where the bundle, the selection or the place is wrong, or
+    where the format's package is not installed.
+    """
+    form = format_of(to)
+    writer = _writer(to, form)
+    source = Source(folder, selection)
+    path = Path(out) if out is not None else source.folder / f"trace{form.suffix}"
+    if any(path.exists() and path.samefile(file) for file in source.paths):
+        raise UserError(f"{path} is the recording itself; choose another name")
+    if not path.parent.is_dir():
+        raise UserError(f"{path}: cannot be written (there is no folder {path.parent})")
+    part = path.with_name(f".{path.stem}.tmp{form.suffix}")  # some packages look at how the name ends
+    try:
+        writer.write(source, part)
+        part.replace(path)
+    except (pa.ArrowException, OSError) as error:
+        why = getattr(error, "strerror", None) or str(error).splitlines()[0]
+        raise UserError(f"{path}: cannot be written ({why})") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return Exported(path, to, source.rows, tuple(column.name for column in source.columns), path.stat().st_size)
+
+
+def _writer(to: str, form: Format) -> Any:
+    """The module that writes the format."""
+    try:
+        return importlib.import_module(f"rtctl.trace.export.{form.module}")
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != form.package:
+            raise
+        wanted = f"rtctl[{form.extra}]" if form.extra else form.package
+        raise UserError(f"--to {to} needs the package {form.package}: pip install '{wanted}'") from None

@@ -1,0 +1,163 @@
+"""What an export reads: chosen columns and rows of a bundle, a batch at a time, however long it is."""
+
+import math
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from rtctl.config.errors import UserError, nearest
+from rtctl.trace.bundle import ROW_GROUP, load_case, recordings
+from rtctl.trace.columns import Column, columns_of
+
+
+class Selection(NamedTuple):
+    """Which columns (all if none; `t` always comes along) and which rows."""
+
+    columns: tuple[str, ...] = ()
+    start: float = -math.inf  # s of the column t
+    end: float = math.inf
+    every: int = 1  # keep the first row of so many; there is no filter in front
+
+
+ALL = Selection()
+
+
+class Source:
+    """The selected rows of a bundle, all parts as one.
+
+    `columns` start with `t`, `rows` is their number, `case` and `paths` are those of the bundle. Raises UserError where
+    it is no finished bundle, has no column of a name, or no row is left.
+    """
+
+    def __init__(self, folder: Path | str, selection: Selection = ALL):
+        self.folder = Path(folder)
+        if not self.folder.is_dir():
+            raise UserError(f"{self.folder} is not a folder; a bundle is a folder with recording.parquet and case.json")
+        self.paths = recordings(self.folder)
+        self.case = load_case(self.folder)
+        self._selection = selection
+        self.schema = self._schema(selection.columns)
+        self.columns: list[Column] = columns_of(self.schema)
+        self._first, self._last, self.rows = self._extent()
+
+    @property
+    def name(self) -> str:
+        """What the machine is called in a file: ivu, ldu, axis."""
+        return str(self.case.get("plant") or "trace")
+
+    @property
+    def started(self) -> datetime | None:
+        """When the recording began, with its time zone; None where the case does not say."""
+        try:
+            found = datetime.fromisoformat(str(self.case.get("recorded_at")))
+        except ValueError:
+            return None
+        return found if found.tzinfo else found.astimezone()
+
+    @property
+    def rate(self) -> float | None:
+        """Rows a second of the selection, as the case says; None where the clock is uneven."""
+        rate = self.case.get("sample_rate")
+        return rate / self._selection.every if isinstance(rate, int | float) and rate > 0 else None
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last `t` of the selection, s."""
+        return self._first, self._last
+
+    def batches(self, names: Sequence[str] | None = None) -> Iterator[pa.RecordBatch]:
+        """The selected rows, at most ROW_GROUP at a time; `names` for some of the columns."""
+        wanted = [column.name for column in self.columns] if names is None else list(names)
+        s = self._selection
+        schema = pa.schema([self.schema.field(name) for name in wanted])
+        passed = 0  # rows between start and end
+        for path in self.paths:
+            with _reading(path) as file:
+                for batch in file.iter_batches(ROW_GROUP, columns=list(dict.fromkeys(("t", *wanted)))):
+                    t = batch.column("t").to_numpy(zero_copy_only=False)
+                    keep = np.flatnonzero((t >= s.start) & (t <= s.end))
+                    chosen = keep[(passed + np.arange(len(keep))) % s.every == 0]
+                    passed += len(keep)
+                    if len(chosen):
+                        rows = batch if len(chosen) == len(t) else batch.take(pa.array(chosen))
+                        arrays = [rows.column(name).cast(schema.field(name).type) for name in wanted]
+                        yield pa.record_batch(arrays, schema=schema)
+
+    def arrays(self) -> Iterator[dict[str, np.ndarray]]:
+        """The same as arrays by name; what was not measured is nan."""
+        for batch in self.batches():
+            yield {name: batch.column(name).to_numpy(zero_copy_only=False) for name in batch.schema.names}
+
+    def column(self, name: str) -> np.ndarray:
+        """One column (rows,) as a whole."""
+        whole, at = np.empty(0), 0
+        for batch in self.batches([name]):
+            values = batch.column(0).to_numpy(zero_copy_only=False)
+            if not at:
+                whole = np.empty(self.rows, values.dtype)
+            whole[at : at + len(values)] = values
+            at += len(values)
+        return whole
+
+    def _schema(self, wanted: Sequence[str]) -> pa.Schema:
+        """Fields of the selection: `t`, then as asked for or as in the file. A column of nulls alone is of doubles."""
+        found = [_schema_of(path) for path in self.paths]
+        for path, schema in zip(self.paths, found, strict=True):
+            if not schema.equals(found[0]):
+                raise UserError(f"{path} has other columns than {self.paths[0]}; they are not parts of one recording")
+        path, schema = self.paths[0], found[0]
+        for name in ("t", *wanted):
+            if name not in schema.names:
+                near = nearest(name, schema.names)
+                hint = f"is it '{near}'?" if near else f"it has {', '.join(schema.names)}"
+                raise UserError(f"{path} has no column '{name}'; {hint}")
+        names = dict.fromkeys(("t", *(wanted or schema.names)))
+        return pa.schema([_numbers(path, schema.field(name)) for name in names], schema.metadata)
+
+    def _extent(self) -> tuple[float, float, int]:
+        first, last, rows = math.nan, math.nan, 0
+        s = self._selection
+        for batch in self.batches(["t"]):
+            t = batch.column(0).to_numpy(zero_copy_only=False)
+            first = float(t[0]) if not rows else first
+            last = float(t[-1])
+            rows += len(t)
+        if not rows:
+            some = "" if math.isinf(s.start) and math.isinf(s.end) else f" from {s.start:g} s to {s.end:g} s"
+            raise UserError(f"{self.folder} holds no rows{some}{self._clock()}")
+        return first, last, rows
+
+    def _clock(self) -> str:
+        """From when to when the recording itself runs, for a message."""
+        ends = [t for path in self.paths if len(t := pq.read_table(path, columns=["t"]).column(0))]
+        return f"; its column t runs from {ends[0][0].as_py():g} s to {ends[-1][-1].as_py():g} s" if ends else ""
+
+
+def _reading(path: Path) -> pq.ParquetFile:
+    try:
+        return pq.ParquetFile(path, pre_buffer=False)  # else it keeps what it has read ahead, the whole file
+    except (pa.ArrowException, OSError) as error:
+        raise UserError(f"{path} cannot be read as Parquet: {str(error).splitlines()[0]}") from None
+
+
+def _schema_of(path: Path) -> pa.Schema:
+    with _reading(path) as file:
+        try:
+            file.schema_arrow.names  # noqa: B018  names that are no text are told only when asked for
+        except UnicodeDecodeError as error:
+            raise UserError(f"{path}: the name of a column is not text in UTF-8: {error.object[:20]!r}") from None
+        return file.schema_arrow
+
+
+def _numbers(path: Path, field: pa.Field) -> pa.Field:
+    kind = field.type
+    if pa.types.is_null(kind):
+        return field.with_type(pa.float64())
+    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)):
+        raise UserError(f"{path}: column '{field.name}' holds {kind}; it should hold numbers")
+    return field

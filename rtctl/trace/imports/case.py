@@ -1,0 +1,66 @@
+"""case.json of an imported recording: what the plan says of the machine, and no more."""
+
+from pathlib import Path
+from typing import Any
+
+from rtctl.config.errors import UserError
+from rtctl.config.units import to_si
+from rtctl.diagnose.case import PARAMETERS, read_case
+from rtctl.trace.bundle import CASE, FORMAT, as_json
+from rtctl.trace.imports.plan import Plan
+from rtctl.trace.imports.table import Table
+
+
+def case_of(table: Table, plan: Plan, units: dict[str, str], rate: float | None, rows: int) -> dict[str, Any]:
+    """The case of an imported recording; `units` are those of our columns. Raises UserError."""
+    given = dict(plan.case)
+    for key in ("sensors", "drive", "controller"):
+        if not isinstance(given.get(key, {}), dict):
+            raise UserError(f"--case {key}={given[key]}: it holds keys of its own, as in --case drive.limit_volt=10")
+    sensors, drive = dict(given.pop("sensors", None) or {}), dict(given.pop("drive", None) or {})
+    position = {name: units[name] for name in ("x", "ref", "target") if name in units}
+    if len(set(position.values())) > 1:
+        told = ", ".join(f"{name} in {unit}" for name, unit in position.items())
+        raise UserError(f"{table.path}: {told}: position and reference should be of one kind")
+    if plan.plant == "axis" and position.get("x", "m") != "m":
+        sensors.setdefault("unit", position["x"])
+    if plan.plant == "axis" and units.get("u", "V") != "V":
+        drive.setdefault("unit", units["u"])
+    controller = given.pop("controller", None)
+    law = {"controller": controller} if controller else {"controller": {"kind": "unknown"}, "controller_known": False}
+    return {
+        "format": FORMAT,
+        "plant": plan.plant,
+        "sample_rate": rate,
+        "parameters": {name: _parameter(plan.plant or "", name, value) for name, value in plan.parameters.items()},
+        **({"sensors": sensors} if sensors else {}),
+        **({"drive": drive} if drive else {}),
+        **law,
+        "notes": f"Imported from {table.path.name}.",
+        **given,
+        "rows": rows,
+        "complete": True,
+    }
+
+
+def checked(case: dict[str, Any], folder: Path) -> list[str]:
+    """What the case is warned of. Raises UserError where it cannot be."""
+    there = f"{folder / CASE}: "  # it is not yet
+    try:
+        as_json(case)
+        return [warning.removeprefix(there) for warning in read_case(case, folder).warnings]
+    except UserError as error:
+        raise UserError(f"{str(error).removeprefix(there)}; see --case and --parameter") from None
+    except ValueError:
+        raise UserError("--case: NaN and infinity are nothing that case.json can hold; write null there") from None
+
+
+def _parameter(plant: str, name: str, value: float | str) -> float:
+    """A parameter in SI. A name that the model does not have is told of by the case's own check."""
+    field = PARAMETERS[plant].model_fields.get(name)
+    extra = field.json_schema_extra if field else None
+    unit = extra.get("unit") if isinstance(extra, dict) else ""
+    try:
+        return float(to_si(value, str(unit or "")))
+    except (TypeError, ValueError) as error:
+        raise UserError(f"--parameter {name}={value}: {error}") from None

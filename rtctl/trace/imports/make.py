@@ -1,0 +1,195 @@
+"""Makes a bundle of a table and a plan: SI units, an even clock, finite numbers, and a case of what is believed."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from rtctl import machines
+from rtctl.config.errors import UserError, nearest
+from rtctl.config.units import convert
+from rtctl.machines import axis, ivu_plant, ldu_plant
+from rtctl.machines.base import Column
+from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
+from rtctl.trace.imports.case import case_of, checked
+from rtctl.trace.imports.plan import ColumnPlan, Plan
+from rtctl.trace.imports.table import Table
+from rtctl.trace.part import refuse_taken
+
+OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of one recording alike
+    "m": ("m", "rad", "V"),
+    "m/s": ("m/s", "rad/s", "V/s"),
+    "V": ("V", "A"),
+}
+TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
+UNEVEN = 0.5  # share of a period by which one row may be off the others' distance
+RATE_OFF = 0.01
+COUNTS = "_counts"
+
+
+class Imported(NamedTuple):
+    folder: Path
+    rows: int
+    rate: float | None  # Hz; None: uneven
+    columns: dict[str, str]  # name -> unit
+    notes: tuple[str, ...]  # sentences for people
+
+
+def make_bundle(table: Table, plan: Plan, folder: Path | str) -> Imported:
+    """Write the bundle of `table` into `folder`, which must not hold one.
+
+    Raises UserError that names file, column and row and says what would be right; nothing is written then.
+    """
+    folder = Path(folder)
+    if plan.plant is None:
+        raise UserError("--plant: say what kind of machine it is: axis, ivu or ldu")
+    known = known_columns(plan.plant)
+    columns, units, notes = _signals(table, _wanted(table, plan, known), plan, known)
+    t, rate = _clock(table, plan, columns)
+    columns = {"t": t, **{name: values for name, values in columns.items() if name != "t"}}
+    units = {"t": "s", **units}
+    if "w" not in columns:
+        columns["w"], units["w"] = np.zeros(len(t)), "V"
+        notes.append("no column is w, the excitation: it is taken as 0")
+    case = case_of(table, plan, units, rate, len(t))
+    notes += checked(case, folder)
+    refuse_taken(folder)
+    made = [known.get(name, Column(name, "", ""))._replace(unit=units[name]) for name in columns]
+    fields = [pa.field(c.name, pa.float64(), nullable=False, metadata={"unit": c.unit, "help": c.help}) for c in made]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        batch = pa.record_batch(list(columns.values()), schema=pa.schema(fields))
+        write_parquet(folder, (batch.slice(k, ROW_GROUP) for k in range(0, len(t), ROW_GROUP)), batch.schema)
+        save_case(folder, case)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
+    return Imported(folder, len(t), rate, units, tuple(notes))
+
+
+def known_columns(plant: str) -> dict[str, Column]:
+    """What a recording of this machine may hold."""
+    return {column.name: column for column in (*machines.MODULES[plant].COLUMNS, *TRUTH[plant])}
+
+
+def _wanted(table: Table, plan: Plan, known: dict[str, Column]) -> dict[str, ColumnPlan]:
+    """Our columns and theirs: as the plan says, or those that have our names already where it names none."""
+    named = {name: given for name, given in plan.columns.items() if given.column}
+    if not named:
+        named = {name: ColumnPlan(column=name) for name in table.columns if name in known}
+    if "t" not in named and "t" in table.columns:
+        named["t"] = ColumnPlan(column="t")
+    elif "t" not in named and table.clock and plan.rate is None:
+        named["t"] = ColumnPlan(column=table.clock)
+    if not set(named) - {"t"}:
+        there = ", ".join(list(table.columns)[:20])
+        raise UserError(f"{table.path} has {there}; say which is which, e.g. --map 'u=vir,x=qm'")
+    for name, given in plan.columns.items():
+        if not given.column:
+            named[name] = ColumnPlan(column=named[name].column if name in named else name, unit=given.unit)
+    for name in named:
+        near = nearest(name, known)
+        if name not in known and near and near not in named:
+            raise UserError(f"--map {name}={named[name].column}: a machine has no '{name}'; did you mean '{near}'?")
+    return named
+
+
+def _signals(
+    table: Table, wanted: dict[str, ColumnPlan], plan: Plan, known: dict[str, Column]
+) -> tuple[dict[str, np.ndarray], dict[str, str], list[str]]:
+    """Columns in SI by our names, their units, and what was assumed."""
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    assumed = []
+    for name, given in wanted.items():
+        values = table.numbers(given.column, name)
+        theirs = given.unit if given.unit is not None else table.units.get(given.column)
+        ours = known[name].unit if name in known else theirs or ""
+        if theirs is None:
+            assumed += [f"{name} in {ours}"] if ours not in ("", "counts", "ticks") else []
+        elif name in known:
+            factor, ours = _factor(table, name, given.column, theirs, ours, plan.plant == "axis")
+            values = values if factor == 1.0 else values * factor
+        if name.endswith(COUNTS):
+            _whole(table, given.column, values)
+        columns[name], units[name] = values, ours
+    lengths = {name: len(values) for name, values in columns.items()}
+    first = next(iter(columns))
+    for name, length in lengths.items():
+        if length != lengths[first]:
+            raise UserError(
+                f"{table.path}: column '{wanted[name].column}' has {length} rows where '{wanted[first].column}' has "
+                f"{lengths[first]}; map columns of one recording"
+            )
+    if not lengths[first]:
+        raise UserError(f"{table.path} holds no rows")
+    return columns, units, [f"no unit is given: {', '.join(assumed)} assumed"] if assumed else []
+
+
+def _factor(table: Table, name: str, column: str, theirs: str, ours: str, axis: bool) -> tuple[float, str]:
+    """What turns the file's unit into ours, and ours."""
+    first: ValueError | None = None
+    choices = OTHER_UNITS.get(ours, (ours,)) if axis else (ours,)
+    if theirs in choices:
+        return 1.0, theirs
+    for unit in choices:
+        try:
+            return convert(1.0, theirs, unit), unit
+        except ValueError as error:
+            first = first or error
+    wanted = ours or "a number without unit"
+    raise UserError(f"{table.path}: column '{column}' ({name}) is in '{theirs}', which is not {wanted}; "
+                    f"--unit {name}=... says what it is") from first  # fmt: skip
+
+
+def _whole(table: Table, column: str, values: np.ndarray) -> None:
+    off = np.flatnonzero(values != np.round(values))
+    if len(off):
+        raise UserError(
+            f"{table.path}: column '{column}', {table.where(int(off[0]))}: {values[off[0]]:g} is not a whole number; "
+            "a counter counts"
+        )
+
+
+def _clock(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None]:
+    """Times (n,) s and the rate, None where they are uneven and may be."""
+    n = len(next(iter(columns.values())))
+    if "t" not in columns:
+        if plan.rate is None:
+            raise UserError(
+                f"{table.path}: which column is the time? --map t=NAME says it, or --rate 1000 where none is"
+            )
+        return np.arange(n) / plan.rate, plan.rate
+    t = columns["t"]
+    if n < 2:
+        raise UserError(f"{table.path} holds one row; a recording has two or more")
+    d = np.diff(t)
+    back = np.flatnonzero(d <= 0)
+    if len(back):
+        k = int(back[0]) + 1
+        raise UserError(
+            f"{table.path}: time, {table.where(k)}: {t[k]:.9g} s after {t[k - 1]:.9g} s; time should increase"
+        )
+    if plan.uneven:
+        return t, None
+    usual = float(np.median(d))
+    off = np.flatnonzero(np.abs(d - usual) > UNEVEN * usual)
+    if len(off):
+        k = int(off[0]) + 1
+        more = f", as at {len(off) - 1} more places" if len(off) > 1 else ""
+        raise UserError(
+            f"{table.path}: time, {table.where(k)}: {d[k - 1]:.6g} s after the row before where {usual:.6g} s is usual"
+            f"{more}; --uneven keeps such a clock, else lay the rows on an even one first"
+        )
+    rate = _tidy((n - 1) / float(t[-1] - t[0]))
+    if plan.rate is not None and abs(rate / plan.rate - 1) > RATE_OFF:
+        raise UserError(
+            f"{table.path}: time runs at {rate:g} rows a second where --rate says {plan.rate:g}; one is wrong"
+        )
+    return t, plan.rate or rate
+
+
+def _tidy(rate: float) -> float:
+    """1000 and not 999.99998: a millionth is less than any clock here is good for."""
+    short = float(f"{rate:.5g}")
+    return short if abs(short / rate - 1) < 1e-6 else rate

@@ -1,0 +1,80 @@
+"""What a reader makes of a file: columns by the names they have there, and how to speak of a row."""
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.config.errors import UserError, nearest
+
+
+def row_number(row: int) -> str:
+    """How a row (0 is the first) is called where the file has no lines."""
+    return f"row {row}"
+
+
+class Table(NamedTuple):
+    path: Path
+    columns: dict[str, np.ndarray]  # (n,) each, of any type; n may differ
+    units: dict[str, str]  # where the file names them
+    clock: str = ""  # column that is the time, in s, where nothing else is
+    where: Callable[[int], str] = row_number
+
+    def has(self, name: str, use: str) -> np.ndarray:
+        """The column; `use` says what it is wanted for. Raises UserError with the nearest name."""
+        if name in self.columns:
+            return self.columns[name]
+        near = nearest(name, self.columns)
+        there = list(self.columns)[:20]
+        hint = f"is it '{near}'?" if near else f"it has {', '.join(there) or 'none'}"
+        raise UserError(f"{self.path} has no column '{name}' (wanted as {use}); {hint}")
+
+    def numbers(self, name: str, use: str) -> np.ndarray:
+        """The column as doubles (n,), each finite. Raises UserError that names the first row that is not."""
+        values = self.has(name, use)
+        if values.dtype.kind not in "fiub":
+            row = next((k for k, cell in enumerate(values) if not _is_number(cell)), None)
+            if row is not None:
+                raise UserError(f"{self.path}: column '{name}', {self.where(row)}: {values[row]!r:.40} is not a number")
+        found = values.astype(np.float64)
+        bad = np.flatnonzero(~np.isfinite(found))
+        if len(bad):
+            more = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
+            what = "empty or nan" if np.isnan(found[bad[0]]) else f"{found[bad[0]]:g}"
+            raise UserError(
+                f"{self.path}: column '{name}', {self.where(int(bad[0]))}{more}: {what}; every row needs a finite "
+                "number: leave such rows out at the ends, fill them in between"
+            )
+        return found
+
+
+def flat(found: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """Arrays of nested names as columns: `s.x` for a field, `y.1` and `y.2` for the columns of a matrix.
+
+    Numbers that stand alone and text are left out.
+    """
+    for key, value in found.items():
+        name = f"{before}{key}"
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{name}.")
+            continue
+        if not isinstance(value, np.ndarray) or value.size < 2 or value.dtype.kind not in "fiubV":
+            continue
+        if value.dtype.names:
+            yield from flat({field: value[field] for field in value.dtype.names}, f"{name}.")
+            continue
+        value = np.squeeze(value)
+        if value.ndim == 1:
+            yield name, value
+        elif value.ndim == 2:
+            tall = value if value.shape[0] >= value.shape[1] else value.T
+            yield from ((f"{name}.{k + 1}", tall[:, k]) for k in range(tall.shape[1]))
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        float(value)
+    except (TypeError, ValueError):
+        return False
+    return True

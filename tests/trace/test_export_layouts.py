@@ -1,0 +1,69 @@
+"""The PlotJuggler layouts in docs name curves that an exported file has."""
+
+import csv
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from rtctl import machines
+from rtctl.trace.bundle import save_case, write_parquet
+from rtctl.trace.export import export
+
+LAYOUTS = Path(__file__).parents[2] / "docs" / "plotjuggler"
+
+
+@pytest.fixture(scope="module", params=["ivu", "ldu"])
+def recording(request, tmp_path_factory):
+    """(kind, bundle) with every column that the machine records."""
+    folder = tmp_path_factory.mktemp(request.param)
+    columns = machines.MODULES[request.param].COLUMNS
+    fields = [pa.field(c.name, pa.float64(), metadata={"unit": c.unit, "help": c.help}) for c in columns]
+    batch = pa.record_batch([np.arange(3.0)] * len(fields), schema=pa.schema(fields))
+    write_parquet(folder, [batch], batch.schema)
+    save_case(folder, {"format": 1, "plant": request.param, "sample_rate": 1.0})
+    return request.param, folder
+
+
+def layout(name):
+    return ElementTree.parse(LAYOUTS / f"{name}.xml").getroot()
+
+
+def curves(root):
+    return [curve.get("name") for curve in root.iter("curve")]
+
+
+def test_csv(recording):
+    kind, folder = recording
+    with export(folder, "csv").path.open(newline="") as file:
+        header = next(csv.reader(file))
+    root = layout(f"{kind}_csv")
+    assert set(curves(root)) <= set(header)
+    assert root.find("Plugins/plugin/default").get("time_axis") == header[0]
+
+
+def test_mcap(recording):
+    reader = pytest.importorskip("mcap.reader")
+    kind, folder = recording
+    with export(folder, "mcap").path.open("rb") as file:
+        _, channel, message = next(iter(reader.make_reader(file).iter_messages()))
+    assert set(curves(layout(kind))) <= {f"{channel.topic}/{name}" for name in json.loads(message.data)}
+
+
+@pytest.mark.parametrize("name", ["ivu", "ivu_csv", "ldu", "ldu_csv"])
+def test_panes(name):
+    root = layout(name)
+    titles = [area.get("name") for area in root.iter("DockArea")]
+    assert {"Position and reference", "Error", "Outputs", "Speed", "State and trip", "Period and lateness"} <= set(
+        titles
+    )
+    assert ("Tension" in titles) == name.startswith("ivu")
+    for splitter in root.iter("DockSplitter"):
+        areas = splitter.findall("DockArea")
+        shares = [float(share) for share in splitter.get("sizes").split(";")]
+        assert len(areas) == len(shares) == int(splitter.get("count")) and sum(shares) == pytest.approx(1, abs=1e-4)
+        assert all(len(area.findall("plot/curve")) > 0 for area in areas)
+    assert len(curves(root)) == len(set(curves(root)))
