@@ -40,6 +40,7 @@ COMMANDS = {
     "trace": "trace",
     "import": "import_",
     "soak": "soak",
+    "campaign": "campaign",
     "doctor": "doctor",
     "keys": "keys",
 }

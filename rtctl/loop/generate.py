@@ -13,7 +13,7 @@ import platform
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -149,6 +149,7 @@ def _advance(stages: Any, substeps: int) -> str:
         ''')
 
 
+@cache
 def copied(function: Callable[..., Any], decorator: str = "compiled") -> str:
     """The source of a function, decorated."""
     return f"@{decorator}\n{textwrap.dedent(inspect.getsource(function))}"

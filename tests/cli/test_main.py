@@ -11,6 +11,7 @@ GROUPS = {
     "trace": ("info", "plot", "repair", "export", "compare"),
     "keys": ("new",),
     "fault": ("add", "list", "clear", "table"),
+    "campaign": ("run", "list"),
     "identify": ("frf", "multisine", "fit", "friction", "radius", "driver", "scale", "steps"),
 }
 LEAVES = [(c,) for c in COMMANDS if c not in GROUPS] + [(g, c) for g, commands in GROUPS.items() for c in commands]

@@ -1,0 +1,106 @@
+"""One run of a campaign, and a chunk of them: what a worker does, be it in this process, another or on another machine.
+
+Writing a machine's tick takes longer than running it. So the generated module is kept for each structure, and what
+differs between runs (gains, radii, references, seeds, faults) goes into records.
+"""
+
+import threading
+from typing import Any
+
+import numpy as np
+
+from rtctl import machines
+from rtctl.campaign.metrics import measure
+from rtctl.campaign.plan import Plan
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.loop import generate, safety
+from rtctl.loop.fused import Run
+from rtctl.loop.loop import Loop
+from rtctl.loop.records import layout
+from rtctl.machines import Machine
+
+_made: dict[Any, generate.Generated] = {}
+_plans: dict[str, Plan] = {}
+_lock = threading.Lock()  # a Dask worker may have several threads
+
+
+def run_chunk(payload: dict[str, Any], identity: str, chunk: int) -> list[dict[str, Any]]:
+    """Rows of the results of one chunk."""
+    with _lock:
+        plan = _plans.get(identity) or _plans.setdefault(identity, Plan(payload))
+    return [run_row(plan, number) for number in plan.numbers(chunk)]
+
+
+def run_row(plan: Plan, number: int) -> dict[str, Any]:
+    """Row of one run. A setting that does not fit is told in the row, and not raised."""
+    row: dict[str, Any] = {"run": number, **plan.labels(number)}
+    try:
+        run = play(plan, number)
+    except (UserError, NoAnswer, ValueError, ArithmeticError, MemoryError) as error:
+        text = str(error) or type(error).__name__
+        return {**row, **dict.fromkeys(plan.metrics), "trip": "", "error": text}
+    found = measure(run, run.loop.machine, plan.metrics)
+    values = {name: value if np.isfinite(value) else None for name, value in found.items()}
+    return {**row, **values, "trip": run.tripped, "error": _trouble(run)}
+
+
+def _trouble(run: Run) -> str:
+    """Why a run says nothing, "" where it does."""
+    if run.tripped or (run.rows["state"] == safety.RUNNING).any():
+        return ""
+    return f"was not running within {len(run.rows) / run.loop.machine.rate:g} s; give it more `seconds`"
+
+
+def play(plan: Plan, number: int) -> Run:
+    """Run it. Raises UserError and ValueError where its settings do not fit."""
+    machine = machines.build(plan.config(number))
+    return fresh(machine, plan.ticks(machine))
+
+
+def fresh(machine: Machine, ticks: int) -> Run:
+    """As `rtctl.loop.fused.run`, with the module of a machine of the same structure where there is one."""
+    made = structure(machine)
+    segment: Any = {
+        name: np.zeros(count, dtype)
+        for name, (dtype, count) in layout(made.params, made.tables, made.row, ticks).items()
+    }
+    loop = Loop(machine, made, segment, segment["outputs"], segment["inputs"])
+    generate.fill_tables(segment["tables"][0], (machine.reference, machine.excitation))
+    loop.c["arm"] = loop.c["play"] = loop.c["order"] = 1  # an order as of a person, so that a bundle can be replayed
+    loop.stretch(0, ticks)
+    return Run(segment["rows"], loop)
+
+
+def structure(machine: Machine) -> generate.Generated:
+    """The generated module of a machine; the same for all that differ in numbers only."""
+    loop, plant = machine.diagram, machine.plant_diagram
+    key = (
+        machine.kind, machine.substeps, machine.truth, tuple(machine.config.record.trace),
+        loop.uses, loop.columns, loop.stages, plant.uses, plant.truth, plant.start, plant.advance, plant.sample,
+        *(_records(blocks) for blocks in (loop.blocks, plant.blocks)),
+        *(value.shape for value in machine.excitation if isinstance(value, np.ndarray)),
+    )  # fmt: skip
+    with _lock:
+        if key not in _made:
+            _made[key] = generate.generate(machine, "shm")
+        return _made[key]
+
+
+def _records(blocks: Any) -> tuple:
+    """Names, kinds and sizes of a diagram's records."""
+    return tuple((b.name, b.state, _fields(b.params)) for b in blocks)
+
+
+def _fields(value: Any) -> Any:
+    if hasattr(value, "_fields"):
+        return (type(value), *map(_fields, value))
+    if isinstance(value, np.ndarray):
+        return (value.dtype, value.shape)
+    return isinstance(value, (bool, int, np.integer))
+
+
+def clear() -> None:
+    """Forget modules and plans."""
+    with _lock:
+        _made.clear()
+        _plans.clear()

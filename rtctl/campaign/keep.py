@@ -1,0 +1,88 @@
+"""Bundles of the runs that are worth a look. They are run once more: on virtual time that gives the same rows."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from rtctl.campaign import cell
+from rtctl.campaign.metrics import METRICS
+from rtctl.campaign.plan import Plan
+from rtctl.config.errors import UserError
+from rtctl.daemon.case import describe
+from rtctl.loop.fused import Run
+from rtctl.trace.bundle import PARQUET, save_case, write_parquet
+from rtctl.trace.columns import record_batch, schema
+from rtctl.trace.orders import ORDERS, Journal
+
+FOLDER = "bundles"
+
+
+def worst(plan: Plan, table: pa.Table, by: str, count: int) -> list[int]:
+    """Numbers of the runs that are worst in a metric, the worst first; those without it are left out."""
+    values = METRICS[by].worse * values_of(table, by)
+    order = np.argsort(-values, kind="stable")
+    return [int(i) for i in order if np.isfinite(values[i])][:count]
+
+
+def values_of(table: pa.Table, name: str) -> np.ndarray:
+    """A metric of all runs (n,), nan where one has none."""
+    return table[name].to_numpy(zero_copy_only=False).astype(float)
+
+
+def flags(table: pa.Table, name: str) -> np.ndarray:
+    """Whether each run (n,) has a text in this column: `trip` or `error`."""
+    return np.array([bool(text) for text in table[name].to_pylist()], dtype=bool)
+
+
+def failed(plan: Plan, table: pa.Table) -> np.ndarray:
+    """Whether each run (n,) failed: it could not be run, or it tripped where that is a failure."""
+    found = flags(table, "error")
+    return found | flags(table, "trip") if plan.payload["trips"] == "fail" else found
+
+
+def wanted(plan: Plan, table: pa.Table) -> list[int]:
+    """Numbers of the runs that leave a bundle."""
+    keep = plan.keep
+    runnable = ~flags(table, "error")
+    if keep.bundles == "none":
+        return []
+    if keep.bundles == "all":
+        return np.flatnonzero(runnable).tolist()
+    tripped = np.flatnonzero(flags(table, "trip") & runnable)[: keep.failures]
+    return list(dict.fromkeys([*worst(plan, table, keep.by, keep.worst), *tripped.tolist()]))
+
+
+def name_of(run: int) -> str:
+    """Folder of a run's bundle, under `bundles`."""
+    return f"run-{run:06d}"
+
+
+def write(plan: Plan, number: int, folder: Path) -> Path:
+    """Write the bundle of a run, if it is not there; returns it. Raises UserError where the disk does not take it."""
+    bundle = folder / FOLDER / name_of(number)
+    if (bundle / PARQUET).is_file():
+        return bundle
+    run = cell.play(plan, number)
+    try:
+        bundle.mkdir(parents=True, exist_ok=True)
+        save_case(bundle, case_of(plan, number, run))
+        journal = Journal()
+        journal.note(run.loop.c[0], {})
+        (bundle / ORDERS).unlink(missing_ok=True)
+        journal.open(bundle)
+        journal.close()
+        columns = run.loop.made.columns
+        form = schema(columns, run.rows.dtype)
+        write_parquet(bundle, [record_batch(run.rows, form)], form)
+    except OSError as error:
+        raise UserError(f"{bundle}: cannot be written: {error.strerror or error}") from None
+    return bundle
+
+
+def case_of(plan: Plan, number: int, run: Run) -> dict[str, Any]:
+    """case.json of a run: the machine's own, and which run of which campaign it was."""
+    case = describe(run.loop.machine, run.loop.made)
+    told = {"name": plan.name, "hash": plan.identity, "run": number, **plan.labels(number)}
+    return {**case, "complete": True, "campaign": told}

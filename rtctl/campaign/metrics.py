@@ -1,0 +1,104 @@
+"""What a run of a campaign is judged by: numbers of its steps, its error, its tape and its drives."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.loop import safety
+from rtctl.loop.fused import Run
+from rtctl.machines import MODULES, Machine
+from rtctl.trace.metrics import step_metrics
+
+
+class Metric(NamedTuple):
+    words: str
+    unit: str
+    worse: int  # +1 where more is worse, -1 where less is
+
+
+METRICS: dict[str, Metric] = {
+    "final_error_mm": Metric("largest mean error at the end of a step", "mm", 1),
+    "overshoot_pct": Metric("largest overshoot of a step", "%", 1),
+    "settling_s": Metric("longest settling time to 2 %; none where a step did not settle", "s", 1),
+    "rms_error_mm": Metric("rms of reference - measured while running", "mm", 1),
+    "peak_error_mm": Metric("largest of it", "mm", 1),
+    "true_final_error_mm": Metric("final error by the emulator's own position", "mm", 1),
+    "tension_min_N": Metric("lowest tape tension while running", "N", -1),
+    "tension_max_N": Metric("highest tape tension while running", "N", 1),
+    "rms_output_V": Metric("rms of what was written to a drive, of the one that had most", "V", 1),
+    "peak_output_V": Metric("largest voltage written to a drive", "V", 1),
+    "trip_s": Metric("controller clock at the trip; none for no trip", "s", -1),
+}
+POSITION = {"ivu": "capstan", "ldu": "position", "axis": "x"}
+ERROR = {"ivu": "capstan_error", "ldu": "position_error", "axis": "position_error"}
+TRUTH = {"ivu": "truth_capstan", "ldu": "truth_x", "axis": "truth_x"}
+OUTPUTS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
+TENSIONS = ("truth_tension1", "truth_tension2"), ("tension1_estimate", "tension2_estimate")
+NAN = float("nan")
+
+
+def measure(run: Run, machine: Machine, wanted: Iterable[str] = METRICS) -> dict[str, float]:
+    """The `wanted` metrics of a run, nan where the machine or this run has none.
+
+    Those of steps judge the measured position by the target, as `rtctl run` does. A run that tripped has none: its
+    steps did not end.
+    """
+    rows = run.rows[run.rows["state"] == safety.RUNNING]
+    found = dict.fromkeys(METRICS, NAN)
+    found["trip_s"] = run.trip_time
+    if len(rows) > 1:
+        if not run.tripped:
+            found |= _steps(rows, machine)
+        found |= _error(rows, machine) | _tension(rows) | _outputs(rows, machine)
+    return {name: found[name] for name in wanted}
+
+
+def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
+    mm, floor = 1000.0 * machine.metres_per_unit, MODULES[machine.kind].SETTLE_FLOOR
+    t, target = rows["t"], rows["target"]
+    steps = step_metrics(t, target, rows[POSITION[machine.kind]], mm, None, settle_floor=floor)
+    if not steps:
+        return {}
+    settling = [_number(s["settling_s"]) for s in steps]
+    found = {
+        "final_error_mm": _largest(steps, "final_error_mm"),
+        "overshoot_pct": _largest(steps, "overshoot_pct"),
+        "settling_s": max(settling) if all(x == x for x in settling) else NAN,
+    }
+    truth = TRUTH[machine.kind]
+    if truth in (rows.dtype.names or ()):
+        true = step_metrics(t, target, rows[truth], mm, None, settle_floor=floor)
+        found["true_final_error_mm"] = _largest(true, "final_error_mm")
+    return found
+
+
+def _largest(steps: list[dict[str, float | None]], key: str) -> float:
+    return max(abs(_number(s[key])) for s in steps)
+
+
+def _number(value: float | None) -> float:
+    return NAN if value is None else value
+
+
+def _error(rows: np.ndarray, machine: Machine) -> dict[str, float]:
+    error = 1000.0 * machine.metres_per_unit * rows[ERROR[machine.kind]]
+    return {"rms_error_mm": float(np.sqrt(np.mean(error * error))), "peak_error_mm": float(np.max(np.abs(error)))}
+
+
+def _tension(rows: np.ndarray) -> dict[str, float]:
+    """By the emulator's own tensions where they are recorded, else by the estimates."""
+    names = rows.dtype.names or ()
+    pair = next((pair for pair in TENSIONS if pair[0] in names), None)
+    if pair is None:
+        return {}
+    values = np.concatenate([rows[name] for name in pair])
+    return {"tension_min_N": float(values.min()), "tension_max_N": float(values.max())}
+
+
+def _outputs(rows: np.ndarray, machine: Machine) -> dict[str, float]:
+    written = [rows[name] for name in OUTPUTS[machine.kind]]
+    return {
+        "rms_output_V": max(float(np.sqrt(np.mean(u * u))) for u in written),
+        "peak_output_V": max(float(np.max(np.abs(u))) for u in written),
+    }
