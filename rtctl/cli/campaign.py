@@ -1,7 +1,5 @@
 """`rtctl campaign`: one config run many times over a matrix of settings, and what came of it."""
 
-import contextlib
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,6 +7,7 @@ import typer
 
 from rtctl.cli import common
 from rtctl.cli.common import JsonOption
+from rtctl.cli.progress import progress
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 
@@ -78,7 +77,7 @@ def run(
 
     folder = out or common.default_folder(plan.name)
     try:
-        with _progress(plan.name) as update:
+        with progress(plan.name, "failed") as update:
             found = campaign.run(plan, folder, jobs or cpus(), scheduler, given, baseline, update)
     except pools.PoolError as error:
         typer.echo(f"rtctl: {error}; go on with --out {folder}", err=True)
@@ -148,24 +147,3 @@ def _words(found: dict[str, Any]) -> list[str]:
         against = f"against {b['folder']}, of which {b['matched']} runs match"
         lines.append(f"{b['regressions']} regressions, {b['better']} improvements {against}")
     return [*lines, found["report"]]
-
-
-@contextlib.contextmanager
-def _progress(name: str) -> Iterator[Callable[[int, int, int], None]]:
-    """A bar with the time left where a person is watching, else nothing."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda *_: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(name, total=None)
-
-        def update(done: int, total: int, failed: int) -> None:
-            bar.update(task, completed=done, total=total, description=f"{name}, {failed} failed" if failed else name)
-
-        yield update

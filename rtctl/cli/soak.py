@@ -9,6 +9,7 @@ import typer
 
 from rtctl.cli import common
 from rtctl.cli.common import ConfigArgument, JsonOption, LinkOption, SetOption
+from rtctl.cli.progress import progress
 
 app = typer.Typer(add_completion=False)
 MOST_HOURS = 24.0 * 365.0
@@ -62,7 +63,7 @@ def soak(
     from rtctl.soak.soak import soak as play
 
     folder = out or common.default_folder(f"soak-{settings.name}")
-    with _stopped() as stopped, _progress(settings.name) as update:
+    with _stopped() as stopped, progress(settings.name, "violations") as update:
         found = play(settings, hours, seed, faults, folder, resume, update, stopped)
     if junit is not None:
         try:
@@ -102,25 +103,3 @@ def _stopped() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextlib.contextmanager
-def _progress(name: str) -> Iterator[Callable[[int, int, int], None]]:
-    """A bar with the time left where a person is watching, else nothing."""
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda *_: None
-        return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(name, total=None)
-
-        def update(done: int, total: int, violations: int) -> None:
-            words = f"{name}, {violations} violations" if violations else name
-            bar.update(task, completed=done, total=total, description=words)
-
-        yield update
