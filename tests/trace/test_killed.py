@@ -90,14 +90,14 @@ def tell(supervisor):
     os.write(1, supervisor.recorder.stats().rows_written.to_bytes(8, "little"))
 Session(config, Path(order["out"]), order["seconds"]).run(tell)
 """
-SECONDS = 120.0
+SECONDS = 400.0
 
 
 @pytest.mark.parametrize("share", [0.1, 0.6])
 def test_a_killed_supervisor_leaves_a_prefix_of_the_run(
     runtime: Path, config: Callable[..., Any], tmp_path: Path, share: float
 ) -> None:
-    settings = config(set={"record.seconds": 2.0})  # a ring of 1000 rows: many batches
+    settings = config(set={"record.seconds": 2.0, "record.batch": 0.001})  # a ring of 1000 rows: many batches
     order = {"config": settings.model_dump(mode="json", exclude_unset=True), "out": str(tmp_path / "run")}
     child = subprocess.Popen(
         [sys.executable, "-c", RUN, json.dumps({**order, "seconds": SECONDS})], stdout=subprocess.PIPE, bufsize=0
