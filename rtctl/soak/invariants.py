@@ -27,7 +27,7 @@ INVARIANTS = {
     "settled": "an undisturbed move ends within tolerance of its target",
     "order": "the number of the newest order never falls, and none is from the future",
     "recovery": "after a fault, reset and arm lead back to running",
-    "memory": "the memory of the process stays flat after the first tenth",
+    "memory": "the memory of the process stays flat once it has warmed up",
 }
 NAMES = tuple(INVARIANTS)
 (

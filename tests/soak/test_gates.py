@@ -210,10 +210,10 @@ def test_a_leak(rig: Make, only: Only, monkeypatch: pytest.MonkeyPatch) -> None:
     only("wait")
     found = rig()
     memory, kept = Memory(), []
-    for k in range(20):
-        kept.append(mmap.mmap(-1, size := round(MOST_MB / 10 * 2**20)))  # not of what the allocator has had before
+    for k in range(80):
+        kept.append(mmap.mmap(-1, size := round(MOST_MB / 20 * 2**20)))  # not of what the allocator has had before
         kept[-1].write(bytes(size))
-        memory.sample(k / 20, found.checker, k)
+        memory.sample(k / 80, found.checker, k)
     assert names(found) == {"memory"} and found.checker.count == 1
 
 
