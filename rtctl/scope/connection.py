@@ -1,0 +1,120 @@
+"""One browser: what it asks, and what is sent to it without ever waiting for it."""
+
+import asyncio
+import contextlib
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import structlog
+from aiohttp import web
+
+from rtctl.config.errors import UserError
+from rtctl.scope.view import MOST_BYTES, read_view
+from rtctl.scope.viewer import Viewer
+
+if TYPE_CHECKING:
+    from rtctl.scope.server import Scope
+
+log = structlog.get_logger()
+COMMANDS = ("arm", "disarm", "reset", "play", "setpoint", "set")  # what the page may ask of the daemon
+MOST_WAITING = 100  # texts that a browser has not taken; then it is given up
+
+
+class Connection:
+    """A WebSocket with its viewer. Messages of the page are JSON texts with a key `op`:
+
+    view     {"op": "view", "view": {...}}    what it wants to see, see View
+    drawn    {"op": "drawn"}                  a frame is on the screen: it can take another
+    others   {"op": "set", "id": 3, "args": {...}}, answered by {"kind": "reply", "id": 3, "ok": ..., ...}
+    """
+
+    def __init__(self, socket: web.WebSocketResponse, scope: "Scope"):
+        self.viewer = Viewer()
+        self._socket, self._scope = socket, scope
+        self._sending: set[asyncio.Task[None]] = set()
+
+    def send_frame(self) -> None:
+        """Send the frame that is due, if there is one and the browser has drawn those before."""
+        try:
+            frame = self.viewer.frame()
+        except Exception as error:  # one viewer's trouble is not that of the others
+            log.exception("no frame", error=str(error))
+            self._send(self._socket.close(code=1011))
+            return
+        if frame is not None:
+            self._send(self._socket.send_bytes(frame))
+
+    def send_text(self, message: dict[str, Any]) -> None:
+        if len(self._sending) > MOST_WAITING:
+            self._send(self._socket.close())
+        elif not self._socket.closed:
+            self._send(self._socket.send_str(json.dumps(finite(message))))
+
+    async def hear(self, text: str) -> None:
+        """Do what a message of the page asks. Whatever is wrong with it is answered, and changes nothing."""
+        id = None
+        try:
+            message = read(text)
+            id, op = message.get("id"), message.get("op")
+            if op == "drawn":
+                self.viewer.drawn()
+            elif op == "view":
+                feed = self._scope.feed
+                names = feed.history.names if feed.history is not None else ()
+                self.viewer.look(read_view(message.get("view"), names))
+            else:
+                result = await self._command(op, message.get("args", {}))
+                self.send_text({"kind": "reply", "id": id, "ok": True, "result": result})
+        except UserError as error:
+            self.send_text({"kind": "reply", "id": id, "ok": False, "error": str(error)})
+
+    async def end(self, why: str) -> None:
+        await self._socket.close(code=1001, message=why.encode())
+
+    async def _command(self, op: Any, args: Any) -> dict[str, Any]:
+        if op not in COMMANDS:
+            raise UserError(f"the page may not ask for '{str(op)[:40]}'; it may ask for {', '.join(COMMANDS)}")
+        if not self._scope.control:
+            raise UserError("this scope is read-only; start it with `rtctl scope --control` to command the machine")
+        if not isinstance(args, dict) or not all(isinstance(key, str) and key.isidentifier() for key in args):
+            raise UserError(f"'{op}': args must be a map of names and values")
+        if "op" in args or "self" in args:
+            raise UserError(f"'{op}' takes no argument 'op' or 'self'")
+        return await self._scope.feed.call(op, **args)
+
+    def _send(self, work: Any) -> None:
+        task = asyncio.create_task(_unless_gone(work))
+        self._sending.add(task)
+        task.add_done_callback(self._sending.discard)
+
+
+async def _unless_gone(work: Any) -> None:
+    with contextlib.suppress(ConnectionError, RuntimeError):  # it went away meanwhile; the reading end notices as well
+        await work
+
+
+def read(text: str) -> dict[str, Any]:
+    """A message of the page. Raises UserError where it is none."""
+    if len(text) > MOST_BYTES:
+        raise UserError(f"a message of {len(text)} characters; at most {MOST_BYTES} are taken")
+    try:
+        message = json.loads(text, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        raise UserError("not a JSON text") from None
+    if not isinstance(message, dict):
+        raise UserError("not a JSON object")
+    return message
+
+
+def finite(value: Any) -> Any:
+    """The same without NaN and infinity, which JSON cannot hold: they become null."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _no_constant(text: str) -> None:
+    raise ValueError(f"{text} is not finite")

@@ -1,0 +1,55 @@
+"""What is drawn of many rows: envelopes that keep every extreme, points of one signal over another, spectra."""
+
+import numpy as np
+
+MOST_POINTS = 4000  # of one signal over another
+LONGEST_SPECTRUM = 1 << 16  # rows
+
+
+def envelope(values: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest of each `rows` rows of an array (signals, n); the last bucket may hold fewer.
+
+    Two arrays (signals, buckets). Values that are not a number are passed over where a bucket has others.
+    """
+    if rows == 1 or not values.size:
+        return values, values
+    whole = values.shape[1] // rows * rows
+    parts = values[:, :whole].reshape(len(values), -1, rows)
+    low, high = np.fmin.reduce(parts, axis=2), np.fmax.reduce(parts, axis=2)
+    if whole < values.shape[1]:
+        rest = values[:, whole:]
+        low = np.column_stack((low, np.fmin.reduce(rest, axis=1)))
+        high = np.column_stack((high, np.fmax.reduce(rest, axis=1)))
+    return low, high
+
+
+def thinned(values: np.ndarray, most: int = MOST_POINTS) -> tuple[np.ndarray, int]:
+    """Every n-th row of an array (signals, rows), the newest included, and n: at most `most` are left."""
+    step = max(1, -(-values.shape[1] // most))
+    return values[:, ::-1][:, ::step][:, ::-1], step
+
+
+def spectrum(values: np.ndarray, dt: float, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitude spectra of an array (signals, rows) that was sampled every `dt` s, without their means.
+
+    Frequencies in Hz (points,) and amplitudes (signals, points) in the units of the signals: a sine of amplitude 1
+    reads 1 where its frequency falls on a line (Hann window, at worst 15 % less between two lines). Of several lines
+    in a column of the logarithmic axis the highest is kept, at the middle of the column. Of more than 65536 rows, the
+    newest.
+
+    Source: Heinzel, Ruediger & Schilling, Spectrum and spectral density estimation by the DFT (2002).
+    """
+    values = values[:, -LONGEST_SPECTRUM:]
+    n = values.shape[1]
+    if n < 8:
+        return np.empty(0), np.empty((len(values), 0))
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
+    level = np.abs(np.fft.rfft((values - values.mean(axis=1, keepdims=True)) * window))[:, 1:]
+    level *= 2.0 / window.sum()
+    frequency = np.fft.rfftfreq(n, dt)[1:]
+    if len(frequency) <= columns:
+        return frequency, level
+    column = (np.log(frequency / frequency[0]) / np.log(frequency[-1] / frequency[0]) * (columns - 1)).astype(int)
+    begins = np.flatnonzero(np.diff(column, prepend=-1))
+    ends = np.append(begins[1:], len(frequency)) - 1
+    return np.sqrt(frequency[begins] * frequency[ends]), np.maximum.reduceat(level, begins, axis=1)

@@ -1,0 +1,224 @@
+// The plots: one lane for each unit, under each other, with a common axis. Errors have a lane of their own.
+
+import { prefixed, short } from "./units.js";
+
+const uPlot = window.uPlot;
+const AXIS = 78; // px of the y axes, so that the lanes line up
+const DECADES = 6; // of a spectrum
+
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const colour = (slot) => css(`--c${slot % 8}`);
+
+export class Plots {
+  // `on` has zoom(from, to), unzoom() and draw(plot, lane, last), the last for cursors and the like.
+  constructor(place, on) {
+    this.place = place;
+    this.on = on;
+    this.lanes = [];
+    this.key = "";
+    new ResizeObserver(() => this.resize()).observe(place);
+  }
+
+  // Draw `traces`; `signals` maps a name to its { unit, slot }.
+  show(traces, signals) {
+    this.traces = traces;
+    const key = JSON.stringify([traces.kind, traces.xName, traces.names.map((n) => [n, signals.get(n)])]);
+    if (key !== this.key) this.build(traces, signals, key);
+    for (const lane of this.lanes) this.update(lane);
+  }
+
+  // Draw again from nothing: the theme has changed.
+  rebuild() { this.key = ""; }
+
+  redraw() { for (const lane of this.lanes) lane.plot.redraw(false); }
+
+  // Where the mouse is on the axis, or null.
+  pointer() {
+    for (const { plot } of this.lanes) if (plot.cursor.left >= 0) return plot.posToVal(plot.cursor.left, "x");
+    return null;
+  }
+
+  build(traces, signals, key) {
+    this.key = key;
+    for (const lane of this.lanes) lane.plot.destroy();
+    this.place.replaceChildren();
+    this.lanes = grouped(traces.names, signals);
+    if (!this.lanes.length) this.place.append(Object.assign(document.createElement("p"), { textContent: "choose signals to show" }));
+    this.lanes.forEach((lane, i) => {
+      lane.last = i === this.lanes.length - 1;
+      lane.at = lane.names.map((name) => traces.names.indexOf(name));
+      lane.xUnit = traces.kind === "time" ? "s" : traces.kind === "spectrum" ? "Hz" : signals.get(traces.xName)?.unit ?? "";
+      lane.root = Object.assign(document.createElement("div"), { className: "lane" });
+      const legend = Object.assign(document.createElement("div"), { className: "legend" });
+      for (const name of lane.names) {
+        const item = document.createElement("span");
+        const line = document.createElement("i");
+        line.style.background = colour(signals.get(name).slot);
+        item.append(line, name);
+        legend.append(item);
+      }
+      lane.root.append(legend);
+      this.place.append(lane.root);
+      lane.scale = { factor: 1, unit: lane.unit };
+      lane.xScale = { factor: 1, unit: lane.xUnit };
+      const none = series(traces.kind, lane, traces).map(() => (traces.kind === "xy" ? [[], []] : []));
+      lane.plot = new uPlot(this.options(lane, traces, signals), [traces.kind === "xy" ? null : [], ...none], lane.root);
+    });
+    this.resize();
+  }
+
+  options(lane, traces, signals) {
+    const kind = traces.kind;
+    const axis = { stroke: () => css("--dim"), grid: { stroke: () => css("--grid"), width: 1 }, ticks: { stroke: () => css("--line"), width: 1, size: 4 }, font: "11px system-ui, sans-serif", labelFont: "11px system-ui, sans-serif" };
+    const shown = series(kind, lane, traces);
+    return {
+      width: 300, height: 150, mode: kind === "xy" ? 2 : 1, legend: { show: false }, padding: [6, 10, lane.last ? 0 : 4, 0],
+      scales: {
+        x: { time: false, distr: kind === "spectrum" ? 3 : 1, range: () => lane.xRange ?? [0, 1] },
+        y: { distr: kind === "spectrum" ? 3 : 1, range: () => lane.yRange ?? [0, 1] },
+      },
+      axes: [
+        { ...axis, size: lane.last ? 22 : 4, gap: 3, labelSize: lane.last ? 16 : 0, labelGap: 0, label: lane.last ? () => this.xLabel(lane) : null,
+          values: (_, ticks) => (lane.last ? labels(ticks, lane.xScale.factor) : ticks.map(() => "")) },
+        { ...axis, size: AXIS - 16, labelSize: 16, labelGap: 0, label: () => `${lane.error ? "error " : ""}[${lane.scale.unit || "-"}]`,
+          values: (_, ticks) => labels(ticks, lane.scale.factor) },
+      ],
+      series: [kind === "xy" ? null : {}, ...shown.map(({ name }) => {
+        const stroke = colour(signals.get(name).slot);
+        return kind === "xy"
+          ? { stroke, paths: line, facets: [{ scale: "x", auto: false }, { scale: "y", auto: false }] }
+          : { stroke, width: 1, points: { show: false }, spanGaps: false };
+      })],
+      bands: kind === "time" ? lane.names.map((name, i) => ({ series: [2 * i + 2, 2 * i + 1], fill: `${colour(signals.get(name).slot)}70` })) : [],
+      cursor: {
+        sync: { key: `lanes-${kind}`, setSeries: false, scales: ["x", null] }, points: { show: false }, y: true,
+        drag: { x: kind !== "xy", y: false, setScale: false }, bind: { dblclick: () => () => { this.on.unzoom(); return null; } },
+      },
+      hooks: {
+        draw: [(plot) => this.on.draw(plot, lane)],
+        setSelect: [(plot) => {
+          const { left, width } = plot.select;
+          if (width > 3) this.on.zoom(plot.posToVal(left, "x"), plot.posToVal(left + width, "x"));
+          plot.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+        }],
+      },
+    };
+  }
+
+  xLabel(lane) {
+    const { kind, xName, about } = this.traces;
+    if (kind === "xy") return `${xName} [${lane.xScale.unit || "-"}]`;
+    if (kind === "spectrum") return `frequency [${lane.xScale.unit}], amplitudes (Hann window)`;
+    return `${about.sweep ? "t from the trigger" : "t of the controller"} [${lane.xScale.unit}]`;
+  }
+
+  // New data and scales for one lane. Everything is redrawn once.
+  update(lane) {
+    const { traces } = this;
+    const shown = series(traces.kind, lane, traces);
+    const [low, high] = extent(lane.at.flatMap((i) => [traces.low[i], traces.high[i]]));
+    const size = Math.max(Math.abs(low), Math.abs(high));
+    lane.scale = prefixed(lane.unit, size);
+    if (traces.kind === "time") {
+      lane.xRange = traces.range[1] > traces.range[0] ? traces.range : [0, 1];
+      lane.yRange = padded(low, high);
+      lane.xScale = traces.about.sweep ? prefixed("s", Math.max(...lane.xRange.map(Math.abs))) : { factor: 1, unit: "s" };
+      lane.plot.setData([traces.x, ...shown.map((s) => s.values)], true);
+    } else if (traces.kind === "spectrum") {
+      lane.xRange = traces.x.length > 1 ? [traces.x[0], traces.x[traces.x.length - 1]] : [1, 10];
+      const top = high > 0 ? 10 ** Math.ceil(Math.log10(high)) : 1;
+      lane.yRange = [Math.max(10 ** Math.floor(Math.log10(Math.max(low, 1e-300))), top / 10 ** DECADES), top];
+      if (lane.yRange[0] >= top) lane.yRange[0] = top / 10;
+      lane.plot.setData([traces.x, ...shown.map((s) => s.values.map((v) => (v > 0 ? v : null)))], true);
+    } else {
+      const [left, right] = extent([traces.x]);
+      lane.xRange = padded(left, right);
+      lane.yRange = padded(low, high);
+      lane.xScale = prefixed(lane.xUnit, Math.max(Math.abs(left), Math.abs(right)));
+      lane.plot.setData([null, ...shown.map((s) => [traces.x, s.values])], true);
+    }
+  }
+
+  resize() {
+    for (const { plot, root } of this.lanes) {
+      const { clientWidth: width, clientHeight: height } = root;
+      if (width > 0 && height > 0 && (plot.width !== width || plot.height !== height)) plot.setSize({ width, height });
+    }
+  }
+}
+
+function grouped(names, signals) {
+  const lanes = new Map();
+  for (const name of names) {
+    const unit = signals.get(name)?.unit;
+    if (unit === undefined) continue;
+    const error = name.endsWith("_error");
+    const key = `${unit}|${error}`;
+    if (!lanes.has(key)) lanes.set(key, { unit, error, names: [] });
+    lanes.get(key).names.push(name);
+  }
+  return [...lanes.values()];
+}
+
+// What uPlot draws of a lane: over time the lower and the upper edge of each signal, else one line.
+function series(kind, lane, traces) {
+  return lane.names.flatMap((name, n) => {
+    const i = lane.at[n];
+    return kind === "time" ? [{ name, values: traces.low[i] }, { name, values: traces.high[i] }] : [{ name, values: traces.high[i] }];
+  });
+}
+
+function extent(lists) {
+  let low = Infinity, high = -Infinity;
+  for (const list of lists) for (const v of list ?? []) {
+    if (v === null) continue;
+    if (v < low) low = v;
+    if (v > high) high = v;
+  }
+  return low <= high ? [low, high] : [0, 0];
+}
+
+function padded(low, high) {
+  const room = 0.06 * (high - low) || 0.05 * Math.abs(high) || 1;
+  return [low - room, high + room];
+}
+
+function tick(value, factor, largest) {
+  if (value === null) return "";
+  const scaled = Number((value / factor).toPrecision(9)); // 0.3, not 0.30000000000000004
+  if (scaled === 0 || Math.abs(value) < largest * 1e-9) return "0";
+  if (Math.abs(scaled) >= 1e6 || Math.abs(scaled) < 1e-3) return scaled.toExponential().replace("e+", "e");
+  return String(scaled);
+}
+
+const labels = (ticks, factor) => {
+  const largest = Math.max(...ticks.map((t) => Math.abs(t ?? 0)));
+  return ticks.map((t) => tick(t, factor, largest));
+};
+
+// One signal over another: a line from point to point in the order of time.
+function line(plot, index) {
+  uPlot.orient(plot, index, (serie, _dx, _dy, scaleX, scaleY, toX, toY, left, top, width, height) => {
+    const [xs, ys] = plot.data[index];
+    const path = new Path2D();
+    let pen = false;
+    for (let i = 0; i < xs.length; i++) {
+      if (xs[i] === null || ys[i] === null) { pen = false; continue; }
+      const x = toX(xs[i], scaleX, width, left), y = toY(ys[i], scaleY, height, top);
+      if (pen) path.lineTo(x, y);
+      else path.moveTo(x, y);
+      pen = true;
+    }
+    plot.ctx.save();
+    plot.ctx.beginPath();
+    plot.ctx.rect(left, top, width, height);
+    plot.ctx.clip();
+    plot.ctx.strokeStyle = serie.stroke();
+    plot.ctx.lineWidth = devicePixelRatio;
+    plot.ctx.stroke(path);
+    plot.ctx.restore();
+  });
+  return null;
+}
+
+export { css };

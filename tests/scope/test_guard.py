@@ -1,0 +1,28 @@
+import pytest
+
+from rtctl.config.errors import UserError
+from rtctl.scope.guard import kept_token
+
+
+def test_the_token_outlives_the_server_and_is_for_its_owner_alone(tmp_path):
+    path = tmp_path / "scope.token"
+    token = kept_token(path)
+    assert len(token) >= 32
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert kept_token(path) == token
+    assert kept_token(tmp_path / "other") != token
+
+
+def test_a_token_that_others_can_read_is_refused(tmp_path):
+    path = tmp_path / "scope.token"
+    kept_token(path)
+    path.chmod(0o644)
+    with pytest.raises(UserError, match="others can read"):
+        kept_token(path)
+
+
+def test_a_link_is_not_followed(tmp_path):
+    (tmp_path / "scope.token").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(UserError, match=r"scope\.token: no file"):
+        kept_token(tmp_path / "scope.token")
+    assert not (tmp_path / "elsewhere").exists()

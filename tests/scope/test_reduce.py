@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.scope.reduce import envelope, spectrum, thinned
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(-1e6, 1e6) | st.just(float("nan")), min_size=1, max_size=200), st.integers(1, 40))
+def test_an_envelope_keeps_the_extremes_of_each_of_its_columns(values, rows):
+    both = np.array([values, values[::-1]])
+    low, high = envelope(both, rows)
+    for k in range(low.shape[1]):
+        part = both[:, k * rows : (k + 1) * rows]
+        for n in range(2):
+            seen = part[n][~np.isnan(part[n])]
+            assert (low[n, k], high[n, k]) == (seen.min(), seen.max()) if len(seen) else np.isnan(low[n, k])
+    assert low.shape[1] == -(-len(values) // rows)
+
+
+def test_one_spike_in_a_million_rows_is_seen():
+    values = np.zeros((1, 1_000_000))
+    values[0, 654_321] = 1.0
+    low, high = envelope(values, 1000)
+    assert np.flatnonzero(high[0]).tolist() == [654]
+    assert not low.any()
+
+
+def test_an_envelope_of_nothing():
+    assert envelope(np.empty((0, 50)), 10)[0].shape[0] == 0
+    assert envelope(np.empty((2, 0)), 10)[0].shape == (2, 0)
+
+
+def test_points_of_one_signal_over_another_end_with_the_newest():
+    kept, step = thinned(np.arange(20.0).reshape(2, 10), 4)
+    assert step == 3
+    assert kept.tolist() == [[0, 3, 6, 9], [10, 13, 16, 19]]
+
+
+@pytest.mark.parametrize("columns", [5000, 300])
+def test_a_sine_reads_its_amplitude_at_its_frequency(columns):
+    t = np.arange(5000) * 1e-3
+    f, level = spectrum(np.array([3.0 * np.sin(2 * np.pi * 40.0 * t) + 7.0, 0.0 * t]), 1e-3, columns)
+    top = level[0].argmax()
+    assert level[0, top] == pytest.approx(3.0, rel=1e-6)
+    assert f[top] == pytest.approx(40.0, rel=1e-9 if columns > 2500 else 0.015)
+    assert level[1].max() < 1e-12
+    assert len(f) <= columns
+
+
+def test_a_spectrum_of_too_few_rows_is_empty():
+    f, level = spectrum(np.zeros((2, 5)), 1e-3, 100)
+    assert (len(f), level.shape) == (0, (2, 0))
