@@ -1,0 +1,68 @@
+"""`rtctl run` at a terminal, a dumb one, and none."""
+
+import fcntl
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+
+import pyte
+import pytest
+
+COLUMNS, ROWS = 70, 24
+LONG = "120s"  # six times what the ring holds: the supervisor takes many turns, however fast the loop is
+
+
+def run(tmp_path, runtime, *words, **environment):
+    """What a run of the reel unit sends to a terminal of COLUMNS x ROWS, and its exit code."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("4H", ROWS, COLUMNS, 0, 0))
+    command = [sys.executable, "-m", "rtctl.cli.main", "run", "ivu", "--mode", "fused", "--for", LONG, "--no-plot"]
+    command += ["--set", f"name=pty{os.getpid()}", "--out", str(tmp_path / "bundle"), *words]
+    plain = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "LINES", "NO_COLOR")}
+    env = {**plain, "TERM": "xterm-256color", **environment}
+    with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, env=env) as process:
+        os.close(theirs)
+        data = b""
+        try:
+            while block := os.read(ours, 65536):
+                data += block
+        except OSError:
+            pass  # the other end is closed
+        process.wait(60)
+    os.close(ours)
+    return process.returncode, data
+
+
+def test_a_panel_that_leaves_a_summary_behind(tmp_path, runtime):
+    code, data = run(tmp_path, runtime, "--reference", "steps", NO_COLOR="1")
+    assert code == 0
+    assert b"|error|" in data  # the panel was there
+    assert not any(f"\x1b[{colour}m".encode() in data for colour in (31, 32, 41, 42))
+    screen = pyte.Screen(COLUMNS, ROWS)
+    pyte.ByteStream(screen).feed(data)
+    lines = [line.rstrip() for line in screen.display]
+    assert lines[0].startswith(f"pty{os.getpid()}  60000 ticks at 500 Hz, fused: 0 missed")
+    assert lines[1].split()[:2] == ["t", "[s]"]
+    assert any(line.startswith("bundle") for line in lines)
+    assert not any("|error|" in line for line in lines)  # and has gone
+    assert not screen.cursor.hidden
+
+
+def test_a_dumb_terminal_gets_lines(tmp_path, runtime):
+    code, data = run(tmp_path, runtime, TERM="dumb")
+    assert code == 0
+    assert b"\x1b[2K" not in data and b"\x1b[1A" not in data and b"\x1b[?25l" not in data
+    assert b"missed 0" in data
+
+
+@pytest.mark.parametrize("json", [False, True])
+def test_a_pipe_gets_no_control_characters(rtctl, tmp_path, json):
+    words = ["run", "ivu", "--mode", "fused", "--for", "1s", "--no-plot", "--out", tmp_path / "bundle"]
+    code, out, err = rtctl(*words, "--set", f"name=pipe{os.getpid()}", *(["--json"] if json else []))
+    assert code == 0
+    assert (out[:1] == "{", len(out.splitlines())) == ((True, 1) if json else (False, 0))
+    assert all(line.isprintable() for line in err.splitlines())
+    assert ("missed" in err) is not json
