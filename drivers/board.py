@@ -1,0 +1,177 @@
+"""What every board is asked for, emulated or real: samples in, codes out, and zero whenever something is wrong.
+
+A board speaks the frame of the link: codes of the AT-MIO-16DE-10 (12 bits), counts modulo 2^24, digital lines as bits.
+`Board` checks and converts, and takes the outputs to 0 V at open, at close and at every error; a card's own file only
+fills in `_open`, `_read_volts`, `_read_counts`, `_write_code`, `_write_lines` and `_close`.
+
+Source: thesis 7.1.1 and appendix D for the order of the calls: mdlStart, mdlOutputs, mdlTerminate.
+"""
+
+import contextlib
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from rtctl.drivers import at_mio_16de as mio
+from rtctl.drivers import daq_stc
+from rtctl.idiom import Settings
+
+LINES = 8  # digital lines of the board's own port
+DT = 1.0  # s: the range of a channel does not hang on the period
+
+
+class EmulatedSettings(Settings):
+    """No card: the board is emulated with the machine."""
+
+    kind: Literal["emulated"] = Field("emulated", description="the machine and its board are emulated")
+
+
+class Wiring(NamedTuple):
+    """Which channels a machine uses, in the order of the frame's codes."""
+
+    outputs: tuple[mio.AnalogOutputSettings, ...]
+    inputs: tuple[mio.AnalogInputSettings, ...] = ()
+    counters: int = 1  # counters 0 to n - 1 hold encoders
+    lines: tuple[int, ...] = ()  # digital lines that the loop writes; the others are inputs
+
+    @property
+    def mask(self) -> int:
+        """Bits of the lines that the loop writes."""
+        return sum(1 << line for line in self.lines)
+
+
+class BoardError(Exception):
+    """A call of a card that failed while it runs: what was done, on which channel, and what the card says."""
+
+
+class Board(ABC):
+    """One card with a machine's wiring. Open it before use; it may be closed twice."""
+
+    def __init__(self, wiring: Wiring) -> None:
+        self.wiring = wiring
+        self.outputs = [mio.build_output(o, DT, 0) for o in wiring.outputs]
+        self.inputs = [mio.build_input(i, DT) for i in wiring.inputs]
+        self.is_open = False
+        self.failed: BoardError | None = None  # the first error since it was opened
+
+    @property
+    def name(self) -> str:
+        """What card this is, for people."""
+        return type(self).__name__
+
+    def open(self) -> "Board":
+        """Find the card, set its channels up, and zero its outputs. Raises UserError where it cannot be used."""
+        try:
+            self._open()
+            self.is_open = True
+            self.zero()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def read(self, frame: Any) -> None:
+        """Counters and inputs of now into `frame.counter_codes` and `frame.ai_codes`. Raises BoardError.
+
+        A failed read takes the outputs to zero: nobody can drive a machine that cannot be seen.
+        """
+        with self._guarded():
+            counts = self._read_counts()
+            volts = self._read_volts() if self.inputs else ()
+            for n, count in enumerate(counts):
+                frame["counter_codes"][n] = int(count) & (daq_stc.SIZE - 1)
+            for n, (value, p) in enumerate(zip(volts, self.inputs, strict=True)):
+                if not math.isfinite(value):
+                    raise BoardError(f"{self.name}: input {self.wiring.inputs[n].channel} reads {value}")
+                frame["ai_codes"][n] = nearest_code(p, value)
+
+    def write(self, codes: Sequence[int], lines: int) -> None:
+        """Codes of the outputs, and the levels of the digital lines. Raises BoardError; the outputs are zero then."""
+        with self._guarded():
+            for n, p in enumerate(self.outputs):
+                if not p.code_min <= codes[n] <= p.code_max:
+                    raise BoardError(f"{self.name}: code {codes[n]} for output {self.wiring.outputs[n].channel} lies "
+                                     f"beyond {p.code_min} to {p.code_max}")  # fmt: skip
+            if self.wiring.lines:  # first: a drive must know its direction before it gets its volts
+                self._write_lines(lines & self.wiring.mask)
+            self._write([int(codes[n]) for n in range(len(self.outputs))])
+
+    def zero(self) -> None:
+        """All outputs to 0 V, all written lines low. Raises BoardError once all have been tried."""
+        troubles = []
+        for n in range(len(self.outputs)):
+            try:
+                self._write_code(n, 0)
+            except BoardError as error:
+                troubles.append(str(error))
+        if self.wiring.lines:
+            try:
+                self._write_lines(0)
+            except BoardError as error:
+                troubles.append(str(error))
+        if troubles:
+            raise BoardError("; ".join(troubles))
+
+    def close(self) -> None:
+        """Outputs to zero, then let go of the card."""
+        if self.is_open:
+            with contextlib.suppress(BoardError):
+                self.zero()
+        self.is_open = False
+        self._close()
+
+    @contextlib.contextmanager
+    def _guarded(self) -> Any:
+        if not self.is_open:
+            raise BoardError(f"{self.name}: it is not open")
+        try:
+            yield
+        except BaseException as error:
+            with contextlib.suppress(BoardError):
+                self.zero()
+            if isinstance(error, BoardError) and self.failed is None:
+                self.failed = error
+            raise
+
+    def _write(self, codes: Sequence[int]) -> None:
+        for n, code in enumerate(codes):
+            self._write_code(n, code)
+
+    # What a card fills in; `n` counts the channels of the wiring
+
+    @abstractmethod
+    def _open(self) -> None: ...
+
+    @abstractmethod
+    def _read_volts(self) -> Sequence[float]: ...
+
+    @abstractmethod
+    def _read_counts(self) -> Sequence[int]: ...
+
+    @abstractmethod
+    def _write_code(self, n: int, code: int) -> None: ...
+
+    @abstractmethod
+    def _write_lines(self, bits: int) -> None: ...
+
+    @abstractmethod
+    def _close(self) -> None: ...
+
+
+def nearest_code(p: mio.AnalogInputParams, volts: float) -> int:
+    """The frame's code for a voltage, half to even, clipped at the ends of the range."""
+    return int(min(max(np.rint(volts / p.volts_per_code), p.code_min), p.code_max))
+
+
+def output_range(p: mio.AnalogOutputParams) -> tuple[float, float]:
+    """Volts of an output's ends, as a card's tables give them: -10 to 10, although the last code is one short of 10."""
+    return p.code_min * p.volts_per_code, (p.code_max + 1) * p.volts_per_code
+
+
+def input_range(p: mio.AnalogInputParams) -> tuple[float, float]:
+    """Volts of an input's ends, as a card's tables give them."""
+    return p.code_min * p.volts_per_code, (p.code_max + 1) * p.volts_per_code

@@ -1,0 +1,89 @@
+"""A real board in the emulator's place: outputs from the loop to the card, samples from the card to the loop.
+
+It stands where the emulated plant does, at the other end of the link (decision 0009), so that it outlives the loop:
+when the loop dies, hangs or is cut off, the outputs go to zero here.
+"""
+
+import gc
+from typing import Any
+
+from rtctl.daemon.link_end import LinkEnd, now, sleep_until
+from rtctl.drivers.board import Board
+from rtctl.drivers.boards import make
+from rtctl.loop import safety
+from rtctl.loop.realtime import RealTime
+from rtctl.machines import Machine
+from rtctl.machines.wiring import wiring
+
+
+class BoardPlant:
+    """A card that serves a loop. Raises UserError where the card cannot be opened."""
+
+    def __init__(
+        self, machine: Machine, link: str, status: Any, out: Any, inp: Any, board: Board | None = None
+    ) -> None:
+        config = machine.config
+        rate = config.driver.rate or 1.0 / machine.plant_period
+        self.board = board or make(config.driver, wiring(config), rate)
+        self._period, self._hold = round(1e9 / rate), round(config.safety.link_timeout * 1e9)
+        self._priority = 0 if config.loop.realtime == "off" else max(config.loop.priority - 1, 1)  # below the loop's
+        self._status = status
+        self.end = LinkEnd(link, status, out, inp)
+        self._codes = [0] * len(self.board.outputs)
+        self.board.open()
+
+    def run(self) -> None:
+        """Serve on the wall clock until status.stop is set; the outputs are zero afterwards, whatever happened.
+
+        Raises BoardError where the card fails; the loop then hears no more, and trips.
+        """
+        real_time = None
+        try:
+            real_time = RealTime(self._priority, None) if self._priority else None
+            gc.disable()  # a turn leaves nothing behind that refers to itself
+            wake = now() + self._period
+            while not self.end.stopped:
+                sleep_until(wake)
+                self.turn()
+                behind = (now() - wake) // self._period
+                self._status["skipped"][0] += behind  # a late sample is not made up for
+                wake += (1 + behind) * self._period
+        finally:
+            self.board.close()
+            self._status["ended"][0] = 1
+            gc.enable()
+            if real_time is not None:
+                real_time.close()
+
+    def turn(self) -> None:
+        """Newest outputs to the card, a sample to the loop."""
+        self.end.newest()
+        codes, lines = self.due()
+        self.board.write(codes, lines)
+        self._codes = codes
+        self.board.read(self.end.rx)
+        self.end.answer()
+
+    def due(self) -> tuple[list[int], int]:
+        """Codes and lines that may be written now.
+
+        Zero while the machine is off, and where the newest outputs answer a sample that is older than the link's
+        time-out, by this process's own clock. After a trip no output grows, whatever the frame says.
+        """
+        tx = self.end.tx
+        off = [0] * len(self._codes)
+        if tx["state"] == safety.IDLE or now() - int(tx["inputs_t_ns"]) > self._hold:
+            return off, 0
+        codes = [int(c) for c in tx["ao_codes"][: len(off)]]
+        if tx["state"] == safety.TRIPPED:
+            codes = [c if abs(c) <= abs(was) and c * was >= 0 else 0 for c, was in zip(codes, self._codes, strict=True)]
+        return codes, int(tx["dio_lines"])
+
+
+def zero(config: Any) -> str | None:
+    """Open a card whose process has died, take its outputs to zero, and let it go; returns what went wrong."""
+    try:
+        make(config.driver, wiring(config), config.loop.rate).open().close()
+    except Exception as error:
+        return str(error)
+    return None

@@ -1,0 +1,257 @@
+"""Wiring checks of a real board, by hand and with the outputs off: what to do, what is read, what would be right.
+
+Nothing here writes anything but zero to the card.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from rtctl.config.errors import UserError
+from rtctl.doctor.finding import Finding
+from rtctl.drivers import at_mio_16de as mio
+from rtctl.drivers import daq_stc, optical_sensor
+from rtctl.drivers.board import Board
+from rtctl.loop import frames
+
+REST_READS = 200
+REST_CODES = 4  # peak to peak; the thesis's board has 0.5 LSB of dither
+TURN = 0.05  # a turn by hand is a turn within this share
+STROKE = 0.1  # m
+BACK = 0.02  # of the way, that may be missing after the way back
+SILENT = "nobody was asked: no terminal, or --json"
+
+
+class Sample(NamedTuple):
+    """One reading: counts since the start of a step, signed, and volts of the inputs."""
+
+    counts: tuple[int, ...]
+    volts: tuple[float, ...]
+
+
+class Person(Protocol):
+    """Who does what a step asks for. Both return whether anybody was there to do it."""
+
+    def act(self, step: "Step", read: Callable[[], Sample]) -> bool:
+        """Have it done, while `read` is called over and over."""
+
+    def confirm(self, step: "Step") -> bool | None:
+        """Whether it is so; None where it was left out."""
+
+
+class Step(NamedTuple):
+    """One check."""
+
+    name: str
+    do: str  # by hand; "" for nothing
+    right: str  # what is right
+    judge: (
+        Callable[[list[Sample]], tuple[str, bool]] | None
+    )  # what was found, and whether it is right; None: a person says
+
+
+class Wires:
+    """An open card, read as the loop would."""
+
+    def __init__(self, card: Board) -> None:
+        self.card = card
+        self._frame = np.zeros(1, frames.INPUTS)[0]
+        self._from: list[int] = []
+        self.start()
+
+    def start(self) -> None:
+        """Outputs to zero once more; counts begin here."""
+        self.card.zero()
+        self._from = self._codes()
+        self._counts = [0] * len(self._from)
+
+    def _codes(self) -> list[int]:
+        self.card.read(self._frame)
+        return [int(c) for c in self._frame["counter_codes"][: self.card.wiring.counters]]
+
+    def read(self) -> Sample:
+        """What the card reads now."""
+        codes = self._codes()
+        for n, (code, before) in enumerate(zip(codes, self._from, strict=True)):
+            self._counts[n] += int(daq_stc.difference.py_func(code, before))
+        self._from = codes
+        used = zip(self.card.inputs, self._frame["ai_codes"], strict=False)
+        return Sample(tuple(self._counts), tuple(float(mio.codes_to_input_volts.py_func(p, c)) for p, c in used))
+
+
+def run(config: Any, card: Board, person: Person | None, tell: Callable[[Finding], None]) -> list[Finding]:
+    """Go through all steps with an open card; without a person those by hand are left out. `tell` hears each finding.
+
+    Raises BoardError where the card fails.
+    """
+    found = [Finding("card", card.name, "good")]
+    tell(found[0])
+    wires = Wires(card)
+    for step in steps(config):
+        found.append(_one(step, wires, person))
+        tell(found[-1])
+    card.zero()
+    return found
+
+
+def _one(step: Step, wires: Wires, person: Person | None) -> Finding:
+    wires.start()
+    if step.judge is None:
+        said = None if person is None else person.confirm(step)
+        if said is None:
+            return Finding(step.name, SILENT if person is None else "left out", "unknown", change=step.do)
+        return Finding(
+            step.name,
+            "as it should be" if said else "not so",
+            "good" if said else "bad",
+            "",
+            "" if said else f"right is: {step.right}",
+        )
+    samples = [wires.read()]
+
+    def read() -> Sample:
+        samples.append(wires.read())
+        return samples[-1]
+
+    if step.do:
+        if person is None:
+            return Finding(step.name, SILENT, "unknown", change=step.do)
+        if not person.act(step, read):
+            return Finding(step.name, "left out", "unknown", change=step.do)
+    else:
+        for _ in range(REST_READS):
+            read()
+    words, good = step.judge(samples)
+    return Finding(step.name, words, "good" if good else "bad", "", "" if good else f"right is: {step.right}")
+
+
+def steps(config: Any) -> list[Step]:
+    """The checks of a machine, in the order in which they are safe."""
+    common = [
+        Step("emergency stop", "Push the emergency stop. The motors must turn freely by hand.",
+             "no drive has power while you touch the machine", None),
+        Step("outputs", "Measure every analog output at the connector block with a voltmeter.",
+             "0 V, within 5 mV, and no drift", None),
+        Step("rest", "", f"counters stand still, inputs within {REST_CODES} codes", _rest(config)),
+    ]  # fmt: skip
+    of = {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.machine]
+    return [*common, *of(config)]
+
+
+def _ivu(config: Any) -> list[Step]:
+    counts = config.sensors.capstan.lines * config.sensors.capstan.multiply
+    out = [
+        *_way("capstan", 0, "Turn the capstan one full turn, tape towards reel 1.", counts, "one turn", TURN),
+    ]
+    for n, name in enumerate(("reel1", "reel2")):
+        sensor = getattr(config.sensors, name)
+        do = f"Turn {name.replace('l', 'l ')} slowly by hand, one full turn in about ten seconds."
+        right = f"{sensor.pulses} pulses, from below {sensor.low:g} V to above {sensor.high:g} V"
+        out.append(Step(name, do, right, _pulses(n, sensor)))
+    return out
+
+
+def _ldu(config: Any) -> list[Step]:
+    counts = config.sensors.encoder.lines * config.sensors.encoder.multiply
+    travel = round(STROKE / config.sensors.scale.pitch)
+    turns = STROKE / (2 * math.pi * config.sensors.R_c)
+    push, way = f"Push the carriage {STROKE * 1e3:g} mm away from home", f"{STROKE * 1e3:g} mm"
+    return [
+        *_way("scale", 1, f"{push}.", travel, way, 0.1),
+        Step("encoder", f"{push} once more.",
+             f"about {counts * turns:.0f} counts, upwards, and the scale beside it",
+             _together(counts / (2 * math.pi * config.sensors.R_c), 1 / config.sensors.scale.pitch)),
+    ]  # fmt: skip
+
+
+def _axis(config: Any) -> list[Step]:
+    travel = round(STROKE / config.encoder.pitch)
+    return _way("encoder", 0, f"Push the axis {STROKE * 1e3:g} mm forwards.", travel, f"{STROKE * 1e3:g} mm", 0.1)
+
+
+def _way(name: str, counter: int, do: str, counts: int, way: str, within: float) -> list[Step]:
+    """There and back: sign, size, and that nothing is lost."""
+    back = "Go back to where you began."
+
+    def there(samples: list[Sample]) -> tuple[str, bool]:
+        n = samples[-1].counts[counter]
+        words = f"{n:+d} counts"
+        if n == 0:
+            words += "; none at all: is the encoder fed, are its wires on the counter's source and direction?"
+        elif n < 0:
+            words += "; the wrong way: swap A and B of this encoder"
+        elif not abs(n / counts - 1) <= within:
+            words += f"; {n / counts:.3g} of what it should be: lines, x1 or x4, or counts lost"
+        return words, abs(n / counts - 1) <= within
+
+    def returned(samples: list[Sample]) -> tuple[str, bool]:
+        n = samples[-1].counts[counter]
+        return f"{n:+d} counts", abs(n / counts + 1) <= within + BACK
+
+    return [
+        Step(name, do, f"{counts:+d} counts for {way}, within {within:.0%}", there),
+        Step(f"{name}, back", back, f"{-counts:+d} counts, within {within + BACK:.0%}", returned),
+    ]
+
+
+def _pulses(channel: int, sensor: Any) -> Callable[[list[Sample]], tuple[str, bool]]:
+    def judge(samples: list[Sample]) -> tuple[str, bool]:
+        volts = [s.volts[channel] for s in samples]
+        s = np.zeros(1, optical_sensor.OPTICAL_SENSOR_STATE).view(np.recarray)[0]
+        p = optical_sensor.build(sensor, 1.0)
+        edges = [int(optical_sensor.count.py_func(p, s, v)) for v in volts][-1]
+        low, high = min(volts), max(volts)
+        words = f"{edges} pulses, {low:.2f} to {high:.2f} V"
+        if high - low < 0.1:
+            words += "; it does not change: is the sensor fed, is it on this input?"
+        return words, abs(edges - sensor.pulses) <= 1 and low < sensor.low and high > sensor.high
+
+    return judge
+
+
+def _together(encoder_per_metre: float, scale_per_metre: float) -> Callable[[list[Sample]], tuple[str, bool]]:
+    def judge(samples: list[Sample]) -> tuple[str, bool]:
+        encoder, scale = (
+            n / per for n, per in zip(samples[-1].counts, (encoder_per_metre, scale_per_metre), strict=True)
+        )
+        words = f"{encoder * 1e3:+.2f} mm by the encoder, {scale * 1e3:+.2f} mm by the scale"
+        if encoder * scale < 0:
+            words += "; against each other: swap A and B of one"
+        return words, scale > STROKE / 2 and abs(encoder / scale - 1) <= TURN
+
+    return judge
+
+
+def _rest(config: Any) -> Callable[[list[Sample]], tuple[str, bool]]:
+    def judge(samples: list[Sample]) -> tuple[str, bool]:
+        moved = [max(s.counts[n] for s in samples) - min(s.counts[n] for s in samples)
+                 for n in range(len(samples[0].counts))]  # fmt: skip
+        wide = [max(s.volts[n] for s in samples) - min(s.volts[n] for s in samples)
+                for n in range(len(samples[0].volts))]  # fmt: skip
+        level = ", ".join(f"{v:.3f} V" for v in samples[-1].volts)
+        words = f"counters moved {moved}" + (f"; inputs at {level}, {', '.join(f'{w * 1e3:.1f}' for w in wide)} mV wide"
+                                             if wide else "")  # fmt: skip
+        steps_ = [REST_CODES * mio.build_input(i, 1.0).volts_per_code for i in _inputs(config)]
+        quiet = all(w <= most * (1 + 1e-9) for w, most in zip(wide, steps_, strict=True))
+        return words, quiet and all(m <= 1 for m in moved)  # an encoder may stand on an edge
+
+    return judge
+
+
+def _inputs(config: Any) -> tuple[Any, ...]:
+    from rtctl.machines.wiring import wiring
+
+    return wiring(config).inputs
+
+
+def card_of(config: Any) -> Board:
+    """The card of a config, not open yet. Raises UserError where it has none."""
+    from rtctl.drivers.boards import make
+    from rtctl.machines.wiring import wiring
+
+    if config.driver.kind == "emulated":
+        raise UserError(f"--board: {config.name} has an emulated board, which has no wires; say which card, e.g. "
+                        "--set 'driver={kind: comedi, device: /dev/comedi0}'")  # fmt: skip
+    return make(config.driver, wiring(config), config.driver.rate or config.loop.rate)

@@ -1,0 +1,145 @@
+"""Real boards and FMUs from the command line: a run of each, and what a mistake in them says."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtctl.cli.common import load_config
+from rtctl.loop import fused
+from rtctl.trace.bundle import load_bundle
+
+TESTS = Path(__file__).parents[1]
+sys.path.insert(0, str(TESTS / "plants"))
+FMU = "plant.fmu={{file: {file}, inputs: {{drive: u}}, outputs: {{sensor: {sensor}}}}}"
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler (cc) here")
+    out = tmp_path_factory.mktemp("comedi") / "libcomedi.so"
+    source = TESTS / "drivers" / "comedi_card.c"
+    subprocess.run([compiler, "-shared", "-fPIC", source, "-o", out, "-lm"], check=True)
+    return out
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    pytest.importorskip("fmpy", reason="FMPy is not installed")
+    import carriage
+
+    folder = tmp_path_factory.mktemp("fmu")
+    built = carriage.library(folder)
+    if built is None:
+        pytest.skip("no C compiler (cc) here")
+    return carriage.pack(folder / "carriage.fmu", built)
+
+
+@pytest.mark.realtime
+def test_a_card_that_fails_in_a_run_is_zeroed_and_told(running, library, tmp_path, monkeypatch):
+    """Its file tells the card of another process that it is broken now."""
+    monkeypatch.setenv("CARD_FAILS_IF", str(tmp_path / "broken"))
+    name, folder = f"card{os.getpid()}", tmp_path / "bundle"
+    with running(name, folder, "--set", f"driver={{kind: comedi, library: {library}}}") as run:
+        (tmp_path / "broken").touch()
+        heard = ""
+        while "its outputs are zero" not in heard:
+            line = run.stderr.readline()
+            assert line, heard
+            heard += line
+        assert "/dev/comedi0 (at-mio-16de-10): reading input 0: Input/output error" in heard
+        run.send_signal(signal.SIGINT)
+        assert run.wait(60) in (0, 130)
+    assert load_bundle(folder).columns["u1"].max() == 0.0
+
+
+def test_an_fmu_runs_in_lockstep_as_the_emulator_of_the_same_equations_does(rtctl, fmu, runtime, tmp_path):
+    reference = "reference.steps=[{at: 0.2 s, to: 5 mm}]"
+    changes = (f"name=f{os.getpid()}", "plant.parameters.F_c=0", reference, FMU.format(file=fmu, sensor="x"))
+    words = ["--mode", "lockstep", "--for", "1s", "--no-plot", "--json", "--out", tmp_path / "bundle"]
+    code, _, err = rtctl("run", "axis", *words, *(w for c in changes for w in ("--set", c)))
+    assert code == 0, err
+    x = load_bundle(tmp_path / "bundle").columns["x"]
+    emulated = fused.run(load_config("axis", ["loop.mode=fused", *changes[:3]]), 1.0)["x"]
+    assert len(x) == 1000
+    assert x.max() > 4e-3
+    # the emulator's output settles for 4 us of each step, the FMU's is there at once
+    assert np.abs(x - emulated).max() < 1e-2 * emulated.max()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--set", "driver.kind=comedy"], "did you mean 'comedi'"),
+        (["--mode", "fused", "--set", "driver.kind=comedi"], "a real board keeps real time"),
+        (["--mode", "lockstep", "--set", "driver={kind: comedi, devise: x}"], "driver.devise: unknown key"),
+        (["--set", FMU.format(file="missing.fmu", sensor="x")], "runs in lockstep only"),
+        (["--mode", "lockstep", "--set", FMU.format(file="missing.fmu", sensor="x")], "there is no such file"),
+    ],
+)
+def test_a_mistake_is_one_message_before_anything_runs(rtctl, words, message):
+    code, _, err = rtctl("check", "axis", *words)
+    assert code == 2
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("config", "plant"), [("ivu_comedi", "/dev/comedi0 by comedi"), ("ldu_nidaqmx", "Dev1 by nidaqmx")]
+)
+def test_the_configs_for_cards_are_right(rtctl, config, plant):
+    code, out, err = rtctl("check", f"boards/{config}")
+    assert (code, plant in out) == (0, True), err
+
+
+def test_an_own_plant_is_neither_a_card_nor_an_fmu(rtctl, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert rtctl("new", "plant", "my_plant", "--for", "axis").code == 0
+    code, out, err = rtctl("check", "my_plant.yaml")
+    assert (code, "emulated" in out) == (0, True), err
+
+
+def test_a_plant_without_its_card_does_not_start(rtctl, runtime):
+    card = "driver={kind: comedi, library: /nothing.so}"
+    code, _, err = rtctl("plant", "boards/ivu_comedi", "--set", f"name=p{os.getpid()}", "--set", card)
+    assert (code, "is no libcomedi" in err) == (2, True), err
+
+
+def test_check_reads_the_fmu(rtctl, fmu):
+    code, _, err = rtctl("check", "axis", "--mode", "lockstep", "--set", FMU.format(file=fmu, sensor="X"))
+    assert (code, "did you mean 'x'" in err) == (2, True)
+    code, out, _ = rtctl("check", "axis", "--mode", "lockstep", "--set", FMU.format(file=fmu, sensor="x"))
+    assert code == 0
+    assert f"the FMU {fmu}" in out
+
+
+def test_the_wiring_checks_without_a_person(rtctl, library, runtime):
+    card = f"driver={{kind: comedi, library: {library}}}"
+    code, out, err = rtctl("doctor", "--board", "ivu", "--json", "--set", card, "--set", f"name=w{os.getpid()}")
+    assert code == 0, err
+    told = json.loads(out)
+    assert told["card"] == "/dev/comedi0 (at-mio-16de-10)"
+    assert {c["name"]: c["verdict"] for c in told["checks"]}["rest"] == "good"
+    assert told["bad"] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--board", "ivu"], "has an emulated board"),
+        (["--board", "ivu", "--need", "500"], "--board checks wires"),
+        (["--set", "loop.rate=100"], "it needs --board CONFIG"),
+        (["--board", "ivu", "--set", "driver={kind: comedi, library: /nothing.so}"], "is no libcomedi"),
+    ],
+)
+def test_the_wiring_checks_refuse_what_makes_no_sense(rtctl, runtime, words, message):
+    code, _, err = rtctl("doctor", *words, *(["--set", "name=nobody"] if "--board" in words else []))
+    assert code == 2
+    assert message in err

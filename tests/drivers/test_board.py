@@ -1,0 +1,130 @@
+"""What every card has to do, emulated or real: one suite over all of them."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rtctl.drivers import daq_stc
+from rtctl.drivers.at_mio_16de import AnalogOutputSettings
+from rtctl.drivers.board import BoardError, Wiring
+from rtctl.loop import frames
+
+KINDS = ("emulated", "comedi", "comedi of 16 bits", "nidaqmx")
+OUT_STEP = 20 / 4096
+CODES = st.integers(-2048, 2047)
+
+
+@pytest.fixture
+def frame():
+    return np.zeros(1, frames.INPUTS)[0]
+
+
+@pytest.fixture(params=KINDS)
+def wired(request, rig):
+    """An open card with its wires, of each kind in turn."""
+    made = rig(request.param)
+    made.card.open()
+    return made
+
+
+def test_outputs_are_zero_from_the_start(wired):
+    assert [wired.output(c) for c in (0, 1)] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert wired.line(2) == 0
+
+
+@pytest.mark.parametrize("codes", [(1, -1), (2047, -2048), (-2048, 2047), (0, 1000)])
+def test_a_code_is_so_many_volts(wired, codes):
+    wired.card.write(codes, 0)
+    assert [wired.output(c) for c in (0, 1)] == pytest.approx([c * OUT_STEP for c in codes], abs=4e-4)
+
+
+@settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(codes=st.tuples(CODES, CODES), lines=st.integers(0, 255))
+def test_any_code_is_within_a_step_of_its_volts_and_only_our_line_moves(wired, codes, lines):
+    others = [wired.line(n) for n in range(8) if n != 2]
+    wired.card.write(codes, lines)
+    assert [wired.output(c) for c in (0, 1)] == pytest.approx([c * OUT_STEP for c in codes], abs=4e-4)
+    assert wired.line(2) == lines >> 2 & 1
+    assert [wired.line(n) for n in range(8) if n != 2] == others
+
+
+@settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(unipolar=st.floats(-1, 12), bipolar=st.floats(-7, 7))
+def test_any_voltage_becomes_the_nearest_code_of_its_range(wired, frame, unipolar, bipolar):
+    wired.set_input(0, unipolar)
+    wired.set_input(1, bipolar)
+    wired.card.read(frame)
+    step = 10 / 4096
+    assert frame["ai_codes"][0] == pytest.approx(min(max(unipolar / step, 0), 4095), abs=0.5 + wired.step / step)
+    assert frame["ai_codes"][1] == pytest.approx(min(max(bipolar / step, -2048), 2047), abs=0.5 + wired.step / step)
+    assert not frame["ai_codes"][2:].any()
+
+
+def test_counters_begin_in_the_middle_and_count_both_ways(wired, frame):
+    wired.pulse(0, 100)
+    wired.pulse(1, -7)
+    wired.card.read(frame)
+    assert list(frame["counter_codes"]) == [daq_stc.INITIAL_COUNT + 100, daq_stc.INITIAL_COUNT - 7]
+    wired.pulse(0, -300)
+    wired.card.read(frame)
+    assert frame["counter_codes"][0] == daq_stc.INITIAL_COUNT - 200
+
+
+def test_a_count_beyond_24_bits_wraps_as_the_reader_expects(wired, frame):
+    s = np.zeros(1, daq_stc.READER_STATE)[0]
+    total = 0
+    for step in (5_000_000, 5_000_000, 5_000_000, -6_000_000, -6_000_000, -6_000_000):
+        wired.pulse(0, step)
+        total += step
+        wired.card.read(frame)
+        assert daq_stc.counter_position(s, frame["counter_codes"][0]) == total
+
+
+@pytest.mark.parametrize(("what", "words"), [("inputs", "input|Scan|pulled|present"), ("counters", "counter|pulled")])
+def test_a_failed_read_takes_the_outputs_to_zero_and_says_where(wired, frame, what, words):
+    wired.card.write((500, -500), 0xFF)
+    wired.fail(what)
+    with pytest.raises(BoardError, match=words) as error:
+        wired.card.read(frame)
+    assert wired.card.name in str(error.value)
+    assert [wired.output(c) for c in (0, 1)] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert wired.line(2) == 0
+    assert wired.card.failed is error.value
+
+
+def test_one_output_that_fails_does_not_leave_the_other_on(wired):
+    wired.card.write((500, -500), 0)
+    wired.fail("outputs")
+    with pytest.raises(BoardError, match=r"output|present|pulled"):
+        wired.card.write((600, -600), 0)
+
+
+@pytest.mark.parametrize("codes", [(2048, 0), (0, -2049), (1 << 20, 0)])
+def test_a_code_that_does_not_exist_is_never_written(wired, codes):
+    wired.card.write((500, -500), 0)
+    with pytest.raises(BoardError, match="-2048 to 2047"):
+        wired.card.write(codes, 0)
+    assert [wired.output(c) for c in (0, 1)] == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
+def test_closing_leaves_zero_behind_and_may_be_done_twice(wired, frame):
+    wired.card.write((500, -500), 0xFF)
+    wired.card.close()
+    wired.card.close()
+    assert [wired.output(c) for c in (0, 1)] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert wired.line(2) == 0
+    for call in (lambda: wired.card.read(frame), lambda: wired.card.write((0, 0), 0)):
+        with pytest.raises(BoardError, match="not open"):
+            call()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_machine_without_inputs_or_lines_reads_its_counter_alone(rig, kind, frame):
+    made = rig(kind, Wiring((AnalogOutputSettings(channel=1, polarity="unipolar"),), counters=1))
+    made.card.open()
+    made.card.write((4095,), 0xFF)
+    assert made.output(1) == pytest.approx(10.0, abs=OUT_STEP)
+    made.pulse(0, 3)
+    made.card.read(frame)
+    assert list(frame["counter_codes"]) == [daq_stc.INITIAL_COUNT + 3, 0]
