@@ -1,8 +1,8 @@
 """Loading a config: YAML, overrides, validation, each mistake in one line that says where and what would be right."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 from pydantic import ValidationError
@@ -14,12 +14,27 @@ from rtctl.config.yaml_file import Document, find, load_yaml, parse, scalar_tag
 from rtctl.idiom import Settings
 
 
-def load_settings(path: str | Path, model: type[Settings], overrides: Sequence[str] = ()) -> Any:
-    """Settings of a file, with `key.path=value` overrides. Raises UserError with one line for each mistake."""
-    document = load_yaml(find(path))
+class Widen(NamedTuple):
+    """How a config may name files of the user's own; see rtctl.own.model."""
+
+    long_form: Callable[[Any], Any]  # of data with short forms in it
+    widened: Callable[[Any, Any, Path], tuple[Any, Any]]  # class, data, its folder -> class, and the data complete
+
+
+def load_settings(
+    path: str | Path, model: type[Settings], overrides: Sequence[str] = (), widen: Widen | None = None
+) -> Any:
+    """Settings of a file, with `key.path=value` overrides. Raises UserError with one line for each mistake.
+
+    With `widen` the class may be another than `model`, where own files are named.
+    """
+    file = find(path)
+    document = load_yaml(file)
     data = {} if document.data is None else document.data  # an empty file lacks its keys, as {} does
     said: dict[tuple, str] = {}
     texts = dict(document.texts)
+    if widen is not None:
+        data = widen.long_form(data)
     for text in overrides:
         key, equals, value = text.partition("=")
         if not equals:
@@ -29,9 +44,15 @@ def load_settings(path: str | Path, model: type[Settings], overrides: Sequence[s
         said.update(dict.fromkeys(made, text))
         texts = {path: word for path, word in texts.items() if path[: len(made[-1])] != made[-1]}
         texts |= {(*made[-1], *path): word for path, word in given.texts.items()}
+    if widen is not None:
+        try:
+            model, data = widen.widened(model, data, file.parent)
+        except ValueError as error:
+            at: tuple = getattr(error, "key", ())
+            raise UserError(f"{_where(document, said, at)}: {'.'.join(map(str, at))}: {error}") from error
     data = fill(Shape(model, model=model), data)
     try:
-        return model.model_validate(data)
+        return model.model_validate(data, context={"folder": file.parent})
     except ValidationError as error:
         raise UserError(sentences(error, model, data, lambda at: _where(document, said, at), texts)) from error
 
@@ -89,14 +110,14 @@ def _where(document: Document, said: dict[tuple, str], path: tuple) -> str:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes what either YAML 1.1 or 1.2 would not read as text."""
+    """Quotes what either YAML 1.1 or 1.2 would not read as text, and leaves the lines of an own file as they are."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
 
 
 def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
-    style = '"' if scalar_tag(text) != "str" else None
+    style = "|" if "\n" in text else '"' if scalar_tag(text) != "str" else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 

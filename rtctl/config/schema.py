@@ -1,5 +1,6 @@
 """What may stand in a config: JSON Schema for editors, and rows for the documentation."""
 
+import sys
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -76,7 +77,8 @@ def _rows(place: Shape, path: str, defaults: dict[str, Any]) -> Iterator[Row]:
         at = shape(field.annotation, field)
         here = f"{path}{name}"
         default = defaults.get(name, field.default)
-        yield Row(here, _type(at), at.unit or "", _default(default), _bounds(field.metadata), field.description or "")
+        text = field.description or _about(at)
+        yield Row(here, _type(at), at.unit or "", _default(default), bounds(field.metadata), text)
         yield from _below(at, here, default)
 
 
@@ -94,6 +96,20 @@ def _below(place: Shape, here: str, default: Any = None) -> Iterator[Row]:
         item = child(place, 0)
         assert item is not None
         yield from _below(item, f"{here}[]")
+
+
+def about(model: type[Settings]) -> str:
+    """What a part of a config is for: first sentence of its class, or of the module that is about nothing else."""
+    text = model.__doc__ or sys.modules[model.__module__].__doc__ or ""
+    return " ".join(text.strip().split("\n\n")[0].split())
+
+
+def _about(place: Shape) -> str:
+    if place.model is not None:
+        return about(place.model)
+    if place.choices:
+        return f"one of several, as {place.tag} says"
+    return "says which of several this is" if len(literals(place.annotation)) == 1 else ""
 
 
 def _type(place: Shape) -> str:
@@ -122,7 +138,7 @@ def _default(value: Any) -> str:
     return "none" if value is None else show(value)
 
 
-def _bounds(metadata: list[Any]) -> str:
+def bounds(metadata: list[Any]) -> str:
     """Bounds from pydantic's metadata, as a person would write them."""
     found = []
     for item in metadata:

@@ -2,10 +2,12 @@
 
 from typing import Any, NamedTuple
 
+from rtctl.config.load import Widen
 from rtctl.laws import excitation, reference
 from rtctl.loop import faults
-from rtctl.machines import axis, ivu, ldu
+from rtctl.machines import axis, ivu, ldu, own_plant
 from rtctl.machines.base import Column, Diagram, MachineSettings, PlantDiagram
+from rtctl.own import model
 
 MODULES: dict[str, Any] = {"ivu": ivu, "ldu": ldu, "axis": axis}
 CONFIGS: dict[str, type[MachineSettings]] = {
@@ -35,6 +37,21 @@ class Machine(NamedTuple):
     radius: float  # m, turns metres into radians
 
 
+OWN = Widen(model.long_form, model.widened)  # for load_settings
+
+
+def widened(data: Any) -> tuple[Any, Any]:
+    """Settings class for plain data of a known machine that is complete, with the keys of the own files that it names,
+    and the data; see `rtctl.own.model.widened`. Raises OwnError."""
+    return model.widened(CONFIGS[data["machine"]], data)
+
+
+def settings(data: Any) -> Any:
+    """Settings of plain data that is complete, as `written` gives it. Raises ValidationError, or OwnError."""
+    kind, data = widened(data)
+    return kind.model_validate(data)
+
+
 def build(config: Any) -> Machine:
     """Diagrams and params for a config. Raises ValueError where the settings contradict each other."""
     try:
@@ -44,20 +61,25 @@ def build(config: Any) -> Machine:
 
 
 def _build(config: Any) -> Machine:
+    check_plant(config)
     module = MODULES[config.machine]
     dt = 1.0 / config.loop.rate
     if config.loop.mode == "real":
         period = 1.0 / (config.plant.rate or max(module.PLANT_RATE, config.loop.rate))
     else:
         period = dt
-    plant = module.plant_diagram(config, period, config.loop.seed)
+    substeps = module.substeps(config, period)
+    if own_plant.is_own(config):
+        plant = own_plant.plant_diagram(config, period, config.loop.seed, substeps)
+    else:
+        plant = module.plant_diagram(config, period, config.loop.seed)
     return Machine(
         kind=config.machine,
         config=config,
         rate=config.loop.rate,
         dt=dt,
         plant_period=period,
-        substeps=module.substeps(config, period),
+        substeps=substeps,
         diagram=module.diagram(config, dt),
         plant_diagram=plant,
         reference=reference.build(config.reference, dt),
@@ -68,3 +90,29 @@ def _build(config: Any) -> Machine:
         metres_per_unit=module.metres_per_unit(config),
         radius=module.radius(config),
     )
+
+
+def fmu_of(config: Any) -> Any:
+    """Settings of the FMU that stands in the plant's place; None for equations, ours or of an own file."""
+    return getattr(config.plant, "fmu", None)
+
+
+def emulated(config: Any) -> bool:
+    """Whether a machine runs against its own emulator: neither a real board nor an FMU."""
+    return config.driver.kind == "emulated" and fmu_of(config) is None
+
+
+def check_plant(config: Any) -> None:
+    """Raise ValueError where the board or the plant of a config cannot run in its time."""
+    real, fmu, mode = config.driver.kind != "emulated", fmu_of(config) is not None, config.loop.mode
+    if real and fmu:
+        raise ValueError(f"plant.fmu and driver.kind {config.driver.kind}: a machine is real or a model; drop one")
+    if real and mode != "real":
+        raise ValueError(f"driver.kind {config.driver.kind}: a real board keeps real time; set loop.mode to real "
+                         f"(--mode real), or driver.kind to emulated for {mode}")  # fmt: skip
+    if fmu and mode != "lockstep":
+        raise ValueError(f"plant.fmu: an FMU runs in lockstep only, and loop.mode is {mode}; use --mode lockstep")
+    if fmu and config.plant.physics:
+        raise ValueError(
+            "plant.physics: terms act inside our own equations, not inside an FMU; drop plant.fmu or the terms"
+        )

@@ -31,9 +31,11 @@ from rtctl.machines.base import (
     PlantDiagram,
     physics_lines,
 )
-from rtctl.machines.ldu import LAW_LINES, LAWS, PositionSettings, play, prepare
+from rtctl.machines.ldu import PositionSettings, play, prepare
 from rtctl.machines.physics import PhysicsTerm, check_nodes
+from rtctl.own import law as own_law
 from rtctl.plants import axis as plant_axis
+from rtctl.plants.fmu import FmuSettings
 
 __all__ = ["play", "prepare"]  # called by the generated tick as machine.play and machine.prepare
 
@@ -43,6 +45,8 @@ PLANT_RATE = 1000.0
 
 
 class AxisLawSettings(Settings):
+    """The law, block by block in the order of the tick."""
+
     shaper: ShaperSettings = ShaperSettings()
     position: PositionSettings
     limit: LimitSettings = LimitSettings()
@@ -51,9 +55,12 @@ class AxisLawSettings(Settings):
 
 
 class AxisPlantSettings(plant_axis.AxisSettings):
+    """The emulated axis."""
+
     rate: float | None = quantity(None, unit="Hz", gt=0, help="rate of the emulator in real mode; the loop's if absent")
     substep: float = quantity(5e-4, unit="s", gt=0, le=1e-2, help="longest integration step")
     physics: list[PhysicsTerm] = Field(default=[], description="terms of physics beyond the equations")
+    fmu: FmuSettings | None = Field(default=None, description="an FMU in the equations' place, in lockstep")
 
     @model_validator(mode="after")
     def _nodes(self) -> "AxisPlantSettings":
@@ -62,6 +69,8 @@ class AxisPlantSettings(plant_axis.AxisSettings):
 
 
 class AxisConfig(MachineSettings):
+    """One axis: a drive that takes volts, an encoder, a cascade of position and speed."""
+
     machine: Literal["axis"] = "axis"
     output: AnalogOutputSettings = AnalogOutputSettings(channel=0)
     encoder: LinearScaleSettings = LinearScaleSettings(pitch=1e-6)
@@ -126,6 +135,11 @@ USES = (
     "rtctl.laws.velocity",
     "rtctl.loop.safety",
 )
+LAW_SIGNALS = {
+    "e": "y.position_error", "x": "y.x", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
+    "a_ref": "s.shaper.acceleration", "u": "y.u",
+}  # fmt: skip
+TRACKED = {"u_wanted": "y.u_c", "u_written": "u"}
 TRUTH = (
     Column("truth_x", "m", "position in the emulator"),
     Column("truth_speed", "m/s", "speed in the emulator"),
@@ -135,10 +149,7 @@ TRUTH = (
 def diagram(config: AxisConfig, dt: float) -> Diagram:
     """Blocks and lines of the loop's tick."""
     law = config.law
-    kind = law.position.kind
-    build, law_state = LAWS[kind]
-    step, reset = LAW_LINES[kind]
-    track = ("pi_velocity.track(p.position, s.position, y.u_c, u)",) if kind == "pi_velocity" else ()
+    position = own_law.lines(law.position, "u_fb", LAW_SIGNALS, TRACKED)
     blocks = (
         Block("machine", AxisParams(round(0.05 / dt), config.amp_per_volt), AXIS_STATE),
         Block("safety", safety.build(config.safety, dt), safety.SAFETY_STATE),
@@ -146,7 +157,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
         Block("reference", None, reference.REFERENCE_STATE),
         Block("shaper", shaper.build(law.shaper, dt), shaper.SHAPER_STATE),
         Block("velocity", velocity.build(law.velocity, dt), velocity.VELOCITY_STATE),
-        Block("position", build(law.position, dt), law_state),
+        Block("position", position.parts.build(law.position, dt), position.parts.state),
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
         Block("limit", limit.build(law.limit, dt), limit.LIMIT_STATE),
         Block("output", at_mio_16de.build_output(config.output, dt), None),
@@ -165,7 +176,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
                 *STATE_LINES,
                 "if s.safety.on != 0:",
                 "    machine.switch_on(p, s, y.x)",
-                f"    {reset}",
+                *(f"    {line}" for line in position.reset),
                 "machine.prepare(p, s, c, k)",
             ),
         ),
@@ -183,13 +194,13 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
             (
                 "y.position_error = y.ref - y.x",
                 "y.speed = velocity.step(p.velocity, s.velocity, y.x)",
-                f"u_fb = {step}",
+                *position.step,
                 "changed = c.gains != s.machine.gains",
                 "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",
                 "s.machine.gains = c.gains",
                 "y.u_c = s.machine.u_fb + y.w",
                 "u = limit.step(p.limit, s.limit, y.u_c)",
-                *track,
+                *position.track,
             ),
         ),
         (
@@ -197,6 +208,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
             (
                 "amperes = abs(u) * p.machine.amp_per_volt",
                 "safety.check_motion(p.safety, s.safety, y.position_error, y.x_counts, u, amperes, k)",
+                "safety.check_number(s.safety, y.u_c, k)",
                 "safety.fade(p.safety, s.safety)",
             ),
         ),
@@ -209,7 +221,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
             ),
         ),
     )
-    return Diagram((*USES, f"rtctl.laws.{kind}"), blocks, COLUMNS, stages)
+    return Diagram((*USES, position.uses), blocks, COLUMNS, stages)
 
 
 def substeps(config: AxisConfig, period: float) -> int:

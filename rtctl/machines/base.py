@@ -5,6 +5,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
+from rtctl.drivers.board import EmulatedSettings
+from rtctl.drivers.boards import DriverSettings
 from rtctl.idiom import Settings, quantity
 from rtctl.loop.faults import FaultSettings
 from rtctl.loop.safety import SafetySettings
@@ -47,6 +49,8 @@ class PlantDiagram(NamedTuple):
 
 
 class LinkSettings(Settings):
+    """How the loop reaches its plant or board."""
+
     kind: Literal["zmq", "shm"] = Field(default="zmq", description="ZeroMQ (also across machines) or shared memory")
     endpoint: str | None = Field(
         default=None, description="where the plant listens, e.g. tcp://bench2:5570; a local socket if absent"
@@ -66,6 +70,8 @@ class LinkSettings(Settings):
 
 
 class LoopSettings(Settings):
+    """Rate, clock and scheduling of the loop."""
+
     rate: float = quantity(unit="Hz", gt=0.1, le=50e3, help="ticks a second")
     mode: Literal["real", "lockstep", "fused"] = Field(
         default="real", description="real: wall clock; lockstep: virtual time, two processes; fused: virtual, in one"
@@ -86,6 +92,8 @@ class LoopSettings(Settings):
 
 
 class RecordSettings(Settings):
+    """What is recorded, and how it comes to disk."""
+
     seconds: float = quantity(20.0, unit="s", gt=0, help="length of the ring between loop and supervisor")
     batch: float = quantity(0.1, unit="s", gt=0, le=10, help="longest time until a row is on disk")
     rotate_mb: float | None = Field(
@@ -97,6 +105,8 @@ class RecordSettings(Settings):
 
 
 class CommandSettings(Settings):
+    """Sockets for commands and telemetry."""
+
     endpoint: str | None = Field(default=None, description="command socket; a local socket if absent")
     telemetry: str | None = Field(default=None, description="telemetry socket; a local socket if absent")
     telemetry_period: float = quantity(0.02, unit="s", ge=0.01, le=1, help="time between telemetry messages")
@@ -105,6 +115,8 @@ class CommandSettings(Settings):
 
 
 class MetricsSettings(Settings):
+    """Numbers for Prometheus."""
+
     port: int | None = Field(
         default=None, ge=1, le=65535, description="where Prometheus may ask, on 127.0.0.1 alone; nowhere if absent"
     )
@@ -116,11 +128,17 @@ class MachineSettings(Settings):
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,40}$", description="name of this machine; one daemon a name")
     loop: LoopSettings
     link: LinkSettings = LinkSettings()
+    driver: DriverSettings = Field(
+        default=EmulatedSettings(), description="the board: emulated with the machine, or a real card"
+    )
     safety: SafetySettings = SafetySettings()
     record: RecordSettings = RecordSettings()
     commands: CommandSettings = CommandSettings()
     metrics: MetricsSettings = MetricsSettings()
     faults: list[FaultSettings] = Field(default=[], description="faults to inject; `rtctl fault list` explains them")
+    own: dict[str, str] = Field(
+        default={}, description="texts of the own files that the config names; filled in when it is read, and recorded"
+    )
 
 
 COMMON_COLUMNS = (

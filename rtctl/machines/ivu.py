@@ -18,7 +18,6 @@ from rtctl.laws import (
     gain_schedule,
     inertia_feedforward,
     limit,
-    pd,
     reel_radius,
     reference,
     shaper,
@@ -38,6 +37,7 @@ from rtctl.machines.base import (
 )
 from rtctl.machines.ivu_plant import plant_diagram, substeps
 from rtctl.machines.ivu_settings import IvuConfig
+from rtctl.own import law as own_law
 
 __all__ = ["IvuConfig", "diagram", "plant_diagram", "substeps"]
 
@@ -82,7 +82,6 @@ def switch_on(p, s, phi):
     """The tick in which outputs come on: every law starts from where the machine stands."""
     reference.hold(0, s.reference, phi)
     shaper.reset(p.shaper, s.shaper, phi)
-    pd.reset(p.position, s.position)
     velocity.reset(p.velocity, s.velocity)
     velocity.reset(p.velocity, s.acceleration)
     velocity.reset(p.velocity, s.reference_speed)
@@ -95,6 +94,7 @@ def switch_on(p, s, phi):
     limit.reset(p.limit, s.limit1, 0.0)
     limit.reset(p.limit, s.limit2, 0.0)
     s.machine.prepared = 0
+    s.machine.u_fb = 0.0  # it may not be a number, where that was the trip
     m = s.machine
     if m.R1_given != p.machine.R1 or m.R2_given != p.machine.R2:  # else they have been followed since
         m.R1_given, m.R2_given = p.machine.R1, p.machine.R2
@@ -180,6 +180,11 @@ COLUMNS = (
     Column("tension2_estimate", "N", "tension at reel 2 from command and motion"),
 )
 
+STEP, RESET = "<step of the position law>", "<reset of the position law>"  # lines that depend on the config
+LAW_SIGNALS = {
+    "e": "y.capstan_error", "x": "y.capstan", "v": "y.capstan_speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
+    "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
+}  # fmt: skip
 STAGES = (
     (
         "read",
@@ -198,6 +203,7 @@ STAGES = (
             *STATE_LINES,
             "if s.safety.on != 0:",
             "    machine.switch_on(p, s, y.capstan)",
+            RESET,
             "if s.safety.state == safety.ARMED:",
             "    machine.prepare(p, s, y.capstan, y.reel1_counts, y.reel2_counts, k)",
         ),
@@ -231,7 +237,7 @@ STAGES = (
         "law",
         (
             "y.capstan_error = y.ref - y.capstan",
-            "u_pd = pd.step(p.position, s.position, y.capstan_error)",
+            STEP,
             "y.gain_factor = gain_schedule.step(p.gain_schedule, s.gain_schedule, y.R1, y.R2, u_pd)",
             "changed = c.gains != s.machine.gains",
             "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, y.gain_factor * u_pd, changed, s.machine.u_fb)",
@@ -284,6 +290,7 @@ class DriveParams(NamedTuple):
 def diagram(config: IvuConfig, dt: float) -> Diagram:
     """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
     law, radius = config.law, config.radius
+    position = own_law.lines(law.position, "u_pd", LAW_SIGNALS)
     at_mio_16de.check_inputs([config.board.reel1, config.board.reel2])
     blocks = (
         Block("machine", _machine_params(config, dt), IVU_STATE),
@@ -303,7 +310,7 @@ def diagram(config: IvuConfig, dt: float) -> Diagram:
             tension_estimate.build(law.tension_estimate, dt),
             tension_estimate.TENSION_ESTIMATE_STATE,
         ),
-        Block("position", pd.build(law.position, dt), pd.PD_STATE),
+        Block("position", position.parts.build(law.position, dt), position.parts.state),
         Block("gain_schedule", gain_schedule.build(law.gain_schedule, dt), gain_schedule.GAIN_SCHEDULE_STATE),
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
         *(
@@ -321,7 +328,13 @@ def diagram(config: IvuConfig, dt: float) -> Diagram:
         Block("output1", at_mio_16de.build_output(config.board.output1, dt), None),
         Block("output2", at_mio_16de.build_output(config.board.output2, dt), None),
     )  # fmt: skip
-    return Diagram(USES, blocks, COLUMNS, STAGES)
+    return Diagram((*USES, position.uses), blocks, COLUMNS, stages(position))
+
+
+def stages(position: own_law.LawLines) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Lines of the tick, with those of its position law."""
+    put = {STEP: position.step, RESET: tuple(f"    {line}" for line in position.reset)}
+    return tuple((name, tuple(part for line in body for part in put.get(line, (line,)))) for name, body in STAGES)
 
 
 USES = (
@@ -336,7 +349,6 @@ USES = (
     "rtctl.laws.gain_schedule",
     "rtctl.laws.inertia_feedforward",
     "rtctl.laws.limit",
-    "rtctl.laws.pd",
     "rtctl.laws.reference",
     "rtctl.laws.shaper",
     "rtctl.laws.tension",

@@ -28,6 +28,7 @@ from rtctl.machines.base import (
 )
 from rtctl.machines.physics import PhysicsTerm, check_nodes
 from rtctl.plants import ivu as plant_ivu
+from rtctl.plants.fmu import FmuSettings
 
 
 class BoardSettings(Settings):
@@ -41,6 +42,8 @@ class BoardSettings(Settings):
 
 
 class SensorSettings(Settings):
+    """Encoder on the capstan, optical sensors on the reels."""
+
     capstan: Ls7084Settings = Ls7084Settings(lines=2500)
     reel1: OpticalSensorSettings = OpticalSensorSettings()
     reel2: OpticalSensorSettings = OpticalSensorSettings()
@@ -72,6 +75,8 @@ class FrictionSettings(Settings):
 
 
 class IvuLawSettings(Settings):
+    """The law, block by block in the order of the tick."""
+
     shaper: ShaperSettings = ShaperSettings()
     position: PdSettings
     gain_schedule: GainScheduleSettings = GainScheduleSettings()
@@ -86,11 +91,14 @@ class IvuLawSettings(Settings):
 
 
 class IvuPlantSettings(plant_ivu.IvuSettings):
+    """The emulated machine."""
+
     rate: float | None = quantity(None, unit="Hz", gt=0, help="rate of the emulator in real mode; 2 kHz if absent")
     substep: float = quantity(5e-4, unit="s", gt=0, le=2e-3, help="longest integration step")
     follow_tape: bool = Field(default=True, description="radii and inertias follow the tape (4.3-4.8)")
     driver: L292Settings = L292Settings()
     physics: list[PhysicsTerm] = Field(default=[], description="terms of physics beyond the equations")
+    fmu: FmuSettings | None = Field(default=None, description="an FMU in the equations' place, in lockstep")
 
     @model_validator(mode="after")
     def _nodes(self) -> "IvuPlantSettings":
@@ -99,6 +107,8 @@ class IvuPlantSettings(plant_ivu.IvuSettings):
 
 
 class IvuConfig(MachineSettings):
+    """The Image Verification Unit: two reels and a capstan at 500 Hz."""
+
     machine: Literal["ivu"] = "ivu"
     board: BoardSettings = BoardSettings()
     sensors: SensorSettings = SensorSettings()

@@ -5,7 +5,7 @@ Block diagram of the tick, thesis figures 12.7 and 12.10:
     reference -> shaper -> error -> law (PI with velocity feedback, PD, or any sections) -> + friction -> limit
 """
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -20,10 +20,7 @@ from rtctl.laws import (
     error_table,
     friction_feedforward,
     limit,
-    pd,
-    pi_velocity,
     reference,
-    sections,
     shaper,
     velocity,
 )
@@ -49,7 +46,9 @@ from rtctl.machines.base import (
 )
 from rtctl.machines.ldu_plant import plant_diagram, substeps
 from rtctl.machines.physics import PhysicsTerm, check_nodes
+from rtctl.own import law as own_law
 from rtctl.plants import ldu as plant_ldu
+from rtctl.plants.fmu import FmuSettings
 
 __all__ = ["LduConfig", "diagram", "plant_diagram", "substeps"]
 
@@ -66,6 +65,8 @@ class LduBoardSettings(Settings):
 
 
 class LduSensorSettings(Settings):
+    """Encoder on the motor shaft, linear scale on the carriage, and which of them the loop closes on."""
+
     encoder: Ls7084Settings = Ls7084Settings(lines=5000)
     scale: LinearScaleSettings = LinearScaleSettings()
     feedback: Literal["encoder", "scale"] = Field(default="encoder", description="what the loop closes on (11.3)")
@@ -82,6 +83,8 @@ class PiLawSettings(PiVelocitySettings):
 
 
 class PdLawSettings(PdMetreSettings):
+    """PD position law with a filtered derivative."""
+
     kind: Literal["pd"] = "pd"
 
 
@@ -95,11 +98,15 @@ PositionSettings = Annotated[PiLawSettings | PdLawSettings | SectionsLawSettings
 
 
 class FrictionSettings(Settings):
+    """Friction compensation in the direction of the reference's motion (12.6)."""
+
     F_c: float = quantity(0.0, unit="N", ge=0, help="dry friction of the carriage to compensate (12.6)")
     newton_per_volt: float = quantity(14.0, unit="N/V", gt=0, help="force at the carriage per volt: N K_m 0.1 / R_c")
 
 
 class ComputedTorqueSettings(Settings):
+    """Acceleration feedforward (12.10)."""
+
     volts: float = quantity(
         0.0,
         unit="V*s^2/m",
@@ -113,6 +120,8 @@ class ComputedTorqueParams(NamedTuple):
 
 
 class LduLawSettings(Settings):
+    """The law, block by block in the order of the tick."""
+
     shaper: ShaperSettings = ShaperSettings()
     position: PositionSettings
     friction: FrictionSettings = FrictionSettings()
@@ -123,12 +132,15 @@ class LduLawSettings(Settings):
 
 
 class LduPlantSettings(plant_ldu.LduSettings):
+    """The emulated drive."""
+
     rate: float | None = quantity(None, unit="Hz", gt=0, help="rate of the emulator in real mode; the loop's if absent")
     substep: float = quantity(5e-5, unit="s", gt=0, le=2e-4, help="longest integration step")
     amplifier: LduAmplifierSettings = LduAmplifierSettings(kind="linear")
     bandwidth: float = quantity(2000.0, unit="Hz", gt=0, help="of the amplifier's current loop (12.2)")
     damping: float = quantity(0.7071, unit="", gt=0, help="of the amplifier's current loop")
     physics: list[PhysicsTerm] = Field(default=[], description="terms of physics beyond the equations")
+    fmu: FmuSettings | None = Field(default=None, description="an FMU in the equations' place, in lockstep")
 
     @model_validator(mode="after")
     def _nodes(self) -> "LduPlantSettings":
@@ -137,6 +149,8 @@ class LduPlantSettings(plant_ldu.LduSettings):
 
 
 class LduConfig(MachineSettings):
+    """The Linear Drive Unit at 10 kHz."""
+
     machine: Literal["ldu"] = "ldu"
     board: LduBoardSettings = LduBoardSettings()
     sensors: LduSensorSettings = LduSensorSettings()
@@ -194,33 +208,21 @@ COLUMNS = (
     Column("u_c", "V", "command before the limit"),
 )
 
-LAW_LINES = {
-    "pi_velocity": (
-        "pi_velocity.step(p.position, s.position, y.position_error, y.speed)",
-        "pi_velocity.reset(p.position, s.position)",
-    ),
-    "pd": ("pd.step(p.position, s.position, y.position_error)", "pd.reset(p.position, s.position)"),
-    "sections": (
-        "sections.step(p.position, s.position, y.position_error)",
-        "sections.reset(p.position, s.position, 0.0)",
-    ),
-}
-LAWS: dict[str, tuple[Any, Any]] = {
-    "pi_velocity": (pi_velocity.build, pi_velocity.PI_VELOCITY_STATE),
-    "pd": (pd.build, pd.PD_STATE),
-    "sections": (sections.build, sections.SECTIONS_STATE),
-}
+LAW_SIGNALS = {
+    "e": "y.position_error", "x": "y.position", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
+    "a_ref": "s.shaper.acceleration", "u": "y.u",
+}  # fmt: skip
+TRACKED = {"u_wanted": "u_c", "u_written": "u"}
 
 
 def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Lines of the tick for the law and the feedback of this config."""
-    step, reset = LAW_LINES[config.law.position.kind]
+    law = own_law.lines(config.law.position, "u_fb", LAW_SIGNALS, TRACKED)
     encoder = position = "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
     if config.sensors.feedback == "scale":
         position = "y.scale"
     elif config.sensors.correction is not None:
         position = f"error_table.step(p.correction, {position})"
-    track = ("pi_velocity.track(p.position, s.position, u_c, u)",) if config.law.position.kind == "pi_velocity" else ()
     return (
         (
             "read",
@@ -237,7 +239,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
                 *STATE_LINES,
                 "if s.safety.on != 0:",
                 "    machine.switch_on(p, s, y.position)",
-                f"    {reset}",
+                *(f"    {line}" for line in law.reset),
                 "machine.prepare(p, s, c, k)",
             ),
         ),
@@ -255,7 +257,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
             (
                 "y.position_error = y.ref - y.position",
                 "y.speed = velocity.step(p.velocity, s.velocity, y.position)",
-                f"u_fb = {step}",
+                *law.step,
                 "changed = c.gains != s.machine.gains",
                 "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",
                 "s.machine.gains = c.gains",
@@ -263,7 +265,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
                 "u_ff += p.inertia.volts * s.shaper.acceleration",
                 "u_c = s.machine.u_fb + u_ff + y.w",
                 "u = limit.step(p.limit, s.limit, u_c)",
-                *track,
+                *law.track,
                 "y.u_c = u_c",
             ),
         ),
@@ -272,6 +274,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
             (
                 "amperes = abs(u) * p.machine.amp_per_volt",
                 "safety.check_motion(p.safety, s.safety, y.position_error, y.encoder_counts, u, amperes, k)",
+                "safety.check_number(s.safety, u_c, k)",
                 f"safety.check_sensors(p.safety, s.safety, {encoder} - y.scale, k)",
                 "safety.fade(p.safety, s.safety)",
             ),
@@ -311,7 +314,7 @@ def play(t, s, c, k):
 def diagram(config: LduConfig, dt: float) -> Diagram:
     """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
     law = config.law
-    build, law_state = LAWS[law.position.kind]
+    position = own_law.law_of(law.position)
     output = at_mio_16de.build_output(config.board.output, dt)
     volts = law.friction.F_c / law.friction.newton_per_volt
     table = config.sensors.correction if config.sensors.feedback == "encoder" else None
@@ -325,7 +328,7 @@ def diagram(config: LduConfig, dt: float) -> Diagram:
         Block("reference", None, reference.REFERENCE_STATE),
         Block("shaper", shaper.build(law.shaper, dt), shaper.SHAPER_STATE),
         Block("velocity", velocity.build(law.velocity, dt), velocity.VELOCITY_STATE),
-        Block("position", build(law.position, dt), law_state),
+        Block("position", position.build(law.position, dt), position.state),
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
         Block(
             "friction",
@@ -337,7 +340,7 @@ def diagram(config: LduConfig, dt: float) -> Diagram:
         Block("amplifier", ldu_amplifier.build(config.amplifier, dt, output.volts_per_code), None),
         Block("output", output, None),
     )
-    uses = (*USES, f"rtctl.laws.{law.position.kind}", *(["rtctl.laws.error_table"] if corrections else []))
+    uses = (*USES, position.module.__name__, *(["rtctl.laws.error_table"] if corrections else []))
     return Diagram(uses, blocks, COLUMNS, stages(config))
 
 

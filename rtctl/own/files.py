@@ -1,0 +1,147 @@
+"""A Python file that a config names, as ./my_law.py:MyLaw: its text, and the module that comes of it.
+
+What runs is the text, not the file: the text is read once, with the config, and goes with the config into every process
+and every bundle. A module is known by a hash of its text, which stands in the generated tick that imports it, so that
+the cache of compiled ticks never takes one text for another, and a replay needs no file.
+"""
+
+import ast
+import hashlib
+import linecache
+import re
+import sys
+import traceback
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+OWN = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_]\w*)")
+MOST_BYTES = 1 << 18
+
+
+class OwnError(ValueError):
+    """What is wrong with a file of the user's own: a sentence that names file and line and says what would be right."""
+
+
+class Source(NamedTuple):
+    """A file and the name in it that a config asks for."""
+
+    file: str  # as the config writes it, ./my_law.py
+    name: str  # MyLaw
+    text: str
+
+    @property
+    def spec(self) -> str:
+        """As the config writes it, ./my_law.py:MyLaw."""
+        return f"{self.file}:{self.name}"
+
+    @property
+    def module(self) -> str:
+        """Name of the module that comes of this text, own_my_law_ and a hash."""
+        stem = re.sub(r"\W", "_", Path(self.file).stem)
+        return f"own_{stem}_{hashlib.sha256(self.text.encode()).hexdigest()[:12]}"
+
+    def error(self, line: int | None, what: str) -> OwnError:
+        """A sentence about a line of the file."""
+        return OwnError(f"{self.file}:{line}: {what}" if line else f"{self.file}: {what}")
+
+    def line_of(self, name: str) -> int | None:
+        """Line where a class, a function or a value is defined at the file's top level, None where it is not."""
+        for node in ast.parse(self.text).body:
+            targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", node)]
+            if name in (getattr(t, "id", None) or getattr(t, "name", None) for t in targets):
+                return int(node.lineno)
+        return None
+
+
+def is_own(kind: Any) -> bool:
+    """Whether a word of a config names a file."""
+    return isinstance(kind, str) and ".py" in kind
+
+
+def split(kind: str) -> tuple[str, str]:
+    """File and name of ./my_law.py:MyLaw. Raises OwnError where it is not of that form."""
+    match = OWN.fullmatch(kind)
+    if match is None:
+        raise OwnError(f"'{kind:.80}' should be a file and a name in it, such as ./my_law.py:MyLaw")
+    return match["file"], match["name"]
+
+
+def read(file: str, folder: Path) -> str:
+    """Text of a file, whose path is relative to the `folder` of the config. Raises OwnError."""
+    path = folder / file
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise OwnError(_missing(file, path)) from None
+    except (OSError, ValueError) as error:
+        raise OwnError(f"{file}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if len(raw) > MOST_BYTES:
+        raise OwnError(f"{file}: is bigger than 256 KiB; a law is one short file")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise OwnError(f"{file}:{raw.count(10, 0, error.start) + 1}: not UTF-8 text; save it as UTF-8") from None
+
+
+def refuse_plant(config: Any, what: str) -> None:
+    """Raise UserError where `what` works with the equations of the plant, and the config has a plant of its own."""
+    from rtctl.config.errors import UserError
+
+    if is_own(getattr(config.plant, "kind", "")):
+        raise UserError(
+            f"plant.kind: {what} needs the equations of the {config.machine}; of {config.plant.kind} it knows nothing"
+        )
+
+
+def keep(texts: dict[str, str], folder: Path) -> None:
+    """Write the texts of own files into a bundle's `own`, for people; a replay takes them from its case.json."""
+    for file, text in texts.items():
+        path = folder / "own" / Path(file).name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def _missing(file: str, path: Path) -> str:
+    from rtctl.config.errors import nearest
+
+    beside = [p.name for p in path.parent.glob("*.py")] if path.parent.is_dir() else []
+    near = nearest(path.name, beside)
+    where = f"no such file in {path.parent.resolve()}, which is where the config's own path leads"
+    return f"{file}: {where}" + (f"; did you mean '{near}'?" if near else "; `rtctl new law NAME` writes one")
+
+
+def load(source: Source) -> ModuleType:
+    """The module of a text, run once in each process. Raises OwnError with the line where it cannot be run."""
+    name = source.module
+    if name in sys.modules:
+        return sys.modules[name]
+    try:
+        code = compile(source.text, source.file, "exec")
+    except (SyntaxError, ValueError) as error:
+        line = getattr(error, "lineno", None)
+        raise source.error(line, f"not Python: {getattr(error, 'msg', None) or error}") from None
+    linecache.cache[source.file] = (len(source.text), None, source.text.splitlines(True), source.file)
+    module = ModuleType(name)
+    module.__file__ = source.file
+    sys.modules[name] = module  # compiled code that refers to it finds it here, in any process that has read the config
+    try:
+        exec(code, module.__dict__)
+    except Exception as error:
+        del sys.modules[name]
+        raise source.error(_line(error, source.file), _words(error)) from error
+    return module
+
+
+def _line(error: BaseException, file: str) -> int | None:
+    """Last line of the file that an exception passed through."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    return lines[-1] if lines else None
+
+
+def _words(error: Exception) -> str:
+    if isinstance(error, ModuleNotFoundError):
+        return f"there is no module '{error.name}'; an own file may import what is installed, and no file beside it"
+    if isinstance(error, ImportError):
+        return str(error).partition(" (")[0]
+    return f"{type(error).__name__} while the file was read: {error}"

@@ -1,0 +1,74 @@
+"""The check of all that a machine has of the user's own, before its tick is compiled around it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rtctl.config.errors import UserError
+from rtctl.idiom import record_dtype
+from rtctl.own import check, law, plant
+from rtctl.own.check import Verdict
+from rtctl.own.files import OwnError, load, split
+from rtctl.own.files import Source as File
+from rtctl.own.parts import Parts
+
+SIZE = {"rad": 1.0, "m": 2e-3}  # of the motion that the check plays, in the unit of the machine's position
+
+
+def verdicts(machine: Any) -> list[Verdict]:
+    """One for each own law and plant of a machine. Raises UserError where a file may not go into the tick."""
+    found = []
+    parts = law.own_laws.get(type(machine.config.law.position))
+    if parts is not None:
+        signals = check.healthy(law.SIGNALS, machine.dt, SIZE[machine.unit])
+        found.append(check.check(parts, _params(machine.diagram, "position"), signals, machine.dt))
+    parts = plant.own_plants.get(type(machine.config.plant))
+    if parts is not None:
+        h = machine.plant_period / machine.substeps
+        signals = check.healthy(plant.INPUT_WORDS, h, SIZE[machine.unit])
+        found.append(check.check(parts, _params(machine.plant_diagram, "own"), signals, h))
+    for settings in machine.config.plant.physics:
+        file = settings.term.partition(":")[0]
+        if file in machine.config.own:
+            _check_term(machine, settings, File(*split(settings.term), machine.config.own[file]))
+    return found
+
+
+def require(machine: Any, path: Path) -> None:
+    """Check what is the user's own before the module at `path` is compiled, once for each module. Raises UserError."""
+    mark = path.with_suffix(".checked")
+    if machine.config.own and not mark.exists():
+        verdicts(machine)
+        mark.touch()
+
+
+def _params(diagram: Any, name: str) -> Any:
+    return next(block.params for block in diagram.blocks if block.name == name)
+
+
+def _check_term(machine: Any, settings: Any, file: File) -> None:
+    """Compile the lines of a term on the record of its machine; they may not allocate."""
+    from rtctl.plants.physics import TERMS, place
+    from rtctl.plants.physics.place import PLANTS
+    from rtctl.plants.physics.term import SITES
+
+    term, kind = TERMS[settings.term], machine.kind
+    spot = place(kind, settings.node)
+    record = getattr(PLANTS[kind], f"{kind.upper()}_STATE")
+    empty = np.dtype([("spare", np.float64)])
+    parts = Parts(load(file), file.name, term.settings, term.state or empty, file)
+    lines = []
+    for site in SITES:
+        act = term.act_at(site, kind)
+        if act is not None:
+            lines += act.format(
+                p="p", s="s", m="m", i=spot.node, l=spot.link, c=spot.channel,
+                r=f"plant.{spot.factor}" if spot.factor else "1.0",
+            ).split("\n")  # fmt: skip
+    params = record_dtype(term.build(settings, machine.plant_period / machine.substeps))
+    belief = record_dtype(_params(machine.plant_diagram, "plant"))
+    try:
+        check.check_lines(parts, lines, {"p": params, "s": parts.state, "m": record["m"], "plant": belief})
+    except OwnError as error:
+        raise UserError(str(error)) from error

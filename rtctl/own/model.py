@@ -1,0 +1,166 @@
+"""Settings of a machine whose config names own files: its own class, with their keys, units and bounds like any other.
+
+    law: {position: {kind: ./my_law.py:MyLaw, gain: 31 V/rad}}     or short: law: ./my_law.py:MyLaw
+    plant: {kind: ./my_plant.py:MyPlant, M: 2 kg}                  or short: plant: ./my_plant.py:MyPlant
+    plant: {physics: [{term: ./windage.py:Windage, node: reel1, c: 1e-6}]}
+
+The texts of the files go into the key `own` of the config, so that plain data of a config is complete: a child process,
+a bundle and another machine build the same class from it, and need no file.
+"""
+
+from functools import lru_cache, reduce
+from operator import or_
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import Field, create_model
+
+from rtctl.own import law, plant, term
+from rtctl.own.files import OwnError, Source, is_own, read, split
+from rtctl.own.parts import Parts, own
+
+Key = tuple[Any, ...]
+LAW, PLANT, PHYSICS = ("law", "position", "kind"), ("plant", "kind"), ("plant", "physics")
+
+
+class MisplacedError(OwnError):
+    """An OwnError and the key of the config that it is about."""
+
+    def __init__(self, key: Key, error: Exception):
+        super().__init__(str(error))
+        self.key = key
+
+
+def widened(base: Any, data: Any, folder: Path | None = None) -> tuple[Any, Any]:
+    """Settings class for plain `data` of a machine, and the data with the texts of its own files.
+
+    `base` is the machine's class, and what comes back where no own file is named. A text that is not in the data is
+    read, from `folder`. Raises MisplacedError, an OwnError that knows the key.
+    """
+    if not isinstance(data, dict):
+        return base, data
+    data = long_form(data)
+    found = _named(data)
+    if not found:
+        return base, data
+    given = data.get("own")
+    texts = dict(given) if isinstance(given, dict) else {}
+    sources = {}
+    for key, word in found.items():
+        try:
+            sources[key] = _source(word, texts, folder)
+            model = _model(base, tuple(sources.items()))
+        except OwnError as error:
+            raise MisplacedError(key, error) from error
+    term.register([source for key, source in sources.items() if key[:2] == PHYSICS])
+    return model, {**data, "own": {file: texts[file] for file in sorted({s.file for s in sources.values()})}}
+
+
+def long_form(data: Any) -> Any:
+    """`law: ./my_law.py:MyLaw`, `position: ./my_law.py:MyLaw` and `plant: ./my_plant.py:MyPlant` written out."""
+    if not isinstance(data, dict):
+        return data
+    found = data.get("law")
+    if is_own(found):
+        found = {"position": found}
+    if isinstance(found, dict) and is_own(found.get("position")):
+        found = {**found, "position": {"kind": found["position"]}}
+    changed = {"law": found} if found is not data.get("law") else {}
+    if is_own(data.get("plant")):
+        changed["plant"] = {"kind": data["plant"]}
+    return {**data, **changed}
+
+
+def _named(data: dict[str, Any]) -> dict[Key, str]:
+    """Key -> ./file.py:Name of all own files that the data names."""
+    found: dict[Key, str] = {}
+    for key in (LAW, PLANT):
+        node: Any = data
+        for part in key:
+            node = node.get(part) if isinstance(node, dict) else None
+        if is_own(node):
+            found[key] = node
+    machine = data.get("plant")
+    terms = machine.get("physics") if isinstance(machine, dict) else None
+    for i, entry in enumerate(terms if isinstance(terms, list) else []):
+        if isinstance(entry, dict) and is_own(entry.get("term")):
+            found[(*PHYSICS, i, "term")] = entry["term"]
+    return found
+
+
+def _source(kind: str, texts: dict[str, str], folder: Path | None) -> Source:
+    file, name = split(kind)
+    if file not in texts:
+        if folder is None:
+            raise OwnError(f"{file}: its text is not in the config's `own`, and nobody knows the config's folder")
+        texts[file] = read(file, folder)
+    return Source(file, name, texts[file])
+
+
+@lru_cache(maxsize=64)
+def _model(base: Any, sources: tuple[tuple[Key, Source], ...]) -> Any:
+    """The machine's class with these own files in it. The same class for the same texts."""
+    model = base
+    for key, source in sources:
+        if key == LAW:
+            laws = _replaced(base.model_fields["law"].annotation, "position", _law(source))
+            model = _replaced(model, "law", laws)
+        elif key == PLANT:
+            model = _replaced(model, "plant", _plant(source, base.model_fields["plant"].annotation, _kind(base)))
+    terms = tuple(source for key, source in sources if key[:2] == PHYSICS)
+    if terms:
+        model = _with_terms(model, terms)
+    return model
+
+
+def _kind(base: Any) -> str:
+    return str(get_args(base.model_fields["machine"].annotation)[0])
+
+
+@lru_cache(maxsize=64)
+def _law(source: Source) -> Any:
+    parts = own(source, law.FUNCTIONS, law.RESULT)
+    settings = _kinded(parts)
+    law.own_laws[settings] = parts
+    return settings
+
+
+@lru_cache(maxsize=64)
+def _plant(source: Source, base: Any, machine: str) -> Any:
+    """The file's settings with what the config of every plant has: rate, substep, an empty list of terms, no FMU."""
+    parts = own(source, plant.FUNCTIONS)
+    plant.check_sensors(parts, machine)
+    parts.call("step", "own", plant.INPUTS[machine])
+    kept: dict[str, Any] = {n: (base.model_fields[n].annotation, base.model_fields[n]) for n in ("rate", "substep")}
+    none: Any = Field(
+        default=[], max_length=0, description="an own plant has no nodes for terms: write them into its step"
+    )
+    kept["physics"] = (list[Any], none)
+    kept["fmu"] = (None, Field(default=None, description="an own plant is no FMU"))
+    settings = create_model(parts.settings.__name__, __base__=_kinded(parts), **kept)
+    plant.own_plants[settings] = parts
+    return settings
+
+
+def _kinded(parts: Parts) -> Any:
+    """The file's settings with the key `kind`, which says which file it is."""
+    assert parts.source is not None
+    word = Literal[parts.source.spec]  # type: ignore[name-defined]
+    return create_model(parts.settings.__name__, __base__=parts.settings, kind=(word, ...))
+
+
+def _with_terms(base: Any, sources: tuple[Source, ...]) -> Any:
+    """The machine's class where the list `physics` may hold these terms besides those of the library."""
+    plants = base.model_fields["plant"].annotation
+    field = plants.model_fields["physics"]
+    items = get_args(get_args(field.annotation)[0])[0]  # list[Annotated[A | B | ..., ...]]
+    members = [*get_args(items), *(term.own_term(source).settings for source in dict.fromkeys(sources))]
+    one: Any = Annotated[reduce(or_, members), Field(discriminator="term")]
+    wide: Any = create_model(plants.__name__, __base__=plants, physics=(list[one], field))
+    return _replaced(base, "plant", wide, wide())
+
+
+def _replaced(model: Any, field: str, annotation: Any, default: Any = ...) -> Any:
+    """The settings class with another type for one of its keys."""
+    fields: dict[str, Any] = {field: (annotation, default)}
+    return create_model(model.__name__, __base__=model, **fields)

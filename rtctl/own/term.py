@@ -1,0 +1,104 @@
+"""A term of physics in a file of the user's own: an effect of the emulated machine, and one that `diagnose` can name.
+
+The file holds what a file in plants/physics holds: XSettings with the key `node`, XParams, build, compiled functions,
+and the value X = Term(...) that tells what the effect is, where it acts, and what looks like it. In its lines `act`
+the file is called by its own name: windage.torque({p}, ...) in windage.py.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import create_model
+
+from rtctl.config.errors import nearest
+from rtctl.idiom import Settings
+from rtctl.own.files import Source, load, read, split
+from rtctl.own.parts import upper
+from rtctl.plants.physics import TERMS, Term
+from rtctl.plants.physics.place import PLANTS
+from rtctl.plants.physics.term import SITES
+
+registered: dict[str, Source] = {}  # ./windage.py:Windage -> its source
+
+
+def register(sources: list[Source]) -> None:
+    """Put terms into the library under the words by which a config names them, ./windage.py:Windage."""
+    for source in dict.fromkeys(sources):
+        TERMS[source.spec] = own_term(source)
+        registered[source.spec] = source
+
+
+def register_file(spec: str, folder: Path) -> None:
+    """As `register`, of a file named on the command line. Raises OwnError."""
+    file, name = split(spec)
+    register([Source(file, name, read(file, folder))])
+
+
+def texts(names: Iterable[str]) -> dict[str, str]:
+    """Texts of the own files among these terms, as a config's `own` has them."""
+    return {registered[name].file: registered[name].text for name in names if name in registered}
+
+
+def sizes(name: str) -> dict[str, tuple[float, float]]:
+    """Parameters of an own term that a fit may choose, with their typical range; the first is the effect's size."""
+    return TERMS[name].typical if name in registered else {}
+
+
+@lru_cache(maxsize=64)
+def own_term(source: Source) -> Term:
+    """The term of a file, as one of the library. Raises OwnError for what is missing or does not fit."""
+    module = load(source)
+    name = upper(source.name)
+    found = getattr(module, name, None)
+    if not isinstance(found, Term):
+        there = [n for n, value in vars(module).items() if isinstance(value, Term)]
+        near = nearest(name, there) or (there[0] if len(there) == 1 else None)
+        hint = f"did you mean {source.file}:{near}?" if near else f"write {name} = Term(name=..., words=..., ...)"
+        raise source.error(source.line_of(name), f"there is no term {name}; {hint}")
+    line = source.line_of(name)
+    for site in found.act:
+        base, _, kind = site.partition(":")
+        if base not in SITES or (kind and kind not in PLANTS):
+            known = ", ".join(SITES)
+            raise source.error(line, f"{name}.act: there is no site '{site}'; it is {known}, or e.g. force:ivu")
+    for kind, nodes in found.nodes.items():
+        plant = PLANTS.get(kind)
+        if plant is None:
+            raise source.error(line, f"{name}.nodes: there is no plant '{kind}'; there is {', '.join(PLANTS)}")
+        known_nodes = {
+            *plant.NODES,
+            *plant.LINKS,
+            *plant.DRIVES,
+            *plant.SENSORS,
+            "carriage",
+            "scale",
+            "loop",
+            "encoder",
+        }
+        for node in nodes:
+            if node not in known_nodes:
+                near = nearest(node, known_nodes)
+                hint = f"did you mean '{near}'?" if near else f"there is {', '.join(sorted(known_nodes))}"
+                raise source.error(line, f"{name}.nodes: the {kind} has no node '{node}'; {hint}")
+    for parameter, (low, high) in found.typical.items():
+        if parameter not in found.settings.model_fields or not 0 < low < high:
+            raise source.error(
+                line, f"{name}.typical: {parameter}: ({low:g}, {high:g}) should be a setting's lowest and highest size"
+            )
+    if "node" not in found.settings.model_fields:
+        raise source.error(
+            source.line_of(found.settings.__name__), f"{found.settings.__name__} has no key `node`; write node: str"
+        )
+    stem = re.escape(Path(source.file).stem)
+    act = {site: re.sub(rf"(?<![\w.]){stem}\.", f"{module.__name__}.", lines) for site, lines in found.act.items()}
+    return replace(found, name=source.spec, settings=_named(found.settings, source.spec), act=act, tabled=False)
+
+
+def _named(settings: type[Settings], spec: str) -> type[Settings]:
+    """The file's settings under the word by which a config names them."""
+    word: Any = Literal[spec]
+    return create_model(settings.__name__, __base__=settings, term=(word, spec))

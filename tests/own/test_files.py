@@ -1,0 +1,60 @@
+import sys
+
+import pytest
+
+from rtctl.own.files import OwnError, Source, is_own, keep, load, read, split
+
+
+def source(text, file="./try.py"):
+    return Source(file, "Try", text)
+
+
+def test_a_word_of_a_config_is_a_file_or_a_kind_that_comes_with_rtctl():
+    assert is_own("./try.py:Try") and is_own("try.py")
+    assert not is_own("pd") and not is_own(None) and not is_own({"kind": "pd"})
+    assert split("../a b/try.py:Try") == ("../a b/try.py", "Try")
+    with pytest.raises(OwnError, match=r"should be a file and a name in it, such as \./my_law\.py:MyLaw"):
+        split("./try.py")
+
+
+def test_another_text_is_another_module_and_the_same_text_is_the_same():
+    one, two = load(source("x = 1\n")), load(source("x = 2\n"))
+    assert (one.x, two.x) == (1, 2)
+    assert one.__name__ != two.__name__
+    assert load(source("x = 1\n")) is one
+    assert sys.modules[one.__name__] is one
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a = 1\nretrn a\n", r"\./try\.py:2: not Python: invalid syntax"),
+        ("import numpy\n1 / 0\n", r"\./try\.py:2: ZeroDivisionError while the file was read"),
+        ("import beside\n", r"\./try\.py:1: there is no module 'beside'; an own file may import what is installed"),
+        ("from rtctl.laws import pdd\n", r"\./try\.py:1: cannot import name 'pdd' from 'rtctl\.laws'$"),
+    ],
+)
+def test_a_file_that_cannot_be_run_says_where(text, message):
+    for _ in range(2):  # nothing half-made is left behind
+        with pytest.raises(OwnError, match=message):
+            load(source(text))
+
+
+def test_a_file_that_is_not_there_or_no_text(tmp_path):
+    (tmp_path / "try.py").write_text("x = 1\n")
+    assert read("./try.py", tmp_path) == "x = 1\n"
+    with pytest.raises(OwnError, match=r"\./tri\.py: no such file in .*; did you mean 'try\.py'"):
+        read("./tri.py", tmp_path)
+    (tmp_path / "bad.py").write_bytes(b"x = 1\n\xff\n")
+    with pytest.raises(OwnError, match=r"\./bad\.py:2: not UTF-8"):
+        read("./bad.py", tmp_path)
+    (tmp_path / "big.py").write_bytes(b"#" * (1 << 19))
+    with pytest.raises(OwnError, match="256 KiB"):
+        read("big.py", tmp_path)
+
+
+def test_texts_are_kept_for_people(tmp_path):
+    keep({}, tmp_path)
+    assert not list(tmp_path.iterdir())
+    keep({"../laws/try.py": "x = 1\n"}, tmp_path)
+    assert (tmp_path / "own" / "try.py").read_text() == "x = 1\n"

@@ -1,0 +1,56 @@
+"""A term of the user's own in the library: what fits and diagnosis make of it."""
+
+import ast
+
+import pytest
+from rtctl_config import TEMPLATES
+
+from rtctl.config.errors import UserError
+from rtctl.diagnose import kernel
+from rtctl.diagnose.hypotheses import Size, parts_of
+from rtctl.own.files import OwnError, Source
+from rtctl.own.term import own_term, register, register_file, sizes, texts
+from rtctl.plants.physics import TERMS
+
+SPEC = "./my_term.py:MyTerm"
+TEXT = (TEMPLATES / "my_term.py").read_text()
+
+
+def test_it_is_a_term_like_any_other_once_it_is_registered(tmp_path):
+    (tmp_path / "my_term.py").write_text(TEXT)
+    register_file(SPEC, tmp_path)
+    term = TERMS[SPEC]
+    assert term.name == SPEC and not term.tabled
+    assert term.settings(node="reel1", c=1e-4).term == SPEC
+    assert texts([SPEC, "friction.viscous"]) == {"./my_term.py": TEXT}
+
+
+def test_what_it_calls_typical_is_what_a_fit_begins_with():
+    register([Source("./my_term.py", "MyTerm", TEXT)])
+    assert sizes(SPEC) == {"c": (1e-6, 1e-3)} and sizes("friction.viscous") == {}
+    (part,) = parts_of(SPEC)
+    assert isinstance(part, Size) and (part.name, part.measure) == ("c", "one")
+    assert part.share == pytest.approx((1e-6 * 1e-3) ** 0.5)
+
+
+def test_the_kernel_of_the_fits_holds_it():
+    before = kernel.source("axis")
+    register([Source("./my_term.py", "MyTerm", TEXT)])
+    after = kernel.source("axis")
+    module = Source("./my_term.py", "MyTerm", TEXT).module
+    assert module not in before
+    assert f"import {module}" in after.splitlines()
+    assert f"{module}.drag(q[k].__my_term_py_MyTerm, " in after
+    ast.parse(after)
+
+
+def test_a_range_that_is_none():
+    with pytest.raises(OwnError, match=r"MY_TERM\.typical: c: \(0, 1\) should be a setting's lowest and highest size"):
+        own_term(Source("./my_term.py", "MyTerm", TEXT.replace("(1e-6, 1e-3)", "(0.0, 1.0)")))
+
+
+def test_a_mistake_on_the_command_line():
+    from rtctl.cli.diagnose import _register
+
+    with pytest.raises(UserError, match=r"--term \./none\.py:None: \./none\.py: no such file"):
+        _register(["./none.py:None"])
