@@ -23,7 +23,7 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 from rtctl.plants.physics.transmission import undone
 
 STRIP = "capstan"  # node of the LDU whose contact is rigid
@@ -35,7 +35,7 @@ class SlipSettings(Settings):
     """Without effect while F_max is above all that the contact carries; the size is 1 / F_max."""
 
     term: Literal["transmission.slip"] = "transmission.slip"
-    node: str
+    node: Node
     F_max: float = quantity(unit="", gt=0, le=1e6, help="what the contact carries, N (Nm of the motor at a wheel)")
     R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip slips")
 
@@ -44,7 +44,7 @@ class CreepSettings(Settings):
     """kappa is the size."""
 
     term: Literal["transmission.creep"] = "transmission.creep"
-    node: str
+    node: Node
     kappa: float = quantity(
         unit="", ge=0, le=1e3, help="way lost per way and force, 1/N (1/Nm of the motor at a wheel)"
     )

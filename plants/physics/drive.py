@@ -9,8 +9,10 @@ Drives (2001), ch. 4 for converters and their supply.
 import math
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 DRIVES = {"ivu": ("drive1", "drive2"), "ldu": ("drive",), "axis": ("drive",)}
 DEADBAND_FORMS = ("shift", "cut", "floor")
@@ -21,7 +23,7 @@ class OffsetSettings(Settings):
     """offset is the size."""
 
     term: Literal["drive.offset"] = "drive.offset"
-    node: str
+    node: Node
     offset: float = quantity(unit="V", ge=-10, le=10, help="what stands at the driver when nothing is asked for")
 
 
@@ -48,9 +50,11 @@ class DeadbandSettings(Settings):
     """
 
     term: Literal["drive.deadband"] = "drive.deadband"
-    node: str
+    node: Node
     band: float = quantity(unit="V", ge=0, le=5, help="half width of the dead zone")
-    form: Literal["shift", "cut", "floor"] = "shift"
+    form: Literal["shift", "cut", "floor"] = Field(
+        default="shift", description="beyond the band: from zero on, a jump to the command, or +-band within it too"
+    )
     edge: float = quantity(0.1, unit="", ge=0, le=1, help="half width of the jump of `cut`, as a share of band")
 
 
@@ -88,7 +92,7 @@ class GainAsymmetrySettings(Settings):
     """a is the size."""
 
     term: Literal["drive.gain_asymmetry"] = "drive.gain_asymmetry"
-    node: str
+    node: Node
     a: float = quantity(unit="", ge=-0.95, le=0.95, help="gain is 1 + a for positive commands and 1 - a for negative")
 
 
@@ -111,7 +115,7 @@ class SaturationSettings(Settings):
     """Without effect where limit is beyond what is commanded and rise is 0; knee alone has none."""
 
     term: Literal["drive.saturation"] = "drive.saturation"
-    node: str
+    node: Node
     limit: float = quantity(unit="V", gt=0, le=1e3, help="the output gets no further than this")
     knee: float = quantity(0.0, unit="", ge=0, le=0.9, help="share of the limit at which it starts to bend; 0 is sharp")
     rise: float = quantity(0.0, unit="s/V", ge=0, le=10, help="time that a change of one volt takes; 0 is at once")
@@ -156,9 +160,11 @@ class SupplySagSettings(Settings):
     """k is the size. current: they draw |volts|; power: their square; drawn: what is left of |volts| once it sags."""
 
     term: Literal["drive.supply_sag"] = "drive.supply_sag"
-    node: str
+    node: Node
     k: float = quantity(unit="", ge=0, le=1, help="share of gain lost per volt, or per volt squared, of all drives")
-    form: Literal["current", "power", "drawn"] = "current"
+    form: Literal["current", "power", "drawn"] = Field(
+        default="current", description="what loads the supply: |volts|, their square, or what is left of |volts|"
+    )
     tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of the supply's capacitor; 0: it has none")
 
 

@@ -12,18 +12,20 @@ import cmath
 import math
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.physics.drive import DRIVES
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 
 class LagSettings(Settings):
     """tau is the size. Order 2 has the natural frequency 1/tau rad/s and the damping zeta."""
 
     term: Literal["drive.lag"] = "drive.lag"
-    node: str
+    node: Node
     tau: float = quantity(unit="s", ge=0, le=10, help="time constant; 0 is no lag")
-    order: Literal[1, 2] = 1
+    order: Literal[1, 2] = Field(default=1, description="of the lag")
     zeta: float = quantity(0.7, unit="", ge=0.05, le=20, help="damping of order 2")
 
 
@@ -73,7 +75,7 @@ class ThermalSettings(Settings):
     """a is the size: exp(-a) of the gain, or of the friction, is left after a long time at V_ref."""
 
     term: Literal["drive.thermal"] = "drive.thermal"
-    node: str
+    node: Node
     a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm through; negative where it gains")
     tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time that it takes to warm")
     V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command at which it is warm")

@@ -13,8 +13,10 @@ the control of machines with friction, Automatica 30 (1994); thesis (8.3); Hoern
 import math
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, tick
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 SHAFTS = {
     "ivu": ("motor1", "motor2", "reel1", "reel2", "capstan"),
@@ -28,7 +30,7 @@ class CoulombSettings(Settings):
     """F_C is the size; negative where there is less dry friction than the base model has."""
 
     term: Literal["friction.coulomb"] = "friction.coulomb"
-    node: str
+    node: Node
     F_C: float = quantity(unit="", ge=-1e4, le=1e4, help="dry friction on top of the base model's, Nm or N by node")
 
 
@@ -51,7 +53,7 @@ class ViscousSettings(Settings):
     """B is the size; negative, down to what the base model has, where there is less of it than believed."""
 
     term: Literal["friction.viscous"] = "friction.viscous"
-    node: str
+    node: Node
     B: float = quantity(
         unit="", ge=-1e5, le=1e5, help="viscous friction on top of the base model's, Nms/rad or Ns/m by node"
     )
@@ -76,7 +78,7 @@ class QuadraticSettings(Settings):
     """Q is the size."""
 
     term: Literal["friction.quadratic"] = "friction.quadratic"
-    node: str
+    node: Node
     Q: float = quantity(unit="", ge=0, le=1e6, help="drag by the square of speed, Nms^2/rad^2 or Ns^2/m^2 by node")
 
 
@@ -102,10 +104,12 @@ class StribeckSettings(Settings):
     """
 
     term: Literal["friction.stribeck"] = "friction.stribeck"
-    node: str
+    node: Node
     F_s: float = quantity(unit="", ge=0, le=1e4, help="dry friction at standstill, Nm or N by node")
     v_s: float = quantity(unit="", gt=0, le=1e3, help="Stribeck speed, rad/s or m/s by node")
-    form: Literal["gaussian", "exponential", "tustin"] = "gaussian"
+    form: Literal["gaussian", "exponential", "tustin"] = Field(
+        default="gaussian", description="how it falls with speed: exp(-(v/v_s)^2), exp(-|v|/v_s), 1/(1 + |v|/v_s)"
+    )
 
 
 class StribeckParams(NamedTuple):

@@ -13,14 +13,14 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.physics.friction import DRY
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 
 class AsymmetrySettings(Settings):
     """The sizes are a and B_a: with both zero it does nothing."""
 
     term: Literal["friction.asymmetry"] = "friction.asymmetry"
-    node: str
+    node: Node
     a: float = quantity(
         unit="", ge=-0.99, le=0.99, help="share by which dry friction is larger forwards and smaller backwards"
     )

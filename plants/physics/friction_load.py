@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 BESIDE = {"capstan": (0, 1), "reel1": (0, 0), "reel2": (1, 1), "motor1": (2, 2), "motor2": (3, 3)}  # links of the ivu
 
@@ -20,7 +20,7 @@ class LoadSettings(Settings):
     """mu is the size; negative only to take back what an earlier term has too much of."""
 
     term: Literal["friction.load"] = "friction.load"
-    node: str
+    node: Node
     mu: float = quantity(unit="", ge=-1.0, le=1.0, help="friction as a share of the force that presses, at its lever")
 
 

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import ivu, linear
 from rtctl.plants.physics.ripple_tape import tape_of
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 PAPER = 1700.0 * 0.037  # kg/m^2: density times width of the thesis's paper
 SMALLEST = 0.05  # of the inertia: a reel does not get lighter than this
@@ -25,7 +25,7 @@ class RadiusChangeSettings(Settings):
     """d is the size."""
 
     term: Literal["geometry.radius_change"] = "geometry.radius_change"
-    node: str
+    node: Node
     d: float = quantity(unit="m", ge=-0.02, le=0.02, help="growth of the radius in a turn: the thickness of the tape")
     rho_h: float = quantity(PAPER, unit="kg/m^2", ge=0, le=1e4, help="density times width of the tape, for the inertia")
     R_min: float = quantity(0.02, unit="m", gt=0, le=1, help="radius of the empty reel")

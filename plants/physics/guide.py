@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.physics.ripple import harmonics
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 GUIDES = {"ldu": ("carriage", "scale"), "axis": ("sensor",)}
 
@@ -23,7 +23,7 @@ class ThicknessSettings(Settings):
     """A, A2, A3 are the sizes: once, twice, three times in a wavelength."""
 
     term: Literal["guide.thickness"] = "guide.thickness"
-    node: str
+    node: Node
     A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="amplitude of the position error")
     wavelength: float = quantity(0.15, unit="m", gt=1e-4, le=1e2, help="along the guide")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
@@ -61,7 +61,7 @@ class StripSettings(Settings):
     """longer is the size: 1e-5 is a strip 0.1 mm up and down over 100 mm, (pi y / wavelength)^2."""
 
     term: Literal["guide.strip"] = "guide.strip"
-    node: str
+    node: Node
     longer: float = quantity(unit="", ge=0, le=0.02, help="share by which the path is longer than straight")
     wavelength: float = quantity(0.1, unit="m", gt=1e-4, le=1e2, help="of the waves of the strip")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
@@ -94,7 +94,7 @@ class DirtSettings(Settings):
     """A is the size."""
 
     term: Literal["guide.dirt"] = "guide.dirt"
-    node: str
+    node: Node
     A: float = quantity(unit="m", ge=-1e-2, le=1e-2, help="largest position error")
     at: float = quantity(unit="m", ge=-100, le=100, help="position of its middle")
     width: float = quantity(1e-3, unit="m", gt=1e-6, le=10, help="standard deviation of the bell")

@@ -9,10 +9,12 @@ chain's drag; thesis 11.2 for dirt on strip and capstan.
 import math
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.physics.friction import SHAFTS
 from rtctl.plants.physics.presliding import bend
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 CARRIAGES = {"ldu": ("carriage",), "axis": ("carriage",)}
 HILL = math.sqrt(math.e)  # steepest slope of exp(-x^2 / 2) is 1 / HILL, at x = 1
@@ -23,7 +25,7 @@ class SpringSettings(Settings):
     """k is the size."""
 
     term: Literal["load.spring"] = "load.spring"
-    node: str
+    node: Node
     k: float = quantity(unit="", ge=-1e6, le=1e6, help="stiffness, N/m or Nm/rad by node; negative pushes away")
     x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="where it does not pull, m or rad by node")
 
@@ -48,7 +50,7 @@ class CableChainSettings(Settings):
     """k and F_h are the sizes."""
 
     term: Literal["load.cable_chain"] = "load.cable_chain"
-    node: str
+    node: Node
     k: float = quantity(unit="", ge=0, le=1e6, help="stiffness of the chain's bend, N/m")
     x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="where it does not pull, m")
     F_h: float = quantity(0.0, unit="", ge=0, le=1e4, help="drag of links and cables on each other, N")
@@ -82,7 +84,7 @@ class ImbalanceSettings(Settings):
     """A is the size; A cos(phi) and A sin(phi) are the well-behaved pair for a fit."""
 
     term: Literal["load.imbalance"] = "load.imbalance"
-    node: str
+    node: Node
     A: float = quantity(unit="", ge=-1e4, le=1e4, help="largest torque, Nm (N at an axis)")
     phi: float = quantity(0.0, unit="", ge=-10, le=10, help="angle of the torque at the start, rad")
     turn: float = quantity(
@@ -115,12 +117,16 @@ class BumpSettings(Settings):
     """
 
     term: Literal["load.bump"] = "load.bump"
-    node: str
+    node: Node
     F: float = quantity(unit="", ge=-1e4, le=1e4, help="largest force, N or Nm by node")
     at: float = quantity(unit="", ge=-1e4, le=1e4, help="position of its middle, m or rad by node")
     width: float = quantity(unit="", gt=0, le=1e3, help="standard deviation of the bell, m or rad by node")
-    form: Literal["drag", "hill", "push"] = "drag"
-    every_turn: bool = False  # of a node that turns, instead of at one unwrapped angle
+    form: Literal["drag", "hill", "push"] = Field(
+        default="drag", description="against the motion, away from the middle, or always forwards"
+    )
+    every_turn: bool = Field(
+        default=False, description="of a node that turns: at each turn instead of at one unwrapped angle"
+    )
 
 
 class BumpParams(NamedTuple):

@@ -19,9 +19,11 @@ model for control of systems with friction, IEEE TAC 40 (1995); thesis 12.6.
 import math
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.physics.friction import DRY
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 NEWTON = 12  # steps at most; each is from below and the last one doubles the digits
 CLOSE = 1e-13  # of the speed: the root is found
@@ -31,9 +33,11 @@ class PreslidingSettings(Settings):
     """z_s is the size: at 0 the node has its plain dry friction."""
 
     term: Literal["friction.presliding"] = "friction.presliding"
-    node: str
+    node: Node
     z_s: float = quantity(unit="", ge=0, le=1.0, help="travel on the bristles before it slides, rad or m by node")
-    form: Literal["dahl", "lugre"] = "dahl"
+    form: Literal["dahl", "lugre"] = Field(
+        default="dahl", description="of the bristles; lugre has damping and a rise at standstill besides"
+    )
     tau_s: float = quantity(3e-3, unit="s", ge=0, le=1.0, help="damping of the bristles over their stiffness; lugre")
     rise: float = quantity(0.0, unit="", ge=0, le=10, help="share by which it is stiffer to start than to keep; lugre")
     v_s: float = quantity(1.0, unit="", gt=0, le=1e3, help="Stribeck speed of that, rad/s or m/s by node")

@@ -13,7 +13,7 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 TURN = 2.0 * math.pi
 
@@ -22,7 +22,7 @@ class CoggingSettings(Settings):
     """A, A2, A3 are the sizes: amplitudes of per_turn, 2 per_turn and 3 per_turn teeth."""
 
     term: Literal["ripple.cogging"] = "ripple.cogging"
-    node: str
+    node: Node
     A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude, Nm or N by node")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     per_turn: float = quantity(1.0, unit="", gt=0, le=1e4, help="teeth in one turn")
@@ -65,7 +65,7 @@ class EncoderSettings(Settings):
     """A, A2, A3 are the sizes: reading errors once, twice, three times in a turn (or `order` times as often)."""
 
     term: Literal["ripple.encoder"] = "ripple.encoder"
-    node: str
+    node: Node
     A: float = quantity(unit="", ge=-10, le=10, help="amplitude of the error, rad (m where it slides)")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     A2: float = quantity(

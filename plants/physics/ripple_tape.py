@@ -16,14 +16,14 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
 from rtctl.plants.physics.ripple import harmonics
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 
 class ReelSettings(Settings):
     """e, e2, e3 are the sizes: the radius is R + e cos(q + phi) + e2 cos(2 q + phi2) + e3 cos(3 q + phi3)."""
 
     term: Literal["ripple.reel"] = "ripple.reel"
-    node: str
+    node: Node
     e: float = quantity(unit="m", ge=-0.02, le=0.02, help="eccentricity")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     e2: float = quantity(0.0, unit="m", ge=-0.02, le=0.02, help="of the second harmonic: an oval")
@@ -36,7 +36,7 @@ class CapstanSettings(Settings):
     """a, a2, a3 are the sizes: the way is off by a sin(theta + phi) + a2 sin(2 theta + phi2) + ..."""
 
     term: Literal["ripple.capstan"] = "ripple.capstan"
-    node: str
+    node: Node
     a: float = quantity(unit="m", ge=-5e-3, le=5e-3, help="amplitude of the way: the eccentricity of the capstan")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
     a2: float = quantity(0.0, unit="m", ge=-5e-3, le=5e-3, help="second harmonic: half the radius deviation of an oval")

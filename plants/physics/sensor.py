@@ -11,10 +11,10 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 MOST = 48  # jumps
 READINGS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)}
@@ -25,13 +25,15 @@ class MissedCountsSettings(Settings):
     """size and each are the sizes; rad or m as the sensor reads. A loss forwards is negative."""
 
     term: Literal["sensor.missed_counts"] = "sensor.missed_counts"
-    node: str
+    node: Node
     at: float = quantity(0.0, unit="s", ge=0, le=1e9, help="time of the jump")
     size: float = quantity(0.0, unit="", ge=-100, le=100, help="jump of the reading, rad or m")
-    more: tuple[tuple[float, float], ...] = ()  # time of each further jump, and its size over that of the first
+    more: tuple[tuple[float, float], ...] = Field(
+        default=(), description="time of each further jump (s), and its size over that of the first"
+    )
     over: float = quantity(1e-3, unit="s", gt=0, le=10, help="time that a jump takes")
     each: float = quantity(0.0, unit="", ge=-10, le=10, help="jump at each passage of the mark, rad or m")
-    way: Literal["forward", "backward"] = "forward"
+    way: Literal["forward", "backward"] = Field(default="forward", description="direction in which the mark is passed")
     mark: float = quantity(0.0, unit="", ge=-100, le=100, help="where the mark is, rad or m")
     turn: float = quantity(2.0 * math.pi, unit="", gt=0, le=1e3, help="way from mark to mark, rad or m")
 
@@ -101,7 +103,7 @@ class RectifiedSettings(Settings):
     """share is the size: 1 counts up in either direction, 0 knows the direction."""
 
     term: Literal["sensor.rectified"] = "sensor.rectified"
-    node: str
+    node: Node
     share: float = quantity(1.0, unit="", ge=0, le=1, help="1: direction unknown; less: it is sometimes right")
 
 
@@ -134,7 +136,7 @@ class ScaleSettings(Settings):
     """relative is the size."""
 
     term: Literal["sensor.scale"] = "sensor.scale"
-    node: str
+    node: Node
     relative: float = quantity(unit="", ge=-0.9, le=10, help="the reading is 1 + relative times too large")
 
 

@@ -19,14 +19,14 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.physics.friction import SHAFTS
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 
 class ResonanceSettings(Settings):
     """mass is the size."""
 
     term: Literal["structure.resonance"] = "structure.resonance"
-    node: str
+    node: Node
     f_Hz: float = quantity(unit="", gt=0.1, le=5e3, help="natural frequency with the node held, in turns a second")
     mass: float = quantity(unit="", ge=0, le=1e3, help="what swings, kg or kg m^2 by node")
     zeta: float = quantity(0.02, unit="", ge=0, lt=1, help="damping ratio")
@@ -71,7 +71,7 @@ class StiffeningSettings(Settings):
     """c3 is the size. With c2 the spring is stiffer one way than the other, with b2 it loses more where it bends."""
 
     term: Literal["structure.stiffening"] = "structure.stiffening"
-    node: str
+    node: Node
     c3: float = quantity(
         unit="", ge=-1e15, le=1e15, help="cubic stiffness, N/m^3 or Nm/rad^3 by link; negative softens"
     )

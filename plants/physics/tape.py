@@ -15,7 +15,7 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 TAPES = {"ivu": ("tape1", "tape2")}
 
@@ -24,7 +24,7 @@ class ViscoelasticSettings(Settings):
     """c_branch and c_branch2 are the sizes."""
 
     term: Literal["tape.viscoelastic"] = "tape.viscoelastic"
-    node: str
+    node: Node
     c_branch: float = quantity(unit="N/m", ge=0, le=1e6, help="stiffness that relaxes")
     tau: float = quantity(unit="s", gt=0, le=1e4, help="how long it takes to relax")
     c_branch2: float = quantity(0.0, unit="N/m", ge=0, le=1e6, help="stiffness of a second branch")
@@ -77,7 +77,7 @@ class SlackSettings(Settings):
     """share is the size: at 0 the tape pushes as a rod would."""
 
     term: Literal["tape.slack"] = "tape.slack"
-    node: str
+    node: Node
     share: float = quantity(1.0, unit="", ge=0, le=1, help="of the push that is missing; 1: the tape cannot push")
     other: float = quantity(1.0, unit="", ge=0, le=1, help="share of that on the other side of the capstan: one tape")
 

@@ -21,13 +21,15 @@ The sites of a substep in their order:
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from rtctl.idiom import Settings
 
 SITES = ("command", "force", "reading")
+Node = Annotated[str, Field(description="where it acts; `rtctl physics TERM` lists the nodes of each machine")]
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ import math
 from typing import Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from rtctl.config.errors import UserError
 from rtctl.counted import uniform
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import ivu, ldu
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 LENGTH = 1024  # substeps that the line holds
 LONGEST = 0.03  # s
@@ -26,7 +27,7 @@ class DelaySettings(Settings):
     """extra is the size."""
 
     term: Literal["timing.delay"] = "timing.delay"
-    node: str
+    node: Node
     extra: float = quantity(unit="s", ge=0, le=LONGEST, help="delay on top of what the loop is known to have")
 
 
@@ -68,11 +69,11 @@ class JitterSettings(Settings):
     """sigma is the size. The reading is taken up to half a period early or late, by chance but the same every time."""
 
     term: Literal["timing.jitter"] = "timing.jitter"
-    node: str
+    node: Node
     sigma: float = quantity(unit="s", ge=0, le=0.01, help="standard deviation of the time of a tick")
     rate: float = quantity(500.0, unit="1/s", gt=0, le=1e5, help="ticks a second")
-    seed: int = 1
-    form: Literal["gaussian", "uniform"] = "gaussian"
+    seed: int = Field(default=1, description="of the chance; the same seed, the same times")
+    form: Literal["gaussian", "uniform"] = Field(default="gaussian", description="distribution of the times")
 
 
 class JitterParams(NamedTuple):

@@ -17,14 +17,14 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
-from rtctl.plants.physics.term import Term
+from rtctl.plants.physics.term import Node, Term
 
 
 class BacklashSettings(Settings):
     """gap is the size."""
 
     term: Literal["transmission.backlash"] = "transmission.backlash"
-    node: str
+    node: Node
     gap: float = quantity(unit="", ge=0, le=1.0, help="total play, rad of the link's first end (m at an axis)")
     damping: float = quantity(0.0, unit="", ge=0, le=1, help="share of the link's damping that also acts in the gap")
     edge: float = quantity(0.05, unit="", ge=0, le=1, help="share of half the gap over which its edge is rounded")

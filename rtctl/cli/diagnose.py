@@ -40,6 +40,12 @@ def diagnose(
         str, typer.Option("--limit", metavar="T", help="Of a folder: longest time for a bundle, e.g. 600s.")
     ] = "600s",
     again: Annotated[bool, typer.Option("--again", help="Of a folder: also those that are diagnosed already.")] = False,
+    terms: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--term", metavar="FILE:NAME", help="A term of your own, ./windage.py:Windage, to be tried as well."
+        ),
+    ] = None,
     closed_loop: Annotated[
         bool, typer.Option("--closed-loop", help="Record the machine of a CONFIG, diagnose it, write its model.")
     ] = False,
@@ -67,6 +73,8 @@ def diagnose(
 
       rtctl diagnose monday --heldout tuesday --out /tmp/d --json
 
+      rtctl diagnose runs/ivu-20250102-101500 --term ./windage.py:Windage
+
       rtctl diagnose recordings --jobs 2 --no-report
 
       rtctl diagnose --closed-loop ivu --for 25s --reference constant_speed
@@ -74,6 +82,7 @@ def diagnose(
     from rtctl.cli.diagnose_console import DiagnoseConsole
 
     console = DiagnoseConsole(json)
+    _register(terms or [])
     if closed_loop:
         if heldout is not None:
             _refuse("--heldout", "goes with a BUNDLE, not with --closed-loop")
@@ -89,11 +98,26 @@ def diagnose(
     bundle = Path(what)
     found = tasks(bundle, out, heldout)
     if found:
+        if terms:
+            _refuse("--term", "goes with one bundle, not with a folder of them")
         length = common.seconds(limit, "--limit")
         assert length is not None
         _folder(console, found, jobs, length, report, again, json)
     else:
         _bundle(console, bundle, heldout, out, report, json)
+
+
+def _register(terms: list[str]) -> None:
+    """Terms in files of the user's own are terms of the library from here on."""
+    from rtctl.config.errors import UserError
+    from rtctl.own.files import OwnError
+    from rtctl.own.term import register_file
+
+    for word in terms:
+        try:
+            register_file(word, Path())
+        except OwnError as error:
+            raise UserError(f"--term {word}: {error}") from error
 
 
 def _refuse(option: str, why: str) -> None:
@@ -162,8 +186,10 @@ def _machine(
 ) -> None:
     from rtctl.diagnose import repair
     from rtctl.diagnose.folder import finite, own_config, write
+    from rtctl.own import files
 
     config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)
+    files.refuse_plant(config, "rtctl diagnose")
     config = repair.ready(config, mode)
     folder = out if out is not None else common.default_folder(config.name)
     with console.stages() as stage:

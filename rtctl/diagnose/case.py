@@ -34,8 +34,8 @@ TERMS = {  # parameters that are terms of their own: absent means 0
     "ldu": ("F_c", "B_c", "B_m", "K_m2"),
     "axis": ("F_v", "F_c", "k"),
 }
-FROM_ELSEWHERE = ("config", "seed", "versions", "run", "changes", "rows", "losses", "complete", "recorded_at",
-                  "part", "parts", "repaired", "discarded_bytes", "recording_error")  # fmt: skip
+FROM_ELSEWHERE = ("config", "seed", "versions", "run", "timing", "changes", "rows", "losses", "complete",
+                  "recorded_at", "part", "parts", "repaired", "discarded_bytes", "recording_error")  # fmt: skip
 KEYS = (
     "format", "plant", "sample_rate", "parameters", "sensors", "drive", "delay_samples", "controller",
     "controller_known", "reaches", "notes",

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import norm
 
 from rtctl.diagnose.fit import Fit, Problem
-from rtctl.diagnose.stretches import loudness, rms
+from rtctl.diagnose.stretches import loudness, memory, rms
 from rtctl.plants.physics import TERMS
 
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
@@ -137,19 +137,3 @@ def unusual(fitted: Fit) -> float:
             if name not in term.scale and size > 0.0:
                 total -= 0.5 * min(max(np.log(low / size), np.log(size / high), 0.0) / np.log(OFTEN), 3.0) ** 2
     return float(total)
-
-
-def memory(r: np.ndarray, most: int = 500) -> float:
-    """Errors that count as one: 1 + 2 sum of the autocorrelation up to where it is lost.
-
-    Source: Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992).
-    """
-    e = r - r.mean()
-    power = float(e @ e) or 1.0
-    total = 1.0
-    for lag in range(1, min(most, len(e) // 4)):
-        rho = float(e[lag:] @ e[:-lag]) / power
-        if rho < 0.05:
-            break
-        total += 2.0 * rho
-    return total

@@ -22,6 +22,7 @@ from rtctl.diagnose.model import Model
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
+from rtctl.own.term import texts
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import TERMS
 
@@ -45,7 +46,9 @@ def write_model(model: Model, record: Record, path: Path | str, config: dict[str
     from rtctl import machines
 
     data, left = _settings_data(model, record, config)
-    settings = _checked(data, machines.CONFIGS[record.plant])
+    own = data.get("own", {}) | texts(entry["term"] for entry in data["plant"]["physics"])
+    kind, data = machines.widened({**data, "own": own} if own else data)
+    settings = _checked(data, kind)
     try:
         machines.build(settings)
     except ValueError as error:
@@ -91,7 +94,7 @@ def read_model(path: Path | str, record: Record) -> Model:
         raise UserError(f"{path}: machine is {kind!r}; it should be {record.plant}, as in the bundle")
     if kind != record.plant:
         raise UserError(f"{path}: machine is {kind}, and the bundle was recorded on the {record.plant}")
-    plant = load_settings(file, machines.CONFIGS[kind]).plant
+    plant = load_settings(file, machines.CONFIGS[kind], widen=machines.OWN).plant
     if kind == "ivu":
         base = _numbers(ivu.parameters(plant))
         if not plant.follow_tape:

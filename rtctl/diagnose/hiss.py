@@ -4,7 +4,8 @@ The correction that keeps a model on track lets a force d (per unit of inertia) 
 e'' + 1.4 w e' + w^2 e = d. Where d is white, or white noise through a lag that is shorter than the correction's own,
 and the sensor's noise is white beside it, the spectrum of e has that shape, with a level and a lag that are unknown.
 Friction, drifts and ripples have another: a peak, a rise to low frequencies, or more error than that level accounts
-for, are no hiss.
+for, are no hiss. Nor are errors that come in bursts, where it turns or where it moves: the sum of many small forces is
+normal, with a kurtosis of 3.
 
 Source: Bartlett, An introduction to stochastic processes (1955), for the cumulative periodogram and its bound; Whittle,
 Arkiv for Matematik 2 (1953), for the likelihood of a spectrum.
@@ -12,11 +13,14 @@ Arkiv for Matematik 2 (1953), for the likelihood of a spectrum.
 
 import numpy as np
 
+from rtctl.diagnose.stretches import memory
+
 FROM = 4.0  # periods in the record, of the lowest frequency looked at
 UPTO = 3.0  # of the correction's bandwidth
 BOUND, EXACT = 2.4, 1.63  # of the cumulative periodogram's distance times the root of the count
 MORE = 1.6  # times the error that the level accounts for
 FEWEST = 20  # frequencies
+BURSTS, CHANCE = 1.2, 3.0  # kurtosis above 3, and the same in standard deviations of so many independent errors
 ROUNDS = 20
 LAGS = (0.1, 0.2, 0.4, 0.7, 1.0)  # of the correction's own time
 
@@ -33,7 +37,7 @@ def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float, exact: bool =
     power = np.abs(np.fft.rfft((e - e.mean()) * taper)) ** 2 / float(np.sum(taper**2))
     band = (w > 2 * np.pi * FROM / (n * dt)) & (w < UPTO * follow)
     count = int(band.sum())
-    if count < FEWEST:
+    if count < FEWEST or bursts(e):
         return False
     best: tuple[float, float, np.ndarray] | None = None
     for lag in (0.0, *np.array(LAGS) / follow):
@@ -51,6 +55,13 @@ def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float, exact: bool =
         return False
     accounted = level * float(np.sum(through[1:])) * 2 / n
     return float(np.var(e)) < MORE * (accounted + floor**2)
+
+
+def bursts(e: np.ndarray) -> bool:
+    """Whether the errors e (n,) are large for some of the time, more so than normal ones that hang together alike."""
+    off = e - e.mean()
+    kurtosis = float(np.mean(off**4) / max(float(np.mean(off**2)) ** 2, 1e-300))
+    return kurtosis > 3.0 + BURSTS and kurtosis > 3.0 + CHANCE * float(np.sqrt(24.0 * memory(e) / len(e)))
 
 
 def _level(power: np.ndarray, passed: np.ndarray, floor: float) -> float:

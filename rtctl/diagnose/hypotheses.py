@@ -15,6 +15,7 @@ from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis
 from rtctl.diagnose.yardstick import Measures
+from rtctl.own.term import sizes
 from rtctl.plants.physics import TERMS
 
 
@@ -205,7 +206,7 @@ def hypotheses(
     out = []
     for name, term in TERMS.items():
         if (
-            (name in SEARCH or name in only)
+            (name in SEARCH or name in only or sizes(name))
             and not (name in ALONE and len(record.y) < 2 and record.plant == "ldu")
             and (not only or name in only)
         ):
@@ -217,8 +218,17 @@ def hypotheses(
                     or (name == "friction.stribeck" and measures.dry(node) <= SLIGHT * measures.of("force", node))
                 ):  # falls to what the base has
                     continue
-                out += _starts(name, node, (slides and SLIDING.get(name)) or ALL[name], measures)
+                out += _starts(name, node, (slides and SLIDING.get(name)) or parts_of(name), measures)
     return out
+
+
+def parts_of(name: str) -> tuple[Part, ...]:
+    """What is fitted of a term; of one in a file of the user's own, what it calls typical, the first being its size."""
+    if name in ALL:
+        return ALL[name]
+    (first, (low, high)), *others = sizes(name).items()
+    more = (Shape(n, "one", ((a * b) ** 0.5,), (b / a) ** 0.5) for n, (a, b) in others)
+    return (Size(first, "one", (low * high) ** 0.5), *more)
 
 
 def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis | None:

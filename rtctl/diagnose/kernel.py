@@ -7,6 +7,7 @@ plants/ and plants/physics/, as in the emulator.
 
 import hashlib
 import os
+import re
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rtctl.config.cache import cache_folder
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
 from rtctl.plants.physics import TERMS, place
@@ -146,7 +148,7 @@ class Kernel(NamedTuple):
 
 def field(name: str) -> str:
     """Name of a term's field in a slot."""
-    return name.replace(".", "_")
+    return re.sub(r"\W", "_", name)
 
 
 def terms_of(kind: str) -> tuple[Term, ...]:
@@ -207,7 +209,7 @@ def source(kind: str) -> str:
     """The module's text."""
     terms = terms_of(kind)
     modules = sorted({t.build.__module__ for t in terms} | {"rtctl.plants.linear"})
-    imports = "\n".join(f"from {m.rpartition('.')[0]} import {m.rpartition('.')[2]}" for m in modules if "physics" in m)
+    imports = "\n".join(generate.imported(m) for m in modules if "physics" in m or "." not in m)
     parts = [HEADER.format(kind=kind, imports=imports)]
     parts += [_site(site, kind, terms) for site in SITES]
     indent = "\n    "
@@ -261,7 +263,7 @@ def kernel(kind: str) -> Kernel:
     terms = terms_of(kind)
     text = source(kind)
     name = hashlib.sha256((text + sources_hash(kind)).encode()).hexdigest()[:16]
-    path = generate.cache_folder() / f"fit_{kind}_{name}.py"
+    path = cache_folder() / f"fit_{kind}_{name}.py"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         draft = path.with_suffix(f".{os.getpid()}.tmp")

@@ -20,3 +20,19 @@ def loudness(r: np.ndarray) -> np.ndarray:
 def usual(r: np.ndarray) -> float:
     """Median of the rms of stretches: a few loud ones do not count."""
     return float(np.median(loudness(r))) + 1e-9
+
+
+def memory(r: np.ndarray, most: int = 500) -> float:
+    """Errors that count as one: 1 + 2 sum of the autocorrelation up to where it is lost.
+
+    Source: Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992).
+    """
+    e = r - r.mean()
+    power = float(e @ e) or 1.0
+    total = 1.0
+    for lag in range(1, min(most, len(e) // 4)):
+        rho = float(e[lag:] @ e[:-lag]) / power
+        if rho < 0.05:
+            break
+        total += 2.0 * rho
+    return total

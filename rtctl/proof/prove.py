@@ -67,7 +67,9 @@ def diagnose_all(folder: Path | str, jobs: int = 1, progress: Progress | None = 
 
 
 def score_all(folder: Path | str) -> dict[str, Any]:
-    """Open the seal, score, and write scores.json and report.md. Raises UserError where the seal is broken."""
+    """Open the seal, score, and write scores.json, report.md and its two pictures. Raises UserError where the seal is
+    broken."""
+    from rtctl.proof import figures
     from rtctl.proof.score import score
 
     folder = Path(folder)
@@ -82,6 +84,8 @@ def score_all(folder: Path | str) -> dict[str, Any]:
     result = score(answers, diagnoses, seconds=seconds)
     (folder / SCORES).write_text(json.dumps(result, sort_keys=True, indent=1) + "\n", "utf-8")
     (folder / REPORT).write_text(report.markdown(result, f"Concealed cases, {answers.get('mix')}"), "utf-8")
+    figures.reliability(result, folder / "reliability.png")
+    figures.confusion(result, folder / "confusion.png")
     return result
 
 

@@ -13,8 +13,6 @@ from rtctl.diagnose.record import Record, check, running, through_amplifier
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
-pytestmark = pytest.mark.xdist_group("chain")  # its fixture is dear: once is enough
-
 STEP = 1e-6  # m, of the encoder
 CASE = {
     "format": 1,

@@ -51,5 +51,12 @@ def test_what_has_a_pattern_is_not(what):
     assert not is_hiss(error(3.0 * force + noise(0)) + 0.05 * noise(1), DT, W, 0.05)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_forces_that_come_in_bursts_are_not(seed):
+    """White while they last: their spectrum is that of hiss."""
+    moves = np.sin(2 * np.pi * 0.4 * DT * np.arange(N)) > 0.7
+    assert not is_hiss(error(8.0 * moves * noise(seed)) + 0.3 * noise(seed + 1), DT, W, 0.3)
+
+
 def test_a_record_too_short_for_a_spectrum_says_nothing():
     assert not is_hiss(noise(0)[:500], DT, W, 1.0)
