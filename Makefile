@@ -1,12 +1,13 @@
 # make run    the reel unit under control, against its emulated twin, with a picture at the end
 # make test   the whole test suite
 # make check  lint, format and types
+# make docs   the manual as a web site, build/site/index.html, and the man page
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test check format bench clean
+.PHONY: run test check format docs bench clean
 
 run: $(VENV)/installed
 	$(BIN)/rtctl run configs/ivu.yaml --reference configs/references/steps.yaml --for 12s
@@ -25,6 +26,11 @@ check: $(VENV)/installed-dev
 format: $(VENV)/installed-dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(VENV)/installed-dev
+	$(BIN)/python -m rtctl.manual docs/man/rtctl.1
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo build/site/index.html
 
 bench: $(VENV)/installed-dev
 	$(BIN)/python benchmarks/fused_speed.py

@@ -1,3 +1,68 @@
-"""rtctl: a real-time controller daemon for motion hardware, with an emulated twin."""
+"""rtctl: a real-time controller daemon for motion hardware, with an emulated twin.
+
+What a script needs, under one name each. Every name is loaded when it is first used, so that `import rtctl` is quick.
+
+    import rtctl
+
+    config = rtctl.load_config("ivu", {"law.position.gain": "25 V/rad"})
+    run = rtctl.run(config, 5.0)                 # virtual time, in memory: run["capstan"]
+    bundle = rtctl.record(config, 5.0, "runs/a") # on disk, as `rtctl run` does it
+    found = rtctl.diagnosis("runs/a")            # what the model lacks
+    with rtctl.connect("ivu") as machine:        # one that runs
+        machine.call("setpoint", value=0.5)
+
+Of everything below these names, only what docs/ describes stays as it is from one version to the next.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rtctl.api import change, connect, load_config, record, run, run_campaign, steps
+    from rtctl.config.errors import NoAnswer, UserError
+    from rtctl.daemon.client import Client
+    from rtctl.diagnose.chain import diagnose as diagnosis
+    from rtctl.diagnose.diagnosis import Diagnosis
+    from rtctl.loop.fused import Run
+    from rtctl.trace.bundle import Bundle, load_bundle
+    from rtctl.trace.compare import compare
+    from rtctl.trace.replay import replay
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Bundle", "Client", "Diagnosis", "NoAnswer", "Run", "UserError", "change", "compare", "connect", "diagnosis",
+    "load_bundle", "load_config", "record", "replay", "run", "run_campaign", "steps",
+]  # fmt: skip
+
+_WHERE = {  # name -> module and name there
+    "Bundle": "rtctl.trace.bundle:Bundle",
+    "Client": "rtctl.daemon.client:Client",
+    "Diagnosis": "rtctl.diagnose.diagnosis:Diagnosis",
+    "NoAnswer": "rtctl.config.errors:NoAnswer",
+    "Run": "rtctl.loop.fused:Run",
+    "UserError": "rtctl.config.errors:UserError",
+    "change": "rtctl.api:change",
+    "compare": "rtctl.trace.compare:compare",
+    "connect": "rtctl.api:connect",
+    "diagnosis": "rtctl.diagnose.chain:diagnose",
+    "load_bundle": "rtctl.trace.bundle:load_bundle",
+    "load_config": "rtctl.api:load_config",
+    "record": "rtctl.api:record",
+    "replay": "rtctl.trace.replay:replay",
+    "run": "rtctl.api:run",
+    "run_campaign": "rtctl.api:run_campaign",
+    "steps": "rtctl.api:steps",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _WHERE:
+        raise AttributeError(f"module 'rtctl' has no attribute '{name}'")
+    module, _, there = _WHERE[name].partition(":")
+    value = globals()[name] = getattr(importlib.import_module(module), there)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

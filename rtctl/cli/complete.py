@@ -1,0 +1,117 @@
+"""What the shell offers at TAB: configs, references, keys, faults, terms, and the machines that run."""
+
+import contextlib
+import json
+import os
+from collections.abc import Iterator
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+SOURCES = ("config", "machines", "laws", "loop", "drivers", "plants")  # packages that the words come from
+
+
+def configs(incomplete: str) -> list[str]:
+    """Configs that come with rtctl, and YAML files from here on."""
+    return [*_shipped("", incomplete), *_files(incomplete)]
+
+
+def references(incomplete: str) -> list[str]:
+    """References that come with rtctl, and YAML files from here on."""
+    return [*_shipped("references", incomplete), *_files(incomplete)]
+
+
+def campaigns(incomplete: str) -> list[str]:
+    """Campaigns that come with rtctl, and YAML files from here on."""
+    return [*_shipped("campaigns", incomplete), *_files(incomplete)]
+
+
+def machines(incomplete: str) -> list[str]:
+    """Machines that run here."""
+    from rtctl.cli.common import running
+
+    return [name for name in running() if name.startswith(incomplete)]
+
+
+def keys(incomplete: str) -> list[str]:
+    """Keys of every machine's config, those of items of a list left out."""
+    return _starting("keys", incomplete)
+
+
+def faults(incomplete: str) -> list[str]:
+    """Faults that can be injected."""
+    return _starting("faults", incomplete)
+
+
+def terms(incomplete: str) -> list[str]:
+    """Terms of physics."""
+    return _starting("terms", incomplete)
+
+
+def _shipped(folder: str, incomplete: str) -> list[str]:
+    place = Path(str(resources.files("rtctl.configs"))) / folder
+    return sorted(path.stem for path in place.glob("*.yaml") if path.stem.startswith(incomplete))
+
+
+def _files(incomplete: str) -> list[str]:
+    """YAML files and folders whose path starts so."""
+    head, _, start = incomplete.rpartition("/")
+    folder = Path(head or ("/" if incomplete.startswith("/") else "."))
+    found: list[str] = []
+    with contextlib.suppress(OSError):
+        for entry in sorted(os.scandir(folder), key=lambda e: e.name):
+            if entry.name.startswith(start) and (start.startswith(".") or not entry.name.startswith(".")):
+                path = f"{incomplete[: len(incomplete) - len(start)]}{entry.name}"
+                found += [f"{path}/"] if entry.is_dir() else [path] * path.endswith((".yaml", ".yml"))
+    return found
+
+
+def _starting(kind: str, incomplete: str) -> list[str]:
+    return [word for word in words()[kind] if word.startswith(incomplete)]
+
+
+def words() -> dict[str, list[str]]:
+    """Keys, faults and terms, from a file in the cache: the settings take half a second to import."""
+    from rtctl import __version__
+    from rtctl.config.cache import cache_folder
+
+    file = cache_folder() / f"completion-{__version__}.json"
+    with contextlib.suppress(OSError, ValueError):
+        if file.stat().st_mtime > max(_written()):
+            return dict(json.loads(file.read_text()))
+    found = _collect()
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        draft = file.with_suffix(f".{os.getpid()}.tmp")
+        draft.write_text(json.dumps(found))
+        draft.replace(file)
+    return found
+
+
+def _written() -> Iterator[float]:
+    """When each source that the words come from was written."""
+    for package in SOURCES:
+        found = find_spec(f"rtctl.{package}")  # without importing it
+        for folder in (found.submodule_search_locations or []) if found else []:
+            for path in Path(folder).rglob("*.py"):
+                yield path.stat().st_mtime
+
+
+def _collect() -> dict[str, Any]:
+    from rtctl.config.schema import settings_table
+    from rtctl.loop.faults import KINDS
+    from rtctl.machines import CONFIGS
+    from rtctl.plants.physics import TERMS
+
+    rows = [row for model in CONFIGS.values() for row in settings_table(model) if row.type != "keys"]
+    paths = {_plain(row.path) for row in rows if "[]" not in row.path}
+    return {"keys": sorted(paths), "faults": list(KINDS), "terms": list(TERMS)}
+
+
+def _plain(path: str) -> str:
+    """law.position[pd].gain as it is written: law.position.gain."""
+    while "[" in path:
+        head, _, tail = path.partition("[")
+        path = head + tail.partition("]")[2]
+    return path

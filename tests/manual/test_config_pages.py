@@ -1,0 +1,47 @@
+import pytest
+
+from rtctl.config.schema import settings_table
+from rtctl.machines import CONFIGS
+from rtctl.manual.config_pages import config_pages, parts
+from rtctl.plants.physics import TERMS
+
+PAGES = config_pages()
+
+
+@pytest.mark.parametrize("kind", CONFIGS)
+def test_every_key_is_described(kind):
+    assert [row.path for row in settings_table(CONFIGS[kind]) if not row.help] == []
+
+
+@pytest.mark.parametrize("kind", CONFIGS)
+def test_every_key_is_on_a_page(kind):
+    there = {path: part for part in parts(CONFIGS[kind]) for path in part.paths}
+    text = PAGES["config.md"] + PAGES[f"config_{kind}.md"] + PAGES["config_physics.md"]
+    for row in settings_table(CONFIGS[kind]):
+        if row.type != "keys" and not row.path.startswith("plant.physics[]["):
+            section, _, key = row.path.rpartition(".")
+            assert key in [r.path.rpartition(".")[2] for r in there[section].rows]
+            assert not section or f"`{section}`" in text
+            assert f"| `{key}` |" in text
+
+
+def test_a_row_has_all_that_is_known():
+    line = next(line for line in PAGES["config_ivu.md"].splitlines() if line.startswith("| `tau_d` |"))
+    row = next(row for row in settings_table(CONFIGS["ivu"]) if row.path == "law.position.tau_d")
+    assert [part.strip() for part in line.strip("|").split("|")] == ["`tau_d`", "number", "s", *line.split("|")[4:6],
+        row.help] or row.help in line  # fmt: skip
+
+
+def test_every_term_is_on_its_page():
+    text = PAGES["config_physics.md"]
+    for name, term in TERMS.items():
+        section = text[text.index(f"## {name} ") :].split("\n## ")[0]
+        assert term.equation in section
+        for key, field in term.settings.model_fields.items():
+            if key not in ("term", "node"):
+                assert f"| `{key}` |" in section and field.description
+
+
+def test_parts_that_are_equal_are_one():
+    paths = [part.paths for part in parts(CONFIGS["ivu"])]
+    assert ("sensors.reel1", "sensors.reel2") in paths
