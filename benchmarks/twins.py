@@ -9,10 +9,9 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.cli.common import load_config, with_loop, with_reference
-from rtctl.loop import generate
+from rtctl.loop import fused, generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
-from rtctl.loop.records import layout
 from rtctl.plants import ivu, ldu, linear
 
 HERE = Path(__file__).parent
@@ -33,8 +32,7 @@ class Ours:
     def __init__(self, machine: machines.Machine):
         self.machine, self.made = machine, generate.generate(machine, "shm")
         length = max(int(machine.config.record.seconds * machine.rate), 1000)  # of the ring, as the supervisor makes it
-        records = layout(self.made.params, self.made.tables, self.made.row, length)
-        self.segment: dict[str, Any] = {name: np.zeros(count, dtype) for name, (dtype, count) in records.items()}
+        self.segment = fused.segment(self.made, length)
         self.rows = self.segment["rows"]
         self.reset()
         self.loop.warm()
@@ -44,10 +42,9 @@ class Ours:
         for name, array in self.segment.items():
             if name != "rows":
                 array[...] = np.zeros((), array.dtype)
-        generate.fill(self.segment["mailbox"][0]["params"], self.machine.diagram.blocks)
-        generate.fill_tables(self.segment["tables"][0], (self.machine.reference, self.machine.excitation))
-        Mailbox(self.segment).post(_arm_and_play)  # type: ignore[arg-type]
-        self.loop = Loop(self.machine, self.made, self.segment, self.segment["outputs"], self.segment["inputs"])  # type: ignore[arg-type]
+        generate.prepare(self.segment, self.machine)
+        Mailbox(self.segment).post(_arm_and_play)
+        self.loop = Loop(self.machine, self.made, self.segment, self.segment["outputs"], self.segment["inputs"])
 
     def run(self, ticks: int) -> None:
         """Run from rest."""

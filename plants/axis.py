@@ -24,6 +24,8 @@ NQ, NU, NX = 1, 1, 2
 
 
 class AxisParameters(Settings):
+    """What the axis weighs, and what holds it back."""
+
     M: float = quantity(95.1, unit="kg", gt=0, help="moving mass seen at the carriage")
     K: float = quantity(35.15, unit="N/V", gt=0, help="force per volt of command")
     F_v: float = quantity(203.5, unit="N*s/m", ge=0, help="viscous friction")

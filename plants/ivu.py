@@ -21,6 +21,7 @@ the simulation set has J_m twice too small for its own process gain; its 250 Hz 
 from typing import Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
@@ -78,7 +79,9 @@ SETS = {
 
 class IvuSettings(Settings):
     kind: Literal["ivu"] = "ivu"
-    set: Literal["identified", "simulation"] = "identified"
+    set: Literal["identified", "simulation"] = Field(
+        default="identified", description="parameters where none are given: chapter 8, or chapter 6"
+    )
     parameters: IvuParameters = IvuParameters()
 
 

@@ -18,6 +18,7 @@ the break-away voltages of 12.6.
 from typing import Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
@@ -67,7 +68,9 @@ SETS = {
 
 class LduSettings(Settings):
     kind: Literal["ldu"] = "ldu"
-    set: Literal["figure_12_2", "appendix_f"] = "figure_12_2"
+    set: Literal["figure_12_2", "appendix_f"] = Field(
+        default="figure_12_2", description="parameters where none are given"
+    )
     parameters: LduParameters = LduParameters()
 
 

@@ -3,6 +3,7 @@
 import itertools
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from hypothesis import settings
 
 from rtctl import machines
 from rtctl.config.errors import NoAnswer, UserError
@@ -23,15 +25,22 @@ from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
 from rtctl.trace.replay import replay
 
+sys.path.insert(0, str(Path(__file__).parent))  # for served.py, under importlib mode
 CONFIGS = Path(__file__).parents[1] / "configs"
 number = itertools.count(1)
+settings.register_profile("any machine", deadline=None)  # no test is wrong because it was slow
+settings.load_profile("any machine")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests on the wall clock one at a time: two FIFO loops on one CPU would judge each other."""
+    """Which tests go to one worker: those on the wall clock, since two FIFO loops on one CPU would judge each other;
+    and those of a file that share a fixture, since it is dear and once is enough."""
     for item in items:
+        fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.xdist_group("realtime"))
+        elif any(found[-1].scope == "module" for found in fixtures):
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -119,3 +128,35 @@ def bench(tmp_path: Path) -> Callable[..., Bench]:
         return Bench(config, tmp_path, rows)
 
     return make
+
+
+@pytest.fixture(scope="module")
+def served(runtime: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Any]]:
+    """`served(config)` is a Bench whose command socket answers; its name is that of the config."""
+    from served import Served
+
+    from rtctl.daemon.server import default_endpoint
+
+    made = []
+
+    def make(config: Any, rows: int = 20_000) -> Any:
+        machine = Bench(config, tmp_path_factory.mktemp("served"), rows)
+        made.append(Served(machine, default_endpoint(config.name, "command")))
+        return made[-1]
+
+    yield make
+    for machine in made:
+        machine.close()
+
+
+@pytest.fixture
+def library() -> Iterator[None]:
+    """The library of terms as it was: an own term stays in it for as long as a process lives."""
+    from rtctl.own.term import registered
+    from rtctl.plants.physics import TERMS
+
+    before = dict(TERMS)
+    yield
+    TERMS.clear()
+    TERMS.update(before)
+    registered.clear()

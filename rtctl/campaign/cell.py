@@ -13,10 +13,8 @@ from rtctl import machines
 from rtctl.campaign.metrics import measure
 from rtctl.campaign.plan import Plan
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.loop import generate, safety
+from rtctl.loop import fused, generate, safety
 from rtctl.loop.fused import Run
-from rtctl.loop.loop import Loop
-from rtctl.loop.records import layout
 from rtctl.machines import Machine
 
 _made: dict[Any, generate.Generated] = {}
@@ -54,21 +52,7 @@ def _trouble(run: Run) -> str:
 def play(plan: Plan, number: int) -> Run:
     """Run it. Raises UserError and ValueError where its settings do not fit."""
     machine = machines.build(plan.config(number))
-    return fresh(machine, plan.ticks(machine))
-
-
-def fresh(machine: Machine, ticks: int) -> Run:
-    """As `rtctl.loop.fused.run`, with the module of a machine of the same structure where there is one."""
-    made = structure(machine)
-    segment: Any = {
-        name: np.zeros(count, dtype)
-        for name, (dtype, count) in layout(made.params, made.tables, made.row, ticks).items()
-    }
-    loop = Loop(machine, made, segment, segment["outputs"], segment["inputs"])
-    generate.fill_tables(segment["tables"][0], (machine.reference, machine.excitation))
-    loop.c["arm"] = loop.c["play"] = loop.c["order"] = 1  # an order as of a person, so that a bundle can be replayed
-    loop.stretch(0, ticks)
-    return Run(segment["rows"], loop)
+    return fused.play(machine, structure(machine), plan.ticks(machine))
 
 
 def structure(machine: Machine) -> generate.Generated:

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rtctl.campaign.metrics import ERROR, METRICS, POSITION
+from rtctl.campaign.metrics import ERROR, METRICS
 from rtctl.loop import safety
 from rtctl.loop.fused import Run
+from rtctl.trace.metrics import POSITION
 
 INK, BLUE, RED, GREY, GREEN = "#222222", "#0b62a8", "#b3262e", "#8a8f98", "#2e8b57"
 POINTS = 1200  # of a line

@@ -7,8 +7,8 @@ import numpy as np
 
 from rtctl.loop import safety
 from rtctl.loop.fused import Run
-from rtctl.machines import MODULES, Machine
-from rtctl.trace.metrics import step_metrics
+from rtctl.machines import Machine
+from rtctl.trace.metrics import POSITION, machine_steps
 
 
 class Metric(NamedTuple):
@@ -30,7 +30,6 @@ METRICS: dict[str, Metric] = {
     "peak_output_V": Metric("largest voltage written to a drive", "V", 1),
     "trip_s": Metric("controller clock at the trip; none for no trip", "s", -1),
 }
-POSITION = {"ivu": "capstan", "ldu": "position", "axis": "x"}
 ERROR = {"ivu": "capstan_error", "ldu": "position_error", "axis": "position_error"}
 TRUTH = {"ivu": "truth_capstan", "ldu": "truth_x", "axis": "truth_x"}
 OUTPUTS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
@@ -55,9 +54,7 @@ def measure(run: Run, machine: Machine, wanted: Iterable[str] = METRICS) -> dict
 
 
 def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    mm, floor = 1000.0 * machine.metres_per_unit, MODULES[machine.kind].SETTLE_FLOOR
-    t, target = rows["t"], rows["target"]
-    steps = step_metrics(t, target, rows[POSITION[machine.kind]], mm, None, settle_floor=floor)
+    steps = machine_steps(machine, rows["t"], rows["target"], rows[POSITION[machine.kind]])
     if not steps:
         return {}
     settling = [_number(s["settling_s"]) for s in steps]
@@ -68,7 +65,7 @@ def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
     }
     truth = TRUTH[machine.kind]
     if truth in (rows.dtype.names or ()):
-        true = step_metrics(t, target, rows[truth], mm, None, settle_floor=floor)
+        true = machine_steps(machine, rows["t"], rows["target"], rows[truth])
         found["true_final_error_mm"] = _largest(true, "final_error_mm")
     return found
 

@@ -101,7 +101,7 @@ class Plan:
         """Settings that runs start from."""
         if name not in self._bases:
             data = self.payload["bases"][name]
-            self._bases[name] = machines.CONFIGS[data["machine"]].model_validate(data)
+            self._bases[name] = machines.settings(data)
         return self._bases[name]
 
     def ticks(self, machine: Any) -> int:

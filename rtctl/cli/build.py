@@ -52,7 +52,10 @@ def _entries(settings: Any) -> tuple[str, ...]:
     mode = settings.loop.mode
     if mode == "fused":
         return ("run_fused",)
-    return (f"run_{mode}", f"plant_{mode}") if settings.link.spawns else (f"run_{mode}",)
+    from rtctl.machines import emulated
+
+    ours = settings.link.spawns and emulated(settings)
+    return (f"run_{mode}", f"plant_{mode}") if ours else (f"run_{mode}",)
 
 
 def _compile(machine: Any, link: str) -> None:

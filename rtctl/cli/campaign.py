@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rtctl.cli import common
+from rtctl.cli import common, complete
 from rtctl.cli.common import JsonOption
 from rtctl.cli.progress import progress
 
@@ -24,6 +24,7 @@ def run(
         typer.Argument(
             metavar="FILE",
             help="Campaign file, one that comes with rtctl (radii_10000), or a machine's config: one run.",
+            autocompletion=complete.campaigns,
         ),
     ],
     jobs: Annotated[

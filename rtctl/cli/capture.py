@@ -57,6 +57,7 @@ def capture(
 def _wait(client: Any, state: dict[str, Any]) -> dict[str, Any]:
     """The state of the capture when it is done, or ended by Ctrl-C."""
     from rtctl.config.errors import UserError
+    from rtctl.daemon.client import listens
 
     try:
         while not state["done"]:
@@ -65,7 +66,7 @@ def _wait(client: Any, state: dict[str, Any]) -> dict[str, Any]:
     except KeyboardInterrupt:
         return {**client.call("capture_stop", id=state["id"]), "interrupted": True}
     except UserError as error:
-        if common.listens(client.endpoint):
+        if listens(client.endpoint):
             raise
         raise UserError(f"the daemon ended; what was captured until then is in {state['bundle']}") from error
     return state

@@ -9,14 +9,25 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+from rtctl.cli import complete
 from rtctl.config.errors import UserError, nearest
 
 ConfigArgument = Annotated[
-    str, typer.Argument(metavar="CONFIG", help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis.")
+    str,
+    typer.Argument(
+        metavar="CONFIG",
+        help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis.",
+        autocompletion=complete.configs,
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change one key, e.g. law.position.gain=20. Repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change one key, e.g. law.position.gain=20. Repeatable.",
+        autocompletion=complete.keys,
+    ),
 ]
 ModeOption = Annotated[
     str | None, typer.Option("--mode", metavar="MODE", help="real, lockstep or fused; as in the config if absent.")
@@ -30,6 +41,7 @@ ReferenceOption = Annotated[
         "--reference",
         metavar="FILE",
         help="Reference to play: a file, or one that comes with rtctl: steps.",
+        autocompletion=complete.references,
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
@@ -40,6 +52,7 @@ NameOption = Annotated[
         "-n",
         metavar="NAME",
         help="The machine's `name` or its endpoint, where several run.",
+        autocompletion=complete.machines,
     ),
 ]
 
@@ -81,7 +94,7 @@ def load_config(path: str, overrides: list[str] | None) -> Any:
             f"{where}: machine: " + (f"'{kind}' is not one of {known}" if kind else f"missing; it is one of {known}")
             + (f"; did you mean '{near}'?" if near else "")
         )  # fmt: skip
-    return load_settings(file, machines.CONFIGS[kind], overrides or [])
+    return load_settings(file, machines.CONFIGS[kind], overrides or [], machines.OWN)
 
 
 def with_reference(config: Any, path: str | None) -> Any:
@@ -113,9 +126,12 @@ def with_loop(config: Any, mode: str | None, link: str | None) -> Any:
 def machine_of(config: Any) -> Any:
     """The machine of a config, not compiled. Raises UserError where its settings contradict each other."""
     from rtctl import machines
+    from rtctl.own.files import OwnError
 
     try:
         return machines.build(config)
+    except OwnError as error:
+        raise UserError(str(error)) from error
     except ValueError as error:
         raise UserError(f"{config.name}: {error}") from error
 
@@ -174,31 +190,11 @@ def client(name: str | None) -> Any:
 
 def running() -> list[str]:
     """Names of the machines whose command socket somebody listens on."""
+    from rtctl.daemon.client import listens
     from rtctl.daemon.server import SYSTEM_DIR, runtime_dir
 
     files = [path for folder in {runtime_dir(), SYSTEM_DIR} if folder.is_dir() for path in folder.glob("*.command")]
     return sorted({path.name.removesuffix(".command") for path in files if listens(f"ipc://{path}")})
-
-
-def listens(endpoint: str) -> bool:
-    """Whether somebody listens at an ipc or tcp endpoint, be it as busy as it may."""
-    import socket
-
-    family: Any = socket.AF_UNIX
-    address: Any = endpoint.removeprefix("ipc://")
-    if endpoint.startswith("tcp://"):
-        host, _, port = endpoint.removeprefix("tcp://").rpartition(":")
-        host = host.strip("[]")
-        family, address = (socket.AF_INET6 if ":" in host else socket.AF_INET), (host, int(port))
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.settimeout(1.0)
-        try:
-            probe.connect(address)
-        except PermissionError:
-            return True  # somebody else's
-        except OSError:
-            return False
-        return True
 
 
 def print_json(value: Any) -> None:

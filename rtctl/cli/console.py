@@ -1,25 +1,22 @@
-"""What `rtctl run` shows: a live line while it runs and a short report after."""
+"""What `rtctl run` shows: a panel while it runs, lines where there is no terminal, and a short report after."""
 
 import contextlib
+import sys
 import time
 from collections.abc import Iterator
 from typing import Any
 
 from rich.console import Console
-from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from rtctl.loop import safety
-from rtctl.loop.histogram import percentiles
+from rtctl.terminal.panel import Panel
+from rtctl.terminal.screen import Screen, takes_pictures
+from rtctl.terminal.traces import Traces
+from rtctl.terminal.view import plain
 
-REFRESH = 0.1  # s
-POSITION = {
-    "ivu": ("capstan", "capstan_error", "rad"),
-    "ldu": ("position", "position_error", "m"),
-    "axis": ("x", "position_error", "m"),
-}
-COLOUR = {"idle": "dim", "armed": "yellow", "running": "green", "tripped": "bold red"}
+REFRESH = 0.25  # s between two pictures
+LINE = 2.0  # s between two lines where there is no terminal
 
 
 class RunConsole:
@@ -28,87 +25,98 @@ class RunConsole:
     def __init__(self, quiet: bool):
         self.console = Console(stderr=True)
         self.quiet = quiet
-        self._live: Live | None = None
+        self._screen: Screen | None = None
+        self._traces: Traces | None = None
         self._last = 0.0
+
+    @property
+    def log(self) -> Any:
+        """The file for log lines: standard error, or above the panel while there is one."""
+        return self._screen or sys.stderr
 
     def say(self, message: str) -> None:
         """One line for the person at the terminal."""
-        (self._live.console if self._live else self.console).print(f"[dim]{message}[/dim]", highlight=False)
+        line = Text(message, "dim")
+        if self._screen:
+            self._screen.say(line)
+        else:
+            self.console.print(line, highlight=False, soft_wrap=True)
 
     @contextlib.contextmanager
-    def live(self, session: Any) -> Iterator[None]:
-        """A status line that refreshes in place, where there is a terminal."""
-        if self.quiet or not self.console.is_terminal:
+    def live(self) -> Iterator[None]:
+        """A panel that is drawn anew in place, where there is a terminal."""
+        if self.quiet or not takes_pictures(self.console):
             yield
             return
-        with Live(Text("starting ..."), console=self.console, refresh_per_second=10, transient=True) as live:
-            self._live = live
+        with Screen(self.console, Text("starting ...")) as screen:
+            self._screen = screen
             try:
                 yield
             finally:
-                self._live = None
+                self._screen = None
 
     def update(self, supervisor: Any) -> None:
         """Called at every turn of the supervisor."""
         now = time.monotonic()
-        if self.quiet or now - self._last < (REFRESH if self._live else 2.0) or supervisor.last_row is None:
+        if self.quiet or now - self._last < (REFRESH if self._screen else LINE) or supervisor.last_row is None:
             return
         self._last = now
-        line = status_line(supervisor)
-        if self._live:
-            self._live.update(line)
-        elif not self.console.is_terminal:
-            self.console.print(line)
+        status = supervisor.report()
+        left = supervisor.ticks / supervisor.machine.rate - status["signals"]["t"] if supervisor.ticks else None
+        if self._traces is None:
+            self._traces = Traces(supervisor.signals())
+        if self._screen:
+            self._traces.update(status["signals"])
+            law = supervisor.config.law.model_dump(mode="json")
+            self._screen.show(Panel(status, law, self._traces, left))
+        else:
+            self.console.print(plain(status, self._traces.units, left), highlight=False, markup=False, soft_wrap=True)
 
     def report(self, result: dict[str, Any]) -> None:
         """What came of the run."""
-        console = self.console
-        late = result["lateness_us"]
-        console.print(
-            f"[bold]{result['name']}[/bold]  {result['ticks']} ticks at {result['rate_hz']:g} Hz, {result['mode']}"
-            f"{'' if result['mode'] == 'fused' else ' over ' + result['link']}: "
-            f"{result['missed']} missed, {result['late']} late"
-            + (f", lateness p50 {late['p50']:.0f} p99.9 {late['p999']:.0f} us" if result["mode"] == "real" else "")
-        )
+        console, late = self.console, result["lateness_us"]
+        link = "" if result["mode"] == "fused" else f" over {result['link']}"
+        told = Text().append(result["name"], "bold")
+        told.append(f"  {result['ticks']} ticks at {result['rate_hz']:g} Hz, {result['mode']}{link}: ")
+        told.append(f"{result['missed']} missed", "bold red" if result["missed"] else "")
+        told.append(f", {result['late']} late")
+        if result["mode"] == "real":
+            told.append(f", lateness p50 {late['p50']:.0f} p99.9 {late['p999']:.0f} max {late['max']:.0f} us")
+        console.print(told)
         if result["steps"]:
-            console.print(steps_table(result["steps"]))
+            console.print(steps_table(result["steps"], console.width))
         if result["trip"]:
-            console.print(f"[bold red]tripped at tick {result['trip']['tick']}: {result['trip']['why']}[/bold red]")
-        lost = result["rows"].get("lost", 0)
+            console.print(Text(f"tripped at tick {result['trip']['tick']}: {result['trip']['why']}", "bold red"))
+        elif result["interrupted"]:
+            console.print("ended by Ctrl-C or SIGTERM, outputs at zero")
+        rows = result["rows"]
+        lost = rows.get("lost", 0) + rows["lost_in_ring"]
         if lost:
-            console.print(f"[red]{lost} rows were lost; the bundle's case.json says which[/red]")
+            console.print(Text(f"{lost} rows were lost; the bundle's case.json says which", "red"))
+        if rows.get("error"):
+            console.print(Text(f"recording stopped: {rows['error']}", "red"))
         for what in ("bundle", "plot"):
             if result.get(what):
-                console.print(f"{what:7}{result[what]}", highlight=False, soft_wrap=True)
+                console.print(f"{what:7}{result[what]}", highlight=False, markup=False, soft_wrap=True)
 
 
-def status_line(supervisor: Any) -> Text:
-    """Rate, state, missed ticks, lateness, position, error, tension."""
-    row, status = supervisor.last_row, supervisor.status
-    state = safety.STATES[int(status["state"])]
-    position, error, unit = POSITION[supervisor.machine.kind]
-    scale, shown = (1.0, "rad") if unit == "rad" else (1000.0, "mm")
-    line = Text()
-    line.append(f"{row['t']:7.1f} s ", "dim")
-    line.append(f" {state} ", COLOUR[state])
-    line.append(f" {supervisor.machine.rate:g} Hz  missed {int(status['missed'])}")
-    if supervisor.config.loop.mode == "real":
-        line.append(f"  late p99.9 {percentiles(status['lateness'])['p999']:.0f} us")
-    line.append(f"  {row[position] * scale:+.4f} {shown}  error {row[error] * scale:+.4f}")
-    if supervisor.machine.kind == "ivu":
-        line.append(f"  tension {row['tension1_estimate']:+.2f} {row['tension2_estimate']:+.2f} N")
-    if state == "tripped":
-        line.append(f"  {safety.TRIPS[int(status['trip'])][0]}", "bold red")
-    return line
+STEP_COLUMNS = {  # heading -> how much it matters; the least goes first where there is little room
+    "t \\[s]": 0, "size": 3, "final error \\[rad]": 4, "\\[mm]": 1, "overshoot \\[%]": 5, "settling \\[s]": 2,
+}  # fmt: skip
 
 
-def steps_table(steps: list[dict[str, Any]]) -> Table:
-    """One row a step."""
+def steps_table(steps: list[dict[str, Any]], width: int) -> Table:
+    """One row a step, in columns that fit into `width` cells."""
+    kept = sorted(STEP_COLUMNS, key=STEP_COLUMNS.__getitem__)
+    while sum(max(len(name) - name.count("\\"), 7) + 2 for name in kept) > width + 2 and len(kept) > 1:
+        kept.pop()
+    chosen = [n for n, name in enumerate(STEP_COLUMNS) if name in kept]
     table = Table(box=None, pad_edge=False)
-    for name in ("t [s]", "size", "final error [rad]", "[mm]", "overshoot [%]", "settling [s]"):
-        table.add_column(name.replace("[", "\\["), justify="right")
+    names = list(STEP_COLUMNS)
+    for n in chosen:
+        table.add_column("final \\[mm]" if names[n] == "\\[mm]" and n - 1 not in chosen else names[n], justify="right")
     for s in steps:
-        table.add_row(
+        cells = (
             f"{s['t']:.2f}",
             f"{s['size']:+.4g}",
             f"{s['final_error_rad']:+.2e}",
@@ -116,4 +124,5 @@ def steps_table(steps: list[dict[str, Any]]) -> Table:
             f"{s['overshoot_pct']:.1f}",
             "-" if s["settling_s"] is None else f"{s['settling_s']:.2f}",
         )
+        table.add_row(*(cells[n] for n in chosen))
     return table

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from rtctl.cli import common
-from rtctl.cli.common import JsonOption
+from rtctl.cli.common import JsonOption, SetOption
 
 app = typer.Typer(add_completion=False)
 RATES = (500.0, 10_000.0)
@@ -39,6 +39,11 @@ def doctor(
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the latency histograms here.")
     ] = None,
+    board: Annotated[
+        str | None,
+        typer.Option("--board", metavar="CONFIG", help="Check the wiring of this config's real board instead."),
+    ] = None,
+    set_: SetOption = None,
     json: JsonOption = False,
 ) -> None:
     """Look at kernel, rights and CPUs, measure how late an empty loop wakes, beside cyclictest where that is
@@ -51,6 +56,11 @@ def doctor(
       rtctl doctor --need 10000 --seconds 60 --json
 
       rtctl doctor --no-measure
+
+      rtctl doctor --board ivu --set 'driver={kind: comedi, device: /dev/comedi0}'
+
+    With --board it asks you to turn and push things by hand, with all outputs off, and exits with 1 where something is
+    wired wrong. Without a terminal, or with --json, it only reads what needs nobody.
     """
     from rich.console import Console
 
@@ -58,6 +68,14 @@ def doctor(
     from rtctl.doctor import console, cpus, facts, report, rights, virtual
     from rtctl.doctor.finding import Tree
 
+    if board is not None:
+        for option, given in (("--need", need), ("--plot", plot), ("--rate", rate)):
+            if given:
+                raise UserError(f"{option} measures the machine, --board checks wires; give one of them")
+        check_wires(board, set_, json)
+        return
+    if set_:
+        raise UserError("--set changes a config; it needs --board CONFIG")
     rates = check(rate, need, measure, plot)
     tree = Tree()
     where = cpus.loop_cpu(tree) if cpu is None else cpu
@@ -108,3 +126,36 @@ def check(rates: list[float] | None, need: float | None, measure: bool, plot: Pa
     if plot is not None and not plot.parent.is_dir():
         raise UserError(f"--plot {plot}: there is no folder {plot.parent}")
     return sorted({*(rates or RATES), *((need,) if need is not None else ())})
+
+
+def check_wires(path: str, overrides: list[str] | None, json: bool) -> None:
+    """Walk through the wiring checks of a config's board; exit code 1 where one is bad."""
+    import sys
+
+    from rich.console import Console
+
+    from rtctl.config.errors import UserError
+    from rtctl.doctor import board
+    from rtctl.doctor.board_console import Terminal, tell
+    from rtctl.drivers.board import BoardError
+
+    config = common.load_config(path, overrides)
+    if config.name in common.running():
+        raise UserError(f"--board: {config.name} runs here and holds the card; `rtctl stop` it first")
+    card = board.card_of(config)
+    console = Console(stderr=json)
+    person = Terminal(console) if sys.stdin.isatty() and sys.stdout.isatty() and not json else None
+    try:
+        card.open()
+        if not json:
+            console.print("All outputs are off and stay off.")
+        found = board.run(config, card, person, (lambda _: None) if json else (lambda f: tell(console, f)))
+    except BoardError as error:
+        raise UserError(f"--board: {error}; the outputs are off") from error
+    finally:
+        card.close()
+    bad = [f.name for f in found if f.verdict == "bad"]
+    if json:
+        common.print_json({"card": card.name, "checks": [f._asdict() for f in found], "bad": bad})
+    if bad:
+        raise typer.Exit(1)

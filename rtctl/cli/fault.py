@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rtctl.cli import common
+from rtctl.cli import common, complete
 from rtctl.cli.common import JsonOption, NameOption
 
 app = typer.Typer(
@@ -15,7 +15,12 @@ app = typer.Typer(
 
 @app.command()
 def add(
-    fault: Annotated[str, typer.Argument(metavar="FAULT", help="Its name; `rtctl fault list` has them all.")],
+    fault: Annotated[
+        str,
+        typer.Argument(
+            metavar="FAULT", help="Its name; `rtctl fault list` has them all.", autocompletion=complete.faults
+        ),
+    ],
     at: Annotated[str | None, typer.Option("--at", metavar="T", help="When, from now on; at once if absent.")] = None,
     lasts: Annotated[str | None, typer.Option("--for", metavar="T", help="How long; until cleared if absent.")] = None,
     channel: Annotated[int, typer.Option("--channel", metavar="N", help="Counter, analog input or output.")] = 0,

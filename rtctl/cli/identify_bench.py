@@ -21,7 +21,7 @@ MARGIN = 6e-3  # m, that a printed image is longer than what is analysed
 def friction(
     source: SourceArgument,
     set_: SetOption = None,
-    turns: Annotated[float, typer.Option(min=1, help="Turns of the capstan to average over.")] = 12,
+    turns: Annotated[float, typer.Option(metavar="N", min=1, help="Turns of the capstan to average over.")] = 12,
     speeds: Annotated[
         str | None, typer.Option("--speeds", metavar="LIST", help="rad/s of the capstan, e.g. 0.2,1,4; the usual ones.")
     ] = None,
@@ -80,7 +80,9 @@ def friction(
 def radius(
     source: SourceArgument,
     set_: SetOption = None,
-    travel: Annotated[float, typer.Option(min=0.2, help="rad of the capstan that a way takes at least.")] = 1.9,
+    travel: Annotated[
+        float, typer.Option(metavar="RAD", min=0.2, help="rad of the capstan that a way takes at least.")
+    ] = 1.9,
     out: OutOption = None,
     json: JsonOption = False,
     plot: PlotOption = None,

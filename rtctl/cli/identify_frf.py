@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False)
 ROWS = 12  # lines of a response in a table
 
-MotorOption = Annotated[int, typer.Option("--motor", min=1, max=2, help="Reel unit: the motor that is excited.")]
+MotorOption = Annotated[
+    int, typer.Option("--motor", metavar="N", min=1, max=2, help="Reel unit: the motor that is excited.")
+]
 RmsOption = Annotated[str | None, typer.Option("--rms", metavar="V", help="Size of the excitation, e.g. 0.5V.")]
 SpeedOption = Annotated[str | None, typer.Option("--speed", metavar="V", help="Constant speed, e.g. 2rad/s or 5mm/s.")]
 BandOption = Annotated[
@@ -33,7 +35,7 @@ KeepOption = Annotated[bool, typer.Option("--keep-law", help="Play with the conf
 def frf(
     source: SourceArgument,
     set_: SetOption = None,
-    averages: Annotated[int, typer.Option(min=8, help="Windows of 4.096 s, half overlapping.")] = 50,
+    averages: Annotated[int, typer.Option(metavar="N", min=8, help="Windows of 4.096 s, half overlapping.")] = 50,
     motor: MotorOption = 1,
     rms: RmsOption = None,
     speed: SpeedOption = None,
@@ -81,8 +83,10 @@ def frf(
 def multisine(
     source: SourceArgument,
     set_: SetOption = None,
-    realisations: Annotated[int, typer.Option(min=2, help="Runs, each with other phases.")] = 4,
-    periods: Annotated[int, typer.Option(min=2, help="Periods in a stretch, beside one for the transient.")] = 4,
+    realisations: Annotated[int, typer.Option(metavar="N", min=2, help="Runs, each with other phases.")] = 4,
+    periods: Annotated[
+        int, typer.Option(metavar="N", min=2, help="Periods in a stretch, beside one for the transient.")
+    ] = 4,
     motor: MotorOption = 1,
     rms: RmsOption = None,
     speed: SpeedOption = None,
@@ -138,7 +142,7 @@ def fit(
         typer.Option("--free", metavar="NAME", help="Parameter to fit, e.g. J_m or c1. Repeatable; the usual ones."),
     ] = None,
     both: Annotated[bool, typer.Option("--both", help="Reel unit, of a CONFIG: excite either motor.")] = False,
-    realisations: Annotated[int, typer.Option(min=2, help="Runs, each with other phases.")] = 4,
+    realisations: Annotated[int, typer.Option(metavar="N", min=2, help="Runs, each with other phases.")] = 4,
     motor: MotorOption = 1,
     rms: RmsOption = None,
     band: BandOption = None,

@@ -94,7 +94,10 @@ def records(
             if given:
                 raise UserError(f"{option} goes with a CONFIG, not with recordings")
         return take_all(load(words))
+    from rtctl.own import files
+
     config = common.load_config(words[0], set_)
+    files.refuse_plant(config, "rtctl identify")
     return take_all(play(config, plan(config), out, say_on_stderr(json)))
 
 

@@ -7,6 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from rtctl.cli import complete
+
 app = typer.Typer(add_completion=False)
 WIDTH = 100
 SCALES = {  # what a typical size is a multiple of
@@ -25,7 +27,9 @@ SCALES = {  # what a typical size is a multiple of
 
 @app.command()
 def physics(
-    term: Annotated[str | None, typer.Argument(metavar="[TERM]", help="Explain this one.")] = None,
+    term: Annotated[
+        str | None, typer.Argument(metavar="[TERM]", help="Explain this one.", autocompletion=complete.terms)
+    ] = None,
     plot: Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="Draw the term here as well.")] = None,
 ) -> None:
     """List the terms of physics, or explain one: equation, parameters, where it can stand, what it is mistaken for, and

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rtctl.cli import common
+from rtctl.cli import common, complete
 from rtctl.cli.common import ModeOption, SetOption
 
 app = typer.Typer(add_completion=False)
@@ -15,7 +15,11 @@ app = typer.Typer(add_completion=False)
 def plant(
     config: Annotated[
         str | None,
-        typer.Argument(metavar="CONFIG", help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis."),
+        typer.Argument(
+            metavar="CONFIG",
+            help="Config file, or the name of one that comes with rtctl: ivu, ldu, axis.",
+            autocompletion=complete.configs,
+        ),
     ] = None,
     endpoint: Annotated[
         str | None,
@@ -36,7 +40,7 @@ def plant(
         Path | None, typer.Option(metavar="FILE", help="Check a seal, print what was hidden, and stop.")
     ] = None,
 ) -> None:
-    """Emulate a machine until Ctrl-C.
+    """Emulate a machine until Ctrl-C, or serve the real board or the FMU that the config names.
 
     The loop that drives it has `link: {plant: external, endpoint: ...}` in its config. With --conceal the machine has
     one more effect than its config says; the loop and its recording do not learn which.
@@ -64,16 +68,21 @@ def plant(
     if settings.loop.mode == "fused":
         raise UserError("a fused run has its plant inside; use --mode real or --mode lockstep")
     machine = common.machine_of(settings)
+    from rtctl.machines import emulated
+
+    if conceal is not None and not emulated(settings):
+        raise UserError("--conceal: an effect is hidden in the emulator; this plant is a real board or an FMU")
     if conceal is not None and seal is not None:
         machine = _hide(settings, conceal, seal)
 
     from rtctl.daemon.notify import from_environment
     from rtctl.daemon.plant_process import alone
     from rtctl.daemon.server import runtime_dir
+    from rtctl.drivers.board import BoardError
     from rtctl.loop import generate
 
     where = endpoint or settings.link.endpoint or f"ipc://{runtime_dir() / f'{settings.name}.plant'}"
-    if not generate.is_warm(generate.write(machine, "zmq"), f"plant_{settings.loop.mode}"):
+    if emulated(settings) and not generate.is_warm(generate.write(machine, "zmq"), f"plant_{settings.loop.mode}"):
         typer.echo("compiling the plant, once for this config structure ...", err=True)
     service = from_environment()
 
@@ -81,7 +90,11 @@ def plant(
         typer.echo(f"{settings.name}: plant listens at {where}")
         service.ready(f"listens at {where}")
 
-    alone(machine, where, announce)
+    try:
+        alone(machine, where, announce)
+    except BoardError as error:
+        typer.echo(f"rtctl: {error}; its outputs are off", err=True)
+        raise typer.Exit(1) from error
     service.stopping()
 
 

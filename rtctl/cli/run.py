@@ -39,13 +39,9 @@ def run(
 
       rtctl run ivu.yaml --set law.position.gain=20 --set radius.source=measured
     """
-    import sys
-
     import structlog
 
     from rtctl.daemon.session import Session
-
-    structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(sys.stderr))  # standard output is the JSON's
 
     def read() -> Any:
         settings = common.load_config(config, set_)
@@ -55,8 +51,9 @@ def run(
     length = common.seconds(duration, "--for")
     folder = out if out is not None else common.default_folder(settings.name)
     console = _console(json)
+    structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # standard output is the JSON's
     session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
-    with console.live(session):
+    with console.live():
         result = session.run(console.update)
     if plot:
         result["plot"] = session.draw()

@@ -4,11 +4,16 @@ from typing import Annotated
 
 import typer
 
-from rtctl.cli import common
+from rtctl.cli import common, complete
 from rtctl.cli.common import JsonOption, NameOption, SignedCommand
 
 app = typer.Typer(add_completion=False)
-PathArgument = Annotated[str, typer.Argument(metavar="PATH", help="Dotted path in the config, e.g. law.position.gain.")]
+PathArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="PATH", help="Dotted path in the config, e.g. law.position.gain.", autocompletion=complete.keys
+    ),
+]
 
 
 @app.command("get")

@@ -9,36 +9,55 @@ from rtctl.cli import common
 from rtctl.cli.common import JsonOption, NameOption
 
 app = typer.Typer(add_completion=False)
-REFRESH = 0.25  # s
+EVERY = 0.25  # s between two pictures or JSON lines
+EVERY_LINE = 1.0  # s between two lines where there is no terminal
 SIGNALS = (  # those that the machine has are shown
     *("ref", "capstan", "capstan_error", "position", "x", "position_error"),
     *("tension1_estimate", "tension2_estimate"),
 )
-COLOUR = {"idle": "dim", "armed": "yellow", "running": "green", "tripped": "bold red"}
 
 
 @app.command()
 def status(
     json: JsonOption = False,
     watch: Annotated[bool, typer.Option("--watch", "-w", help="Keep showing it until Ctrl-C.")] = False,
+    every: Annotated[
+        str | None, typer.Option(metavar="T", help="Time between two looks with --watch; 250ms, to a pipe 1s.")
+    ] = None,
     name: NameOption = None,
 ) -> None:
     """Show state, timing, link and signals of a running machine.
+
+    With --watch it goes on while the daemon is stopped and started again. A terminal gets a panel with
+    sparklines of the last 30 s, a pipe gets a line each time.
 
     Examples:
 
       rtctl status
 
-      rtctl status --watch --name ivu
+      rtctl status --watch --every 1s --name ivu
 
       rtctl status --json | jq .state
     """
+    pause = common.seconds(every, "--every")
+    if pause is not None and not watch:
+        from rtctl.config.errors import UserError
+
+        raise UserError("--every is for --watch; without it the status is shown once")
     with common.client(name) as client:
         found = client.call("status")
-        if watch:
-            _watch(client, found, json)
+        if watch and json:
+            _json_lines(client, found, pause or EVERY)
         elif json:
             common.print_json(found)
+        elif watch:
+            from rich.console import Console
+
+            from rtctl.terminal.screen import takes_pictures
+            from rtctl.terminal.watch import Watch
+
+            console = Console()
+            Watch(client, found, console).run(pause or (EVERY if takes_pictures(console) else EVERY_LINE))
         else:
             from rich.console import Console
 
@@ -46,29 +65,20 @@ def status(
             Console().print(table(found, units))
 
 
-def _watch(client: Any, found: dict[str, Any], json: bool) -> None:
-    """Show again and again, in place or as JSON lines; ends with Ctrl-C or the daemon."""
-    from rich.console import Console
-    from rich.live import Live
-
+def _json_lines(client: Any, found: dict[str, Any], every: float) -> None:
+    """One JSON object a line; ends with Ctrl-C or the daemon."""
     from rtctl.config.errors import UserError
+    from rtctl.daemon.client import listens
 
-    units = {s["name"]: s["unit"] for s in client.call("signals")["signals"]}
     try:
-        if json:
-            while True:
-                common.print_json(found)
-                time.sleep(REFRESH)
-                found = client.call("status")
-        with Live(table(found, units), console=Console(), auto_refresh=False) as live:
-            while True:
-                time.sleep(REFRESH)
-                found = client.call("status")
-                live.update(table(found, units), refresh=True)
+        while True:
+            common.print_json(found)
+            time.sleep(every)
+            found = client.call("status")
     except KeyboardInterrupt:
         return
     except UserError:
-        if common.listens(client.endpoint):
+        if listens(client.endpoint):
             raise
         typer.echo(f"{found['name']} has ended", err=True)
 
@@ -78,12 +88,14 @@ def table(found: dict[str, Any], units: dict[str, str]) -> Any:
     from rich.table import Table
     from rich.text import Text
 
+    from rtctl.terminal.view import STYLE
+
     out = Table(box=None, show_header=False, pad_edge=False)
     out.add_column(style="dim")
     out.add_column()
     late, tick, rows = found["lateness_us"], found["tick_us"], found["rows"]
     out.add_row("machine", Text(f"{found['name']} ({found['machine']}, pid {found['pid']})", "bold"))
-    out.add_row("state", Text(found["state"], COLOUR.get(found["state"], "")))
+    out.add_row("state", Text(found["state"], STYLE.get(found["state"], "")))
     if found["trip"]:
         trip = found["trip"]
         out.add_row("trip", Text(f"{trip['code']} at tick {trip['tick']}: {trip['why']}", "bold red"))

@@ -77,6 +77,7 @@ def stop(
       rtctl stop --name ldu --wait 5min
     """
     from rtctl.config.errors import UserError
+    from rtctl.daemon.client import listens
 
     limit = common.seconds(wait, "--wait") or 0.0
     with common.client(name) as client:
@@ -84,7 +85,7 @@ def stop(
         client.call("stop")
         endpoint = client.endpoint
     deadline = time.monotonic() + limit
-    while common.listens(endpoint):
+    while listens(endpoint):
         if time.monotonic() > deadline:
             raise UserError(
                 f"outputs are off, but the daemon (pid {pid}) has not ended after {wait}; it may still write"

@@ -47,7 +47,7 @@ def report(event: str, **values: Any) -> None:
 def machine_from(order: dict[str, Any]) -> Machine:
     """The machine of an order, which carries its config in full."""
     config = order["config"]
-    return machines.build(machines.CONFIGS[config["machine"]].model_validate(config))
+    return machines.build(machines.settings(config))
 
 
 def segment_from(order: dict[str, Any], made: generate.Generated) -> Segment:

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import socket as sockets
 import time
 from types import TracebackType
 from typing import Any
@@ -39,7 +40,7 @@ class Client:
             raise refuse_open(endpoint)
         self.endpoint = endpoint
         self.timeout = timeout
-        self._curve = curve
+        self.curve = curve
         self._context = context or zmq.Context.instance()
         self._ids = itertools.count(1)
         self._socket: zmq.Socket | None = None
@@ -79,7 +80,7 @@ class Client:
         socket = self._connected()
         deadline = time.monotonic() + self.timeout
         if not socket.poll(_left_ms(deadline), zmq.POLLOUT):
-            keys = ", or it does not know our key" if self._curve else ""
+            keys = ", or it does not know our key" if self.curve else ""
             raise UserError(f"no daemon answers at {self.endpoint} (start one with `rtctl run`){keys}")
         socket.send(request, zmq.NOBLOCK)
         while socket.poll(_left_ms(deadline), zmq.POLLIN):
@@ -97,11 +98,30 @@ class Client:
             socket.immediate = True
             socket.reconnect_ivl = 20
             socket.ipv6 = "[" in self.endpoint
-            if self._curve is not None:
-                apply_client(socket, self._curve.keys, self._curve.server)
+            if self.curve is not None:
+                apply_client(socket, self.curve.keys, self.curve.server)
             socket.connect(self.endpoint)
         return self._socket
 
 
 def _left_ms(deadline: float) -> int:
     return max(0, round((deadline - time.monotonic()) * 1000))
+
+
+def listens(endpoint: str) -> bool:
+    """Whether somebody listens at an ipc or tcp endpoint, be it as busy as it may."""
+    family: Any = sockets.AF_UNIX
+    address: Any = endpoint.removeprefix("ipc://")
+    if endpoint.startswith("tcp://"):
+        host, _, port = endpoint.removeprefix("tcp://").rpartition(":")
+        host = host.strip("[]")
+        family, address = (sockets.AF_INET6 if ":" in host else sockets.AF_INET), (host, int(port))
+    with sockets.socket(family, sockets.SOCK_STREAM) as probe:
+        probe.settimeout(1.0)
+        try:
+            probe.connect(address)
+        except PermissionError:
+            return True  # somebody else's
+        except OSError:
+            return False
+        return True

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
 SWITCHED = (
-    "loop", "link", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation", "faults",
-    "metrics",
+    "loop", "link", "driver", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation",
+    "faults", "metrics", "own",
 )  # fmt: skip
+LOOKS = ("status", "signals", "get", "capture_status")  # who only looks stands in for no commander
 
 
 class Commands:
@@ -31,11 +32,16 @@ class Commands:
 
     def handle(self, op: str, args: Args) -> dict[str, Any]:
         """Carry out `op`. Raises UserError where the request makes no sense now."""
-        self._last_heard = time.monotonic()
+        if op not in LOOKS:
+            self.heard()
         return getattr(self, f"_{op}")(**args.model_dump(exclude_unset=True))
 
+    def heard(self) -> None:
+        """The commander is there: it commands, or sends a `ping` as its sign of life."""
+        self._last_heard = time.monotonic()
+
     def watch_commander(self) -> None:
-        """Tell the loop when nobody has talked to the command socket for too long, where the config requires it."""
+        """Tell the loop when the commander has been silent for too long, where the config requires one."""
         limits = self._of.config.safety
         lost = int(limits.require_commander and time.monotonic() - self._last_heard > limits.commander_timeout)
         if lost != self._commander_lost:
@@ -55,12 +61,10 @@ class Commands:
         return self._post(**{name: int(command[name]) + 1})
 
     def _status(self) -> dict[str, Any]:
-        row = self._of.last_row
-        signals = {} if row is None else {n: float(row[n]) for n in row.dtype.names}
-        return {**self._of.snapshot(), "signals": signals}
+        return self._of.report()
 
     def _signals(self) -> dict[str, Any]:
-        return {"signals": [{"name": c.name, "unit": c.unit, "help": c.help} for c in self._of.made.columns]}
+        return self._of.signals()
 
     def _arm(self) -> dict[str, Any]:
         taken_in = self._of.mailbox.seen == int(self._of.segment["mailbox"][0]["count"])  # or a reset is on its way

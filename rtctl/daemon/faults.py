@@ -94,15 +94,16 @@ class Faults:
         if settings.fault == "plant.kill" and (self._of.config.loop.mode == "fused" or not self._of.config.link.spawns):
             raise UserError("plant.kill: there is no process of ours to kill: the emulator runs "
                             + ("inside the loop" if self._of.config.loop.mode == "fused" else "elsewhere"))  # fmt: skip
+        if settings.fault == "plant.kill" and self._of.config.driver.kind != "emulated":
+            raise UserError("plant.kill: a real board's process is not killed: its outputs would stay as they are; "
+                            "use link.silent")  # fmt: skip
         if settings.fault in ("recorder.stall", "disk.full") and self._of.out is None:
             raise UserError(f"{settings.fault}: this run records nothing")
         built = faults.build(settings, 1.0 / self._of.config.loop.rate, now)
         return Planned(settings.fault, max(built.begin, 1), built.end, built.size)
 
     def _in_force(self) -> list[faults.Fault]:
-        command = self._of.segment["mailbox"][0]["command"]
-        rows = [faults.Fault(*(value.item() for value in row)) for row in command["faults"][: int(command["faulty"])]]
-        return [fault for fault in rows if fault.kind != faults.NONE]
+        return faults.in_force(self._of.segment["mailbox"][0]["command"])
 
     def _described(self, fault: faults.Fault, tick: int) -> dict[str, Any]:
         name = next(name for name, kind in faults.KINDS.items() if kind.number == fault.kind)

@@ -95,13 +95,11 @@ def _wait_for_plant(
             return
     if time.monotonic() < deadline:
         return  # told to stop
+    keys = f"; if it runs, its folder `authorized` lacks our {key_name}.key or our server.key is not its own"
     raise UserError(
         f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, "
-        "or leave link.endpoint out to have one started"
-        + (
-            f"; if it runs, its folder `authorized` lacks our {key_name}.key or our server.key is not its own"
-            * bool(key_name)
-        )
+        "and wait until it says that it listens, or leave link.endpoint out to have one started"
+        + (keys if key_name else "")
     )
 
 

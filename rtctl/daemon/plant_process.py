@@ -1,4 +1,7 @@
-"""The emulated machine's process: `python -m rtctl.daemon.plant_process ORDERS`, or `rtctl plant CONFIG` by itself."""
+"""The process at the plant's end of the link: the emulated machine, a real board in its place, or an FMU.
+
+`python -m rtctl.daemon.plant_process ORDERS`, or `rtctl plant CONFIG` by itself.
+"""
 
 import contextlib
 import os
@@ -11,9 +14,10 @@ import zmq
 from rtctl.config.errors import UserError
 from rtctl.daemon import child
 from rtctl.daemon.server import release
+from rtctl.drivers.board import BoardError
 from rtctl.loop import frames, generate
 from rtctl.loop.records import PLANT_STATUS
-from rtctl.machines import Machine
+from rtctl.machines import Machine, fmu_of
 
 SECOND = 1_000_000_000
 MOST_BEHIND = 200  # periods that the emulator makes up for before it lets time slip
@@ -43,17 +47,30 @@ class Plant:
         self.status["ended"] = 1
 
 
+def plant(machine: Machine, made: generate.Generated, link: str, status: Any, out: Any, inp: Any) -> Any:
+    """What stands at the plant's end, by the config; `run()` serves the loop. Raises UserError where it cannot."""
+    if machine.config.driver.kind != "emulated":
+        from rtctl.daemon.board_plant import BoardPlant
+
+        return BoardPlant(machine, link, status, out, inp)
+    if fmu_of(machine.config) is not None:
+        from rtctl.daemon.fmu_plant import FmuPlant
+
+        return FmuPlant(machine, link, status, out, inp)
+    return Plant(machine, made, status, out, inp)
+
+
 def serve(machine: Machine, endpoint: str, status: Any, announce: Any) -> None:
     """Listen at a ZeroMQ endpoint and emulate; `announce()` is called when it listens."""
     made = generate.generate(machine, "zmq")
     context = zmq.Context()
     link = machine.config.link
     socket = child.link_socket(context, endpoint, True, 1.0, link.keys)
-    plant = Plant(machine, made, status, socket.underlying, socket.underlying)
+    served = plant(machine, made, "zmq", status, socket.underlying, socket.underlying)
     announce()
     if machine.config.loop.mode == "lockstep":
         _wait_for_hello(socket, status)
-    plant.run()
+    served.run()
     release(socket, endpoint)
     context.term()
 
@@ -89,8 +106,7 @@ def main(argv: list[str]) -> int:
     if order["link"] == "zmq":
         serve(machine, order["endpoint"], status, lambda: None)
     else:
-        plant = Plant(machine, made, status, segment["inputs"], segment["outputs"])
-        plant.run()
+        plant(machine, made, "shm", status, segment["inputs"], segment["outputs"]).run()
     child.report("ended")
     return 0
 
@@ -112,3 +128,6 @@ if __name__ == "__main__":
     except UserError as error:
         child.report("error", message=str(error), code=2)
         sys.exit(2)
+    except BoardError as error:  # the loop hears no more and trips; the supervisor passes our last words on
+        print(f"{error}; its outputs are off", file=sys.stderr)
+        sys.exit(1)

@@ -24,6 +24,8 @@ def reload(supervisor: "Supervisor", fresh: Any) -> tuple[list[str], list[str]]:
     old = supervisor.config
     if fresh.machine != old.machine:
         raise UserError(f"machine: '{fresh.machine}' instead of '{old.machine}' needs a restart")
+    if type(fresh) is not type(old):
+        raise UserError(f"own: {' '.join(sorted({**old.own, **fresh.own}))} is another text now; restart the machine")
     changed = differences(old, fresh)
     refused = [path for path in changed if path.split(".")[0] in SWITCHED]
     free = [path for path in changed if path not in refused]

@@ -11,6 +11,7 @@ import socket as sockets
 import stat
 import struct
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -41,10 +42,19 @@ class Handler(Protocol):
 class CommandServer:
     """Takes requests from any number of clients. `accepted` and `refused[code]` count the answers given.
 
-    `ping` is answered here, so that it tells of the socket and the process and needs nothing else to be alive.
+    `ping` is answered here, so that it tells of the socket and the process and needs nothing else to be alive; `heard`
+    is called for it.
     """
 
-    def __init__(self, endpoint: str, handler: Handler, context: zmq.Context, curve: ServerCurve | None = None):
+    def __init__(
+        self,
+        endpoint: str,
+        handler: Handler,
+        context: zmq.Context,
+        curve: ServerCurve | None = None,
+        heard: Callable[[], None] = lambda: None,
+    ):
+        self._heard = heard
         self.accepted = 0
         self.refused: Counter[str] = Counter()
         self._handler = handler
@@ -97,6 +107,7 @@ class CommandServer:
 
     def _do(self, op: str, args: Args) -> dict[str, Any]:
         if op == "ping":
+            self._heard()
             return {"pid": os.getpid(), "version": __version__, "protocol": list(VERSIONS)}
         result = self._handler.handle(op, args)
         if not isinstance(result, dict):
@@ -125,8 +136,8 @@ def runtime_dir() -> Path:
     return folder
 
 
-def default_endpoint(machine_name: str, which: Literal["command", "telemetry"]) -> str:
-    """The ipc endpoint of a machine's `command` or `telemetry` socket."""
+def default_endpoint(machine_name: str, which: Literal["command", "telemetry", "rows"]) -> str:
+    """The ipc endpoint of a machine's `command`, `telemetry` or `rows` socket."""
     if not MACHINE.fullmatch(machine_name):
         raise UserError(f"'{machine_name}' cannot name a socket; use letters, digits, '_', '-' and '.'")
     path = runtime_dir() / f"{machine_name}.{which}"
@@ -134,7 +145,7 @@ def default_endpoint(machine_name: str, which: Literal["command", "telemetry"]) 
     return f"ipc://{path}"
 
 
-def find_endpoint(machine_name: str, which: Literal["command", "telemetry"]) -> str:
+def find_endpoint(machine_name: str, which: Literal["command", "telemetry", "rows"]) -> str:
     """For clients: the user's own daemon, or else the one that runs as a system service."""
     own = default_endpoint(machine_name, which)
     service = SYSTEM_DIR / f"{machine_name}.{which}"

@@ -10,7 +10,6 @@ from typing import Any
 from rtctl.config.errors import UserError
 from rtctl.daemon.notify import from_environment
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.machines import MODULES
 
 MOST_ROWS = 3_000_000  # read back for steps and picture; of a longer run, draw a part with `rtctl trace plot`
 
@@ -75,24 +74,15 @@ class Session:
         if self.bundle is None or not 0 < self._rows() <= MOST_ROWS:
             return []
         from rtctl.trace.bundle import load_bundle
-        from rtctl.trace.metrics import step_metrics
+        from rtctl.trace.metrics import POSITION, machine_steps
 
         trace = load_bundle(self.bundle).columns
         machine = self.supervisor.machine
         running = trace["state"] == 2
         if running.sum() < 2:
             return []
-        y = trace["capstan" if machine.kind == "ivu" else "x" if machine.kind == "axis" else "position"]
-        rad = 1.0 if machine.unit == "rad" else 1.0 / machine.radius
-        mm = 1000.0 * machine.metres_per_unit
-        return step_metrics(
-            trace["t"][running],
-            trace["target"][running],
-            y[running],
-            mm,
-            rad,
-            settle_floor=MODULES[machine.kind].SETTLE_FLOOR,
-        )
+        t, target, y = (trace[name][running] for name in ("t", "target", POSITION[machine.kind]))
+        return machine_steps(machine, t, target, y)
 
     def draw(self) -> str | None:
         """Draw the run beside its bundle; returns the picture's path."""

@@ -21,6 +21,7 @@ import zmq
 from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.daemon import keys
+from rtctl.daemon.answers import Answers
 from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
 from rtctl.daemon.children import ChildProcess
@@ -29,14 +30,16 @@ from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
 from rtctl.daemon.notify import Service
 from rtctl.daemon.reload import reload
+from rtctl.daemon.rows import RowsOut
 from rtctl.daemon.server import CommandServer, default_endpoint, runtime_dir
 from rtctl.daemon.telemetry import Telemetry
-from rtctl.loop import faults, generate, safety
-from rtctl.loop.histogram import account, percentiles
+from rtctl.loop import generate, safety
+from rtctl.loop.histogram import account
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.memory import Segment
-from rtctl.loop.records import STAGES, late_ticks, layout
+from rtctl.loop.records import STAGES, layout
 from rtctl.loop.ring import Reader
+from rtctl.own import files as own_files
 from rtctl.trace.orders import Journal
 from rtctl.trace.recorder import Recorder
 from rtctl.trace.rotation import Rotation
@@ -47,7 +50,12 @@ START_TIMEOUT = 180.0  # s; a cold cache compiles for some ten seconds
 SHM = Path("/dev/shm")
 
 
-class Supervisor:
+def segment_path(name: str) -> Path:
+    """Where the shared memory of a machine of this name lies, for this user."""
+    return SHM / f"rtctl-{os.getuid()}-{name}"
+
+
+class Supervisor(Answers):
     """A running machine. Use as a context: leaving it stops the loop with its outputs at zero.
 
     `out` is the folder of the run's bundle; None records nothing but captures. `ticks` ends the run, 0 never.
@@ -69,6 +77,7 @@ class Supervisor:
         self.reread: Callable[[], Any] | None = None  # gives the settings as the config file has them now
         self.service = Service()
         self.changes: list[dict[str, Any]] = []
+        self.recorder: Recorder | None = None
         self._ended = False
         self._stack = contextlib.ExitStack()
         self._last_telemetry = 0.0
@@ -76,7 +85,12 @@ class Supervisor:
 
     def __enter__(self) -> "Supervisor":
         with contextlib.ExitStack() as stack:
-            self._open(stack)
+            try:
+                self._open(stack)
+            except BaseException:
+                if self.recorder is not None:
+                    self.recorder.abandon()
+                raise
             self._stack = stack.pop_all()
         return self
 
@@ -88,17 +102,12 @@ class Supervisor:
         config, made = self.config, self.made
         stack.enter_context(MachineLock(runtime_dir() / f"{config.name}.lock", config.name))
         rows = max(int(config.record.seconds * self.machine.rate), 1000)
-        self.segment = Segment.create(
-            SHM / f"rtctl-{os.getuid()}-{config.name}", layout(made.params, made.tables, made.row, rows)
-        )
-        stack.callback(self.segment.unlink)
+        self.segment = Segment.create(segment_path(config.name), layout(made.params, made.tables, made.row, rows))
         stack.callback(self.segment.unlink)  # a crash leaves it, with the last seconds of the trace
         self.status = self.segment["status"][0]
         self.mailbox = Mailbox(self.segment)
         self.reader = Reader(self.segment)
-        generate.fill(self.segment["mailbox"][0]["params"], self.machine.diagram.blocks)
-        faults.fill(self.segment["mailbox"][0]["command"], self.machine.faults)
-        generate.fill_tables(self.segment["tables"][0], (self.machine.reference, self.machine.excitation))
+        generate.prepare(self.segment, self.machine)
         self.journal = Journal()
         stack.callback(self.journal.close)
         if self.armed_at_start:
@@ -109,7 +118,11 @@ class Supervisor:
         self.commands = Commands(self)
         curve = keys.server_curve() if config.commands.keys else None
         self.server = CommandServer(
-            config.commands.endpoint or default_endpoint(config.name, "command"), self.commands, context, curve
+            config.commands.endpoint or default_endpoint(config.name, "command"),
+            self.commands,
+            context,
+            curve,
+            self.commands.heard,
         )
         stack.callback(self.server.close)
         self._signals = [c.name for c in made.columns if c.name not in ("t",)]
@@ -123,10 +136,11 @@ class Supervisor:
             curve=curve,
         )
         stack.callback(self.telemetry.close)
+        self.rows_out = RowsOut(default_endpoint(config.name, "rows"), config.name, made.row, context)
+        stack.callback(self.rows_out.close)
         self.case = describe(self.machine, made)
         self.captures = Captures(self.machine.rate, made.columns, made.row, self.case)
         stack.callback(self.captures.close)
-        self.recorder: Recorder | None = None
         if self.out is not None:
             try:
                 self.recorder = Recorder(
@@ -134,6 +148,7 @@ class Supervisor:
                     rotation=Rotation(config.record.rotate_mb, config.record.rotate_minutes),
                 )  # fmt: skip
                 self.journal.open(self.out)
+                own_files.keep(config.own, self.out)
             except OSError as error:
                 raise UserError(f"{self.out}: cannot record here: {error.strerror}") from error
         if config.metrics.port is not None:
@@ -181,6 +196,8 @@ class Supervisor:
             for child in self.children:
                 if not child.running() and not self.status["ready"] and not self.status["ended"]:
                     self._hear()
+                    if child is self.plant and self.config.driver.kind != "emulated":
+                        raise UserError(f"driver: {child.last_words()}")
                     raise RuntimeError(f"the {child.role} process ended while it started:\n{child.last_words()}")
             if time.monotonic() > deadline:
                 raise RuntimeError(f"the loop did not start within {START_TIMEOUT:g} s")
@@ -219,9 +236,20 @@ class Supervisor:
         if self.plant is not None and not self._ended and not self.plant.running() and not self._plant_died:
             self._plant_died = True
             log.warning("plant ended", last_words=self.plant.last_words())
+            if self.config.driver.kind != "emulated":
+                self._board_off()
         return not self._ended
 
     _plant_died = False
+
+    def _board_off(self) -> None:
+        """The process of a real board is gone; killed, it has left its outputs as they were."""
+        from rtctl.daemon.board_plant import zero
+
+        assert self.plant is not None
+        trouble = zero(self.config)
+        now = f"ITS OUTPUTS MAY BE ON, switch the power off: {trouble}" if trouble else "its outputs are zero"
+        self.say(f"the board's process ended: {self.plant.last_words() or 'killed'}; {now}")
 
     def _drain(self) -> None:
         while True:
@@ -238,8 +266,7 @@ class Supervisor:
             if self.recorder is not None:
                 self.recorder.put(rows)
             self._publish(rows)
-
-    last_row: Any = None
+            self.rows_out.publish(rows)
 
     def _publish(self, rows: np.ndarray) -> None:
         self._rows_after.append(rows[-2000:])
@@ -289,41 +316,6 @@ class Supervisor:
         log.info("reload", taken=taken)
         self.service.reloaded()
 
-    # what others ask
-
-    def snapshot(self) -> dict[str, Any]:
-        """State, counts and times of now, as `rtctl status` and the run's JSON give them."""
-        s = self.status
-        trip = safety.TRIPS[int(s["trip"])]
-        return {
-            "name": self.config.name,
-            "machine": self.machine.kind,
-            "mode": self.config.loop.mode,
-            "link": self.link if self.config.loop.mode != "fused" else "none",
-            "pid": os.getpid(),
-            "state": safety.STATES[int(s["state"])],
-            "trip": None if not s["trip"] else {"code": trip[0], "why": trip[1], "tick": int(s["trip_tick"])},
-            "ticks": int(s["tick"]),
-            "rate_hz": self.machine.rate,
-            "measured_rate_hz": self._measured_rate(),
-            "missed": int(s["missed"]),
-            "late": int(s["late"]),
-            "overruns": int(s["overruns"]),
-            "lateness_us": percentiles(s["lateness"]),
-            "tick_us": percentiles(s["ticks"]),
-            "exchange_us": percentiles(s["exchange"]),
-            "stages_us": {name: percentiles(s[field]) for name, field in STAGES.items()},
-            "late_ticks": late_ticks(s),
-            "link_latency_us": percentiles(s["round_trip"]),
-            "sample_age_us": percentiles(s["age"]),
-            "frames": {"received": int(s["link_frames"]), "not_sent": int(s["link_dropped"])},
-            "lost_counts": int(s["lost_counts"]),
-            "rows": self.rows_counted(),
-            "refused_commands": dict(self.server.refused),
-            "lacks": self.lacks,
-            "faults": self.faults.told,
-        }
-
     def order(self, write: Callable[[Any, Any], None], changed: dict[str, Any] | None = None) -> None:
         """Post what `write(params, command)` changes and keep it for a replay; `changed` are settings by their path."""
         self.mailbox.post(write)
@@ -332,25 +324,6 @@ class Supervisor:
     def note_change(self, path: str, value: Any) -> None:
         """Remember a setting that was changed while running, for the bundle."""
         self.changes.append({"tick": int(self.status["tick"]), "path": path, "value": value})
-
-    def rows_counted(self) -> dict[str, Any]:
-        """What became of the rows of the trace."""
-        lost = {"lost_in_ring": self.reader.lost}
-        if self.recorder is None:
-            return lost
-        stats = self.recorder.stats()
-        return {
-            **lost,
-            "recorded": stats.rows_written,
-            "queued": stats.rows_queued,
-            "lost": stats.rows_lost,
-            "error": stats.error,
-        }
-
-    def _measured_rate(self) -> float | None:
-        if self.last_row is None or self.last_row["t"] <= 0:
-            return None
-        return round(float(self.last_row["tick"] / self.last_row["t"]), 3)
 
     def stop(self) -> None:
         """End the loop with its outputs at zero and take in what it still wrote."""

@@ -8,17 +8,14 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, cast
-
-import numpy as np
+from typing import Any
 
 from rtctl import machines
 from rtctl.daemon.plant_process import Plant
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.loop import faults, generate
+from rtctl.loop import fused, generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
-from rtctl.loop.records import layout
 from rtctl.trace.bundle import load_bundle
 
 Write = Callable[[Any, Any], None]
@@ -37,17 +34,12 @@ class Inside:
     def __init__(self, config: Any, ticks: int):
         machine = machines.build(config)
         made = generate.generate(machine, "shm")
-        records = layout(made.params, made.tables, made.row, ticks + 1)
-        segment = cast(Any, {name: np.zeros(count, dtype) for name, (dtype, count) in records.items()})
-        self._segment: Any = segment
+        self._segment = fused.segment(made, ticks + 1)
         self._plant: threading.Thread | None = None
-        box = self._segment["mailbox"][0]
-        generate.fill(box["params"], machine.diagram.blocks)
-        faults.fill(box["command"], machine.faults)
-        self.post = Mailbox(segment).post
+        generate.prepare(self._segment, machine)
+        self.post = Mailbox(self._segment).post
         self.post(again)
         self._loop = Loop(machine, made, self._segment, self._segment["outputs"], self._segment["inputs"])
-        generate.fill_tables(self._segment["tables"][0], (machine.reference, machine.excitation))
         self._lockstep = config.loop.mode == "lockstep"
 
     def __enter__(self) -> "Inside":

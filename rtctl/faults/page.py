@@ -11,14 +11,18 @@ HEAD = """# Faults
 
 Every fault that `rtctl` can inject, on every shipped machine, written by `rtctl fault table --markdown docs/faults.md`.
 
-    rtctl fault list                                  # what there is
-    rtctl fault add encoder.freeze --at 3s --for 200ms
-    rtctl fault clear
+```bash
+rtctl fault list                                  # what there is
+rtctl fault add encoder.freeze --at 3s --for 200ms
+rtctl fault clear
+```
 
 or in a config:
 
-    faults:
-      - {fault: encoder.freeze, at: 3 s, lasts: 200 ms}
+```yaml
+faults:
+  - {fault: encoder.freeze, at: 3 s, lasts: 200 ms}
+```
 
 The machine plays a move at constant speed, as processes of the daemon in lockstep, with the limits of its shipped
 config. Numbers are ticks. *Detected* counts from the fault to the trip, *zero written* from the fault to the first tick

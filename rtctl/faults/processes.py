@@ -1,6 +1,5 @@
 """Faults of processes, on those of the daemon: each has its run, or a part of one, that proves it was survived."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -15,7 +14,7 @@ import numpy as np
 from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.config.load import to_yaml
-from rtctl.daemon.supervisor import SHM, Supervisor
+from rtctl.daemon.supervisor import Supervisor, segment_path
 from rtctl.faults.cases import Stand
 from rtctl.faults.drives import again
 from rtctl.faults.play import same
@@ -179,7 +178,7 @@ def _left(config: Any) -> Any:
     machine = machines.build(config)
     made = generate.generate(machine, "shm")
     rows = max(int(config.record.seconds * machine.rate), 1000)
-    where = SHM / f"rtctl-{os.getuid()}-{config.name}"
+    where = segment_path(config.name)
     try:
         segment = Segment.open(where, layout(made.params, made.tables, made.row, rows))
     except FileNotFoundError:

@@ -117,12 +117,16 @@ def config_of(bundle: Bundle) -> Any:
     from rtctl import machines
     from rtctl.config.complaints import sentences
     from rtctl.config.fields import Shape, fill
+    from rtctl.own.files import OwnError
 
     data = bundle.case.get("config")
     where = bundle.folder / "case.json"
     if not isinstance(data, dict) or data.get("machine") not in machines.CONFIGS:
         raise UserError(f"{where}: no config of a machine under 'config'; experiments read recordings of `rtctl run`")
-    model = machines.CONFIGS[data["machine"]]
+    try:
+        model, data = machines.widened(data)
+    except OwnError as error:
+        raise UserError(f"{where}: config: {error}") from error
     filled = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(filled)

@@ -65,18 +65,18 @@ def build(settings: SectionsSettings, dt: float) -> SectionsParams:
 
 
 @tick
-def step(p, s, x):
-    """Output of the cascade for the input `x`."""
-    y = biquad.step(p.first, s.first, x)
+def step(p, s, e):
+    """Output of the cascade for the input `e`."""
+    y = biquad.step(p.first, s.first, e)
     y = biquad.step(p.second, s.second, y)
     y = biquad.step(p.third, s.third, y)
     return biquad.step(p.fourth, s.fourth, y)
 
 
 @tick
-def reset(p, s, x):
-    """Put every section in its steady state for the constant input `x` and return the output (see `biquad.reset`)."""
-    y = biquad.reset(p.first, s.first, x)
+def reset(p, s, e):
+    """Put every section in its steady state for the constant input `e` and return the output (see `biquad.reset`)."""
+    y = biquad.reset(p.first, s.first, e)
     y = biquad.reset(p.second, s.second, y)
     y = biquad.reset(p.third, s.third, y)
     return biquad.reset(p.fourth, s.fourth, y)

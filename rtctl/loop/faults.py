@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from rtctl import counted
 from rtctl.drivers import daq_stc
@@ -89,7 +89,7 @@ PROCESSES = tuple(name for name, kind in KINDS.items() if kind.number == NONE)
 class FaultSettings(Settings):
     """One fault. Times count from the start of the loop."""
 
-    fault: Literal[*KINDS]  # type: ignore[valid-type]
+    fault: Literal[*KINDS] = Field(description="which; `rtctl fault list` explains each")  # type: ignore[valid-type]
     at: float = quantity(0.0, unit="s", ge=0, help="when it begins")
     lasts: float | None = quantity(None, unit="s", gt=0, help="how long it lasts; for good if absent")
     channel: int = quantity(0, unit="", ge=0, help="counter, analog input or output, from 0")
@@ -159,6 +159,12 @@ def fill(command: Any, wanted: Sequence[Fault]) -> None:
     for j, fault in enumerate(wanted):
         command["faults"][j] = fault
     command["faulty"] = slots
+
+
+def in_force(command: Any) -> list[Fault]:
+    """The faults that a command record holds, those that are over included."""
+    rows = [Fault(*(value.item() for value in row)) for row in command["faults"][: int(command["faulty"])]]
+    return [fault for fault in rows if fault.kind != NONE]
 
 
 @tick

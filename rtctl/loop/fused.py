@@ -53,14 +53,20 @@ def run(config: Any, seconds: float) -> Run:
     Raises ValueError where the settings contradict each other.
     """
     machine = machines.build(config)
-    made = generate.generate(machine, "shm")
-    ticks = round(seconds * machine.rate)
-    segment: Any = {
-        name: np.zeros(count, dtype)
-        for name, (dtype, count) in layout(made.params, made.tables, made.row, ticks).items()
-    }
-    loop = Loop(machine, made, segment, segment["outputs"], segment["inputs"])
-    generate.fill_tables(segment["tables"][0], (machine.reference, machine.excitation))
-    loop.c["arm"] = loop.c["play"] = 1
+    return play(machine, generate.generate(machine, "shm"), round(seconds * machine.rate))
+
+
+def play(machine: machines.Machine, made: generate.Generated, ticks: int) -> Run:
+    """As `run`, with a module that was generated for a machine of the same structure."""
+    arrays = segment(made, ticks)
+    generate.prepare(arrays, machine)
+    loop = Loop(machine, made, arrays, arrays["outputs"], arrays["inputs"])
+    loop.c["arm"] = loop.c["play"] = loop.c["order"] = 1  # an order as of a person, so that a bundle can be replayed
     loop.stretch(0, ticks)
-    return Run(segment["rows"], loop)
+    return Run(arrays["rows"], loop)
+
+
+def segment(made: generate.Generated, rows: int) -> Any:
+    """What loop and supervisor share, as arrays of this process alone; `rows` is the length of the ring."""
+    records = layout(made.params, made.tables, made.row, rows)
+    return {name: np.zeros(count, dtype) for name, (dtype, count) in records.items()}

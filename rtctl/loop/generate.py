@@ -20,20 +20,21 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-import platformdirs
 
 from rtctl import __version__
+from rtctl.config.cache import cache_folder
 from rtctl.config.errors import UserError
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import excitation, reference
-from rtctl.loop import frames, runner
+from rtctl.loop import faults, frames, runner
 from rtctl.machines import Machine
 from rtctl.machines.base import Block, Column
 
-# folders whose sources no tick can come from
+# folders and files whose sources no tick can come from
 NEVER_COMPILED = {
-    "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "identify", "proof", "reproduce", "soak",
-    "trace",
+    "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "foxglove", "identify", "manual", "own",
+    "proof", "reproduce", "scope", "soak", "terminal", "trace",
+    "api.py", "board.py", "boards.py", "comedi.py", "emulated.py", "fmu.py", "nidaqmx.py", "wiring.py",
 }  # fmt: skip
 HEADER = '''"""{title}
 
@@ -71,12 +72,6 @@ class Generated(NamedTuple):
     plant_state: np.dtype
 
 
-def cache_folder() -> Path:
-    """Where generated modules and their machine code live: $RTCTL_CACHE_DIR, or the user's cache folder."""
-    given = os.environ.get("RTCTL_CACHE_DIR")
-    return Path(given) if given else Path(platformdirs.user_cache_dir("rtctl"))
-
-
 def source(machine: Machine, link: str) -> str:
     """The module's text, for `rtctl build --show`."""
     loop, plant = machine.diagram, machine.plant_diagram
@@ -103,8 +98,14 @@ def source(machine: Machine, link: str) -> str:
 
 def header(machine: Machine, title: str, uses: Sequence[str]) -> str:
     """Head of a generated module that uses these modules."""
-    imports = "\n".join(f"from {m.rpartition('.')[0]} import {m.rpartition('.')[2]}" for m in sorted(set(uses)))
+    imports = "\n".join(imported(module) for module in sorted(set(uses)))
     return HEADER.format(title=title, version=__version__, machine=machine.kind, imports=imports)
+
+
+def imported(module: str) -> str:
+    """A module of rtctl, or one of an own file, whose name has a hash of its text in it."""
+    package, _, name = module.rpartition(".")
+    return f"from {package} import {name}" if package else f"import {name}"
 
 
 def timed(stages: Stages) -> Stages:
@@ -228,6 +229,10 @@ def warm(entry: Any, arguments: tuple[Any, ...]) -> None:
 def generate(machine: Machine, link: str) -> Generated:
     """Write and load the tick of a machine for a link, `zmq` or `shm`."""
     path = write(machine, link)
+    if machine.config.own:
+        from rtctl.own.machine import require  # here: the plain tick has nothing of the user's own
+
+        require(machine, path)
     return Generated(
         machine=machine,
         module=load(path),
@@ -282,6 +287,14 @@ def fill_tables(record: Any, tables: tuple[reference.ReferenceParams, excitation
     """Copy reference and excitation into one of the two table records."""
     fill_record(record["reference"], tables[0])
     fill_record(record["excitation"], tables[1])
+
+
+def prepare(segment: Any, machine: Machine) -> None:
+    """What a loop finds in its segment at its start: params and faults in the mailbox, and the first of the tables."""
+    box = segment["mailbox"][0]
+    fill(box["params"], machine.diagram.blocks)
+    faults.fill(box["command"], machine.faults)
+    fill_tables(segment["tables"][0], (machine.reference, machine.excitation))
 
 
 def new_frames() -> dict[str, np.ndarray]:

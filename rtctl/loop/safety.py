@@ -52,8 +52,8 @@ class SafetySettings(Settings):
     current: float = quantity(1.0, unit="A", gt=0, help="continuous current of a drive")
     current_time: float = quantity(2.0, unit="s", ge=0, help="how long it may be exceeded; 0 switches it off")
     missed_ticks: int = Field(default=10, ge=0, description="late ticks in a row that trip; 0 switches it off")
-    require_commander: bool = Field(default=False, description="trip where nobody talks to the command socket")
-    commander_timeout: float = quantity(1.0, unit="s", gt=0, help="how long the command socket may be silent")
+    require_commander: bool = Field(default=False, description="trip where nobody commands, or sends a ping")
+    commander_timeout: float = quantity(1.0, unit="s", gt=0, help="how long the commander may be silent")
     disagreement: float = quantity(
         0.0, unit="m", ge=0, help="most that two sensors of one motion may come apart after arming; 0 switches it off"
     )
@@ -193,6 +193,13 @@ def check_motion(p, s, error, counts, effort, amperes, k):
     s.over = s.over + 1 if amperes > p.current else 0
     if p.current_time > 0 and s.over > p.current_time:
         trip(s, CURRENT, k)
+
+
+@tick
+def check_number(s, u, k):
+    """The law's command `u` (V) as it is before any limit, which would hide what is not a number."""
+    if not abs(u) <= 1e300:
+        trip(s, NOT_A_NUMBER, k)
 
 
 @tick

@@ -28,9 +28,11 @@ their models by `rtctl reproduce`, which wrote this page.
 
 {words}
 
-    rtctl reproduce                  # all of it, with the figures, into docs/
-    rtctl reproduce --only 8         # one chapter, one row or one figure
-    rtctl reproduce --json           # the rows for a program
+```bash
+rtctl reproduce                  # all of it, with the figures, into docs/
+rtctl reproduce --only 8         # one chapter, one row or one figure
+rtctl reproduce --json           # the rows for a program
+```
 
 A row passes where the measured number is within the tolerance of the thesis's, or above or below it where it says so.
 Where the thesis contradicts its own equations (erratum) the row is held against the number that the equations give.

@@ -8,6 +8,7 @@ from collections import Counter
 
 import numpy as np
 
+from rtctl.config.load import get_path
 from rtctl.loop import faults, safety
 from rtctl.soak import ranges
 from rtctl.soak.invariants import NEVER
@@ -181,8 +182,9 @@ class Day:
         checker.checked("recovery")
         self.recovered[kind] += int(tripped and ready)
         w["must_by"] = NEVER
-        if kind in ("encoder.missed", "encoder.freeze") or self.rig.lost_counts != lost:
-            checker.carry["has_base"] = 0  # gone for good: they are compared from here on
+        if kind in ("encoder.missed", "encoder.freeze") or self.rig.lost_counts != lost:  # gone for good
+            ready = ready and self._find_anew()
+            checker.carry["has_base"] = 0  # they are compared from here on
         w["counts_from"] = NEVER if self.config.faults else self.rig.tick
         if ready and not self.config.faults:  # those of the config have a time of their own
             w["quiet_from"] = self.rig.tick
@@ -248,6 +250,19 @@ class Day:
                 return True
         self.rig.checker.note("recovery", self.rig.tick, float(self._state), float(safety.RUNNING))
         return False
+
+    def _find_anew(self) -> bool:
+        """What the law followed by counts that were lost has the machine measure anew, as its owner would."""
+        if self.range.measure is None:
+            return True
+        path, measured = self.range.measure
+        self._restless()
+        self.rig.set(path, measured)
+        self.rig.ask("disarm")
+        self._run(STILL)
+        ready = self._get_running()
+        self.rig.set(path, get_path(self.config, path))
+        return ready
 
     def _stand_still(self) -> None:
         """Wait until a machine that coasts has come to rest, if its outputs are off."""

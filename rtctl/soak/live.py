@@ -87,7 +87,7 @@ class Live:
         with contextlib.suppress(UserError):
             self._handle("setpoint", value=target, ramp=rate or None)
 
-    def set(self, path: str, value: float) -> None:
+    def set(self, path: str, value: float | str) -> None:
         """One setting of the law, the others as the config has them."""
         if self._changed is not None and self._changed != path:
             self._handle("set", path=self._changed, value=get_path(self._config, self._changed))

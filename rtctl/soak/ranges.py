@@ -34,6 +34,7 @@ class Range(NamedTuple):
     counters: int  # channels that are wired
     inputs: int
     gains: dict[str, tuple[float, float]]  # setting -> share of the config's own value, lowest and highest
+    measure: tuple[str, str] | None = None  # setting with which arming measures what is followed by counts
 
 
 RANGES = {
@@ -46,6 +47,7 @@ RANGES = {
             "law.position.gain": (0.7, 1.1), "law.position.tau_d": (0.8, 1.2), "law.shaper.bandwidth": (0.6, 1.0),
             "law.tension.F_t": (0.8, 2.0), "law.friction.motor1.tau_C": (0.8, 1.0),
         },
+        measure=("radius.source", "measured"),
     ),
     "ldu": Range(
         position="position", error="position_error", outputs=("u",), counts="encoder_counts", truth="truth_x",

@@ -5,14 +5,11 @@ The same few calls are made on a running daemon by `rtctl.soak.live`.
 
 from typing import Any, Protocol
 
-import numpy as np
-
 from rtctl import machines
 from rtctl.config.load import set_path
-from rtctl.loop import faults, generate
+from rtctl.loop import faults, fused, generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
-from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
 from rtctl.machines import Machine
 from rtctl.soak.checker import Checker
@@ -33,7 +30,7 @@ class Rig(Protocol):
     def lost_counts(self) -> int: ...
     def ask(self, request: str) -> None: ...
     def setpoint(self, target: float, rate: float) -> None: ...
-    def set(self, path: str, value: float) -> None: ...
+    def set(self, path: str, value: float | str) -> None: ...
     def fault(self, settings: faults.FaultSettings) -> faults.Fault: ...
     def run(self, ticks: int) -> None: ...
     def finish(self) -> None: ...
@@ -48,21 +45,15 @@ class Fused:
         self.config = config
         self.machine = machines.build(config)
         self.made = generate.generate(self.machine, "shm")
-        self.segment: dict[str, Any] = {
-            name: np.zeros(count, dtype)
-            for name, (dtype, count) in layout(self.made.params, self.made.tables, self.made.row, 2 * STRETCH).items()
-        }
-        generate.fill(self.segment["mailbox"][0]["params"], self.machine.diagram.blocks)
-        faults.fill(self.segment["mailbox"][0]["command"], self.machine.faults)
-        generate.fill_tables(self.segment["tables"][0], (self.machine.reference, self.machine.excitation))
+        self.segment = fused.segment(self.made, 2 * STRETCH)
+        generate.prepare(self.segment, self.machine)
         self.loop = Loop(self.machine, self.made, self.segment, self.segment["outputs"], self.segment["inputs"])
         self.loop.warm()
         self._entry, self._arguments = self.loop.entry()
-        shared: Any = self.segment
-        self.mailbox, self.reader = Mailbox(shared), Reader(shared)
+        self.mailbox, self.reader = Mailbox(self.segment), Reader(self.segment)
         self.checker = Checker(self.machine, self.made, out, seed)
         self.status = self.segment["status"][0]
-        self._built: dict[tuple[str, float], Machine] = {}
+        self._built: dict[tuple[str, float | str], Machine] = {}
 
     @property
     def tick(self) -> int:
@@ -98,7 +89,7 @@ class Fused:
 
         self._post(write)
 
-    def set(self, path: str, value: float) -> None:
+    def set(self, path: str, value: float | str) -> None:
         """One setting of the law, the others as the config has them; swapped in at a tick, without a jump."""
         key = (path, value)
         if key not in self._built:
@@ -114,9 +105,7 @@ class Fused:
     def fault(self, settings: faults.FaultSettings) -> faults.Fault:
         """Add a fault, its time counted from now; those that are over leave their slots."""
         made = faults.build(settings, self.machine.dt, self.tick)
-        command = self.segment["mailbox"][0]["command"]
-        kept = [faults.Fault(*(v.item() for v in row)) for row in command["faults"][: int(command["faulty"])]]
-        kept = [f for f in kept if f.end > self.tick]
+        kept = [f for f in faults.in_force(self.segment["mailbox"][0]["command"]) if f.end > self.tick]
         self._post(lambda _, c: faults.fill(c, [*kept, made]))
         return made
 

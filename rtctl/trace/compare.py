@@ -12,11 +12,11 @@ import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
-from rtctl.trace.metrics import scales, step_metrics
+from rtctl.trace.metrics import POSITION, scales, settle_floor, step_metrics
 
 Align = Literal["auto", "tick", "reference"]
 REFERENCES = ("target", "ref")  # before shaping, if it is there: it moves at once
-MEASURED = ("capstan", "position", "x")  # what the steps are judged by
+MEASURED = tuple(POSITION.values())
 MOVES = 0.01  # share of the reference's span that counts as a start
 RATE_OFF = 1e-3  # share by which the rates may differ
 RUNNING = 2  # in the column `state`
@@ -103,7 +103,8 @@ def steps(bundle: Bundle) -> list[dict[str, float | None]]:
         mm, rad = scales(bundle.case)
     except ValueError:
         return []
-    return step_metrics(columns["t"][ran], ref[ran], y[ran], mm, rad) if ran.any() else []
+    floor = settle_floor(bundle.case.get("plant", ""))
+    return step_metrics(columns["t"][ran], ref[ran], y[ran], mm, rad, settle_floor=floor) if ran.any() else []
 
 
 def _alike(a: Bundle, b: Bundle) -> None:

@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from rtctl.machines import MODULES, Machine
+
+POSITION = {"ivu": "capstan", "ldu": "position", "axis": "x"}  # the column that steps are judged by
 LEAST_HOLD = 10  # samples; a reference that rests for less is still on its way
 
 
@@ -53,6 +56,17 @@ def step_metrics(
             }
         )
     return steps
+
+
+def machine_steps(machine: Machine, t: np.ndarray, ref: np.ndarray, y: np.ndarray) -> list[dict[str, float | None]]:
+    """`step_metrics` in the units of a machine, with what it calls settled."""
+    rad = 1.0 if machine.unit == "rad" else 1.0 / machine.radius
+    return step_metrics(t, ref, y, 1000.0 * machine.metres_per_unit, rad, settle_floor=settle_floor(machine.kind))
+
+
+def settle_floor(kind: str) -> float:
+    """Error at which a machine of this kind has settled, however small its step, in its unit; 0 of one unknown here."""
+    return MODULES[kind].SETTLE_FLOOR if kind in MODULES else 0.0
 
 
 def scales(case: Mapping[str, Any]) -> tuple[float, float | None]:

@@ -6,6 +6,7 @@ failed, are lost, and the bundle says how many and which: rows put = rows writte
 Memory is flat, however long it records: the queue is bounded, and so is the list of gaps.
 """
 
+import contextlib
 import itertools
 import threading
 from collections import deque
@@ -16,9 +17,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.trace.bundle import FORMAT
+from rtctl.trace.bundle import ARROWS, CASE, FORMAT
 from rtctl.trace.columns import Column
 from rtctl.trace.losses import Losses
+from rtctl.trace.orders import ORDERS
 from rtctl.trace.part import Part
 from rtctl.trace.rotation import Parts, Rotation
 
@@ -126,6 +128,21 @@ class Recorder:
         self._bundle.finish(extra or {}, self._losses, self._error)
         self._finished = self.folder
         return self.folder
+
+    def abandon(self) -> None:
+        """Free the folder where not one row has come, so that the next try may have it; else leave all as it is."""
+        if self._finished or not isinstance(self._bundle, Part):
+            return
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._thread.join()
+        with contextlib.suppress(OSError):
+            self._bundle.close()
+            if self._bundle.rows == 0 and not self._losses.rows:
+                for name in (ARROWS, CASE, ORDERS):
+                    (self.folder / name).unlink(missing_ok=True)
+                self.folder.rmdir()  # not with somebody else's files in it
 
     def _lost(self, first_tick: int, end: int) -> Losses:
         with self._changed:

@@ -17,6 +17,7 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_paths
 from rtctl.loop import generate
 from rtctl.loop.replay import Replay, read_columns, written_columns
+from rtctl.own.files import OwnError
 from rtctl.trace.bundle import Bundle, load_bundle
 from rtctl.trace.orders import orders, restore
 
@@ -89,7 +90,10 @@ def _config(bundle: Bundle) -> Any:
         raise NoAnswer(f"{bundle.folder}: its case has no rtctl `config`, so nobody knows the law to replay")
     model = machines.CONFIGS[given["machine"]]
     try:
+        model, given = machines.widened(given)
         return model.model_validate(given)
+    except OwnError as error:
+        raise UserError(f"{bundle.folder}/case.json, config: {error}") from error
     except ValidationError as error:
         raise UserError(f"{bundle.folder}/case.json, config: {sentences(error, model, given)}") from error
 

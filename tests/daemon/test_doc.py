@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rtctl.daemon import protocol
+from rtctl.daemon.rows import RowsOut
 from rtctl.daemon.server import default_endpoint
 from rtctl.daemon.telemetry import Telemetry
 
@@ -49,10 +50,12 @@ def test_examples_run(code, serving, context, monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     done = threading.Event()
     telemetry = Telemetry(default_endpoint("ivu", "telemetry"), "ivu", ["v"], context)
+    rows = RowsOut(default_endpoint("ivu", "rows"), "ivu", np.dtype([("t", float)]), context)
 
     def publish():
         while not done.wait(0.01):
             telemetry.publish(np.array([[1.5, 0.25]]))
+            rows.publish(np.array([(2.5,)], [("t", float)]))
 
     thread = threading.Thread(target=publish)
     thread.start()
@@ -65,7 +68,9 @@ def test_examples_run(code, serving, context, monkeypatch, tmp_path, capsys):
     out = capsys.readouterr().out
     if "status" in code:
         assert "'op': 'status'" in out
-    if "SUB" in code:
+    if '"rows"' in code:
+        assert out.endswith("[2.5]\n")
+    elif "SUB" in code:
         assert "1.5 {'timestamp': 1.5, 'v': 0.25}" in out
     if "REQ" in code:
         assert "tension.gain" in out

@@ -19,7 +19,7 @@ import zmq
 
 from rtctl.daemon.server import CommandServer, runtime_dir
 from rtctl.daemon.session import Session
-from rtctl.daemon.supervisor import SHM, Supervisor
+from rtctl.daemon.supervisor import Supervisor, segment_path
 from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import STATUS
@@ -46,13 +46,9 @@ def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
     return found
 
 
-def segment_path(config: Any) -> Path:
-    return SHM / f"rtctl-{os.getuid()}-{config.name}"
-
-
 def left(config: Any) -> list[Path]:
     """All that a machine has in shared memory and in the folder of sockets."""
-    return [p for p in [segment_path(config), *runtime_dir().glob(f"{config.name}.*")] if p.exists()]
+    return [p for p in [segment_path(config.name), *runtime_dir().glob(f"{config.name}.*")] if p.exists()]
 
 
 def gone(pid: int) -> bool:
@@ -80,7 +76,7 @@ def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]
         data = config.model_dump(mode="json", exclude_unset=True)
         order = {"config": data, "out": str(tmp_path / "killed"), "length": LONG}
         made.append(subprocess.Popen([sys.executable, "-c", RUN, json.dumps(order)]))
-        pid, path = made[-1].pid, segment_path(config)
+        pid, path = made[-1].pid, segment_path(config.name)
         wait_for(path.exists)
         wait_for(lambda: status_of(path)["tick"] > 1000, 200)
         stream = tmp_path / "killed" / "recording.arrows"
@@ -105,7 +101,7 @@ def test_after_sigkill_nothing_runs_on_and_the_next_start_takes_it_all_over(
     children = killed(settings)
     wait_for(lambda: all(map(gone, children)), 10)
     assert {p.suffix for p in left(settings)} >= {".lock", ".command", ".telemetry"}  # nobody was there to clean up
-    assert segment_path(settings) in left(settings)  # with the last seconds of the trace
+    assert segment_path(settings.name) in left(settings)  # with the last seconds of the trace
     assert Session(settings, tmp_path / "next", 2.0).run()["ticks"] == 1000
     assert left(settings) == []
     kept, first = load_bundle(tmp_path / "next").columns, repair(tmp_path / "killed")
@@ -121,7 +117,7 @@ def test_two_machines_of_other_names_have_nothing_in_common(
     first, second = config(), config()
     with Supervisor(first, None, 50) as supervisor:
         assert Session(second, tmp_path / "second", 0.1).run()["ticks"] == 50
-        assert left(second) == [] and len(left(first)) == 4
+        assert left(second) == [] and len(left(first)) == 5
         for _ in supervisor.run():
             pass
         assert supervisor.snapshot()["ticks"] == 50

@@ -15,8 +15,6 @@ from rtctl.design import error_table
 from rtctl.identify import luminance
 from rtctl.laws import error_table as law
 
-pytestmark = pytest.mark.xdist_group("error_table")  # its fixture is dear: once is enough
-
 PERIOD = 2 * np.pi * 3e-3
 TERMS = [
     {"term": "ripple.encoder", "node": "encoder", "A": 1e-3, "phi": 0.4, "A2": 2e-4, "phi2": 1.0},

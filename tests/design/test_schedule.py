@@ -5,8 +5,6 @@ import pytest
 from rtctl.config.errors import NoAnswer
 from rtctl.design import margins, robustness, schedule
 
-pytestmark = pytest.mark.xdist_group("schedule")  # its fixture is dear: once is enough
-
 
 @pytest.fixture(scope="module")
 def found() -> schedule.Schedule:

@@ -25,6 +25,7 @@ from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop import frames, generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
+from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 
 REQUESTS = (
@@ -97,8 +98,8 @@ def _standing(folder: Path) -> Any:
     """A supervisor without processes and sockets. Captures go into `folder`, whatever is asked for."""
     data = yaml.safe_load((CONFIGS / "ivu.yaml").read_text())
     made: Any = Supervisor(machines.CONFIGS["ivu"].model_validate(data), None)
-    arrays = layout(made.made.params, made.made.tables, made.made.row, 10).items()
-    made.segment = {name: np.zeros(count, dtype) for name, (dtype, count) in arrays}
+    shape = layout(made.made.params, made.made.tables, made.made.row, 10)
+    made.segment = Segment.create(folder / "segment", shape)
     made.status, made.mailbox = made.segment["status"][0], Mailbox(made.segment)
     made.reader, made.server = SimpleNamespace(lost=0), SimpleNamespace(refused={})
     made.journal = SimpleNamespace(note=lambda *_: None)

@@ -62,12 +62,12 @@ def bursts():
 @pytest.mark.parametrize(
     ("what", "told"),
     [
-        (raises, "KeyError: 'no such thing' (test_harness.py:"),
-        (warns, "SyntaxWarning: look here"),
-        (dies, "died by SIGSEGV"),
-        (leaves, "ended by itself"),
-        (grows, "took 5"),
-        (bursts, "MemoryError"),
+        (raises, ("KeyError: 'no such thing' (test_harness.py:",)),
+        (warns, ("SyntaxWarning: look here",)),
+        (dies, ("died by SIGSEGV",)),
+        (leaves, ("ended by itself",)),
+        (grows, ("took 5", "Unable to allocate", "no end within")),  # the last on a machine that is too slow for it
+        (bursts, ("MemoryError", "Unable to allocate")),
     ],
 )
 def test_what_goes_wrong_is_found_with_its_input(what, told):
@@ -76,7 +76,7 @@ def test_what_goes_wrong_is_found_with_its_input(what, told):
     found = run("planted", planted(what), 20)
     resource.setrlimit(resource.RLIMIT_CORE, core)
     assert found.inputs >= 20 and found.findings
-    assert told in found.findings[0].what or "Unable to allocate" in found.findings[0].what
+    assert any(words in found.findings[0].what for words in told)
     assert {finding.input for finding in found.findings} == {BAD}
 
 

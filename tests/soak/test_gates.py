@@ -33,9 +33,18 @@ def names(rig: Fused) -> set[str]:
 
 
 def params(rig: Fused, block: str, **values: float) -> None:
-    """Parameters that the tick takes over with the next post, and that the config knows nothing of."""
-    for name, value in values.items():
-        rig.segment["mailbox"][0]["params"][block][name] = value
+    """Parameters that the tick takes over with every post, and that the config knows nothing of."""
+    post = rig.mailbox.post
+
+    def tamper(write: Any) -> None:
+        def wrong(records: Any, command: Any) -> None:
+            write(records, command)
+            for name, value in values.items():
+                records[block][name] = value
+
+        post(wrong)
+
+    rig.mailbox.post = tamper  # type: ignore[method-assign]
 
 
 def tampered(rig: Fused, change: Callable[[np.ndarray], np.ndarray], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ import yaml
 
 from rtctl.daemon.client import Client
 from rtctl.daemon.server import default_endpoint
-from rtctl.daemon.supervisor import SHM
+from rtctl.daemon.supervisor import segment_path
 
 CONFIG = Path(__file__).parents[2] / "configs" / "ivu.yaml"
 WATCHDOG = 200_000  # us
@@ -117,7 +117,7 @@ def start(manager: Manager, tmp_path: Path) -> Iterator[Callable[..., Running]]:
     for each in made:
         each.process.kill()
         each.process.communicate()
-        (SHM / f"rtctl-{os.getuid()}-{each.config['name']}").unlink(missing_ok=True)
+        segment_path(each.config["name"]).unlink(missing_ok=True)
 
 
 SERVICE = ("--no-arm", "--no-plot", "--json", "--out")

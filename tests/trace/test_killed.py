@@ -2,7 +2,6 @@
 
 import json
 import multiprocessing
-import os
 import random
 import signal
 import subprocess
@@ -17,7 +16,7 @@ from feeder import FINISHING, feed
 from trace_rows import ROW, is_truth
 
 from rtctl.config.errors import NoAnswer
-from rtctl.daemon.supervisor import SHM
+from rtctl.daemon.supervisor import segment_path
 from rtctl.loop import fused
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.repair import repair
@@ -112,7 +111,7 @@ def test_a_killed_supervisor_leaves_a_prefix_of_the_run(
         child.wait()
     finally:
         child.kill()
-        (SHM / f"rtctl-{os.getuid()}-{settings.name}").unlink(missing_ok=True)
+        segment_path(settings.name).unlink(missing_ok=True)
     assert child.returncode == -signal.SIGKILL
     rows = repair(tmp_path / "run").rows
     assert share * SECONDS * 500 <= written <= rows < SECONDS * 500

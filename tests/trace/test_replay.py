@@ -17,8 +17,6 @@ from rtctl.loop import safety
 from rtctl.trace.orders import ORDERS
 from rtctl.trace.replay import replay
 
-pytestmark = pytest.mark.xdist_group("replay")  # its fixture is dear: once is enough
-
 GAIN = "law.position.gain"
 TICKS = 20_000
 
