@@ -1,5 +1,7 @@
 """Fits the owner's parameters first: a wrong value is not missing physics."""
 
+import numpy as np
+
 from rtctl.diagnose.decide import COMPLETE
 from rtctl.diagnose.fit import Fit, Problem, fit
 from rtctl.diagnose.model import free_parameters, owner_model
@@ -12,11 +14,11 @@ RINGS = {"ivu": (), "ldu": (("k_c", "M"),), "axis": ()}  # spring and mass: anot
 AWAY = 0.8  # of the tolerance
 
 
-def base_fit(sim: Simulator, problem: Problem) -> Fit:
-    """The owner's model with its parameters as the record wants them, within their tolerance."""
+def base_fit(sim: Simulator, problem: Problem, start: np.ndarray | None = None) -> Fit:
+    """The owner's model with its parameters as the record wants them, within their tolerance; from x = `start`."""
     owner = owner_model(sim.case, sim.record)
     space = Space(owner, free_parameters(sim.case, owner), sim.case.tolerance)
-    fitted = settle(problem, fit(problem, space))
+    fitted = settle(problem, fit(problem, space, start))
     if fitted.rms < COMPLETE * problem.floor:
         return fitted
     low, high = space.bounds()

@@ -25,7 +25,17 @@ from rtctl.diagnose.rest import awake
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
-from rtctl.diagnose.verdict import Verdict, judge, of_factor, of_jitter, proven, with_known
+from rtctl.diagnose.verdict import (
+    CLOSED_BY_SEVERAL,
+    LOST,
+    TELLING,
+    Verdict,
+    judged,
+    of_factor,
+    of_jitter,
+    proven,
+    with_known,
+)
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.timing import JitterSettings
 
@@ -94,9 +104,11 @@ def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
 
 
 def base_of(sim: Simulator) -> tuple[Problem, Fit]:
-    """Its problem, and the fit of the owner's parameters."""
+    """Its problem, and the fit of the owner's parameters, which shows which way counters without direction went."""
     problem = Problem(sim)
-    return problem, base_fit(sim, problem)
+    base = base_fit(sim, problem)
+    directed = problem.seen_by(base.model)
+    return (directed, base_fit(sim, directed, base.x)) if directed.edges else (problem, base)
 
 
 class Shown(NamedTuple):
@@ -115,23 +127,30 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     """The verdict on what was found, once its model has predicted rows that it was not fitted on; `again` where more
     has been refused."""
     problem, base, best = found.problem, found.base, found.best
-    verdict = judge(problem, base, best, found.rivals, problem.block)
+    verdict = judged(problem, base, best, found.rivals, problem.block)
     if found.beyond is not None and verdict.verdict in (NAMED, AMBIGUOUS):
         verdict = Verdict(UNNAMED, (), verdict.explained)
     named = {e.name for e in with_known(verdict, known).effects}
     taken = best if any(h.term in named for h in best.space.hypotheses) else base
     if found.factor is not None and "sensor.scale" in named:
         taken = fit(problem, taken.space.add(scaled(found.factor)), taken.x, rounds=8)
+    cut = cut_of(sim.record)
     if other is None:
-        cut = cut_of(sim.record)
-        judge_sim, rows = sim, slice(cut, None)
-        before, after = (heldout.refit(sim, problem, f, cut).model for f in (base, taken))
+        judge, rows = problem, slice(cut, None)
+        fits = [heldout.refit(sim, problem, f, cut) for f in (base, taken)]
     else:
-        judge_sim, rows = Simulator(other), slice(0, None)
-        before, after = base.model, taken.model
-    errors = [heldout.nrmse(judge_sim, model, rows) for model in (before, after)]
-    floor = problem.floor * float(problem.sigma[0]) / (float(np.std(judge_sim.seen)) or 1.0)
-    proved = proven(verdict, errors[0], errors[1], floor, again)
+        judge, rows, fits = Problem(Simulator(other)).seen_by(taken.model), slice(0, None), [base, taken]
+    before, after = (f.model for f in fits)
+    errors = [heldout.nrmse(judge.sim, model, rows, judge.edges) for model in (before, after)]
+    floor = heldout.floor(judge, judge.sim.seen)
+    closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
+    several = again or len(verdict.effects) > 1  # what is left of several that were refused has to do as much as they
+    if other is None:
+        on_track = heldout.closed_on_track(problem, *fits, cut)
+        several = several and not on_track > CLOSED_BY_SEVERAL
+        if decide.complete(problem, base, best) and not decide.quiet(problem, base, best):
+            closed, several = on_track, False  # a free run adds random forces up
+    proved = proven(verdict, closed if max(errors) < LOST else np.nan, several)
     refused = proved.verdict == UNNAMED and verdict.verdict != UNNAMED
     verdict = with_known(proved, known)
     if verdict.verdict == UNNAMED:

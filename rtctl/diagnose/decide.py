@@ -9,7 +9,7 @@ Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Ec
 """
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.stretches import loudness, memory, rms
@@ -23,6 +23,7 @@ QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
+ONCE = 0.02  # the same of a further term that shows at a few places only
 SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 CLEAR = 0.15  # share of the cost that it must take off
@@ -48,6 +49,8 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return False  # of a machine that is known to be louder nobody knows what is noise
         if before.bound() and not after.bound() and chance < RELEASED and after.cost < (1.0 - FREE) * before.cost:
             return True  # the owner's values need not be stretched any more
+        if before.space.hypotheses and chance < ONCE and quiet(problem, base, before):
+            return after.cost < (1.0 - CLEAR) * before.cost and by_noise(before, after) < NEVER
         if chance > LUCK:
             return False
         noise = rms(before.r) < COMPLETE * problem.floor
@@ -55,6 +58,15 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
+
+
+def by_noise(before: Fit, after: Fit) -> float:
+    """Chance that noise alone takes so much off, however few the places where it does.
+
+    Source: Wilks, Annals of Mathematical Statistics 9 (1938), with as many errors as are independent.
+    """
+    level = 2.0 * after.cost / len(after.r) * memory(after.r, LONGEST)
+    return float(chi2.sf(2.0 * (before.cost - after.cost) / level, len(after.x) - len(before.x)))
 
 
 def better(before: Fit, after: Fit) -> bool:

@@ -23,6 +23,7 @@ RICH = 10.0  # the same, of one that is tried in its richer form because the bes
 EQUAL = 1.02  # times the best cost: equally good
 NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
 LOSES_WAY = ("transmission.slip", "transmission.creep", "sensor.scale", "sensor.rectified", "geometry.radius_change")
+SPARED = 1.5  # times the best cost: what a model may come to when it loses a term in doubt
 MOST = 4  # rivals of one hypothesis
 Progress = Callable[[str], None]
 Places = tuple[tuple[Alternative, ...], ...]
@@ -69,6 +70,7 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit
         close = [best, *(f for f in others if f.cost < CLOSE * best.cost)]
         others += [f for f in (enrich(problem, f, decide.better) for f in close) if f.cost < CLEARLY * best.cost]
     ahead = min(others, key=lambda f: f.merit, default=best)
+    looked = looked._replace(rounds=(*looked.rounds, (best, *others)))  # what came out second is a rival of the first
     if ahead.merit < best.merit:  # a rival came out ahead once it was fitted to the bottom
         best, near = ahead, replacements(problem, ahead, looked, (), progress)
     likelier = most_likely(problem, best, near)
@@ -116,14 +118,17 @@ def in_order(fitted: Fit, before: Fit, near: Places) -> Places:
 def without_doubtful(
     problem: Problem, best: Fit, looked: Search, near: Places, progress: Progress
 ) -> tuple[Fit, Places]:
-    """Leave out what others could stand in for as well, as long as the rest explains enough without it."""
+    """Leave out what others could stand in for as well, as long as the rest explains enough without it, and not much
+    less: of what is surely there it is better to say that it has one of two names."""
     while len(best.space.hypotheses) > 1 and decide.enough(problem, looked.base, best):
         sure = [standing(problem, best, i, places) for i, places in enumerate(near)]
         weakest = min(range(len(sure)), key=lambda i: sure[i])
         if sure[weakest] >= SURE:
             break
         less = dropped(problem, best, weakest, 10)
-        if not decide.enough(problem, looked.base, less):
+        if less.cost > SPARED * best.cost:
+            less = enrich(problem, less, decide.better)
+        if less.cost > SPARED * best.cost or not decide.enough(problem, looked.base, less):
             break
         best = polish(problem, less)
         near = replacements(problem, best, looked, (), progress)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.hiss import is_hiss
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
@@ -23,8 +24,11 @@ from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.space import Space
 from rtctl.diagnose.stretches import rms
 
+EDGE = 0.85  # of an edge's sigma, on quiet machines
+EDGES = 0.5  # share of the main sensor's rows that all edges count for: they are few, but each is worth many rows
 FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # of SIGMA, on quiet machines
 TOLL = 0.08  # share of the cost that a further number of a term must take off
+RECTIFIED = ("reel1_counts", "reel2_counts")
 FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
 THREADS = 2
 LOUDEST = 12.0  # times the floor, of what random forces leave
@@ -69,10 +73,19 @@ class Fit(NamedTuple):
 
 
 class Problem:
-    """A recording, how its errors are weighed, and the rows that count."""
+    """A recording, how its errors are weighed, and the rows that count.
+
+    Errors are those of the sensors that know direction, averaged over `mean` ticks, sensor by sensor, and between them,
+    in the order of time, those of the edges that reels were seen at.
+    """
 
     def __init__(
-        self, sim: Simulator, stop: int | None = None, channels: Sequence[int] | None = None, mean: int | None = None
+        self,
+        sim: Simulator,
+        stop: int | None = None,
+        channels: Sequence[int] | None = None,
+        mean: int | None = None,
+        edges: Sequence[Edges] = (),
     ):
         self.sim = sim
         self.rows = slice(settled(sim), stop)
@@ -82,8 +95,24 @@ class Problem:
         self.target = means(seen[self.rows], self.mean)
         self.sigma = np.array([_sigma(sim, c) for c in self.channels])
         self.n = len(seen) if stop is None else stop
+        self.edges = tuple(e.between(self.rows.start, self.n) for e in edges)
+        ticks = np.tile(self.rows.start + self.mean * np.arange(len(self.target)), len(self.channels))
+        rows = np.concatenate([ticks, *(e.rows for e in self.edges)])
+        self.order = np.argsort(rows, kind="stable") if self.edges else np.arange(len(rows))
+        self.time_rows = rows[self.order]  # of each error
+        few = sum(len(e.rows) for e in self.edges)
+        self.balance = float(np.sqrt(EDGES * len(self.target) / few)) if few else 1.0  # what an edge counts for
         self.weights = np.ones(1)
         self.louder = 1.0  # than a quiet machine, as far as is known
+
+    def seen_by(self, model: Model) -> "Problem":
+        """The same with the edges of counters that cannot tell direction, which the model tells; there must be no
+        weights yet."""
+        names = {c: name for c, name in enumerate(self.sim.channels) if name in RECTIFIED}
+        out = self.sim.run(model, directed=True) if names else np.empty((0, 0))
+        found = [edges(self.sim.record.y[name], out[:, c], c) for c, name in names.items()]
+        stop = None if self.n == len(self.sim.seen) else self.n
+        return Problem(self.sim, stop, self.channels, self.mean, [e for e in found if e is not None])
 
     def weighed(self, weights: np.ndarray) -> "Problem":
         """The same with a further weight for each error."""
@@ -92,25 +121,59 @@ class Problem:
         return other
 
     @property
-    def floor(self) -> float:
-        """Weighted rms of the error where nothing is missing: counts, and a machine that is never quiet."""
+    def main_floor(self) -> float:
+        """Weighted rms of the error where nothing is missing, of the sensors that know direction: what counts leave,
+        and a machine that is never quiet."""
         share = [FLOOR.get(self.sim.channels[c], 0.0) for c in self.channels]
         if not any(share):
             return FINEST * self.louder
         mean = 0.62 if self.mean > 1 else 1.0
-        return self.louder * float(np.sqrt(np.mean((np.array(share) * mean) ** 2)))
+        return self.louder * mean * rms(np.array(share))
+
+    @property
+    def floor(self) -> float:
+        """The same of all errors."""
+        known, edges = len(self.target) * len(self.channels), len(self.order)
+        edges -= known
+        power = known * self.main_floor**2 + edges * (EDGE * self.balance * self.louder) ** 2
+        return float(np.sqrt(power / len(self.order)))
 
     def error(self, model: Model, coarse: bool = False) -> np.ndarray:
         """Readings less simulation by their noise (rows, channels), without a constant offset of a second sensor."""
-        out = self.sim.run(model, TRACK, self.n, coarse)[:, self.channels][self.rows]
-        e = (self.target - means(out, self.mean)) / self.sigma
+        return self._error(self.sim.run(model, TRACK, self.n, coarse))
+
+    def _error(self, out: np.ndarray) -> np.ndarray:
+        e = (self.target - means(out[:, self.channels][self.rows], self.mean)) / self.sigma
         e[:, 1:] -= e[:, 1:].mean(axis=0)
         return e
 
     def residual(self, model: Model, coarse: bool = False) -> np.ndarray:
-        """The same as one row of numbers; 1e6 where the model runs away."""
-        e = np.nan_to_num(self.error(model, coarse), nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)
-        return e.T.ravel() * self.weights
+        """All errors as one row of numbers; 1e6 where the model runs away."""
+        out = self.sim.run(model, TRACK, self.n, coarse, directed=bool(self.edges))
+        e = np.concatenate([self._error(out).T.ravel(), *(self.balance * reel.error(out) for reel in self.edges)])
+        return np.nan_to_num(e, nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)[self.order] * self.weights
+
+    def beside(self, values: np.ndarray, edges: float = 0.0) -> np.ndarray:
+        """Values of the sensors that know direction, sensor by sensor, in the order of the errors; those of edges."""
+        return np.concatenate([values, np.full(len(self.order) - len(values), edges)])[self.order]
+
+    def by_sensor(self, r: np.ndarray) -> dict[str, np.ndarray]:
+        """The errors of a residual r by the sensor they are of, in the order of time; the main one is first."""
+        e = np.empty_like(r)
+        e[self.order] = r
+        sizes = [len(self.target)] * len(self.channels) + [len(reel.rows) for reel in self.edges]
+        names = [self.sim.channels[c] for c in (*self.channels, *(reel.channel for reel in self.edges))]
+        parts = np.split(e, np.cumsum(sizes)[:-1])
+        return dict(zip(names, [*parts[: len(self.channels)], *(x / self.balance for x in parts[len(self.channels) :])],
+                        strict=True))  # fmt: skip
+
+    def at_rows(self, channel: str, errors: np.ndarray) -> np.ndarray:
+        """The errors of a sensor at the rows of those that know direction, where they are of edges."""
+        for reel in self.edges:
+            if self.sim.channels[reel.channel] == channel:
+                rows = self.rows.start + self.mean * np.arange(len(self.target))
+                return np.interp(rows, reel.rows, errors)
+        return errors
 
     @property
     def block(self) -> int:
@@ -119,12 +182,12 @@ class Problem:
 
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
-        main = r[: len(r) // len(self.channels)]
-        loud = rms(main) / self.floor
+        main = next(iter(self.by_sensor(r).values()))
+        loud = rms(main) / self.main_floor
         if loud > LOUDEST:
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
-        return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.floor, exact)
+        return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.main_floor, exact)
 
 
 def means(x: np.ndarray, count: int) -> np.ndarray:

@@ -8,10 +8,13 @@ Source: Janot, Gautier & Brunot (2019) and Champneys, Beintema, Toth, Schoukens 
 the recorded command as the measure of a model; Ljung, System Identification (1999), 3.3, for long predictions.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rtctl.diagnose.decide import better
-from rtctl.diagnose.fit import Fit, Problem, fit
+from rtctl.diagnose.edges import Edges
+from rtctl.diagnose.fit import EDGE, Fit, Problem, fit
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
 from rtctl.diagnose.model import Model
@@ -22,6 +25,7 @@ from rtctl.diagnose.stretches import rms
 
 TRIES = 4  # weights of the two errors, by what the last fit left of each
 NONE = 1e-12  # an rms to divide by is never quite 0
+NO_GAP = 0.1  # of what is left
 WORSE = 1.5  # times the rms on track: a free run is not bought at any price
 
 
@@ -32,20 +36,51 @@ def mode_of(record: Record) -> int:
     return OPEN if record.case.controller.kind == "none" else TRACK
 
 
-def nrmse(sim: Simulator, model: Model, rows: slice) -> float:
-    """Error of the free run's main sensor over `rows`, by the spread of the whole recording."""
-    y = sim.seen
-    out = sim.run(model, mode_of(sim.record))[:, 0]
-    error = (y - out)[rows]
-    if not np.isfinite(error).all():
+def nrmse(sim: Simulator, model: Model, rows: slice, edges: Sequence[Edges] = ()) -> float:
+    """Error of the free run over `rows`, by the spread of the whole recording; rms over the main sensor and the reels
+    whose edges are known."""
+    out = sim.run(model, mode_of(sim.record), directed=bool(edges))
+    if not np.isfinite(out).all():
         return 1e3
-    spread = float(np.std(y)) or 1.0
-    return min(float(np.sqrt(np.mean(error**2))) / spread, 1e3)
+    n = len(out)
+    shares = [rms((sim.seen - out[:, 0])[rows]) / spread(sim.seen)]
+    for reel in edges:
+        e = reel.error(out) * reel.sigma  # the constant is of the whole record
+        late = (reel.rows >= (rows.start or 0)) & (reel.rows < (rows.stop or n))
+        if late.any():
+            shares.append(rms(e[late]) / spread(reel.at))
+    return min(rms(np.array(shares)), 1e3)
+
+
+def floor(problem: Problem, seen: np.ndarray) -> float:
+    """The same of noise alone, of a main sensor that has `seen` this."""
+    shares = [problem.main_floor * float(problem.sigma[0]) / spread(seen)]
+    shares += [EDGE * rms(reel.sigma) / spread(reel.at) for reel in problem.edges]
+    return rms(np.array(shares))
+
+
+def spread(y: np.ndarray) -> float:
+    """Standard deviation, never 0."""
+    return float(np.std(y)) or 1.0
+
+
+def closed_on_track(problem: Problem, before: Fit, after: Fit, cut: int) -> float:
+    """Share of the gap to the noise that `after`, fitted on rows before `cut`, closes beyond them, of errors on track.
+
+    The noise is what `after` leaves of the rows that it was fitted on: where forces are random, a free run adds them up
+    and tells nothing. Nan where `before` leaves no gap.
+    """
+    late = problem.time_rows >= cut
+    old, new = problem.residual(before.model), problem.residual(after.model)
+    gap = rms(old[late]) ** 2 - rms(new[~late]) ** 2
+    if gap < NO_GAP * rms(new[~late]) ** 2:
+        return float("nan")
+    return (rms(old[late]) ** 2 - rms(new[late]) ** 2) / gap
 
 
 def refit(sim: Simulator, problem: Problem, fitted: Fit, stop: int) -> Fit:
     """The same model fitted anew on the rows before `stop` alone."""
-    first = Problem(sim, stop=stop, channels=problem.channels, mean=problem.mean)
+    first = Problem(sim, stop, problem.channels, problem.mean, problem.edges)
     return fit(first, fitted.space, fitted.x, rounds=5)
 
 

@@ -306,8 +306,11 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}
             else:
                 turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
-                step = min(1e-2, TURN / turns)
-                yield (Coordinate(part.name, SHAPE, value, -part.reach, part.reach, step=step),), {}
+                step, longest = min(1e-2, TURN / turns), part.reach
+                if part.name == "turn":  # less than a whole one is a spring and a push
+                    longest = min(longest, float(np.log(turns / (2 * np.pi))))
+                if longest > 0.0:
+                    yield (Coordinate(part.name, SHAPE, value, -part.reach, longest, step=step),), {}
     elif isinstance(part, Where):
         yield (), {}
         yield (), {part.name: m.scale(node).at(0.5)}

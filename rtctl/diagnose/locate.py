@@ -21,13 +21,12 @@ UNITS = {"velocity": ("rad/s", "m/s"), "position": ("rad", "m"), "angle": ("rad"
 
 def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Search, ticks: bool = False) -> Located:
     """Of the fitted base's error; `ticks`: they come off their times, and no hypothesis may be needed beside that."""
-    n = len(base.r) // len(problem.channels)
-    error = base.r.reshape(len(problem.channels), n)
-    worst = int(np.argmax(np.mean(error**2, axis=1)))
-    channel = sim.channels[problem.channels[worst]]
+    errors = problem.by_sensor(base.r)
+    channel = max(errors, key=lambda name: float(np.mean(errors[name] ** 2)))
+    error = problem.at_rows(channel, errors[channel])
     step = sim.record.dt * problem.mean
     first = sim.record.dt * (problem.rows.start or 0)
-    loud = np.flatnonzero(np.abs(error[worst]) > 4 * problem.floor)
+    loud = np.flatnonzero(np.abs(error) > 4 * problem.floor)
     since = float(first + step * loud[0]) if len(loud) else 0.0
     if ticks and not best.space.hypotheses:
         return Located(channel, "loop", "time", "at every tick, the more the faster it moves", first, 1.0)
@@ -39,7 +38,7 @@ def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Sear
     axis = TERMS[h.term].axis
     if not best.space.hypotheses or share < 0.5:
         axis = repeats(sim, base.model) or axis
-    return Located(channel, h.node, axis, where(sim, problem, error[worst], axis), since, share)
+    return Located(channel, h.node, axis, where(sim, problem, error, axis), since, share)
 
 
 def along(sim: Simulator) -> dict[str, np.ndarray]:

@@ -59,17 +59,28 @@ class Simulator:
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
         self.law = law_params(record)
 
-    def run(self, model: Model, mode: int = TRACK, n: int | None = None, coarse: bool = False) -> np.ndarray:
-        """Readings (n, sensors) in the sensors' units; nan from the tick on at which the model ran away."""
-        return self.everything(model, mode, n, coarse=coarse)[0]
+    def run(
+        self, model: Model, mode: int = TRACK, n: int | None = None, coarse: bool = False, directed: bool = False
+    ) -> np.ndarray:
+        """Readings (n, sensors) in the sensors' units; nan from the tick on at which the model ran away.
+
+        `directed`: as if every counter knew its direction.
+        """
+        return self.everything(model, mode, n, coarse=coarse, directed=directed)[0]
 
     def everything(
-        self, model: Model, mode: int = TRACK, n: int | None = None, follow: float | None = None, coarse: bool = False
+        self,
+        model: Model,
+        mode: int = TRACK,
+        n: int | None = None,
+        follow: float | None = None,
+        coarse: bool = False,
+        directed: bool = False,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Readings, the volts that the law wrote (CLOSED) and the correction (n,) that kept the model on track (TRACK).
 
         The correction is in the unit of the linear machine's input; `follow` is its bandwidth in rad/s. `coarse` takes
-        twice the step in half the time: good for differences, not for verdicts.
+        twice the step in half the time: good for differences, not for verdicts. `directed`: see `run`.
         """
         k = self.kernel
         n = len(self.seen) if n is None else n
@@ -88,6 +99,8 @@ class Simulator:
         for slot, settings in zip(slots, ordered(list(model.terms)), strict=False):
             kernel.fill_slot(k, slot, settings, params)
         job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
+        if directed:
+            job["rectified"] = 0
         laws = np.zeros(1, record_dtype(self.law))
         fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))

@@ -47,7 +47,7 @@ class Verdict(NamedTuple):
     explained: float  # share of the excess over the noise
 
 
-def judge(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alternative]], block: int) -> Verdict:
+def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alternative]], block: int) -> Verdict:
     """The verdict on `best`; `rivals` holds for each of its hypotheses the fits with another one in its place."""
     loud = base.rms > decide.LOUD * problem.floor and not decide.complete(problem, base, base)
     if not best.space.hypotheses:
@@ -90,19 +90,18 @@ def by_weight(problem: Problem, best: Fit) -> list[int]:
     return sorted(range(count), key=lambda i: -without[i])
 
 
-def proven(verdict: Verdict, before: float, after: float, floor: float, again: bool = False) -> Verdict:
-    """The verdict once its model has predicted rows that it was not fitted on, with errors `before` and `after` it.
+def proven(verdict: Verdict, closed: float, several: bool) -> Verdict:
+    """The verdict once its model has predicted rows that it was not fitted on, and `closed` this share of the gap to
+    the noise that the model without its names leaves there; nan where hardly anything was to be gained.
 
-    Terms that only imitate what is missing fit the rows that they have seen and predict the others badly, several of
-    them together most of all; what is left of such (`again`) has to do as much as they. Where hardly anything was to be
-    gained the prediction says nothing.
+    Terms that only imitate what is missing fit the rows that they have seen and predict the others badly, `several` of
+    them together most of all.
     """
-    if verdict.verdict != NAMED or before < TELLING * floor or max(before, after) >= LOST:
+    if verdict.verdict != NAMED or not np.isfinite(closed):
         return verdict
-    gap = (before - after) / (before - floor)
-    if gap < (CLOSED if len(verdict.effects) == 1 and not again else CLOSED_BY_SEVERAL):
+    if closed < (CLOSED_BY_SEVERAL if several else CLOSED):
         return Verdict(UNNAMED, (), verdict.explained)
-    sure = 0.5 + 0.5 * min(gap, 1.0)
+    sure = 0.5 + 0.5 * min(closed, 1.0)
     return verdict._replace(effects=tuple(e._replace(confidence=min(e.confidence, sure)) for e in verdict.effects))
 
 

@@ -231,7 +231,7 @@ AXIS = {
 WRITTEN = {"ivu": IVU, "ldu": LDU, "axis": AXIS}  # cases as json has them
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def case_of():
     """`case_of("ivu", **keys)`: a case as json has it; `parameters__R1=1` goes one level down."""
 

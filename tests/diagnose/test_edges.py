@@ -1,0 +1,99 @@
+"""What reels without direction tell: edges of a disc whose way is known, and what a fit makes of them."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.base import base_fit
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.edges import directions, edges
+from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.kernel import CLOSED
+from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.simulate import Simulator
+from rtctl.plants.physics import TERMS
+
+T = 2e-3 * np.arange(15000)
+WAY = 40 * np.sin(2 * np.pi * 0.11 * T) + 7 * np.sin(2 * np.pi * 0.53 * T)  # counts of a reel, there and back
+
+
+def counter(way, phase=0.37):
+    """What a disc that stood at `phase` shows of it: one more for every edge that goes past, either way."""
+    return np.concatenate([[0], np.cumsum(np.abs(np.diff(np.floor(way + phase))))])
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.37, 0.81])
+@pytest.mark.parametrize("stretch", [1.0, 0.97, 1.03])
+def test_every_edge_is_found_whatever_the_way_back(phase, stretch):
+    found = edges(counter(WAY, phase), stretch * WAY, 1)
+    assert found is not None and len(found.rows) == counter(WAY, phase)[-1]
+    true = WAY[found.rows] - found.at  # but for the tick in which it came, and where the disc stood
+    assert np.ptp(true) < 2 * np.abs(np.diff(WAY)).max()
+
+
+def test_a_reading_between_two_edges_is_as_good_as_they_are():
+    found = edges(counter(WAY), WAY, 0)
+    exact = found.error(np.stack([WAY], axis=1))
+    assert np.sqrt(np.mean(exact**2)) < 1.0
+    off = found.error(np.stack([WAY + 0.2 * np.sin(0.3 * WAY)], axis=1)) * found.sigma
+    assert np.std(off) == pytest.approx(0.2 / np.sqrt(2), rel=0.1)
+    some = found.between(1000, 3000)
+    assert some.rows.min() >= 1000 and some.rows.max() < 3000
+
+
+def test_a_model_that_does_not_know_the_way_is_not_believed():
+    assert edges(counter(WAY), np.roll(WAY, 1500), 1) is None
+    assert edges(counter(WAY), np.full_like(WAY, np.nan), 1) is None
+    assert edges(counter(0.1 * WAY[:3000]), 0.1 * WAY[:3000], 1) is None  # too few
+
+
+def test_of_all_directions_those_that_fit_as_a_whole():
+    forward = directions(np.array([1.0, 0.9, 0.1, -1.1, -0.6, 0.2, 1.0]))
+    assert forward.tolist() == [True, True, True, False, False, False, True, True]
+
+
+RIPPLE = {"term": "ripple.reel", "node": "reel1", "e": 8e-5, "phi": 0.4}  # an eccentricity of 0.08 mm
+
+
+@pytest.fixture(scope="module")
+def reels(case_of):
+    """A record of two reels, one of which is a little off centre, and the model that it was made with."""
+    case, n = read_case(case_of("ivu"), "."), 10000
+    t = 2e-3 * np.arange(n)
+    ref, zero = 12 * (1 - np.cos(2 * np.pi * 0.13 * t)) + 1.5 * np.sin(2 * np.pi * 0.9 * t), np.zeros(n)
+    names = ("capstan_counts", "reel1_counts", "reel2_counts")
+    empty = Record("ivu", case, t, 2e-3, ref, zero, np.zeros((n, 2)), dict.fromkeys(names, zero), {})
+    model = owner_model(case).add(TERMS["ripple.reel"].settings(**RIPPLE))
+    out, volts, _ = Simulator(empty).everything(model, CLOSED, directed=True)
+    y = {names[0]: np.floor(out[:, 0]), **{name: counter(out[:, c]) for c, name in enumerate(names) if c}}
+    return Simulator(empty._replace(u=volts, y=y)), model
+
+
+def test_a_reel_off_centre_shows_at_its_edges_alone(reels):
+    sim, model = reels
+    plain = Problem(sim)
+    base = base_fit(sim, plain)
+    assert base.rms < 2.0 * plain.floor  # by the capstan it may be noise
+    problem = plain.seen_by(base.model)
+    assert [sim.channels[e.channel] for e in problem.edges] == ["reel1_counts", "reel2_counts"]
+    errors = problem.by_sensor(problem.residual(base.model))
+    assert list(errors) == ["capstan_counts", "reel1_counts", "reel2_counts"]
+    loud = {name: float(np.sqrt(np.mean(e**2))) for name, e in errors.items()}
+    assert loud["reel1_counts"] > 1.5 > 1.2 > loud["reel2_counts"]
+    true = problem.by_sensor(problem.residual(model))
+    assert np.sqrt(np.mean(true["reel1_counts"] ** 2)) < 1.2
+
+
+def test_errors_are_in_the_order_of_time_and_none_is_lost(reels):
+    sim, model = reels
+    problem = Problem(sim).seen_by(model)
+    r = problem.residual(model)
+    assert (np.diff(problem.time_rows) >= 0).all() and len(r) == len(problem.time_rows)
+    parts = problem.by_sensor(r)
+    assert sum(map(len, parts.values())) == len(r)
+    np.testing.assert_allclose(parts["capstan_counts"], problem.error(model)[:, 0])
+    assert len(problem.at_rows("reel1_counts", parts["reel1_counts"])) == len(parts["capstan_counts"])
+    first = Problem(sim, 4000, problem.channels, problem.mean, problem.edges)
+    assert all(e.rows.max() < 4000 for e in first.edges)
+    share = sum(problem.balance**2 * len(e.rows) for e in problem.edges) / len(parts["capstan_counts"])
+    assert share == pytest.approx(0.5)
