@@ -23,6 +23,8 @@ FRAMES = 30.0  # a second
 LOOK = 0.25  # s between two looks at the status
 SETTINGS_EVERY = 4  # looks
 MOST_VIEWERS = 8
+STARTING = "is there but does not answer yet: it compiles its tick, or hangs; waiting for it"
+ABSENT = "does not run yet; waiting for it, start it with `rtctl run`"
 
 
 class Scope:
@@ -39,8 +41,13 @@ class Scope:
     def url(self) -> str:
         return f"http://{ADDRESS}:{self.guard.port}/?token={self.guard.token}"
 
-    async def serve(self, port: int, ready: Callable[["Scope"], None] = lambda _: None) -> None:
-        """Serve on loopback until cancelled, SIGINT or SIGTERM. Raises UserError where the port cannot be had."""
+    async def serve(
+        self, port: int, ready: Callable[["Scope"], None] = lambda _: None, say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Serve on loopback until cancelled, SIGINT or SIGTERM. Raises UserError where the port cannot be had.
+
+        `ready` is called once pages are served; `say` gets what it waits for as long as no daemon has answered.
+        """
         app = web.Application(middlewares=[self._guarded], client_max_size=1024)
         app.add_routes([web.get("/", self._page), web.get("/stream", self._stream), web.static("/static", STATIC)])
         runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=1.0)
@@ -60,7 +67,7 @@ class Scope:
                 with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread
                     asyncio.get_running_loop().add_signal_handler(number, ended.set)
             ready(self)
-            await first_of(self._frames(), self._looks(), ended.wait())
+            await first_of(self._frames(), self._looks(), self._first_answer(say), ended.wait())
         finally:
             for connection in list(self.connections):
                 await connection.end("the scope's server ends")
@@ -91,13 +98,26 @@ class Scope:
             if self.feed.alive and turn % SETTINGS_EVERY == 0:
                 await self._look_at_settings()
             turn += 1
-            told = (self.feed.alive, self.feed.run, json.dumps(self._settings), len(self.feed.signals))
+            told = (self.feed.alive, self.feed.there, self.feed.run, json.dumps(self._settings), len(self.feed.signals))
             for connection in self.connections:
                 if told != self._told:
                     connection.send_text(self._hello())
                 connection.send_text(self._status(connection))
             self._told = told
             await asyncio.sleep(LOOK)
+
+    async def _first_answer(self, say: Callable[[str], None]) -> None:
+        """Say what is waited for until the daemon answers, and that it does."""
+        told = ""
+        while not self.feed.alive:
+            lack = STARTING if self.feed.there else ABSENT
+            if lack != told:
+                say(f"{self.feed.name} {lack}")
+                told = lack
+            await asyncio.sleep(LOOK)
+        if told:
+            say(f"{self.feed.name} answers")
+        await asyncio.Event().wait()
 
     async def _look_at_settings(self) -> None:
         with contextlib.suppress(UserError):
@@ -126,6 +146,7 @@ class Scope:
         return {
             "kind": "status",
             "alive": self.feed.alive,
+            "there": self.feed.there,
             "status": self.feed.status,
             "lateness": self.feed.lateness.tolist(),
             "dropped": connection.viewer.dropped,
