@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import errno
+import itertools
 import json
 import signal
 from collections.abc import Callable, Coroutine
@@ -15,6 +16,7 @@ from rtctl.config.errors import UserError
 from rtctl.scope.connection import Connection
 from rtctl.scope.feed import Feed
 from rtctl.scope.guard import HEADERS, Guard
+from rtctl.scope.spectra import Spectra
 from rtctl.scope.tunable import PARTS, tunable
 
 ADDRESS = "127.0.0.1"
@@ -33,6 +35,7 @@ class Scope:
     def __init__(self, feed: Feed, guard: Guard, control: bool = False):
         self.feed, self.guard, self.control = feed, guard, control
         self.connections: set[Connection] = set()
+        self.spectra = Spectra()
         self._settings: list[dict[str, Any]] = []
         self._told: tuple[Any, ...] = ()
         self._run = 0
@@ -79,14 +82,14 @@ class Scope:
         """Thirty times a second: take in rows, and a frame for each viewer that can take one."""
         clock = asyncio.get_running_loop()
         due = clock.time()
-        while True:
+        for turn in itertools.count():
             self.feed.drain()
             if self.feed.run != self._run:
                 self._run = self.feed.run
                 for connection in self.connections:
                     self._start(connection)
             for connection in self.connections:
-                connection.send_frame()
+                connection.send_frame(turn)
             due = max(due + 1.0 / FRAMES, clock.time())
             await asyncio.sleep(due - clock.time())
 
