@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
+from scipy.fft import rfft
 
 MOST_POINTS = 4000  # of one signal over another
 FEWEST, LONGEST_SPECTRUM = 8, 1 << 16  # rows of a spectrum
@@ -45,13 +46,23 @@ def spectrum(values: np.ndarray, dt: float, columns: int) -> tuple[np.ndarray, n
 
 
 def lines(values: np.ndarray) -> np.ndarray:
-    """Squared amplitudes (signals, lines) of an array (signals, rows), from the first frequency beyond zero on."""
+    """Squared amplitudes (signals, lines) of an array (signals, rows), from the first frequency beyond zero on.
+
+    The transform is in single precision, which takes a third of the time; without mean and scale that loses what lies
+    some 140 dB below the signal.
+    """
     values = values[:, -LONGEST_SPECTRUM:]
     if values.shape[1] < FEWEST:
         return np.empty((len(values), 0))
     window, scale = _hann(values.shape[1])
-    found = np.fft.rfft((values - values.mean(axis=1, keepdims=True)) * window)[:, 1:]
-    return (found.real**2 + found.imag**2) * scale
+    short, largest = np.empty(values.shape, np.float32), np.empty((len(values), 1))
+    for k, signal in enumerate(values):  # one by one: they stay in the cache
+        moved = signal - signal.mean()
+        largest[k] = max(moved.max(), -moved.min()) or 1.0
+        moved *= window
+        np.divide(moved, largest[k], out=short[k], casting="same_kind")
+    found = rfft(short, overwrite_x=True)[:, 1:]  # all at once: then it works on several in one instruction
+    return (found.real**2 + found.imag**2) * (scale * largest**2)
 
 
 def in_columns(squared: np.ndarray, rows: int, dt: float, columns: int) -> tuple[np.ndarray, np.ndarray]:
