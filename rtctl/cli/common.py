@@ -188,6 +188,27 @@ def client(name: str | None) -> Any:
     return Client(where)
 
 
+def first_status(client: Any) -> dict[str, Any]:
+    """The first status of a daemon of this computer; one that still starts is waited for, and that is said once.
+
+    Raises UserError where no daemon listens, and for one far away that does not answer.
+    """
+    from rtctl.daemon.client import CommandError, listens
+
+    told = False
+    while True:
+        try:
+            return client.call("status")
+        except CommandError:
+            raise
+        except UserError:
+            if not client.endpoint.startswith("ipc://") or not listens(client.endpoint):
+                raise
+        if not told:
+            typer.echo("the daemon is there but does not answer yet: it compiles its tick, or hangs; waiting", err=True)
+            told = True
+
+
 def running() -> list[str]:
     """Names of the machines whose command socket somebody listens on."""
     from rtctl.daemon.client import listens

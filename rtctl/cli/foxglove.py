@@ -45,6 +45,7 @@ def foxglove(
                 raise
             raise UserError("this needs the package foxglove-sdk: pip install 'rtctl[foxglove]'") from None
 
+        common.first_status(client)
         with Bridge(client, host, port, None if whole else rate, control) as bridge:
             typer.echo(f"{bridge.url}\n{bridge.app_url}\nCtrl-C ends", err=True)
             try:

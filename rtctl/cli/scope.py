@@ -1,5 +1,6 @@
 """`rtctl scope`: a running machine on a page in the browser."""
 
+import time
 from typing import Annotated
 
 import typer
@@ -8,6 +9,7 @@ from rtctl.cli import common
 
 app = typer.Typer(add_completion=False)
 PORT = 8642
+LOOK = 0.25  # s between two looks for a machine
 
 
 @app.command()
@@ -22,8 +24,8 @@ def scope(
 ) -> None:
     """Serve a page with live traces, trigger, spectrum and state of a running machine, until Ctrl-C.
 
-    It listens on 127.0.0.1 only, and the page can change nothing unless --control is given. From another computer:
-    ssh -L 8642:127.0.0.1:8642 HOST.
+    The machine may be started before the scope or after it, and again. The page is served on 127.0.0.1 only, and can
+    change nothing unless --control is given. From another computer: ssh -L 8642:127.0.0.1:8642 HOST.
 
     Examples:
 
@@ -35,20 +37,44 @@ def scope(
     """
     import asyncio
 
-    from rtctl.config.errors import UserError
     from rtctl.scope.feed import Feed
     from rtctl.scope.guard import Guard
     from rtctl.scope.server import Scope
 
-    if machine is not None and "://" in machine:
-        raise UserError(f"scope {machine}: give the machine's name; to look from afar, forward the page's port by ssh")
-    with common.client(machine) as client:
-        name = client.call("status")["name"]
-    feed = Feed(name)
+    feed = Feed(_name(machine))
     try:
-        asyncio.run(Scope(feed, Guard(), control).serve(port, _say))
+        asyncio.run(Scope(feed, Guard(), control).serve(port, _say, _note))
     finally:
         feed.close()
+
+
+def _name(machine: str | None) -> str:
+    """The machine to look at. A name need not run yet; without one, whichever starts first is taken.
+
+    Raises UserError for what is no name, for several to choose from, and for one that this account may not command.
+    """
+    from rtctl.config.errors import UserError, nearest
+
+    if machine is not None and "://" in machine:
+        raise UserError(f"scope {machine}: give the machine's name; to look from afar, forward the page's port by ssh")
+    if machine is not None and machine.endswith((".yaml", ".yml")):
+        raise UserError(f"scope {machine}: give the machine's `name`, as its config says it, not the file")
+    names = common.running()
+    if machine is None and not names:
+        _note("no machine runs here; waiting for one, start it with `rtctl run CONFIG`")
+        while not (names := common.running()):
+            time.sleep(LOOK)
+    if machine is None or machine in names:
+        with common.client(machine):  # refuses what could not be asked
+            return machine or names[0]
+    near = nearest(machine, names)
+    if names:
+        _note(f"of other machines there is {', '.join(names)}" + (f"; did you mean '{near}'?" if near else ""))
+    return machine
+
+
+def _note(line: str) -> None:
+    typer.echo(line, err=True)
 
 
 def _say(scope: object) -> None:

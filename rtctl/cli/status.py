@@ -45,7 +45,7 @@ def status(
 
         raise UserError("--every is for --watch; without it the status is shown once")
     with common.client(name) as client:
-        found = client.call("status")
+        found = common.first_status(client) if watch else client.call("status")
         if watch and json:
             _json_lines(client, found, pause or EVERY)
         elif json:

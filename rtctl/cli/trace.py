@@ -119,8 +119,6 @@ def plot(
         plot_run(load_bundle(bundle), [], path)
     except ValueError as error:
         raise UserError(f"{bundle}: {error}") from error
-    except OSError as error:
-        raise UserError(f"{path}: cannot write the picture: {error.strerror or error}") from error
     typer.echo(path)
 
 

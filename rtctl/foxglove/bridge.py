@@ -46,7 +46,7 @@ class Bridge:
                 supported_encodings=["json"],
             )  # fmt: skip
         except (RuntimeError, OSError) as error:
-            raise UserError(f"cannot serve at {host}:{port}: {error}; choose another --port") from None
+            raise UserError(f"cannot serve at {host}:{port}: {error}; choose another --port or --host") from None
         self._parameters.server = self._server
         self.url = f"ws://{host}:{self._server.port}"
         self.gone = False

@@ -178,7 +178,7 @@ def _type(found: Any) -> str:
     if isinstance(found, types.NoneType):
         return "nothing"
     words = {types.Array: "an array", types.BaseTuple: "several values", types.UnicodeType: "text"}
-    return next((word for kind, word in words.items() if isinstance(found, kind)), str(found))
+    return next((word for kind, word in words.items() if isinstance(found, kind)), str(found).partition("(")[0])
 
 
 def _complaint(parts: Parts, name: str, error: Exception) -> OwnError:

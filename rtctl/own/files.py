@@ -105,7 +105,7 @@ def keep(texts: dict[str, str], folder: Path) -> None:
 def _missing(file: str, path: Path) -> str:
     from rtctl.config.errors import nearest
 
-    beside = [p.name for p in path.parent.glob("*.py")] if path.parent.is_dir() else []
+    beside = [p.name for p in path.parent.glob("*.py") if p.exists()] if path.parent.is_dir() else []
     near = nearest(path.name, beside)
     where = f"no such file in {path.parent.resolve()}, which is where the config's own path leads"
     return f"{file}: {where}" + (f"; did you mean '{near}'?" if near else "; `rtctl new law NAME` writes one")
@@ -144,4 +144,5 @@ def _words(error: Exception) -> str:
         return f"there is no module '{error.name}'; an own file may import what is installed, and no file beside it"
     if isinstance(error, ImportError):
         return str(error).partition(" (")[0]
-    return f"{type(error).__name__} while the file was read: {error}"
+    said = str(error).strip().split("\n")[0]  # pydantic goes on with an address on the web
+    return f"{type(error).__name__} while the file was read: {said}"

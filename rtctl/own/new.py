@@ -87,7 +87,7 @@ def _renamed(text: str, kind: str, stem: str, machine: str) -> str:
     for old, new in (
         (f"my_{kind}", stem),
         (camel(f"my_{kind}"), camel(stem)),
-        (f"MY_{kind.upper()}", stem.upper()),
+        (f"MY_{kind.upper()}", upper(camel(stem))),
         (f"My {kind}", stem.replace("_", " ").capitalize()),
     ):
         text = text.replace(old, new)

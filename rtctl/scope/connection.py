@@ -30,14 +30,14 @@ class Connection:
     """
 
     def __init__(self, socket: web.WebSocketResponse, scope: "Scope"):
-        self.viewer = Viewer()
+        self.viewer = Viewer(scope.spectra)
         self._socket, self._scope = socket, scope
         self._sending: set[asyncio.Task[None]] = set()
 
-    def send_frame(self) -> None:
+    def send_frame(self, turn: int) -> None:
         """Send the frame that is due, if there is one and the browser has drawn those before."""
         try:
-            frame = self.viewer.frame()
+            frame = self.viewer.frame(turn)
         except Exception as error:  # one viewer's trouble is not that of the others
             log.exception("no frame", error=str(error))
             self._send(self._socket.close(code=1011))

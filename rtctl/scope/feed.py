@@ -10,7 +10,7 @@ import structlog
 import zmq
 
 from rtctl.config.errors import UserError
-from rtctl.daemon.client import Client
+from rtctl.daemon.client import Client, listens
 from rtctl.daemon.rows import MESSAGES_WAITING, decode
 from rtctl.daemon.server import find_endpoint
 from rtctl.scope.history import MOST_ROWS, MOST_SECONDS, History
@@ -23,13 +23,14 @@ EDGES_US = [2.0**k for k in range(-2, 15)]  # of the lateness histogram
 class Feed:
     """Follows the machine `name`, through restarts of its daemon. Use in one event loop.
 
-    `run` counts up with each daemon that is met; `history` holds its rows. `alive` says whether it answers.
+    `run` counts up with each daemon that is met; `history` holds its rows. `alive` says whether it answers, `there`
+    whether its socket is there: a daemon that starts has one long before it answers.
     """
 
     def __init__(self, name: str):
         self.name = name
         self.run = 0
-        self.alive = False
+        self.alive = self.there = False
         self.rate = 0.0
         self.signals: list[dict[str, str]] = []
         self.history: History | None = None
@@ -41,7 +42,8 @@ class Feed:
         self._rows = self._context.socket(zmq.SUB)
         self._rows.linger, self._rows.rcvhwm, self._rows.reconnect_ivl = 0, MESSAGES_WAITING, 50
         self._rows.subscribe(name)
-        self._rows.connect(find_endpoint(name, "rows"))
+        self._rows_at = find_endpoint(name, "rows")
+        self._rows.connect(self._rows_at)
         self._client = Client(find_endpoint(name, "command"), timeout=TIMEOUT, context=self._context)
         self._thread = ThreadPoolExecutor(1, "daemon")  # a client is for one thread
 
@@ -54,10 +56,12 @@ class Feed:
         try:
             self.status = await self.call("status")
             if not self.signals:
+                self._follow()
                 self.signals = (await self.call("signals"))["signals"]
-            self.alive, self.rate = True, float(self.status["rate_hz"])
+            self.alive, self.there, self.rate = True, True, float(self.status["rate_hz"])
         except UserError:
             self.alive, self.signals = False, []
+            self.there = await asyncio.get_running_loop().run_in_executor(self._thread, self._find)
 
     def drain(self) -> int:
         """Take in the rows that have come; returns how many."""
@@ -70,6 +74,22 @@ class Feed:
                 except (TypeError, ValueError) as error:
                     log.warning("not a message of rows", error=str(error))
         return taken
+
+    def _find(self) -> bool:
+        """Whether somebody listens where the daemon's socket would be: ours, or by now that of a system service."""
+        at = find_endpoint(self.name, "command")
+        if at != self._client.endpoint:
+            self._client.close()
+            self._client.endpoint = at
+        return listens(at)
+
+    def _follow(self) -> None:
+        """Take the rows from where the daemon is now."""
+        at = find_endpoint(self.name, "rows")
+        if at != self._rows_at:
+            self._rows.disconnect(self._rows_at)
+            self._rows.connect(at)
+            self._rows_at = at
 
     def _take(self, topic: bytes, head: bytes, payload: bytes) -> int:
         """Take in one message. Raises ValueError or TypeError where it is none of a daemon."""

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import errno
+import itertools
 import json
 import signal
 from collections.abc import Callable, Coroutine
@@ -15,6 +16,7 @@ from rtctl.config.errors import UserError
 from rtctl.scope.connection import Connection
 from rtctl.scope.feed import Feed
 from rtctl.scope.guard import HEADERS, Guard
+from rtctl.scope.spectra import Spectra
 from rtctl.scope.tunable import PARTS, tunable
 
 ADDRESS = "127.0.0.1"
@@ -23,6 +25,8 @@ FRAMES = 30.0  # a second
 LOOK = 0.25  # s between two looks at the status
 SETTINGS_EVERY = 4  # looks
 MOST_VIEWERS = 8
+STARTING = "is there but does not answer yet: it compiles its tick, or hangs; waiting for it"
+ABSENT = "does not run yet; waiting for it, start it with `rtctl run`"
 
 
 class Scope:
@@ -31,6 +35,7 @@ class Scope:
     def __init__(self, feed: Feed, guard: Guard, control: bool = False):
         self.feed, self.guard, self.control = feed, guard, control
         self.connections: set[Connection] = set()
+        self.spectra = Spectra()
         self._settings: list[dict[str, Any]] = []
         self._told: tuple[Any, ...] = ()
         self._run = 0
@@ -39,8 +44,13 @@ class Scope:
     def url(self) -> str:
         return f"http://{ADDRESS}:{self.guard.port}/?token={self.guard.token}"
 
-    async def serve(self, port: int, ready: Callable[["Scope"], None] = lambda _: None) -> None:
-        """Serve on loopback until cancelled, SIGINT or SIGTERM. Raises UserError where the port cannot be had."""
+    async def serve(
+        self, port: int, ready: Callable[["Scope"], None] = lambda _: None, say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Serve on loopback until cancelled, SIGINT or SIGTERM. Raises UserError where the port cannot be had.
+
+        `ready` is called once pages are served; `say` gets what it waits for as long as no daemon has answered.
+        """
         app = web.Application(middlewares=[self._guarded], client_max_size=1024)
         app.add_routes([web.get("/", self._page), web.get("/stream", self._stream), web.static("/static", STATIC)])
         runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=1.0)
@@ -60,7 +70,7 @@ class Scope:
                 with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread
                     asyncio.get_running_loop().add_signal_handler(number, ended.set)
             ready(self)
-            await first_of(self._frames(), self._looks(), ended.wait())
+            await first_of(self._frames(), self._looks(), self._first_answer(say), ended.wait())
         finally:
             for connection in list(self.connections):
                 await connection.end("the scope's server ends")
@@ -72,14 +82,14 @@ class Scope:
         """Thirty times a second: take in rows, and a frame for each viewer that can take one."""
         clock = asyncio.get_running_loop()
         due = clock.time()
-        while True:
+        for turn in itertools.count():
             self.feed.drain()
             if self.feed.run != self._run:
                 self._run = self.feed.run
                 for connection in self.connections:
                     self._start(connection)
             for connection in self.connections:
-                connection.send_frame()
+                connection.send_frame(turn)
             due = max(due + 1.0 / FRAMES, clock.time())
             await asyncio.sleep(due - clock.time())
 
@@ -91,13 +101,26 @@ class Scope:
             if self.feed.alive and turn % SETTINGS_EVERY == 0:
                 await self._look_at_settings()
             turn += 1
-            told = (self.feed.alive, self.feed.run, json.dumps(self._settings), len(self.feed.signals))
+            told = (self.feed.alive, self.feed.there, self.feed.run, json.dumps(self._settings), len(self.feed.signals))
             for connection in self.connections:
                 if told != self._told:
                     connection.send_text(self._hello())
                 connection.send_text(self._status(connection))
             self._told = told
             await asyncio.sleep(LOOK)
+
+    async def _first_answer(self, say: Callable[[str], None]) -> None:
+        """Say what is waited for until the daemon answers, and that it does."""
+        told = ""
+        while not self.feed.alive:
+            lack = STARTING if self.feed.there else ABSENT
+            if lack != told:
+                say(f"{self.feed.name} {lack}")
+                told = lack
+            await asyncio.sleep(LOOK)
+        if told:
+            say(f"{self.feed.name} answers")
+        await asyncio.Event().wait()
 
     async def _look_at_settings(self) -> None:
         with contextlib.suppress(UserError):
@@ -126,6 +149,7 @@ class Scope:
         return {
             "kind": "status",
             "alive": self.feed.alive,
+            "there": self.feed.there,
             "status": self.feed.status,
             "lateness": self.feed.lateness.tolist(),
             "dropped": connection.viewer.dropped,

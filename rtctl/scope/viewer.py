@@ -12,6 +12,7 @@ import numpy as np
 
 from rtctl.scope.history import History
 from rtctl.scope.reduce import envelope, spectrum, thinned
+from rtctl.scope.spectra import Spectra
 from rtctl.scope.trigger import PATIENCE, Trigger
 from rtctl.scope.view import View
 
@@ -31,12 +32,13 @@ class Picture(NamedTuple):
 
 class Viewer:
     """`frame()` gives the next frame; `drawn()` says that the viewer has drawn one. `dropped` counts frames that were
-    due while it had not drawn those it had."""
+    due while it had not drawn those it had. Viewers of one history may share `spectra`."""
 
-    def __init__(self) -> None:
+    def __init__(self, spectra: Spectra | None = None) -> None:
         self.view = View()
         self.dropped = 0
         self.outstanding = 0
+        self._spectra = spectra or Spectra()
         self._history: History | None = None
         self._rate = 1.0
         self._trigger: Trigger | None = None
@@ -72,11 +74,14 @@ class Viewer:
     def drawn(self) -> None:
         self.outstanding = max(0, self.outstanding - 1)
 
-    def frame(self) -> bytes | None:
-        """The frame that is due now; None where there is nothing new, or the viewer has not drawn the last ones."""
+    def frame(self, turn: int | None = None) -> bytes | None:
+        """The frame that is due now; None where there is nothing new, or the viewer has not drawn the last ones.
+
+        `turn` counts frames for all viewers, so that those who see the same get it in the same one.
+        """
         if self._history is None or not self._asked:
             return None
-        self._turn += 1
+        self._turn = self._turn + 1 if turn is None else turn
         self._look_for_sweep()
         if self.outstanding >= OUTSTANDING:
             self.dropped += 1
@@ -152,6 +157,8 @@ class Viewer:
         if self._turn % SLOW[self.view.kind]:
             return None
         assert self._history is not None
+        if self.view.kind == "spectrum":
+            return self._newest_spectrum()
         names, head = ("t", *self._wanted(self._history.names)), self._history.head
         return self._picture(Picture(names, self._history.take(names, head - self.rows, head), 0.0, False, head))
 
@@ -184,9 +191,7 @@ class Viewer:
             first = int(np.searchsorted(values[0], self.view.span[0])) - 1  # and a row beyond either end: lines go on
             last = int(np.searchsorted(values[0], self.view.span[1], "right")) + 1
             values = values[:, max(first, 0) : last]
-        about: dict[str, Any] = {"names": names, "sweep": still.sweep, "held": held, "span": self.view.span}
-        if self._trigger is not None:
-            about |= {"sweeps": self._trigger.count, "done": self._trigger.done}
+        about = self._about(names, still.sweep)
         if self.view.kind == "xy":
             points, step = thinned(values[1:])
             return pack({**about, "kind": "xy", "step": step}, points)
@@ -195,6 +200,21 @@ class Viewer:
             return pack({**about, "kind": "spectrum", "rows": values.shape[1]}, [f, *level])
         size = max(1, math.ceil(values.shape[1] / self.view.columns))
         return self._time(names, values, size, {**about, "kind": "picture"})
+
+    def _newest_spectrum(self) -> bytes:
+        """The spectrum of the window's rows, which other viewers may have asked for as well."""
+        history = self._history
+        assert history is not None
+        names = self._wanted(history.names)
+        f, level, rows = self._spectra.newest(history, names, self.rows, 1.0 / self._rate, self.view.columns)
+        return pack({**self._about(names, sweep=False), "kind": "spectrum", "rows": rows}, [f, *level])
+
+    def _about(self, names: list[str], sweep: bool) -> dict[str, Any]:
+        """What each picture says of itself."""
+        about = {"names": names, "sweep": sweep, "held": self._held is not None, "span": self.view.span}
+        if self._trigger is not None:
+            about |= {"sweeps": self._trigger.count, "done": self._trigger.done}
+        return about
 
     def _time(self, names: list[str], values: np.ndarray, size: int, about: dict[str, Any]) -> bytes:
         low, high = envelope(values[1:], size)

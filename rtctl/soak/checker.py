@@ -75,13 +75,16 @@ class Checker:
         ):  # fmt: skip
             w[field] = place[column]
         per_unit = ranges.counts_per_unit(config)
-        knows = r.truth in place and np.isfinite(per_unit)
+        empty = ranges.unknown(config) & set(place)
+        w["n_empty"] = len(empty)
+        w["empty"][: len(empty)] = sorted(place[name] for name in empty)
+        knows = r.truth in place and r.truth not in empty and np.isfinite(per_unit)
         w["truth"] = place[r.truth] if knows else -1
         w["per_unit"] = per_unit if knows else 0.0
         w["counts_off"] = r.stretch
         w["n_outputs"] = len(r.outputs)
         w["outputs"][: len(r.outputs)] = [place[name] for name in r.outputs]
-        tensions = [*r.tensions, *(r.truth_tensions if all(n in place for n in r.truth_tensions) else ())]
+        tensions = [*r.tensions, *(r.truth_tensions if set(r.truth_tensions) <= place.keys() - empty else ())]
         w["n_tensions"] = len(tensions)
         w["tensions"][: len(tensions)] = [place[name] for name in tensions]
         w["low"], w["high"] = ranges.volts(config)

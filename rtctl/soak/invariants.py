@@ -44,6 +44,7 @@ WINDOWS = state(
     # columns of the matrix; -1 for none
     state=int, trip=int, age=int, lateness=int, order=int, position=int, error=int, counts=int, truth=int,
     outputs=(int, 2), n_outputs=int, tensions=(int, 4), n_tensions=int,  # estimates first, then the truth
+    empty=(int, 8), n_empty=int,  # of a plant that does not know them
     # limits
     low=float, high=float, rounding=float, fade=float,  # V, V, V between law and row, share a tick
     tension_min=float, tension_max=float, tension_ticks=int,
@@ -95,7 +96,7 @@ def check(rows, ticks, windows, carry, found):
     for i in range(len(rows)):
         y, k = rows[i], ticks[i]
         _ring(s, found, k)
-        _finite(s, found, y, k)
+        _finite(w, s, found, y, k)
         now, on = int(y[w.state]), y[w.state] == ARMED or y[w.state] == RUNNING
         _outputs(w, s, found, y, k, now)
         _states(w, s, found, y, k, now)
@@ -115,16 +116,25 @@ def _ring(s, found, k):
 
 
 @compiled
-def _finite(s, found, y, k):
+def _finite(w, s, found, y, k):
     fine = True
     for j in range(len(y)):
         fine &= abs(y[j]) <= BIGGEST
     if not fine:
-        worst = 0
+        worst = -1
         for j in range(len(y)):
-            if not abs(y[j]) <= BIGGEST:
+            if not abs(y[j]) <= BIGGEST and not _is_empty(w, j):
                 worst = j
-        note(s, found, FINITE, k, y[worst], float(worst))
+        if worst >= 0:
+            note(s, found, FINITE, k, y[worst], float(worst))
+
+
+@compiled
+def _is_empty(w, j):
+    found = False
+    for n in range(w.n_empty):
+        found |= w.empty[n] == j
+    return found
 
 
 @compiled

@@ -128,12 +128,30 @@ def rounding(config: Any) -> float:
     return 2 * code + (ldu_amplifier.KNEE_VOLTS if amplifier is not None and amplifier.compensate else 0.0)
 
 
+def unknown(config: Any) -> set[str]:
+    """Truth columns that stay empty: those that an own plant has no state of, and all of an FMU."""
+    from rtctl.machines import own_plant
+    from rtctl.own.plant import TRUTH
+
+    columns = [column.name for column in own_plant.COLUMNS[config.machine]]
+    parts = own_plant.parts_of(config)
+    if parts is not None:
+        fields = zip(columns, TRUTH[config.machine], strict=True)
+        return {column for column, field in fields if field not in (parts.state.names or ())}
+    return set(columns) if config.plant.fmu is not None else set()
+
+
 def counts_per_unit(config: Any) -> float:
-    """Counts for one unit of the truth column; nan where a term of physics stands between the two."""
+    """Counts for one unit of the truth column; nan where a term of physics stands between the two, and where only an
+    own plant knows what the linear drive's encoder turns on."""
+    from rtctl.machines import own_plant
     from rtctl.plants import ldu
     from rtctl.plants.physics import TERMS
 
-    if any(TERMS[t.term].act_at("reading", config.machine) is not None for t in config.plant.physics):
+    if own_plant.is_own(config):
+        if config.machine == "ldu":
+            return float("nan")
+    elif any(TERMS[t.term].act_at("reading", config.machine) is not None for t in config.plant.physics):
         return float("nan")
     if config.machine == "axis":
         return float(1.0 / config.encoder.pitch)

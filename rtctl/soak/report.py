@@ -1,5 +1,6 @@
 """What came of a soak: a JSON summary, JUnit XML for a CI server, and a few lines for a person."""
 
+import math
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -7,6 +8,7 @@ from xml.etree import ElementTree
 from rtctl.loop.safety import TRIPS
 from rtctl.soak.events import Day
 from rtctl.soak.invariants import INVARIANTS, NAMES
+from rtctl.trace.bundle import as_json
 
 SUMMARY = "summary.json"
 TIMES = ("wall_s", "memory_mb")  # fields that two runs of the same day do not share
@@ -39,6 +41,17 @@ def summary(day: Day, wall_s: float, memory_mb: float, mode: str, out: Path) -> 
         "memory_mb": round(memory_mb, 1),
         "out": str(out),
     }
+
+
+def as_text(found: dict[str, Any]) -> str:
+    """The summary for its file. What is no number becomes null there, which JSON can hold."""
+    return as_json({**found, "violation_list": [_numbers(v) for v in found["violation_list"]]}, indent=1) + "\n"
+
+
+def _numbers(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _numbers(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def junit(found: dict[str, Any], path: Path) -> None:

@@ -10,7 +10,6 @@ from rtctl.soak import progress, ranges, report
 from rtctl.soak.events import Day
 from rtctl.soak.memory import Memory
 from rtctl.soak.rig import Fused
-from rtctl.trace.bundle import as_json
 
 SAVE = 10.0  # s of wall time between two writes of the progress file
 Update = Callable[[int, int, int], None]  # ticks done, ticks in all, violations
@@ -84,7 +83,7 @@ def _play(
     found = report.summary(day, wall, memory.most, mode, out)
     found["complete"] = rig.tick >= total
     try:
-        (out / report.SUMMARY).write_text(as_json(found, indent=1) + "\n")
+        (out / report.SUMMARY).write_text(report.as_text(found))
     except OSError as error:
         raise UserError(f"{out / report.SUMMARY}: cannot be written: {error.strerror}") from None
     return found

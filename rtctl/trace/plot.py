@@ -89,7 +89,7 @@ def plot_run(
     """Draw a bundle, or columns by name with `t` in s, into a PNG at `path`; what of the known names is there is drawn.
 
     `metrics` as from `step_metrics` (may be empty). The title is the case's machine and date where none is given.
-    Raises ValueError where there is no `t`, or nothing to draw.
+    Raises ValueError where there is no `t`, or nothing to draw, and UserError where the file cannot be written.
     """
     bundle = run if isinstance(run, Bundle) else None
     columns = bundle.columns if bundle else dict(run)  # type: ignore[arg-type]
@@ -113,16 +113,22 @@ def plot_run(
     figure.suptitle(title or _title(bundle.case if bundle else {}), x=0.01, ha="left", fontsize=14, fontweight="bold")
     if metrics:
         every[0].set_title(summary(metrics), loc="left", fontsize=10, color="#444444")
-    figure.savefig(path)
+    save(figure, Path(path), "")
     return Path(path)
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write what `--plot` asked for. Raises UserError where the file cannot be written."""
+def save(figure: Figure, path: Path, option: str = "--plot ") -> None:
+    """Write what `option` asked for. Raises UserError where the file cannot be written."""
+    kinds = sorted(figure.canvas.get_supported_filetypes())
+    if path.is_dir() or path.suffix.removeprefix(".").lower() not in kinds:
+        why = "a folder" if path.is_dir() else "no kind of picture"
+        raise UserError(f"{option}{path}: is {why}; name a file that ends in .png, .svg or .pdf")
+    if not path.parent.is_dir():
+        raise UserError(f"{option}{path}: cannot be written (there is no folder {path.parent})")
     try:
         figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise UserError(f"--plot {path}: cannot be written ({error})") from None
+    except OSError as error:
+        raise UserError(f"{option}{path}: cannot be written ({error.strerror or error})") from None
 
 
 def summary(metrics: Sequence[Mapping[str, Any]]) -> str:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from rtctl.cli.common import load_config
+
 DOC = Path(__file__).parents[2] / "docs" / "tutorial_own_law.md"
 BLOCK = re.compile(r"(?P<before>[^\n]*(?:\n[^\n]+)*)\n\n```(?P<kind>\w+)\n(?P<text>.*?)^```", re.MULTILINE | re.DOTALL)
 pytestmark = pytest.mark.usefixtures("library")
@@ -36,6 +38,15 @@ def test_what_it_writes_passes_its_tests_and_is_right(rtctl, tmp_path):
         assert (code, err) == (0, ""), err
     assert "V/m" in (tmp_path / "new" / "cascade.py").read_text()
     assert not any("my_" in p.read_text().lower() for p in (tmp_path / "new").glob("*.py"))
+
+
+@pytest.mark.parametrize("name", ["l_ivu", "a_b_c", "v2_law", "PIController", "my__law", "pd2x", "X", "law_2"])
+def test_any_name_that_it_takes_makes_a_file_that_is_found_again(rtctl, tmp_path, name):
+    for kind, machine in (("law", "ivu"), ("plant", "axis"), ("term", "ldu")):
+        folder = tmp_path / kind
+        assert rtctl("new", kind, name, "--for", machine, "--into", folder).code == 0
+        (config,) = folder.glob("*.yaml")
+        load_config(str(config), [])
 
 
 def test_it_never_overwrites(rtctl, tmp_path):

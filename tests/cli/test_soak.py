@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 Rtctl = Callable[..., Any]
 
@@ -20,6 +21,24 @@ def test_a_short_soak_passes(rtctl: Rtctl, tmp_path: Path) -> None:
     assert "<testsuite" in xml.read_text()
     more = rtctl("soak", "ivu", "--hours", 0.015, "--seed", 2, "--out", out, "--resume")
     assert more.code == 0 and "no violations" in more.out
+
+
+def test_a_law_and_a_plant_of_ones_own(rtctl: Rtctl, tmp_path: Path) -> None:
+    """As `rtctl new` writes them; the plant keeps its speed for itself, so that column is empty."""
+    assert rtctl("new", "law", "pusher", "--for", "axis", "--into", tmp_path).code == 0
+    assert rtctl("new", "plant", "slide", "--for", "axis", "--into", tmp_path).code == 0
+    plant, config = tmp_path / "slide.py", tmp_path / "slide.yaml"
+    plant.write_text(plant.read_text().replace("x=float, v=float", "x=float, w=float").replace("s.v", "s.w"))
+    law = yaml.safe_load((tmp_path / "pusher.yaml").read_text())["law"]["position"]
+    given = yaml.safe_load(config.read_text())
+    given["law"]["position"] = law
+    config.write_text(yaml.safe_dump(given, sort_keys=False))
+    said = rtctl("soak", config, "--hours", 0.03, "--seed", 3, "--out", tmp_path / "out", "--json")
+    assert said.code == 0, said.err
+    found = json.loads(said.out)
+    assert found["violations"] == 0 and found["moves"] > 10 and found["faults"]
+    assert found["invariants"]["finite"] == found["ticks"]
+    assert found["invariants"]["counters"] > 0.5 * found["ticks"]
 
 
 def test_violations_are_exit_code_1(rtctl: Rtctl, tmp_path: Path) -> None:

@@ -36,7 +36,23 @@ def test_plot(rtctl, bundle, tmp_path):
     code, out, _ = rtctl("trace", "plot", bundle, "-o", tmp_path / "picture.png")
     assert (code, out) == (0, f"{tmp_path / 'picture.png'}\n")
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
-    assert rtctl("trace", "plot", bundle, "-o", tmp_path / "nowhere" / "picture.png").code == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("", "is a folder; name a file that ends in .png"),
+        ("picture", "is no kind of picture; name a file that ends in .png"),
+        ("picture.xyz", "is no kind of picture; name a file that ends in .png"),
+        ("nowhere/picture.png", "cannot be written (there is no folder"),
+    ],
+)
+def test_a_picture_that_cannot_be(rtctl, bundle, tmp_path, name, message):
+    for words in (["plot", bundle, "-o", tmp_path / name], ["compare", bundle, bundle, "--plot", tmp_path / name]):
+        code, out, err = rtctl("trace", *words)
+        assert (code, out) == (2, "")
+        assert message in err and str(tmp_path / name) in err and err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == [bundle.name]
 
 
 def test_repair_of_what_is_whole(rtctl, bundle):
@@ -92,6 +108,8 @@ def test_export(rtctl, bundle, tmp_path):
         (["--to", "csv", "--from", "soon"], "--from soon: not a duration"),
         (["--to", "csv", "--every", "0"], "invalid value for '--every'"),
         (["--to", "csv", "--from", "-2s", "--to-time", "-1s"], "holds no rows from -2 s to -1 s"),
+        (["--to", "csv", "--from", "500s"], "holds no rows from 500 s on; its column t runs from 0 s to 0.99 s"),
+        (["--to", "csv", "--to-time", "-1s"], "holds no rows to -1 s; its"),
         ([], "missing option '--to'"),
     ],
 )

@@ -44,6 +44,7 @@ def test_a_law_in_order_is_measured(law):
         ("return [e, e][s.n]", "return [e", "list(float64)<iv=None> takes memory in every tick"),
         ("print(e)\n    return e", "def step", "step calls Python (print, objmode)"),
         ("return s.x", "def step", "step gives an array; it should give one number, the command in V"),
+        ("return s", "def step", "step gives Record; it should give one number"),
         ("s.n += 1", "def step", "step gives nothing; it should give one number"),
         ("return np.log(-1.0 - e * e)", "def step", "step gives nan in tick 0 for a healthy input (e = 0)"),
         ("s.x[0] = e / 0.0\n    return e", "def step", "s.x is no number any more"),

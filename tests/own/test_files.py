@@ -30,6 +30,10 @@ def test_another_text_is_another_module_and_the_same_text_is_the_same():
     [
         ("a = 1\nretrn a\n", r"\./try\.py:2: not Python: invalid syntax"),
         ("import numpy\n1 / 0\n", r"\./try\.py:2: ZeroDivisionError while the file was read"),
+        (
+            "from rtctl.idiom import Settings\nclass A(Settings):\n    k = 1.0\n",
+            r"\./try\.py:2: PydanticUserError while the file was read: [^\n]*$",
+        ),
         ("import beside\n", r"\./try\.py:1: there is no module 'beside'; an own file may import what is installed"),
         ("from rtctl.laws import pdd\n", r"\./try\.py:1: cannot import name 'pdd' from 'rtctl\.laws'$"),
     ],
@@ -45,6 +49,9 @@ def test_a_file_that_is_not_there_or_no_text(tmp_path):
     assert read("./try.py", tmp_path) == "x = 1\n"
     with pytest.raises(OwnError, match=r"\./tri\.py: no such file in .*; did you mean 'try\.py'"):
         read("./tri.py", tmp_path)
+    (tmp_path / "led_nowhere.py").symlink_to(tmp_path / "gone")
+    with pytest.raises(OwnError, match=r"no such file in .*; `rtctl new law NAME` writes one"):
+        read("./led_nowhere.py", tmp_path)
     (tmp_path / "bad.py").write_bytes(b"x = 1\n\xff\n")
     with pytest.raises(OwnError, match=r"\./bad\.py:2: not UTF-8"):
         read("./bad.py", tmp_path)

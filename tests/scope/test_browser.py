@@ -262,3 +262,23 @@ def test_a_narrow_screen_needs_no_sideways_scrolling(open_page):
     page = open_page()
     page.set_viewport_size({"width": 360, "height": 740})
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
+
+
+def test_a_page_that_is_opened_before_the_machine_runs(browser, runtime, tmp_path):
+    machine, server = Machine(f"late{os.getpid()}", tmp_path), Server(f"late{os.getpid()}", tmp_path)
+    server.start()
+    page, said = browser.new_page(), []
+    page.set_default_timeout(LONGEST)
+    page.on("console", lambda message: said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    try:
+        page.goto(server.url)
+        page.wait_for_selector("#banner:has-text('it does not run')")
+        machine.start()
+        until(page, "window.scope?.traces.x.length > 10")
+        page.wait_for_selector("#banner", state="hidden")
+    finally:
+        page.close()
+        server.stop()
+        machine.stop()
+    assert not said

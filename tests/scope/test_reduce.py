@@ -49,6 +49,25 @@ def test_a_sine_reads_its_amplitude_at_its_frequency(columns):
     assert len(f) <= columns
 
 
+@pytest.mark.parametrize("size", [1e-30, 1e-9, 1.0, 1e30])
+def test_small_lines_beside_large_ones_at_any_scale(size):
+    t = np.arange(50_000) * 1e-4
+    large, small = np.sin(2 * np.pi * 10.0 * t), 1e-6 * np.sin(2 * np.pi * 700.0 * t)
+    f, level = spectrum(size * np.array([large + small, large, 1e3 + small]), 1e-4, 30_000)
+    at = round(700.0 / f[0]) - 1
+    assert level[0, at] == pytest.approx(1e-6 * size, rel=0.01)  # 120 dB down
+    assert level[1, at] < 1e-7 * size
+    assert level[2, at] == pytest.approx(1e-6 * size, rel=1e-3)  # the mean is taken off in full precision
+
+
+def test_what_is_no_number_spoils_its_own_signal_alone():
+    t = np.arange(5000) * 1e-3
+    both = np.array([np.sin(2 * np.pi * 40.0 * t), np.sin(2 * np.pi * 40.0 * t)])
+    both[0, 17] = np.nan
+    _, level = spectrum(both, 1e-3, 5000)
+    assert np.isnan(level[0]).all() and level[1].max() == pytest.approx(1.0, rel=1e-6)
+
+
 def test_a_spectrum_of_too_few_rows_is_empty():
     f, level = spectrum(np.zeros((2, 5)), 1e-3, 100)
     assert (len(f), level.shape) == (0, (2, 0))

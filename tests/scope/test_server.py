@@ -18,16 +18,21 @@ from rtctl.daemon.rows import RowsOut
 from rtctl.daemon.server import CommandServer, default_endpoint
 from rtctl.scope.feed import Feed
 from rtctl.scope.guard import Guard
-from rtctl.scope.server import MOST_VIEWERS, Scope
+from rtctl.scope.server import ABSENT, MOST_VIEWERS, STARTING, Scope
 
 number = itertools.count(1)
 
 
 class Daemon:
-    """A daemon of 1 kHz in a thread: publishes ten rows every 10 ms, and does to its config what it is asked."""
+    """A daemon of 1 kHz in a thread: publishes ten rows every 10 ms, and does to its config what it is asked.
+
+    It answers while `answers` is set.
+    """
 
     def __init__(self, config, row):
         self.config, self.row, self.seen = config, row, []
+        self.answers = threading.Event()
+        self.answers.set()
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._run)
 
@@ -66,7 +71,8 @@ class Daemon:
             out.publish(rows)
             if self._done.wait(0.01):
                 break
-            server.process()
+            if self.answers.is_set():
+                server.process()
         out.close()
         server.close()
         context.destroy(linger=0)
@@ -79,14 +85,14 @@ def daemon(runtime, config, rows):
         yield running
 
 
-def serving(daemon, folder, work, control=False):
-    """Run `work(scope, session)` beside a server; the session holds the token."""
+def serving(daemon, folder, work, control=False, say=lambda _: None):
+    """Run `work(scope, session)` beside a server; the session holds the token. `say` hears what is waited for."""
 
     async def main():
         feed, guard = Feed(daemon.config.name), Guard(folder)
         scope = Scope(feed, guard, control)
         ready = asyncio.Event()
-        server = asyncio.create_task(scope.serve(0, lambda _: ready.set()))
+        server = asyncio.create_task(scope.serve(0, lambda _: ready.set(), say))
         waiting = asyncio.create_task(ready.wait())
         await asyncio.wait({server, waiting}, return_when=asyncio.FIRST_COMPLETED)
         try:
@@ -279,6 +285,46 @@ def test_another_daemon_of_the_name_is_taken_up(runtime, config, rows, tmp_path,
         first.__exit__()
         second._done.set()
         second._thread.join()
+
+
+def test_the_scope_may_be_first(runtime, config, rows, tmp_path):
+    """Then the daemon comes, at first as one that compiles its tick: its sockets are there and nobody answers."""
+    late, said = Daemon(config("ivu"), rows(0, 1).dtype), []
+    late.answers.clear()
+
+    async def work(scope, session):
+        async with page(scope, session) as viewer:
+            assert (await viewer.until("hello"))["signals"] == []
+            await viewer.until("status", alive=False, there=False)
+            late.__enter__()
+            await viewer.until("status", alive=False, there=True)
+            while len(said) < 2:
+                await viewer.until("status", alive=False)
+            late.answers.set()
+            await viewer.look()
+            await viewer.until("roll")
+        while len(said) < 3:
+            await asyncio.sleep(0)
+
+    try:
+        serving(late, tmp_path, work, say=said.append)
+    finally:
+        late._done.set()
+        late._thread.join()
+    name = late.config.name
+    assert said == [f"{name} {ABSENT}", f"{name} {STARTING}", f"{name} answers"]
+
+
+def test_a_daemon_that_answers_needs_no_words(daemon, tmp_path):
+    said = []
+
+    async def work(scope, session):
+        async with page(scope, session) as viewer:
+            await viewer.look()
+            await viewer.until("roll")
+
+    serving(daemon, tmp_path, work, say=said.append)
+    assert said == []
 
 
 def test_a_port_that_is_taken(daemon, tmp_path):

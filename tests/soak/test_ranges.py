@@ -1,14 +1,18 @@
 """The table of what a day may ask: it names signals and settings that there are, and bounds that hold."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from rtctl import machines
+from rtctl.cli.common import load_config
+from rtctl.cli.main import main
 from rtctl.config.load import get_path, set_path
 from rtctl.loop import generate
+from rtctl.plants.fmu import FmuSettings
 from rtctl.soak import ranges
 
 
@@ -52,6 +56,38 @@ def test_counts_are_compared_unless_a_term_stands_between(config: Callable[..., 
     assert ranges.counts_per_unit(config("axis")) == pytest.approx(1e6)
     terms = [{"term": "ripple.encoder", "node": "sensor", "A": 1e-6}]
     assert np.isnan(ranges.counts_per_unit(config("axis", set={"plant.physics": terms})))
+
+
+@pytest.mark.parametrize(
+    ("machine", "without", "empty"),
+    [
+        ("axis", {}, set()),
+        ("axis", {"v=float": "w=float", "s.v": "s.w"}, {"truth_speed"}),
+        ("ivu", {}, {"truth_tension1"}),
+        ("ldu", {}, set()),
+    ],
+)
+def test_what_an_own_plant_does_not_tell_is_not_asked_for(
+    tmp_path: Path, machine: str, without: dict[str, str], empty: set[str]
+) -> None:
+    main(["new", "plant", "mine", "--for", machine, "--into", str(tmp_path)])
+    text = (tmp_path / "mine.py").read_text()
+    for old, new in without.items():
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "mine.py").write_text(text)
+    own = load_config(str(tmp_path / "mine.yaml"), [])
+    assert empty <= ranges.unknown(own)
+    if not empty:
+        assert f"truth_{'capstan' if machine == 'ivu' else 'x'}" not in ranges.unknown(own)
+    assert np.isnan(ranges.counts_per_unit(own)) == (machine == "ldu")
+
+
+def test_an_fmu_tells_nothing_but_what_its_sensors_see(config: Callable[..., Any]) -> None:
+    fmu = FmuSettings(file="a.fmu", inputs={"drive": "u"}, outputs={"sensor": "x"})
+    axis = config("axis")
+    with_fmu = axis.model_copy(update={"plant": axis.plant.model_copy(update={"fmu": fmu})})
+    assert ranges.unknown(with_fmu) == {"truth_x", "truth_speed"} and ranges.unknown(axis) == set()
 
 
 def test_a_config_keeps_its_own_reference(settings: Any) -> None:

@@ -1,5 +1,6 @@
 """Summary, JUnit XML and the words of a soak."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,18 @@ def test_the_summary_counts_and_tells(found: dict[str, Any]) -> None:
     assert all(v["seed"] == 7 and v["signals"] and v["bundle"] for v in found["violation_list"])
     assert {"simulated_hours", "wall_s", "faults", "ticks", "moves", "trips", "invariants"} <= set(found)
     assert found["invariants"]["finite"] == found["ticks"] > 0
+
+
+def test_a_violation_by_what_is_no_number_can_be_written(rig: Callable[..., Fused], tmp_path: Path) -> None:
+    machine = rig("axis", seed=7)
+    day = Day(machine, 7)
+    day.step()
+    machine.checker.note("finite", 12, float("nan"), 3.0)
+    machine.checker.kept[0].signals["u"] = float("inf")
+    found = report.summary(day, 1.5, 200.0, "fused", tmp_path)
+    written = json.loads(report.as_text(found))["violation_list"][0]
+    assert (written["value"], written["bound"], written["signals"]["u"]) == (None, 3.0, None)
+    assert "nan, allowed 3" in report.sentence(found["violation_list"][0])
 
 
 def test_junit_has_a_test_case_for_each_invariant(found: dict[str, Any], tmp_path: Path) -> None:

@@ -195,6 +195,8 @@ def test_refuses_what_is_no_bundle_and_what_cannot_be_written(bundle, tmp_path):
     folder = written(tmp_path / "b", {"t": [0.0, 1.0]})
     with pytest.raises(UserError, match="is the recording itself"):
         export(folder, "parquet", folder / "recording.parquet")
+    with pytest.raises(UserError, match="is a part of the bundle"):
+        export(folder, "csv", folder / "case.json")
     with pytest.raises(UserError, match="holds string"):
         export(written(tmp_path / "c", {"t": [0.0], "name": ["a"]}), "csv")
 

@@ -223,6 +223,14 @@ def test_columns_that_differ_in_length(tmp_path):
         make_bundle(read(tmp_path / "a.npz"), plan(), tmp_path / "b")
 
 
+def test_what_is_no_archive_and_what_is_no_file(tmp_path):
+    (tmp_path / "a.npz").write_bytes(b"x" * 3000)
+    with pytest.raises(UserError, match="cannot be read as npz: it is no archive of arrays"):
+        read(tmp_path / "a.npz")
+    with pytest.raises(UserError, match="is a folder; give the file in it"):
+        read(tmp_path)
+
+
 def test_an_existing_bundle_stays(tmp_path):
     table = read(text(tmp_path / "a.csv"))
     make_bundle(table, plan(), tmp_path / "b")
@@ -341,6 +349,7 @@ def test_bad_map_files(tmp_path, content, words):
     ("options", "words"),
     [
         ({"maps": ["x"]}, "--map x: write ours=theirs, e.g. x=qm"),
+        ({"maps": ["x=qm,u=vir", "x=vir"]}, "--map: x cannot be both qm and vir"),
         ({"units": ["x="]}, "--unit x=: write"),
         ({"parameters": ["95"]}, "--parameter 95: write"),
         ({"case": ["drive=1", "drive.limit_volt=2"]}, "drive is a value and has no key 'limit_volt'"),

@@ -10,7 +10,7 @@ export function showMachine(hello, message, connected) {
   const status = message?.status ?? {};
   const alive = connected && message?.alive;
   lamps(hello, status, message, connected, alive);
-  banner(status, connected, alive);
+  banner(status, connected, alive, message?.there);
   if (alive) {
     counts(status, message);
     histogram(message.lateness);
@@ -52,12 +52,13 @@ function lamps(hello, status, message, connected, alive) {
   }));
 }
 
-function banner(status, connected, alive) {
+function banner(status, connected, alive, there) {
   const place = $("banner");
   const faults = (status.faults ?? []).map((fault) => fault.fault ?? String(fault));
   let text = "", warn = true;
   if (!connected) text = "The scope's server does not answer; trying again.";
-  else if (!alive) text = "The daemon does not answer; waiting for it. What is shown is its last.";
+  else if (!alive && there) text = "The daemon does not answer: it starts, which may take a minute, or it hangs. Waiting for it.";
+  else if (!alive) text = "The daemon does not answer: it does not run. Waiting for it; what is shown is its last.";
   else if (status.trip && status.state === "tripped") { text = `Tripped at tick ${status.trip.tick}, ${status.trip.code}: ${status.trip.why}.`; warn = false; }
   else if (faults.length) text = `Faults are injected on purpose: ${faults.join(", ")}.`;
   place.hidden = !text;

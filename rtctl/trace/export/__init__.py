@@ -32,6 +32,9 @@ FORMATS = {
 }
 
 
+OWN = ("case.json", "orders.jsonl")  # files of a bundle beside its recording
+
+
 class Exported(NamedTuple):
     path: Path
     to: str
@@ -62,6 +65,8 @@ def export(folder: Path | str, to: str, out: Path | str | None = None, selection
     path = Path(out) if out is not None else source.folder / f"trace{form.suffix}"
     if any(path.exists() and path.samefile(file) for file in source.paths):
         raise UserError(f"{path} is the recording itself; choose another name")
+    if path.name in OWN and path.parent.resolve() == source.folder.resolve():
+        raise UserError(f"{path} is a part of the bundle; choose another name")
     if not path.parent.is_dir():
         raise UserError(f"{path}: cannot be written (there is no folder {path.parent})")
     part = path.with_name(f".{path.stem}.tmp{form.suffix}")  # some packages look at how the name ends

@@ -128,7 +128,8 @@ class Source:
             last = float(t[-1])
             rows += len(t)
         if not rows:
-            some = "" if math.isinf(s.start) and math.isinf(s.end) else f" from {s.start:g} s to {s.end:g} s"
+            some = "" if math.isinf(s.start) else f" from {s.start:g} s on"
+            some = some if math.isinf(s.end) else f"{some.removesuffix(' on')} to {s.end:g} s"
             raise UserError(f"{self.folder} holds no rows{some}{self._clock()}")
         return first, last, rows
 

@@ -22,6 +22,8 @@ READERS = {  # how the name ends -> module here
 def read(path: Path | str) -> Table:
     """All columns of a file, into memory. Raises UserError where it cannot be read, or its kind is not known."""
     path = Path(path)
+    if path.is_dir():
+        raise UserError(f"{path} is a folder; give the file in it, one of {', '.join(READERS)}")
     suffix = path.suffix.lower()
     if suffix not in READERS:
         near = nearest(suffix, READERS)

@@ -88,9 +88,12 @@ def with_options(
 ) -> Plan:
     """The plan with what the command line says on top. Raises UserError."""
     columns = dict(plan.columns)
+    mapped: dict[str, str] = {}
     for option in maps:
         for pair in option.split(","):
             name, theirs = _pair("--map", pair, "x=qm")
+            if mapped.setdefault(name, theirs) != theirs:
+                raise UserError(f"--map: {name} cannot be both {mapped[name]} and {theirs}; name one column for it")
             columns[name] = ColumnPlan(column=theirs, unit=columns[name].unit if name in columns else None)
     for text in units:
         name, unit = _pair("--unit", text, "x=mm")
