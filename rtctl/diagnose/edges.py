@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 FEWEST = 20  # counts of a reel, below which it says little
-SURE = 0.25  # counts between neighbouring edges, rms, beyond which directions are guesses
+SURE = 0.12  # counts between neighbouring edges, rms, beside the tick that they came in: else directions are guesses
 OWN = 0.02  # counts: what a disc and a model that is right leave
 
 
@@ -58,7 +58,7 @@ def edges(counts: np.ndarray, way: np.ndarray, channel: int) -> Edges | None:
         forward = directions(np.diff(predicted))
         at = np.concatenate([[0], np.cumsum(np.where(forward[1:] == forward[:-1], np.where(forward[1:], 1, -1), 0))])
         predicted = predicted * float(np.polyfit(predicted, at, 1)[0])
-    if np.sqrt(np.mean((np.diff(at) - np.diff(predicted)) ** 2)) > SURE:
+    if np.mean((np.diff(at) - np.diff(predicted)) ** 2) > SURE**2 + np.mean(moved**2) / 6.0:
         return None
     return Edges(channel, rows, at.astype(float), np.hypot(OWN, moved / np.sqrt(12.0)))
 

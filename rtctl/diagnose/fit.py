@@ -110,7 +110,10 @@ class Problem:
         weights yet."""
         names = {c: name for c, name in enumerate(self.sim.channels) if name in RECTIFIED}
         out = self.sim.run(model, directed=True) if names else np.empty((0, 0))
-        found = [edges(self.sim.record.y[name], out[:, c], c) for c, name in names.items()]
+        found = []
+        for c, name in names.items():  # a reel follows the capstan that was seen, not the one that was simulated
+            gear = float(np.polyfit(out[:, 0], out[:, c], 1)[0]) if np.isfinite(out).all() else np.nan
+            found.append(edges(self.sim.record.y[name], out[:, c] + gear * (self.sim.seen - out[:, 0]), c))
         stop = None if self.n == len(self.sim.seen) else self.n
         return Problem(self.sim, stop, self.channels, self.mean, [e for e in found if e is not None])
 

@@ -13,7 +13,7 @@ import numpy as np
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
 from rtctl.diagnose.hypotheses import HINTED, forms, richer
-from rtctl.diagnose.scan import resonances
+from rtctl.diagnose.scan import resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
 from rtctl.diagnose.stretches import loudness, usual
@@ -89,6 +89,9 @@ def search(
             if not quiet and (sure or not full or not enough(full[0])):
                 progress("looking for resonances")
                 full = sorted([*full, *resonances(problem, base, scores)], key=lambda f: f.merit)
+            if base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
+                progress("looking for a slack tape")
+                full = sorted([*full, *slack(problem, base, scores)], key=lambda f: f.merit)
         if full and sure and worth(beam[0], full[0]):
             full, _ = grow(problem, parents, candidates, ROUNDS[level], away, progress)
         if not full:

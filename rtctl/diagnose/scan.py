@@ -1,15 +1,22 @@
-"""A closer look for a resonance, whose first look says nothing where it is strong and its frequency is not met.
+"""A closer look for what a first look says nothing of: a resonance that is strong and whose frequency is not met, and
+a tape that goes slack.
 
 A heavy part on a spring turns the whole response round about its frequency: a small mass at a frequency nearby, all
 that the screening tries, explains nothing. So every frequency is tried with a mass that counts and with broad damping,
 which lets a fit slide along.
+
+When a tape goes slack hangs on small differences between pull and friction: with the owner's values it does at other
+moments, or never, and no slope leads from there to where it did. So values all over their tolerance are tried.
 """
 
 from collections.abc import Sequence
 
-import numpy as np
+from functools import partial
 
-from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
+import numpy as np
+from scipy.stats import qmc
+
+from rtctl.diagnose.fit import Fit, Problem, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import USUAL
 from rtctl.diagnose.screen import Score
 from rtctl.diagnose.space import Hypothesis
@@ -19,6 +26,8 @@ STEP = 1.2  # between frequencies: with this damping a fit finds the way from ha
 HEAVY, BROAD = 0.25, 0.05  # of a tenth of the machine's inertia; damping ratio
 NODES = {"ldu": 1, "ivu": 3, "axis": 1}  # that are looked at
 ROUGH, FULL = 4, 2  # rounds of a rough fit, full fits
+SLACK, ELSEWHERE, DEEP = "tape.slack", 32, 3  # values tried all over their tolerance, and full fits
+INSIDE = 0.9  # of the tolerance
 
 
 def resonances(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
@@ -48,3 +57,16 @@ def _tried(problem: Problem, base: Fit, h: Hypothesis) -> list[Fit]:
         fits.append(fit(problem, space, start, rounds=ROUGH, J=J, rough=True))
     costs = [trial.cost for trial in fits]
     return [trial for i, trial in enumerate(fits) if trial.cost <= min(costs[max(i - 1, 0) : i + 2])]
+
+
+def slack(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
+    """Full fits with a tape that goes slack, from the plant parameters at which it does best."""
+    kinds = {(s.hypothesis.node, *s.hypothesis.fixed.items()): s.hypothesis for s in scores}
+    starts: list[Fit] = []
+    for h in (h for h in kinds.values() if h.term == SLACK):
+        space = base.space.add(h)
+        low, high = space.bounds()
+        xs = INSIDE * (low + (high - low) * qmc.Sobol(len(low), seed=0).random(ELSEWHERE))
+        errors = parallel([partial(problem.residual, space.model(x), True) for x in xs])
+        starts += [Fit(space, x, r, np.empty((0, 0)), 0.5 * float(r @ r)) for x, r in zip(xs, errors, strict=True)]
+    return [fit(problem, f.space, f.x, rounds=12) for f in sorted(starts, key=lambda f: f.cost)[:DEEP]]
