@@ -11,19 +11,17 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Evidence, Interval, Located
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Evidence, Interval
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet, with_fewer
-from rtctl.diagnose.fit import Fit, Problem, fit
+from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.name import names
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.record import Record, load_record
-from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.rest import awake
 from rtctl.diagnose.simulate import Simulator
-from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
 from rtctl.diagnose.verdict import (
     CLOSED_BY_SEVERAL,
@@ -31,7 +29,6 @@ from rtctl.diagnose.verdict import (
     TELLING,
     Verdict,
     judged,
-    of_factor,
     of_jitter,
     proven,
     with_known,
@@ -69,7 +66,6 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         checked = replace(checked, findings=(*checked.findings, *more))
         progress("predicting rows that were not fitted")
         known = [of_jitter(found.jitter)] if found.jitter is not None else []
-        known += [of_factor(found.factor)] if found.factor is not None else []
         shown = predicted(sim, other, found, known)
         while shown.refused and len(found.best.space.hypotheses) > 1:  # several that only imitate: one may be there
             found = with_fewer(found)
@@ -132,8 +128,6 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
         verdict = Verdict(UNNAMED, (), verdict.explained)
     named = {e.name for e in with_known(verdict, known).effects}
     taken = best if any(h.term in named for h in best.space.hypotheses) else base
-    if found.factor is not None and "sensor.scale" in named:
-        taken = fit(problem, taken.space.add(scaled(found.factor)), taken.x, rounds=8)
     cut = cut_of(sim.record)
     if other is None:
         judge, rows = problem, slice(cut, None)
@@ -173,7 +167,9 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         preflight=checked,
         verdict=verdict.verdict,
         effects=verdict.effects,
-        located=None if verdict.verdict == NOTHING else where(sim, found),
+        located=None
+        if verdict.verdict == NOTHING
+        else locate.located(sim, problem, base, found.best, found.search, found.jitter is not None),
         parameters=parameter_intervals(taken, covariance(taken, problem.block)),
         owner=owner_model(record.case, record),
         before=base.model,
@@ -196,19 +192,6 @@ def resembled(found: Found) -> tuple[str, str] | None:
     """The law without a name that does better than what was found, and its node."""
     terms = () if found.beyond is None else found.beyond.space.hypotheses
     return next(((h.term, h.node) for h in terms if not TERMS[h.term].tabled), None)
-
-
-def scaled(found: Factor) -> Hypothesis:
-    """An encoder whose factor is known."""
-    return Hypothesis("sensor.scale", "encoder", (), {"relative": found.relative})
-
-
-def where(sim: Simulator, found: Found) -> Located:
-    """Where recording and simulation part."""
-    ticks = found.jitter is not None
-    if found.factor is not None and not ticks and not found.best.space.hypotheses:
-        return Located("reel1_counts", "encoder", "position", "all along the way", 0.0, 1.0)
-    return locate.located(sim, found.problem, found.base, found.best, found.search, ticks)
 
 
 def ticks(found: Jitter, dt: float) -> JitterSettings:

@@ -11,7 +11,6 @@ from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
 from rtctl.diagnose.name import Search, dropped, eliminate, enrich, look_alikes, names, polish, rivals, search
-from rtctl.diagnose.reels import Factor, factor
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.verdict import SURE, Alternative, standing
@@ -22,7 +21,6 @@ CLEARLY = 0.5  # of the best cost: what a richer form must come down to, to take
 RICH = 10.0  # the same, of one that is tried in its richer form because the best is in it
 EQUAL = 1.02  # times the best cost: equally good
 NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
-LOSES_WAY = ("transmission.slip", "transmission.creep", "sensor.scale", "sensor.rectified", "geometry.radius_change")
 SPARED = 1.5  # times the best cost: what a model may come to when it loses a term in doubt
 MOST = 4  # rivals of one hypothesis
 Progress = Callable[[str], None]
@@ -34,7 +32,6 @@ class Found(NamedTuple):
 
     problem: Problem
     jitter: Jitter | None  # of the ticks
-    factor: Factor | None  # of the encoder, by the way of the reels
     base: Fit
     best: Fit
     search: Search
@@ -78,9 +75,7 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit
         best, near = likelier, replacements(problem, likelier, looked, (), progress)
     best, near = without_doubtful(problem, best, looked, near, progress)
     best, near = usual_nodes(sim.record.plant, best, near)
-    other = any(h.term in LOSES_WAY for h in best.space.hypotheses)
-    scale = None if other else factor(sim, best.model, base.space.owner)
-    return Found(problem, off, scale, base, best, looked, near, beyond.nameless(problem, best, progress))
+    return Found(problem, off, base, best, looked, near, beyond.nameless(problem, best, progress))
 
 
 def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:

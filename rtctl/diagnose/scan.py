@@ -10,7 +10,6 @@ moments, or never, and no slope leads from there to where it did. So values all 
 """
 
 from collections.abc import Sequence
-
 from functools import partial
 
 import numpy as np

@@ -14,7 +14,6 @@ from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect,
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.jitter import Jitter, interval
 from rtctl.diagnose.name import dropped
-from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals
 
@@ -128,11 +127,6 @@ def of_jitter(found: Jitter) -> Effect:
     """Of the ticks, which shows in the noise."""
     low, high = interval(found)
     return Effect("timing.jitter", "loop", KNOWN, {"sigma": Interval(found.sigma, low, high, "s")}, ())
-
-
-def of_factor(found: Factor) -> Effect:
-    """Of the encoder, which shows in the way of the reels."""
-    return Effect("sensor.scale", "encoder", KNOWN, {"relative": Interval(*found, "")}, ())
 
 
 def standing(problem: Problem, best: Fit, index: int, rivals: Sequence[Alternative]) -> float:

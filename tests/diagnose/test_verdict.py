@@ -7,9 +7,8 @@ from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.reels import Factor
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
-from rtctl.diagnose.verdict import Verdict, of_factor, of_jitter, patched, proven, with_known
+from rtctl.diagnose.verdict import Verdict, of_jitter, patched, proven, with_known
 
 
 def fitted(**sizes):
@@ -28,7 +27,8 @@ def test_less_dry_and_more_viscous_friction_is_another_curve(sizes, expected):
 
 
 def test_what_shows_elsewhere_stands_beside_a_verdict():
-    jitter, scale = of_jitter(Jitter(2e-4, 1e-5)), of_factor(Factor(0.07, 0.05, 0.09))
+    jitter = of_jitter(Jitter(2e-4, 1e-5))
+    scale = Effect("sensor.scale", "encoder", 0.95, {}, ())
     assert jitter.parameters["sigma"].low < 2e-4 < jitter.parameters["sigma"].high
     nothing, unnamed = Verdict(NOTHING, (), 0.0), Verdict(UNNAMED, (), 0.2)
     assert with_known(nothing, []) is nothing
@@ -42,7 +42,7 @@ def test_what_shows_elsewhere_stands_beside_a_verdict():
 
 def test_it_is_not_told_twice():
     named = Verdict(NAMED, (Effect("sensor.scale", "encoder", 0.9, {}, ()),), 1.0)
-    assert with_known(named, [of_factor(Factor(0.07, 0.05, 0.09))]).effects == named.effects
+    assert with_known(named, [Effect("sensor.scale", "encoder", 0.95, {}, ())]).effects == named.effects
 
 
 @pytest.mark.parametrize(("several", "closed", "expected"), [
