@@ -141,10 +141,11 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     several = again or len(verdict.effects) > 1  # what is left of several that were refused has to do as much as they
     if other is None:
         on_track = heldout.closed_on_track(problem, *fits, cut)
-        if decide.quiet(problem, base, best):  # a free run may wander where the model on track is right to the noise
-            closed, several = float(np.fmax(closed, on_track)), several and not on_track > CLOSED_BY_SEVERAL
-        elif decide.complete(problem, base, best):  # and adds random forces up
-            closed, several = on_track, False
+        if not decide.quiet(problem, base, best):
+            if problem.hiss(best.r):  # a free run adds random forces up
+                closed, several = on_track, False
+        elif on_track > CLOSED_BY_SEVERAL:  # and may wander where the model on track is right to the noise
+            closed = on_track
     proved = proven(verdict, closed if max(errors) < LOST else np.nan, several)
     refused = proved.verdict == UNNAMED and verdict.verdict != UNNAMED
     verdict = with_known(proved, known)
