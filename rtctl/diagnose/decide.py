@@ -49,12 +49,13 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return False  # of a machine that is known to be louder nobody knows what is noise
         if before.bound() and not after.bound() and chance < RELEASED and after.cost < (1.0 - FREE) * before.cost:
             return True  # the owner's values need not be stretched any more
-        if before.space.hypotheses and chance < ONCE and quiet(problem, base, before):
-            return after.cost < (1.0 - CLEAR) * before.cost and by_noise(before, after) < NEVER
+        noise = rms(before.r) < COMPLETE * problem.floor
+        clear = after.cost < (1.0 - CLEAR) * before.cost
+        if noise and clear and before.space.hypotheses and chance < ONCE and by_noise(before, after) < NEVER:
+            return True
         if chance > LUCK:
             return False
-        noise = rms(before.r) < COMPLETE * problem.floor
-        if noise and chance < NEVER and after.cost < (1.0 - CLEAR) * before.cost:
+        if noise and clear and chance < NEVER:
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
     return merit(after, weights) < (1.0 - share) * merit(before, weights)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from rtctl.diagnose.decide import complete, explained, p_value, probabilities, worth
+from rtctl.diagnose.decide import by_noise, complete, explained, p_value, probabilities, worth
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
@@ -84,6 +84,22 @@ def test_what_the_form_of_a_law_misses_asks_for_no_second_term():
     assert not worth(Floor(0.8), base, one, two)  # type: ignore[arg-type]
     everywhere = made(np.where(np.arange(4000) < 200, 6.0, 0.5), 2)
     assert worth(Floor(0.4), base, one, everywhere)  # type: ignore[arg-type]
+
+
+def test_a_second_term_may_show_at_a_few_places_only_if_noise_cannot():
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal(8000)
+    push = np.zeros(8000)
+    for start in (700, 2900, 5100, 7300):  # of all the record four places
+        push[start : start + 200] = 2.0
+    base = noise + push + 20.0 * (np.arange(8000) < 400)  # what the first term has taken
+    one, two = made(noise + push, 1), made(noise, 2)
+    assert p_value(two, one, 200) > 1e-4  # by places alone it could be luck
+    assert by_noise(one, two) < 1e-20
+    assert worth(Floor(0.8), made(base), one, two)  # type: ignore[arg-type]
+    lucky = made(noise + 0.02 * push, 1)
+    assert by_noise(lucky, two) > 1e-4
+    assert not worth(Floor(0.8), made(base), lucky, two)  # type: ignore[arg-type]
 
 
 def test_a_fit_is_complete_near_the_floor():

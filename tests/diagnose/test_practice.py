@@ -18,7 +18,7 @@ from rtctl.diagnose.record import Record, load_record
 from rtctl.proof.score import score
 
 FULL = os.environ.get("RTCTL_PROOF") == "full"
-NULL, SINGLE, DRIVE = "case-0018", "case-0007", "case-0006"
+NULL, SINGLE, DRIVE = "case-0018", "case-0020", "case-0006"
 PLAIN = ("friction.coulomb", "friction.viscous", "friction.stribeck", "drive.offset", "load.spring")
 VISIBLE = 0.3  # times the noise floor
 

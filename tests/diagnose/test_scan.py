@@ -1,10 +1,19 @@
-"""The closer look for a resonance: it meets one that is heavy and lies between the frequencies of the first look."""
+"""Closer looks: a resonance that is heavy and lies between the frequencies of the first look, and a slack tape."""
 
+import numpy as np
 import pytest
 
+from rtctl.diagnose.base import base_fit
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.hypotheses import hypotheses
-from rtctl.diagnose.scan import TERM, resonances
+from rtctl.diagnose.kernel import CLOSED
+from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.scan import SLACK, TERM, resonances, slack
 from rtctl.diagnose.screen import screen
+from rtctl.diagnose.simulate import Simulator
+from rtctl.plants.physics import TERMS
 
 HEAVY = {"term": TERM, "node": "carriage", "mass": 40.0, "f_Hz": 14.5, "zeta": 0.04}
 
@@ -28,3 +37,24 @@ def test_a_heavy_resonance_is_met(make_axis, searched):
 def test_without_a_hypothesis_of_one_there_is_nothing_to_look_for(plain, searched):
     problem, base, looked = scores(searched, plain)
     assert resonances(problem, base, [s for s in looked if s.hypothesis.term != TERM]) == []
+
+
+def test_a_slack_tape_is_met_from_values_all_over_their_tolerance(case_of):
+    """From the owner's the tape goes slack at other moments, and no slope leads to where it did."""
+    case, n = read_case(case_of("ivu", controller__tension_N=0.04), "."), 4000
+    t, zero = 2e-3 * np.arange(n), np.zeros(n)
+    ref = 6 * (1 - np.cos(2 * np.pi * 0.2 * t)) + 3 * np.sin(2 * np.pi * 1.1 * t)
+    names = ("capstan_counts", "reel1_counts", "reel2_counts")
+    empty = Record("ivu", case, t, 2e-3, ref, zero, zero[:, None] * [0, 0], dict.fromkeys(names, zero), {})
+    owner = owner_model(case)
+    b = owner.base
+    true = owner.change(K_m1=0.88 * b["K_m1"], K_m2=0.9 * b["K_m2"], tau_F1=1.1 * b["tau_F1"])
+    true = true.add(TERMS[SLACK].settings(term=SLACK, node="tape1", share=1.0, other=1.0))
+    out, volts, _ = Simulator(empty).everything(true, CLOSED)
+    sim = Simulator(empty._replace(u=volts, y=dict(zip(names, np.floor(out).T, strict=True))))
+    problem = Problem(sim)
+    base = base_fit(sim, problem)
+    looked = screen(problem, base, hypotheses(sim.record, base.model.base, only=(SLACK, "drive.offset")))
+    best = min(slack(problem, base, looked), key=lambda f: f.cost)
+    assert {h.term for h in best.space.hypotheses} == {SLACK}
+    assert best.rms < 0.3 * base.rms
