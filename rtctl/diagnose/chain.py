@@ -131,16 +131,15 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     cut = cut_of(sim.record)
     if other is None:
         judge, rows = problem, slice(cut, None)
-        fits = [heldout.refit(sim, problem, f, cut) for f in (base, taken)]
+        old, new = (heldout.refit(sim, problem, f, cut) for f in (base, taken))
     else:
-        judge, rows, fits = Problem(Simulator(other)).seen_by(taken.model), slice(0, None), [base, taken]
-    before, after = (f.model for f in fits)
-    errors = [heldout.nrmse(judge.sim, model, rows, judge.edges) for model in (before, after)]
+        judge, rows, old, new = Problem(Simulator(other)).seen_by(taken.model), slice(0, None), base, taken
+    errors = [heldout.nrmse(judge.sim, f.model, rows, judge.edges) for f in (old, new)]
     floor = heldout.floor(judge, judge.sim.seen)
     closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
     several = again or len(verdict.effects) > 1  # what is left of several that were refused has to do as much as they
     if other is None:
-        on_track = heldout.closed_on_track(problem, *fits, cut)
+        on_track = heldout.closed_on_track(problem, old, new, cut)
         if not decide.quiet(problem, base, best):
             if problem.hiss(best.r):  # a free run adds random forces up
                 closed, several = on_track, False
@@ -151,7 +150,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     verdict = with_known(proved, known)
     if verdict.verdict == UNNAMED:
         taken, errors[1] = base, errors[0]
-    return Shown(verdict, refused, taken, before, errors[0], errors[1], floor)
+    return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor)
 
 
 def cut_of(record: Record) -> int:
