@@ -25,7 +25,7 @@ from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
 from rtctl.trace.replay import replay
 
-sys.path.insert(0, str(Path(__file__).parent))  # for served.py, under importlib mode
+sys.path.insert(0, str(Path(__file__).parent))  # for served.py and compiled.py, under importlib mode
 CONFIGS = Path(__file__).parents[1] / "configs"
 number = itertools.count(1)
 settings.register_profile("any machine", deadline=None)  # no test is wrong because it was slow
@@ -58,6 +58,10 @@ def every_recording_replays(tmp_path_factory: pytest.TempPathFactory) -> Iterato
 @pytest.fixture(scope="session")
 def runtime() -> Iterator[Path]:
     """A folder of our own for sockets and locks, with a short path: a socket's has 107 bytes at most."""
+    if "PYTEST_XDIST_WORKER" in os.environ:  # many tests are coming; for one of them it would be too much
+        from compiled import reel_unit
+
+        reel_unit()
     folder = Path(tempfile.mkdtemp(prefix="rt-", dir="/tmp"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
