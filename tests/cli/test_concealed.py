@@ -26,7 +26,7 @@ def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(started, r
     endpoint = f"ipc://{runtime}/{name}.plant"
     hide = ["--endpoint", endpoint, "--mode", "lockstep", "--conceal", "2", "--seal", str(seal)]
     changes = [f"name={name}", f"link.endpoint={endpoint}", "link.plant=external", "link.timeout=60"]
-    run = ["run", "ldu", "--mode", "lockstep", "--reference", "print_steps", "--for", "6s", "--no-plot"]
+    run = ["run", "ldu", "--mode", "lockstep", "--reference", "print_steps", "--for", "4s", "--no-plot"]
     with started("plant", "ldu", "--set", f"name={name}", *hide) as plant:
         plant.stdout.readline()
         with started(*run, "--out", str(folder), *(w for c in changes for w in ("--set", c))) as loop:
