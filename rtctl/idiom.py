@@ -22,6 +22,7 @@ from pydantic.fields import FieldInfo
 from rtctl.config.units import to_si
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False}
+INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def tick(function: Callable[..., Any]) -> Any:
@@ -43,7 +44,7 @@ class Step:
     def __init__(self, function: Callable[..., Any]):
         update_wrapper(self, function)
         self.py_func = function
-        self._inner = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **OPTIONS)(function)
+        self._inner = njit(**OPTIONS, **INNER)(function)
         self._outer = njit(**OPTIONS)(function)
         self._numba_type_ = typeof(self._inner)  # what a name stands for in compiled code
 
