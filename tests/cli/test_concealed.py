@@ -1,10 +1,11 @@
 """From a machine with something hidden in it to the opened seal: plant and loop as two processes, the capture
-diagnosed, the model run against it. Of the linear drive; the reel unit's tutorial does the same, and is played in
-tests/docs."""
+diagnosed, the model run against it."""
 
 import os
 import signal
 from functools import partial
+
+import pytest
 
 from rtctl.diagnose import chain, find
 from rtctl.diagnose.export import read_model, write_model
@@ -21,13 +22,19 @@ AMONG = (  # the library in full takes a minute on the LDU
 )  # fmt: skip
 
 
-def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(started, runtime, tmp_path, monkeypatch):
-    name, seal, folder = f"ldu{os.getpid()}", tmp_path / "seal.json", tmp_path / "bundle"
+@pytest.mark.parametrize(
+    ("machine", "seed", "reference", "seconds"),
+    [("ivu", 2, "steps", 13), ("ldu", 2, "print_steps", 4)],
+)
+def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(
+    started, runtime, tmp_path, monkeypatch, machine, seed, reference, seconds
+):
+    name, seal, folder = f"{machine}{os.getpid()}", tmp_path / "seal.json", tmp_path / "bundle"
     endpoint = f"ipc://{runtime}/{name}.plant"
-    hide = ["--endpoint", endpoint, "--mode", "lockstep", "--conceal", "2", "--seal", str(seal)]
+    hide = ["--endpoint", endpoint, "--mode", "lockstep", "--conceal", str(seed), "--seal", str(seal)]
     changes = [f"name={name}", f"link.endpoint={endpoint}", "link.plant=external", "link.timeout=60"]
-    run = ["run", "ldu", "--mode", "lockstep", "--reference", "print_steps", "--for", "4s", "--no-plot"]
-    with started("plant", "ldu", "--set", f"name={name}", *hide) as plant:
+    run = ["run", machine, "--mode", "lockstep", "--reference", reference, "--for", f"{seconds}s", "--no-plot"]
+    with started("plant", machine, "--set", f"name={name}", *hide) as plant:
         plant.stdout.readline()
         with started(*run, "--out", str(folder), *(w for c in changes for w in ("--set", c))) as loop:
             _, err = loop.communicate(timeout=300)
@@ -36,7 +43,7 @@ def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(started, r
             plant.send_signal(signal.SIGINT)
         plant.communicate(timeout=30)
     record = load_record(folder)
-    assert 1 / record.dt == 10_000
+    assert 1 / record.dt == {"ivu": 500, "ldu": 10000}[machine]
     monkeypatch.setattr(find, "hypotheses", partial(hypotheses, only=AMONG))
     told = chain.diagnose_record(record)
     (entry,) = open_seal(seal)[0]["physics"]
