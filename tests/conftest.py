@@ -25,22 +25,33 @@ from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
 from rtctl.trace.replay import replay
 
-sys.path.insert(0, str(Path(__file__).parent))  # for served.py, under importlib mode
+sys.path.insert(0, str(Path(__file__).parent))  # for served.py and compiled.py, under importlib mode
 CONFIGS = Path(__file__).parents[1] / "configs"
 number = itertools.count(1)
 settings.register_profile("any machine", deadline=None)  # no test is wrong because it was slow
 settings.load_profile("any machine")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(wrapper=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
     """Which tests go to one worker: those on the wall clock, since two FIFO loops on one CPU would judge each other;
     and those of a file that share a fixture, since it is dear and once is enough."""
-    for item in items:
-        fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
-        if item.get_closest_marker("realtime"):
-            item.add_marker(pytest.mark.xdist_group("realtime"))
-        elif any(found[-1].scope == "module" for found in fixtures):
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+    groups = {item: name for item in items if (name := group(item))}
+    for item, name in groups.items():
+        item.add_marker(pytest.mark.xdist_group(name))
+    yield
+    for item, name in groups.items() if "PYTEST_XDIST_WORKER" in os.environ else ():
+        if not item.nodeid.endswith(f"@{name}"):  # from pytest 9.2 on xdist forgets it (pytest-dev/pytest-xdist#1386)
+            setattr(item, "_id", type(item.id).parse(f"{item.nodeid}@{name}"))  # noqa: B010
+
+
+def group(item: pytest.Item) -> str:
+    """The group of a test, "" for none."""
+    fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
+    if item.get_closest_marker("realtime"):
+        return "realtime"
+    shared = any(found[-1].scope == "module" for found in fixtures)
+    return f"{item.path.parent.name}-{item.path.stem}" if shared else ""
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -58,6 +69,10 @@ def every_recording_replays(tmp_path_factory: pytest.TempPathFactory) -> Iterato
 @pytest.fixture(scope="session")
 def runtime() -> Iterator[Path]:
     """A folder of our own for sockets and locks, with a short path: a socket's has 107 bytes at most."""
+    if "PYTEST_XDIST_WORKER" in os.environ:  # many tests are coming; for one of them it would be too much
+        from compiled import reel_unit
+
+        reel_unit()
     folder = Path(tempfile.mkdtemp(prefix="rt-", dir="/tmp"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))

@@ -196,13 +196,13 @@ def receive(c, f, rx, fresh, k):
         f.raw = rx[0]
     if f.known == 0:
         f.known, f.since, f.last = 1, k, f.raw
-        f.before[:] = f.raw.counter_codes
+        assign(f.before, f.raw.counter_codes)
     rx[0] = f.raw
     misread(c, f, rx[0], k)
     f.past[k % DEPTH] = rx[0]
     f.came[k % DEPTH] = fresh
     fresh = link_in(c, f, rx, k)
-    rx[0].truth[:] = f.raw.truth
+    assign(rx[0].truth, f.raw.truth)
     return fresh
 
 
@@ -281,10 +281,17 @@ def transmit(c, f, tx, wire, k):
 
 
 @tick
+def assign(to, of):
+    """Copy an array. Not `to[:] = of`: what that would say of arrays of two lengths takes a second to compile."""
+    for i in range(len(to)):
+        to[i] = of[i]
+
+
+@tick
 def put(wire, tx):
     """Copy the outputs, and leave number and time of the frame alone."""
     wire.inputs_t_ns = tx.inputs_t_ns
-    wire.ao_codes[:] = tx.ao_codes
+    assign(wire.ao_codes, tx.ao_codes)
     wire.dio_lines = tx.dio_lines
     wire.state = tx.state
 
