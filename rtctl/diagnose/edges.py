@@ -3,9 +3,11 @@
 A count is an edge of a slotted disc that went past, one way or the other: the next one if it went on, the same one if
 it came back. The two lie a whole count apart, and a model that follows the capstan knows the way of the reel since the
 last edge to a few hundredths of one. So the direction of every count is known, nothing is lost at reversals, and the
-reel's angle is known at every edge but for one constant: where the disc stood at first.
+reel's angle is known at every edge but for one constant: where the disc stood at first. A sensor that counts only where
+dark turns to light has other edges on the way back, half a count off and known but for a constant of their own.
 
-Source: thesis 7.1.3 for the sensors; two-phase decoding, in which the direction comes with the pulse, does the same.
+Source: thesis 7.1.3 and 7.4 for the sensors; two-phase decoding, in which the direction comes with the pulse, does the
+same.
 """
 
 from typing import NamedTuple
@@ -15,6 +17,7 @@ import numpy as np
 FEWEST = 20  # counts of a reel, below which it says little
 SURE = 0.12  # counts between neighbouring edges, rms, beside the tick that they came in: else directions are guesses
 OWN = 0.02  # counts: what a disc and a model that is right leave
+EVERY, RISING = (0.0,), (0.5, -0.5)  # counts from the last edge forward to the first one back, by the sensor's kind
 
 
 class Edges(NamedTuple):
@@ -24,11 +27,12 @@ class Edges(NamedTuple):
     rows: np.ndarray  # (n,) first row that holds the count: it came in the tick before
     at: np.ndarray  # (n,) position of the edge, counts from where it stood at first
     sigma: np.ndarray  # (n,) noise, counts
+    group: np.ndarray  # (n,) of edges whose constant is the same
 
     def between(self, start: int, stop: int) -> "Edges":
         """Those of these rows."""
         keep = (self.rows >= start) & (self.rows < stop)
-        return self._replace(rows=self.rows[keep], at=self.at[keep], sigma=self.sigma[keep])
+        return Edges(self.channel, *(x[keep] for x in self[1:]))
 
     def way(self, out: np.ndarray) -> np.ndarray:
         """Simulated position (n,) at the edges, counts, of readings out (rows, sensors) that keep their direction."""
@@ -36,10 +40,10 @@ class Edges(NamedTuple):
         return 0.5 * (y[self.rows - 1] + y[self.rows])
 
     def error(self, out: np.ndarray) -> np.ndarray:
-        """Edges less simulation, by their noise, (n,); the constant is what fits best."""
-        e = self.at - self.way(out)
-        weight = self.sigma**-2
-        found: np.ndarray = (e - weight @ e / weight.sum()) / self.sigma
+        """Edges less simulation, by their noise, (n,); the constants are those that fit best."""
+        e, weight = self.at - self.way(out), self.sigma**-2
+        mean = np.bincount(self.group, weight * e) / np.maximum(np.bincount(self.group, weight), 1e-12)
+        found: np.ndarray = (e - mean[self.group]) / self.sigma
         return found
 
 
@@ -54,29 +58,57 @@ def edges(counts: np.ndarray, way: np.ndarray, channel: int) -> Edges | None:
     rows = np.repeat(np.arange(1, len(counts)), steps)
     predicted = 0.5 * (way[rows - 1] + way[rows])
     moved = np.abs(np.diff(way))[rows - 1]
-    for _ in range(2):  # radii that are a little off stretch the whole way
-        forward = directions(np.diff(predicted))
-        at = np.concatenate([[0], np.cumsum(np.where(forward[1:] == forward[:-1], np.where(forward[1:], 1, -1), 0))])
-        predicted = predicted * float(np.polyfit(predicted, at, 1)[0])
-    if np.mean((np.diff(at) - np.diff(predicted)) ** 2) > SURE**2 + np.mean(moved**2) / 6.0:
+    turns = EVERY
+    forward, at, off = followed(predicted, turns)
+    turned = forward[1:] != forward[:-1]
+    if turned.any() and np.median(np.abs(off[turned])) > 0.5 * RISING[0]:
+        turns = RISING
+        forward, at, off = followed(predicted, turns)
+    if np.mean(off**2) > SURE**2 + np.mean(moved**2) / 6.0:
         return None
-    return Edges(channel, rows, at.astype(float), np.hypot(OWN, moved / np.sqrt(12.0)))
+    group = forward.astype(int) if turns == RISING else np.zeros(len(at), int)
+    return Edges(channel, rows, at, np.hypot(OWN, moved / np.sqrt(12.0)), group)
 
 
-def directions(moved: np.ndarray) -> np.ndarray:
-    """Whether each edge (n + 1,) went past forward, from the way (n,) that a model goes from one to the next.
+def followed(predicted: np.ndarray, turns: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which way each edge (n,) went, where it lies, and by how much the model differs from one to the next (n - 1,).
 
-    Two edges the same way lie a count apart, and there and back again is the same edge: of all sequences that with the
-    least squares of what the model's way has too much. Source: Viterbi, IEEE Trans. Information Theory 13 (1967).
+    `predicted` (n,) is the way that the model gives it, in counts.
     """
-    back, turn, on = ((moved + 1.0) ** 2, moved**2, (moved - 1.0) ** 2)
+    for _ in range(2):  # radii that are a little off stretch the whole way
+        forward, steps = directions(np.diff(predicted), turns)
+        at = np.concatenate([[0.0], np.cumsum(steps)])
+        predicted = predicted * float(np.polyfit(predicted, at, 1)[0])
+    return forward, at, steps - np.diff(predicted)
+
+
+def directions(moved: np.ndarray, turns: tuple[float, ...] = EVERY) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each edge (n + 1,) went past forward, and the counts (n,) from one to the next, from the way (n,) that a
+    model goes between them.
+
+    Two edges the same way lie a count apart, or are the same edge where a sensor of rising ones did not see that it
+    turned twice between them; after one turn `turns` say how far: of all sequences that with the least squares of what
+    the model's way has too much. Source: Viterbi, IEEE Trans. Information Theory 13 (1967).
+    """
+    ahead = nearest(moved, (1.0,) if turns == EVERY else (1.0, 0.0))
+    behind = nearest(moved, (-1.0,) if turns == EVERY else (-1.0, 0.0))
+    there, home = nearest(moved, turns), nearest(moved, tuple(-t for t in turns))
+    back, on, over, under = ((moved - to) ** 2 for to in (behind, ahead, there, home))
     cost, came = (0.0, 0.0), np.empty((len(moved), 2), bool)
     for k in range(len(moved)):
-        ends = (cost[0] + back[k], cost[1] + turn[k]), (cost[0] + turn[k], cost[1] + on[k])
+        ends = (cost[0] + back[k], cost[1] + over[k]), (cost[0] + under[k], cost[1] + on[k])
         came[k] = [end[1] < end[0] for end in ends]
         cost = min(ends[0]), min(ends[1])
     out = np.empty(len(moved) + 1, bool)
     out[-1] = cost[1] < cost[0]
     for k in range(len(moved) - 1, -1, -1):
         out[k] = came[k, int(out[k + 1])]
-    return out
+    steps = np.where(out[1:] == out[:-1], np.where(out[1:], ahead, behind), np.where(out[:-1], there, home))
+    return out, steps
+
+
+def nearest(values: np.ndarray, among: tuple[float, ...]) -> np.ndarray:
+    """The nearest of `among` to each value, (n,)."""
+    choice = np.array(among)
+    found: np.ndarray = choice[np.argmin(np.abs(values[:, None] - choice), axis=1)]
+    return found

@@ -41,6 +41,23 @@ def test_a_reading_between_two_edges_is_as_good_as_they_are():
     assert some.rows.min() >= 1000 and some.rows.max() < 3000
 
 
+def rising(way, phase=0.37):
+    """What a sensor shows of it that counts where dark turns to light, a quarter of a period on or three back."""
+    light = np.mod(way + phase, 1.0) - 0.5
+    light = np.abs(light) < 0.25
+    return np.concatenate([[0], np.cumsum(light[1:] & ~light[:-1])])
+
+
+def test_a_sensor_of_rising_edges_has_others_on_the_way_back():
+    found = edges(rising(WAY), 1.02 * WAY, 0)
+    assert set(found.group) == {0, 1}
+    exact = found.error(np.stack([WAY], axis=1))
+    assert np.sqrt(np.mean(exact**2)) < 1.0
+    off = found.at - found.way(np.stack([WAY], axis=1))
+    ends = [np.mean(off[found.group == g]) for g in (0, 1)]
+    assert abs(ends[0] - ends[1]) < 0.05  # half a count off is what they were taken to be
+
+
 def test_a_model_that_does_not_know_the_way_is_not_believed():
     assert edges(counter(WAY), np.roll(WAY, 1500), 1) is None
     assert edges(counter(WAY), np.full_like(WAY, np.nan), 1) is None
@@ -48,7 +65,8 @@ def test_a_model_that_does_not_know_the_way_is_not_believed():
 
 
 def test_of_all_directions_those_that_fit_as_a_whole():
-    forward = directions(np.array([1.0, 0.9, 0.1, -1.1, -0.6, 0.2, 1.0]))
+    forward, steps = directions(np.array([1.0, 0.9, 0.1, -1.1, -0.6, 0.2, 1.0]))
+    assert steps.tolist() == [1, 1, 0, -1, -1, 0, 1]
     assert forward.tolist() == [True, True, True, False, False, False, True, True]
 
 
