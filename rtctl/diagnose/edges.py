@@ -17,7 +17,8 @@ import numpy as np
 FEWEST = 20  # counts of a reel, below which it says little
 SURE = 0.12  # counts between neighbouring edges, rms, beside the tick that they came in: else directions are guesses
 OWN = 0.02  # counts: what a disc and a model that is right leave
-EVERY, RISING = (0.0,), (0.5, -0.5)  # counts from the last edge forward to the first one back, by the sensor's kind
+EVERY: tuple[float, ...] = (0.0,)  # counts from the last edge forward to the first one back, of a sensor of all edges
+RISING: tuple[float, ...] = (0.5, -0.5)  # and of rising ones
 
 
 class Edges(NamedTuple):
