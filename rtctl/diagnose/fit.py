@@ -24,7 +24,7 @@ from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.space import Space
 from rtctl.diagnose.stretches import rms
 
-EDGE = 0.85  # of an edge's sigma, on quiet machines
+EDGE = 0.6  # of an edge's sigma, on quiet machines
 EDGES = 0.5  # share of the main sensor's rows that all edges count for: they are few, but each is worth many rows
 FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # of SIGMA, on quiet machines
 TOLL = 0.08  # share of the cost that a further number of a term must take off
