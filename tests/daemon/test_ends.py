@@ -1,5 +1,6 @@
 """What is left when a supervisor is killed or a disk is full: ended children, a trace that can be read, a free name."""
 
+import contextlib
 import json
 import signal
 import subprocess
@@ -22,6 +23,7 @@ from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
 from rtctl.trace.bundle import load_bundle
+from rtctl.trace.recorder import Recorder
 from rtctl.trace.repair import repair
 
 # a busy machine is no reason to trip
@@ -169,10 +171,10 @@ def layout_of(config: Any) -> dict[str, Any]:
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of one megabyte: a sixth of what is to come, since a recorder that is held up loses rows."""
+    """A file system that a recording fills but for what the test lets it."""
     folder = tmp_path / "disk"
     folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64m", "tmpfs", str(folder)]
     try:
         if subprocess.run(mount, capture_output=True, check=False).returncode:
             pytest.skip("mounting a small file system is not allowed here")
@@ -183,15 +185,28 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def test_a_disk_without_room_for_the_bundle_is_told_and_repaired_once_there_is(
-    runtime: Path, config: Callable[..., Any], small_disk: Path
+    runtime: Path, config: Callable[..., Any], small_disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    out = small_disk / "bundle"
+    """Rows fit while it runs; then somebody else fills the disk, before they become a bundle."""
+    out, filler, finish = small_disk / "bundle", small_disk / "filler", Recorder.finish
+
+    def full(self: Recorder, *args: Any) -> Path:
+        deadline = time.monotonic() + 60.0
+        while self.stats().rows_queued:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        with contextlib.suppress(OSError), filler.open("wb", buffering=0) as file:
+            while file.write(bytes(4096)):
+                pass
+        return finish(self, *args)
+
+    monkeypatch.setattr(Recorder, "finish", full)
     with pytest.raises(
         UserError,
         match=r"did not take the recording \(.*No space left on device\); make room, then `rtctl trace repair ",
     ):
-        Session(config(set={"record.seconds": 2.0}), out, 60.0).run()
-    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+        Session(config(set={"record.seconds": 60.0}), out, 60.0).run()
+    filler.unlink()
     report = repair(out)
     kept = load_bundle(out).columns
-    assert 1000 < report.rows < 30_000 and (kept["tick"] == np.arange(report.rows)).all()
+    assert report.rows == 30_000 and (kept["tick"] == np.arange(report.rows)).all()
