@@ -135,7 +135,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     else:
         judge, rows, old, new = Problem(Simulator(other)).seen_by(taken.model), slice(0, None), base, taken
     errors = [heldout.nrmse(judge.sim, f.model, rows, judge.edges) for f in (old, new)]
-    floor = heldout.floor(judge, judge.sim.seen)
+    floor = heldout.floor(judge)
     closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
     several = again or len(verdict.effects) > 1  # what is left of several that were refused has to do as much as they
     if other is None:

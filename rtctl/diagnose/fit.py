@@ -136,9 +136,8 @@ class Problem:
     @property
     def floor(self) -> float:
         """The same of all errors."""
-        known, edges = len(self.target) * len(self.channels), len(self.order)
-        edges -= known
-        power = known * self.main_floor**2 + edges * (EDGE * self.balance * self.louder) ** 2
+        known = len(self.target) * len(self.channels)
+        power = known * self.main_floor**2 + (len(self.order) - known) * (EDGE * self.balance * self.louder) ** 2
         return float(np.sqrt(power / len(self.order)))
 
     def error(self, model: Model, coarse: bool = False) -> np.ndarray:
@@ -156,9 +155,9 @@ class Problem:
         e = np.concatenate([self._error(out).T.ravel(), *(self.balance * reel.error(out) for reel in self.edges)])
         return np.nan_to_num(e, nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)[self.order] * self.weights
 
-    def beside(self, values: np.ndarray, edges: float = 0.0) -> np.ndarray:
-        """Values of the sensors that know direction, sensor by sensor, in the order of the errors; those of edges."""
-        return np.concatenate([values, np.full(len(self.order) - len(values), edges)])[self.order]
+    def beside(self, values: np.ndarray) -> np.ndarray:
+        """Values of the sensors that know direction, sensor by sensor, in the order of the errors; 0 for edges."""
+        return np.concatenate([values, np.zeros(len(self.order) - len(values))])[self.order]
 
     def by_sensor(self, r: np.ndarray) -> dict[str, np.ndarray]:
         """The errors of a residual r by the sensor they are of, in the order of time; the main one is first."""

@@ -52,9 +52,9 @@ def nrmse(sim: Simulator, model: Model, rows: slice, edges: Sequence[Edges] = ()
     return min(rms(np.array(shares)), 1e3)
 
 
-def floor(problem: Problem, seen: np.ndarray) -> float:
-    """The same of noise alone, of a main sensor that has `seen` this."""
-    shares = [problem.main_floor * float(problem.sigma[0]) / spread(seen)]
+def floor(problem: Problem) -> float:
+    """The same of noise alone."""
+    shares = [problem.main_floor * float(problem.sigma[0]) / spread(problem.sim.seen)]
     shares += [EDGE * rms(reel.sigma) / spread(reel.at) for reel in problem.edges]
     return rms(np.array(shares))
 
