@@ -143,12 +143,13 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
         if not decide.quiet(problem, base, best):
             if problem.hiss(best.r):  # a free run adds random forces up
                 closed, several = on_track, False
-        elif on_track > CLOSED_BY_SEVERAL:  # and may wander where the model on track is right to the noise
+        elif np.isnan(closed) or on_track > CLOSED_BY_SEVERAL:  # and may wander where the model is right to the noise
             closed = on_track
-    proved = proven(verdict, closed if max(errors) < LOST else np.nan, several)
-    refused = proved.verdict == UNNAMED and verdict.verdict != UNNAMED
+    loud = not decide.complete(problem, base, base)
+    proved = proven(verdict, closed if max(errors) < LOST else np.nan, several, UNNAMED if loud else NOTHING)
+    refused = verdict.verdict == NAMED and not proved.effects
     verdict = with_known(proved, known)
-    if verdict.verdict == UNNAMED:
+    if not proved.effects:
         taken, errors[1] = base, errors[0]
     return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor)
 

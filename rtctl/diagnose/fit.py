@@ -20,6 +20,7 @@ from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.hiss import is_hiss
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.rest import shares
 from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.space import Space
 from rtctl.diagnose.stretches import rms
@@ -102,7 +103,10 @@ class Problem:
         self.time_rows = rows[self.order]  # of each error
         few = sum(len(e.rows) for e in self.edges)
         self.balance = float(np.sqrt(EDGES * len(self.target) / few)) if few else 1.0  # what an edge counts for
-        self.weights = np.ones(1)
+        grain = resolution(sim.record) if sim.record.plant == "axis" else 1.0
+        share = shares(sim.seen[: self.n], grain, self.block * self.mean)[self.time_rows]
+        self.moves = share == 1.0  # (errors,): the machine does
+        self.weights = np.sqrt(share / share.mean())
         self.louder = 1.0  # than a quiet machine, as far as is known
 
     def seen_by(self, model: Model) -> "Problem":
@@ -184,7 +188,8 @@ class Problem:
 
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
-        main = next(iter(self.by_sensor(r).values()))
+        main, moves = (next(iter(self.by_sensor(x).values())) for x in (r, self.moves))
+        main = main[moves] if moves.any() else main
         loud = rms(main) / self.main_floor
         if loud > LOUDEST:
             return False

@@ -89,9 +89,10 @@ def by_weight(problem: Problem, best: Fit) -> list[int]:
     return sorted(range(count), key=lambda i: -without[i])
 
 
-def proven(verdict: Verdict, closed: float, several: bool) -> Verdict:
+def proven(verdict: Verdict, closed: float, several: bool, otherwise: str = UNNAMED) -> Verdict:
     """The verdict once its model has predicted rows that it was not fitted on, and `closed` this share of the gap to
-    the noise that the model without its names leaves there; nan where hardly anything was to be gained.
+    the noise that the model without its names leaves there; nan where hardly anything was to be gained. `otherwise` is
+    the verdict where the names are not borne out.
 
     Terms that only imitate what is missing fit the rows that they have seen and predict the others badly, `several` of
     them together most of all.
@@ -99,7 +100,7 @@ def proven(verdict: Verdict, closed: float, several: bool) -> Verdict:
     if verdict.verdict != NAMED or not np.isfinite(closed):
         return verdict
     if closed < (CLOSED_BY_SEVERAL if several else CLOSED):
-        return Verdict(UNNAMED, (), verdict.explained)
+        return Verdict(otherwise, (), verdict.explained)
     sure = 0.5 + 0.5 * min(closed, 1.0)
     return verdict._replace(effects=tuple(e._replace(confidence=min(e.confidence, sure)) for e in verdict.effects))
 

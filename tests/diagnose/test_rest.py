@@ -1,9 +1,9 @@
-"""A long rest at the end is left out, and only that."""
+"""A long rest at the end is left out, and only that; a stop counts as little as it tells."""
 
 import numpy as np
 import pytest
 
-from rtctl.diagnose.rest import REST, awake
+from rtctl.diagnose.rest import REST, awake, shares
 
 MOVE, RATE = 5.0, 1000
 
@@ -32,3 +32,15 @@ def test_what_follows_the_last_motion_is_left_out(resting):
 def test_a_short_rest_and_a_machine_that_is_pushed_at_rest_stay(resting, rest, works):
     record = resting(rest, works)
     assert awake(record) is record
+
+
+def test_all_of_a_stop_counts_for_as_much_as_a_moment_in_motion():
+    way = np.concatenate((np.arange(400.0), np.full(1000, 400.0), np.arange(401.0, 800.0)))
+    noisy = np.round(way + np.random.default_rng(1).normal(0.0, 0.3, len(way)))
+    share = shares(noisy, 1.0, memory=50)
+    assert (share[:375] == 1.0).all() and (share[1425:] == 1.0).all()
+    assert share[share < 1.0].sum() == pytest.approx(50, rel=1e-6)
+
+
+def test_slow_motion_is_motion():
+    assert (shares(np.floor(0.1 * np.arange(2000.0)), 1.0, memory=50) == 1.0).all()

@@ -54,3 +54,8 @@ def test_a_name_must_predict_and_several_must_predict_better(several, closed, ex
     assert told.verdict == expected
     assert all(0.88 < e.confidence < 0.96 for e in told.effects)
     assert proven(named, float("nan"), several) is named  # where there was nothing to predict
+
+
+def test_where_the_model_without_it_is_right_to_the_noise_a_name_that_does_not_predict_leaves_nothing():
+    named = Verdict(NAMED, (Effect("structure.resonance", "carriage", 0.98, {}, ()),), 0.8)
+    assert proven(named, 0.2, False, NOTHING) == Verdict(NOTHING, (), 0.8)
