@@ -86,7 +86,11 @@ def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
     if record.plant == "axis" and record.case.controller.kind == "none":
         held = min(held, base_of(Simulator(record, held=False)), key=lambda pair: pair[1].cost)
     sim = held[0].sim
-    found = find(sim, held[0], progress, held[1])
+    found = find(sim, held[0], progress, held[1], unless_misread=True)
+    if not found.problem.agrees(found.best.model):
+        progress("reading the reels anew, through the model that was found")
+        problem = Problem(sim).seen_by(found.best.model)
+        found = find(sim, problem, progress, base_fit(sim, problem, found.base.x))
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or record.case.controller.kind == "none" or faster <= sim.follow:
         return sim, found

@@ -10,6 +10,7 @@ Source: thesis 7.1.3 and 7.4 for the sensors; two-phase decoding, in which the d
 same.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +70,14 @@ def edges(counts: np.ndarray, way: np.ndarray, channel: int) -> Edges | None:
         return None
     group = forward.astype(int) if turns == RISING else np.zeros(len(at), int)
     return Edges(channel, rows, at, np.hypot(OWN, moved / np.sqrt(12.0)), group)
+
+
+def alike(some: Sequence[Edges], others: Sequence[Edges]) -> bool:
+    """Whether both say the same of every count."""
+    return len(some) == len(others) and all(
+        a.channel == b.channel and np.array_equal(np.diff(a.at), np.diff(b.at))
+        for a, b in zip(some, others, strict=True)
+    )
 
 
 def followed(predicted: np.ndarray, turns: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -43,8 +43,13 @@ def quiet(text: str) -> None:
     """Say nothing."""
 
 
-def find(sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit | None = None) -> Found:
-    """Base fit, unless it is given, search, and the rivals of what it found."""
+def find(
+    sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit | None = None, unless_misread: bool = False
+) -> Found:
+    """Base fit, unless it is given, search, and the rivals of what it found.
+
+    `unless_misread`: ends after the first round where the best model does not agree with how the reels were read.
+    """
     if base is None:
         progress("fitting the owner's parameters")
         base = base_fit(sim, problem)
@@ -54,7 +59,13 @@ def find(sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit
         base = base_fit(sim, problem)
     worth = partial(decide.worth, problem, base)
     propose = partial(proposed, sim)
-    looked = search(problem, base, propose, partial(decide.complete, problem, base), worth, progress)
+
+    def sound(first: Fit) -> bool:
+        return not unless_misread or not worth(base, first) or problem.agrees(first.model)
+
+    looked = search(problem, base, propose, partial(decide.complete, problem, base), worth, progress, sound)
+    if len(looked.rounds) == 1 and not sound(looked.rounds[0][0]):
+        return Found(problem, off, base, looked.rounds[0][0], looked, ())
     best = base
     for level in looked.rounds:
         if worth(best, level[0]):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.edges import Edges, edges
+from rtctl.diagnose.edges import Edges, alike, edges
 from rtctl.diagnose.hiss import is_hiss
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
@@ -120,6 +120,10 @@ class Problem:
             found.append(edges(self.sim.record.y[name], out[:, c] + gear * (self.sim.seen - out[:, 0]), c))
         stop = None if self.n == len(self.sim.seen) else self.n
         return Problem(self.sim, stop, self.channels, self.mean, [e for e in found if e is not None])
+
+    def agrees(self, model: Model) -> bool:
+        """Whether the model tells the directions of the reels' counts as they were taken."""
+        return alike(Problem(self.sim).seen_by(model).edges, self.edges)
 
     def weighed(self, weights: np.ndarray) -> "Problem":
         """The same with a further weight for each error."""

@@ -65,12 +65,13 @@ def search(
     enough: Callable[[Fit], bool],
     worth: Callable[[Fit, Fit], bool],
     progress: Callable[[str], None] = lambda text: None,
+    sound: Callable[[Fit], bool] = lambda first: True,
 ) -> Search:
     """Grow models until a further term does not earn its place by `worth(before, after)`.
 
     `propose(model)` lists hypotheses with the starts that the record suggests once it is seen through that model.
     Where a model is `enough`, down to the noise, a quick round looks for what may still hide beside it, and only if
-    there is something a broad one for what it is.
+    there is something a broad one for what it is. Nothing is built on a first round whose best is not `sound`.
     """
     beam, sure = [base], enough(base)
     rounds: list[tuple[Fit, ...]] = []
@@ -97,6 +98,8 @@ def search(
         if not full:
             break
         rounds.append(tuple(full))
+        if level == 0 and not sound(full[0]):
+            break
         if not worth(beam[0], full[0]) or (level == 1 and full[0].cost > FAR * base.cost):
             break
         sure = enough(full[0])
