@@ -18,7 +18,7 @@ from rtctl.diagnose.simulate import Simulator, resolution
 
 FAST = 0.7  # counts a tick: slower, the cut into counts is no white noise
 ENOUGH = 400  # rows that fast
-LEAST = 0.04  # of a tick: less is what any clock does
+LEAST = 0.025  # of a tick: less is what any clock does
 LOUD = 0.15  # of the variance at the usual speed, what jitter must add
 CERTAIN = 8.0  # standard errors
 LOUDER = 1.5  # times the noise that is left: a late tick also holds the last command for longer
