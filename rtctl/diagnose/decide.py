@@ -21,6 +21,7 @@ NEARLY = 0.1  # the same where the model is already near the noise
 BESIDE = 0.5  # the same where more is left than noise, which the form of a law may account for
 QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
+ANGLES = ("ripple.encoder", "transmission.backlash")  # whose typical sizes are angles: those of an axis may be ways
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
 ONCE = 0.02  # the same of a further term that shows at a few places only
@@ -49,7 +50,7 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return False  # of a machine that is known to be louder nobody knows what is noise
         if before.bound() and not after.bound() and chance < RELEASED and after.cost < (1.0 - FREE) * before.cost:
             return True  # the owner's values need not be stretched any more
-        noise = rms(before.r) < COMPLETE * problem.floor
+        noise = rms(before.r) < COMPLETE * problem.floor and not same_law(before, after)
         clear = after.cost < (1.0 - CLEAR) * before.cost
         if noise and clear and before.space.hypotheses and chance < ONCE and by_noise(before, after) < NEVER:
             return True
@@ -59,6 +60,17 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
+
+
+def same_law(before: Fit, after: Fit) -> bool:
+    """Whether what `after` has more looks like a law that `before` has at that very node: it may be its form."""
+    there = {(h.term, h.node) for h in before.space.hypotheses}
+    new = [h for h in after.space.hypotheses if (h.term, h.node) not in there]
+    return any(
+        node == h.node and (h.term in TERMS[term].look_alikes or term in TERMS[h.term].look_alikes)
+        for h in new
+        for term, node in there
+    )
 
 
 def by_noise(before: Fit, after: Fit) -> float:
@@ -147,6 +159,7 @@ def unusual(fitted: Fit) -> float:
         term, values = TERMS[h.term], h.values(x)
         for name, (low, high) in term.typical.items():
             size = abs(values.get(name, 0.0))
-            if name not in term.scale and size > 0.0:
+            angle = h.term in ANGLES and fitted.model.kind == "axis"
+            if name not in term.scale and size > 0.0 and not angle:
                 total -= 0.5 * min(max(np.log(low / size), np.log(size / high), 0.0) / np.log(OFTEN), 3.0) ** 2
     return float(total)

@@ -6,7 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from rtctl.diagnose.decide import by_noise, complete, explained, p_value, probabilities, worth
+from rtctl.diagnose.decide import (
+    by_noise,
+    complete,
+    explained,
+    p_value,
+    probabilities,
+    same_law,
+    unusual,
+    worth,
+)
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
@@ -187,3 +196,24 @@ def test_of_two_equal_laws_the_one_with_the_usual_size_is_likelier():
     offset = fitted("drive.offset", "drive", "offset", 0.1)
     assert probabilities([offset, fitted("friction.asymmetry", "carriage", "a", 0.9)])[0] > 0.9
     assert probabilities([offset, fitted("friction.asymmetry", "carriage", "a", 0.2)])[0] == pytest.approx(0.5)
+
+
+def with_terms(*terms, kind="ivu", sizes=(1.0, 1.0, 1.0)):
+    names = {"ripple.encoder": "A", "drive.offset": "offset"}
+    found = tuple(Hypothesis(t, node, (Coordinate(names.get(t, "a"), SIZE, 1.0),)) for t, node in terms)
+    space = Space(Model(kind, {}), (), lambda name: 0.1, found)
+    x = np.array(sizes[: len(terms)])
+    return Fit(space, x, np.ones(9), np.zeros((9, len(x))), 4.5)
+
+
+def test_a_law_that_looks_like_one_at_the_same_node_may_be_its_form():
+    play, twist = ("transmission.backlash", "motor2"), ("structure.stiffening", "motor2")
+    assert same_law(with_terms(play), with_terms(play, twist))
+    assert not same_law(with_terms(play), with_terms(play, ("structure.stiffening", "motor1")))
+    assert not same_law(with_terms(play), with_terms(play, ("drive.offset", "motor2")))
+
+
+def test_typical_angles_say_nothing_of_ways():
+    ripple = ("ripple.encoder", "encoder")
+    assert unusual(with_terms(ripple, sizes=(3e-5,))) < -1.0
+    assert unusual(with_terms(("ripple.encoder", "sensor"), kind="axis", sizes=(3e-5,))) == 0.0

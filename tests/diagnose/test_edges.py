@@ -5,7 +5,7 @@ import pytest
 
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.edges import directions, edges
+from rtctl.diagnose.edges import alike, directions, edges
 from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
@@ -115,3 +115,12 @@ def test_errors_are_in_the_order_of_time_and_none_is_lost(reels):
     assert all(e.rows.max() < 4000 for e in first.edges)
     share = sum(problem.balance**2 * len(e.rows) for e in problem.edges) / len(parts["capstan_counts"])
     assert share == pytest.approx(0.5)
+
+
+def test_reels_are_read_alike_where_every_step_is():
+    one, other = edges(counter(WAY), WAY, 1), edges(counter(WAY), 1.02 * WAY, 1)
+    assert alike([one], [other]) and alike([], [])
+    assert not alike([one], []) and not alike([one], [one._replace(channel=2)])
+    turned = one.at.copy()
+    turned[40:] -= 2.0  # one edge that went past the other way
+    assert not alike([one], [one._replace(at=turned)])
