@@ -124,3 +124,12 @@ def test_reels_are_read_alike_where_every_step_is():
     turned = one.at.copy()
     turned[40:] -= 2.0  # one edge that went past the other way
     assert not alike([one], [one._replace(at=turned)])
+
+
+def test_reels_that_were_misread_are_told_by_a_better_model(reels):
+    sim, model = reels
+    well = Problem(sim).seen_by(model)
+    assert well.agrees(model)
+    wrong = [e._replace(at=np.where(np.arange(len(e.at)) < 60, e.at, e.at - 2.0)) for e in well.edges]
+    assert not Problem(sim, edges=wrong).agrees(model)
+    assert not Problem(sim).agrees(model)  # reels that took no part, and now can
