@@ -19,10 +19,11 @@ SURELY = 0.02  # chance of explaining as well, below which a name gives way to o
 AS_GOOD = 1.02  # times the merit of several names: one law that does as well is likelier
 
 
-def nameless(problem: Problem, best: Fit, progress: Callable[[str], None] = lambda text: None) -> Fit | None:
+def nameless(problem: Problem, base: Fit, best: Fit, progress: Callable[[str], None] = lambda text: None) -> Fit | None:
     """The model in which a law without a name takes the place of names that it does better than; None if there is none.
 
-    In the place of one name it has to be ahead by more than chance, in the place of several it has to do as well.
+    In the place of one name it has to be ahead by more than chance, in the place of several, or alone in the place of
+    all that `best` has beyond `base`, it has to do as well.
     """
     for term, imitated in IMITATED.items():
         out = [i for i, h in enumerate(best.space.hypotheses) if h.term in imitated]
@@ -35,9 +36,13 @@ def nameless(problem: Problem, best: Fit, progress: Callable[[str], None] = lamb
             rest = dropped(problem, rest, i, 4)
         candidates = hypotheses(problem.sim.record, rest.model.base, only=(term,))
         there = [h for h in candidates if h.node in nodes] or candidates
-        for fitted in look_alikes(problem, rest, screen(problem, rest, there), {term}, best.cost):
+        trials = look_alikes(problem, rest, screen(problem, rest, there), {term}, best.cost)
+        if len(out) < len(best.space.hypotheses):
+            trials += look_alikes(problem, base, screen(problem, base, there), {term}, best.cost)
+        for fitted in trials:
             trial = polish(problem, fitted) if fitted.cost < 2 * best.cost else fitted
             surely = decide.p_value(trial, best, problem.block) < SURELY
-            if (len(out) > 1 and trial.merit < AS_GOOD * best.merit) or (surely and decide.better(best, trial)):
+            several = len(trial.space.hypotheses) < len(best.space.hypotheses)
+            if (several and trial.merit < AS_GOOD * best.merit) or (surely and decide.better(best, trial)):
                 return trial
     return None

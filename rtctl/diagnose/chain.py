@@ -38,6 +38,7 @@ from rtctl.plants.physics.timing import JitterSettings
 
 QUICK = 10 / 3  # times the usual bandwidth of the correction
 FASTEST = 0.1  # rad a tick
+WORSE = 3.0  # times the error before: a free run this bad is judged as it is
 SHOWS = 2.5  # times the noise floor
 HELDOUT = 0.25  # share of a record, at its end, that the prediction is judged on
 
@@ -142,14 +143,14 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     floor = heldout.floor(judge)
     closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
     several = again or len(verdict.effects) > 1  # what is left of several that were refused has to do as much as they
-    if other is None:
+    if other is None and errors[1] < WORSE * errors[0]:
         on_track = heldout.closed_on_track(problem, old, new, cut)
         if not decide.quiet(problem, base, best):
             if problem.hiss(best.r):  # a free run adds random forces up
                 closed, several = on_track, False
         elif np.isnan(closed) or on_track > CLOSED_BY_SEVERAL:  # and may wander where the model is right to the noise
             closed = on_track
-    loud = not decide.complete(problem, base, base)
+    loud = decide.loud(problem, base)
     proved = proven(verdict, closed if max(errors) < LOST else np.nan, several, UNNAMED if loud else NOTHING)
     refused = verdict.verdict == NAMED and not proved.effects
     verdict = with_known(proved, known)

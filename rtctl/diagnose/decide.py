@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.space import COSINE, SIZE
 from rtctl.diagnose.stretches import loudness, memory, rms
 from rtctl.plants.physics import TERMS
 
@@ -21,6 +22,7 @@ NEARLY = 0.1  # the same where the model is already near the noise
 BESIDE = 0.5  # the same where more is left than noise, which the form of a law may account for
 QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
+ABSURD = 20.0  # times the largest typical size
 ANGLES = ("ripple.encoder", "transmission.backlash")  # whose typical sizes are angles: those of an axis may be ways
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
@@ -104,6 +106,11 @@ def complete(problem: Problem, base: Fit, fitted: Fit) -> bool:
     return quiet(problem, base, fitted) or problem.hiss(fitted.r)
 
 
+def loud(problem: Problem, base: Fit) -> bool:
+    """Whether the owner's model leaves so much that something is missing, named or not."""
+    return base.rms > LOUD * problem.floor and not complete(problem, base, base)
+
+
 def quiet(problem: Problem, base: Fit, fitted: Fit) -> bool:
     """Whether what is left is no more than the noise of the sensor."""
     return rms(discount(problem, base, fitted) * fitted.r) < COMPLETE * problem.floor
@@ -147,6 +154,18 @@ def probabilities(fits: list[Fit], floor: float = 0.0) -> np.ndarray:
     log -= np.array([unusual(f) for f in fits])
     w = np.exp(-np.clip(log - log.min(), 0.0, 700.0))
     return w / w.sum()
+
+
+def absurd(fitted: Fit) -> bool:
+    """Whether a size is far beyond all that is typical: then it is a number that fits, and no machine's."""
+    for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True):
+        term, values = TERMS[h.term], h.values(x)
+        for c in h.coordinates:
+            name = c.name.partition("|")[0]
+            if c.kind in (SIZE, COSINE) and name in term.typical and name not in term.scale:
+                if abs(values[name]) > ABSURD * term.typical[name][1]:
+                    return True
+    return False
 
 
 def unusual(fitted: Fit) -> float:

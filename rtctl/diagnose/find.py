@@ -86,7 +86,7 @@ def find(
         best, near = likelier, replacements(problem, likelier, looked, (), progress)
     best, near = without_doubtful(problem, best, looked, near, progress)
     best, near = usual_nodes(sim.record.plant, best, near)
-    return Found(problem, off, base, best, looked, near, beyond.nameless(problem, best, progress))
+    return Found(problem, off, base, best, looked, near, beyond.nameless(problem, base, best, progress))
 
 
 def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:

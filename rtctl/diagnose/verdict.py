@@ -48,12 +48,12 @@ class Verdict(NamedTuple):
 
 def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alternative]], block: int) -> Verdict:
     """The verdict on `best`; `rivals` holds for each of its hypotheses the fits with another one in its place."""
-    loud = base.rms > decide.LOUD * problem.floor and not decide.complete(problem, base, base)
+    loud = decide.loud(problem, base)
     if not best.space.hypotheses:
         return Verdict(UNNAMED if loud else NOTHING, (), 0.0)
     share = decide.explained(problem, base, best)
     whole = decide.complete(problem, base, best)
-    if patched(best):
+    if patched(best) or decide.absurd(best):
         return Verdict(UNNAMED, (), share)
     if not decide.enough(problem, base, best):
         loud = loud or (share > HALF and decide.p_value(best, base, block) < decide.LUCK)

@@ -44,24 +44,30 @@ BOTH = "friction.viscous", "friction.stribeck"
 
 def test_one_law_that_does_as_well_as_two_names_takes_their_place(found):
     drag = found(1.0)
-    assert beyond.nameless(PROBLEM, fitted(*BOTH)) is drag
+    assert beyond.nameless(PROBLEM, fitted(loud=50.0), fitted(*BOTH)) is drag
 
 
 def test_one_name_stands_unless_the_law_is_clearly_ahead(found):
     found(0.999)
-    assert beyond.nameless(PROBLEM, fitted("friction.viscous")) is None
+    assert beyond.nameless(PROBLEM, fitted(loud=50.0), fitted("friction.viscous")) is None
     drag = found(0.5)
-    assert beyond.nameless(PROBLEM, fitted("friction.viscous")) is drag
+    assert beyond.nameless(PROBLEM, fitted(loud=50.0), fitted("friction.viscous")) is drag
 
 
 def test_two_names_that_do_better_stand(found):
     found(1.2)
-    assert beyond.nameless(PROBLEM, fitted(*BOTH)) is None
+    assert beyond.nameless(PROBLEM, fitted(loud=50.0), fitted(*BOTH)) is None
+
+
+def test_alone_it_takes_the_place_of_all_that_do_no_better(found):
+    drag = found(1.0)
+    some = fitted("drive.supply_sag", "guide.thickness", loud=1.01)
+    assert beyond.nameless(PROBLEM, fitted(loud=50.0), some) is drag
 
 
 def test_names_that_it_does_not_resemble_are_left_alone(found):
     found(0.1)
-    assert beyond.nameless(PROBLEM, fitted("load.spring")) is None
+    assert beyond.nameless(PROBLEM, fitted(loud=50.0), fitted("load.spring")) is None
 
 
 def test_none_of_them_is_in_the_table_and_all_they_resemble_is():

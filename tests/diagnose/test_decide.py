@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from rtctl.diagnose.decide import (
+    absurd,
     by_noise,
     complete,
     explained,
@@ -217,3 +218,9 @@ def test_typical_angles_say_nothing_of_ways():
     ripple = ("ripple.encoder", "encoder")
     assert unusual(with_terms(ripple, sizes=(3e-5,))) < -1.0
     assert unusual(with_terms(("ripple.encoder", "sensor"), kind="axis", sizes=(3e-5,))) == 0.0
+
+
+def test_a_size_beyond_all_that_is_typical_is_no_machines():
+    wave = ("drive.offset", "drive1")
+    assert not absurd(with_terms(wave, sizes=(0.5,))) and not absurd(with_terms(wave, sizes=(1e-6,)))
+    assert absurd(with_terms(wave, sizes=(-6.0,)))
