@@ -22,7 +22,7 @@ NEARLY = 0.1  # the same where the model is already near the noise
 BESIDE = 0.5  # the same where more is left than noise, which the form of a law may account for
 QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
-ABSURD = 20.0  # times the largest typical size
+ABSURD = 30.0  # times the largest typical size
 ANGLES = ("ripple.encoder", "transmission.backlash")  # whose typical sizes are angles: those of an axis may be ways
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
@@ -162,9 +162,9 @@ def absurd(fitted: Fit) -> bool:
         term, values = TERMS[h.term], h.values(x)
         for c in h.coordinates:
             name = c.name.partition("|")[0]
-            if c.kind in (SIZE, COSINE) and name in term.typical and name not in term.scale:
-                if abs(values[name]) > ABSURD * term.typical[name][1]:
-                    return True
+            known = c.kind in (SIZE, COSINE) and name in term.typical and name not in term.scale
+            if known and abs(values[name]) > ABSURD * term.typical[name][1]:
+                return True
     return False
 
 

@@ -223,4 +223,4 @@ def test_typical_angles_say_nothing_of_ways():
 def test_a_size_beyond_all_that_is_typical_is_no_machines():
     wave = ("drive.offset", "drive1")
     assert not absurd(with_terms(wave, sizes=(0.5,))) and not absurd(with_terms(wave, sizes=(1e-6,)))
-    assert absurd(with_terms(wave, sizes=(-6.0,)))
+    assert absurd(with_terms(wave, sizes=(-7.0,)))
