@@ -24,6 +24,7 @@ SENSORS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)
 CALM = {"ivu": 0.02, "ldu": 2e-3}  # s, over which an acceleration is taken
 SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)])
+WHOLE = tuple(map(float, range(2, 49)))  # of slots and poles: where it turns fast none stands out, and each is tried
 SEEN = 2.0  # times the observer's bandwidth: a quicker ripple is not in what it shows
 SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
 FINEST = 120.0  # waves along the way of an axis
@@ -60,6 +61,7 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
     found: dict[str, list] = grips(record, base, read[:, 0])
     for node, ratio in ratios.items():
         found["order" + node] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
+        found["order" + node] += [n for n in WHOLE if n not in found["order" + node]]
     if record.plant != "ivu":
         way = x * (base["R_c"] if record.plant == "ldu" else 1.0)
         target = d

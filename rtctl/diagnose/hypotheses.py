@@ -103,6 +103,7 @@ class Choice(NamedTuple):
 USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
 SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
+COUNTED, NEARLY_WHOLE = ("per_turn",), 1e-3  # slots and poles are; and how near a fit comes to them
 Part = Size | Limit | Shape | Turn | At | Hint | Where | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),
@@ -254,6 +255,17 @@ def forms(h: Hypothesis) -> list[Hypothesis]:
     name, values = FORMS.get(h.term, ("", ()))
     default = TERMS[h.term].settings.model_fields[name].default if name else None
     return [h._replace(fixed={**h.fixed, name: v}) for v in values if v != h.fixed.get(name, default)]
+
+
+def rounded(h: Hypothesis, x: np.ndarray) -> tuple[int, Hypothesis] | None:
+    """The same hypothesis with its order at the whole number that it is next to at x, and which coordinate it loses by
+    that; None where it has no order or one in between."""
+    for i, c in enumerate(h.coordinates):
+        order = c.scale * float(np.exp(x[i])) if c.name in COUNTED else 0.0
+        if order > 0.5 and abs(order / round(order) - 1.0) < NEARLY_WHOLE:
+            rest = (*h.coordinates[:i], *h.coordinates[i + 1 :])
+            return i, h._replace(coordinates=rest, fixed={**h.fixed, c.name: float(round(order))})
+    return None
 
 
 def _starts(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[Hypothesis]:

@@ -12,6 +12,7 @@ import numpy as np
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
+from rtctl.diagnose.hypotheses import COUNTED
 from rtctl.diagnose.model import DRY, dry_friction
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, Hypothesis
 from rtctl.diagnose.words import unit_at
@@ -75,6 +76,7 @@ def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Inte
         elif c.kind in ("size", PLACE):
             v, w = values[c.name], abs(c.scale) * half
             out[c.name] = Interval(v, v - w, v + w, parameter_unit(kind, h, c.name))
+    out |= {n: Interval(v, v, v, parameter_unit(kind, h, n)) for n, v in h.fixed.items() if n in COUNTED}
     return with_total(out, fitted, h, cov, columns[0]) if h.term == "friction.coulomb" else out
 
 

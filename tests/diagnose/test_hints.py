@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.diagnose.hints import MOST, ORDERS, hints, jumps, observe, peaks, spectrum, spots
+from rtctl.diagnose.hints import MOST, ORDERS, WHOLE, hints, jumps, observe, peaks, spectrum, spots
 
 
 def turning(n=6000, turns=3.0, seed=0):
@@ -100,7 +100,8 @@ def test_a_bump_on_the_way_is_suggested_as_a_spot(make_axis):
     assert set(found) == {"order", "wavelength", "spot", "jump:sensor"}
     x = made.record.y["x"]
     assert min(abs(x.min() + s * np.ptp(x) - 0.05) for s in found["spot"][:2]) < 4e-3
-    assert all(len(v) <= MOST * (1 + (kind == "wavelength")) for kind, v in found.items())
+    assert all(len(v) <= MOST * (1 + (kind == "wavelength")) for kind, v in found.items() if kind != "order")
+    assert set(WHOLE) <= set(found["order"]) and len(found["order"]) <= MOST + len(WHOLE)
 
 
 def test_a_short_wave_of_the_drive_is_suggested(make_axis):
