@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.space import COSINE, SIZE
-from rtctl.diagnose.stretches import loudness, memory, rms
+from rtctl.diagnose.stretches import memory, rms
 from rtctl.plants.physics import TERMS
 
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
@@ -98,7 +98,7 @@ def merit(fitted: Fit, weights: np.ndarray) -> float:
 def discount(problem: Problem, base: Fit, fitted: Fit) -> np.ndarray:
     """Weights (n,) of errors where the terms of `fitted` do much: no law is the machine's own to the last per cent,
     and what its form misses asks for no second effect."""
-    return 1.0 / np.sqrt(1.0 + (FORM * loudness(base.r - fitted.r) / problem.floor) ** 2)
+    return 1.0 / np.sqrt(1.0 + (FORM * problem.loudness(base.r - fitted.r) / problem.floor) ** 2)
 
 
 def complete(problem: Problem, base: Fit, fitted: Fit) -> bool:

@@ -23,7 +23,7 @@ from rtctl.diagnose.model import Model
 from rtctl.diagnose.rest import shares
 from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.space import Space
-from rtctl.diagnose.stretches import rms
+from rtctl.diagnose.stretches import loudness, rms
 
 EDGE = 0.6  # of an edge's sigma, on quiet machines
 EDGES = 0.5  # share of the main sensor's rows that all edges count for: they are few, but each is worth many rows
@@ -34,6 +34,7 @@ FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolut
 THREADS = 2
 LOUDEST = 20.0  # times the floor, of what random forces leave
 EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond which that has to have their very pattern
+SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
 IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
 TOGETHER = 100.0  # errors that count as one
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
@@ -101,6 +102,8 @@ class Problem:
         rows = np.concatenate([ticks, *(e.rows for e in self.edges)])
         self.order = np.argsort(rows, kind="stable") if self.edges else np.arange(len(rows))
         self.time_rows = rows[self.order]  # of each error
+        sizes = [len(self.target)] * len(self.channels) + [len(e.rows) for e in self.edges]
+        self.source = np.repeat(np.arange(len(sizes)), sizes)[self.order]  # number of the sensor that it is of
         few = sum(len(e.rows) for e in self.edges)
         self.balance = float(np.sqrt(EDGES * len(self.target) / few)) if few else 1.0  # what an edge counts for
         grain = resolution(sim.record) if sim.record.plant == "axis" else 1.0
@@ -177,6 +180,13 @@ class Problem:
         return dict(zip(names, [*parts[: len(self.channels)], *(x / self.balance for x in parts[len(self.channels) :])],
                         strict=True))  # fmt: skip
 
+    def loudness(self, r: np.ndarray) -> np.ndarray:
+        """Rms of the errors of a residual r in the stretch that each lies in, sensor by sensor."""
+        out = np.empty_like(r)
+        for sensor in np.unique(self.source):
+            out[self.source == sensor] = loudness(r[self.source == sensor])
+        return out
+
     def at_rows(self, channel: str, errors: np.ndarray) -> np.ndarray:
         """The errors of a sensor at the rows of those that know direction, where they are of edges."""
         for reel in self.edges:
@@ -195,7 +205,8 @@ class Problem:
         main, moves = (next(iter(self.by_sensor(x).values())) for x in (r, self.moves))
         main = main[moves] if moves.any() else main
         loud = rms(main) / self.main_floor
-        if loud > LOUDEST:
+        edges = list(self.by_sensor(r).values())[len(self.channels) :]
+        if loud > LOUDEST or any(rms(e) > SHAKEN * EDGE for e in edges):
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
         return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.main_floor, exact)

@@ -178,6 +178,7 @@ FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in 
     "transmission.backlash": ("damping", (0.0, 1.0)),
     "drive.supply_sag": ("form", ("current", "power", "drawn")),
     "drive.deadband": ("form", ("shift", "cut", "floor")),
+    "load.bump": ("form", ("drag", "hill", "push")),
 }
 BEYOND: dict[str, tuple[Part, ...]] = {  # what has no name in the table, looked for where a name may stand for it
     "friction.quadratic": (Size("Q", "drag2", 0.1),),

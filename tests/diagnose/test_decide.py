@@ -20,6 +20,7 @@ from rtctl.diagnose.decide import (
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
+from rtctl.diagnose.stretches import loudness
 
 
 class Floor:
@@ -27,6 +28,7 @@ class Floor:
 
     def __init__(self, floor, hiss=False):
         self.floor, self.hiss, self.block, self.louder = floor, lambda r: hiss, 20, 1.0
+        self.loudness = loudness
 
 
 def made(r, terms=0, x=None):
