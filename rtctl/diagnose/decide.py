@@ -121,7 +121,8 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH
-    return share > MOSTLY or p_value(after, before, problem.block) < LUCK
+    luck = LUCK if complete(problem, before, before) else RELEASED  # where something is missing it need be no miracle
+    return share > MOSTLY or p_value(after, before, problem.block) < luck
 
 
 def explained(problem: Problem, before: Fit, after: Fit) -> float:

@@ -184,7 +184,6 @@ BEYOND: dict[str, tuple[Part, ...]] = {  # what has no name in the table, looked
     "friction.quadratic": (Size("Q", "drag2", 0.1),),
 }
 ALL = SEARCH | BEYOND
-HINTED = tuple(name for name, parts in SEARCH.items() if any(isinstance(part, Hint | Jumps | At) for part in parts))
 
 
 ALONE = ("sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt")  # asks for a second sensor
@@ -193,6 +192,11 @@ SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
     "ripple.encoder": (Turn("A", "phi", "one", 1e-5), Hint("turn", "wavelength", 0.4)),
     "ripple.cogging": (Turn("A", "phi", "force", 0.05), Hint("turn", "wavelength", 0.4)),
 }
+HINTED = tuple(  # whose starts the record suggests
+    name
+    for name, parts in [*SEARCH.items(), *SLIDING.items()]
+    if any(isinstance(part, Hint | Jumps | At) for part in parts)
+)
 LEAD, RAIL = 0.045, 0.012  # m: the longest turn of a screw or encoder of a linear axis, the shortest wave of its guide
 
 
