@@ -92,8 +92,10 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
     return found
 
 
-def grips(record: Record, base: dict[str, float], read: np.ndarray) -> dict[str, list]:
-    """Limits at which a contact would slip for some share of the time, from the simulated reading (n,)."""
+def grips(
+    record: Record, base: dict[str, float], read: np.ndarray, shares: tuple[float, ...] = SLIPPING
+) -> dict[str, list]:
+    """Limits that would hold a contact for these `shares` of the time, from the simulated reading (n,)."""
     if record.plant == "axis":
         return {}
     w = max(1, round(CALM[record.plant] / record.dt))
@@ -106,7 +108,7 @@ def grips(record: Record, base: dict[str, float], read: np.ndarray) -> dict[str,
         R, N = base["R_c"], base["N"]
         force = base["M"] * R * a + base["F_c"] * np.sign(v) + base["B_c"] * R * v
         carried = {"capstan": force, "wheel": (force * R + (base["J_t"] + base["J_c"] + base["J_e"]) * a) / N}
-    return {f"grip:{node}": [float(f) for f in np.quantile(np.abs(F), SLIPPING)] for node, F in carried.items()}
+    return {f"grip:{node}": [float(f) for f in np.quantile(np.abs(F), shares)] for node, F in carried.items()}
 
 
 def _second(sim: Simulator, model: Model, start: int) -> np.ndarray:

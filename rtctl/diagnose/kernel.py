@@ -61,6 +61,8 @@ def substep(job, p, s, q, z):
     linear.midpoint(m)
     {follow}
     force(q, z, m)
+    for i in range(m.f.shape[0]):
+        m.f[i] += job.correction * job.push[i]
     linear.advance(m)
 
 
@@ -156,7 +158,7 @@ def terms_of(kind: str) -> tuple[Term, ...]:
     return tuple(term for term in TERMS.values() if term.nodes.get(kind))
 
 
-def job_dtype(ny: int, nu: int) -> np.dtype:
+def job_dtype(ny: int, nu: int, nq: int) -> np.dtype:
     """What one simulation is asked to do, and its scratch."""
     return state(
         mode=int,
@@ -172,7 +174,8 @@ def job_dtype(ny: int, nu: int) -> np.dtype:
         P=float,  # of the correction, in the input's unit a rad or m
         D=float,
         a=float,
-        share=(float, nu),
+        share=(float, nu),  # of the correction that goes to each drive
+        push=(float, nq),  # and what it pushes with at each node instead
         correction=float,
         e=float,
         d=float,
@@ -279,7 +282,7 @@ def kernel(kind: str) -> Kernel:
         names=tuple(t.name for t in terms),
         slot=np.dtype(head + params, align=True),
         slot_state=np.dtype([*states, ("spare", np.float64)], align=True),
-        job=job_dtype(len(plant.SENSORS), plant.NU),
+        job=job_dtype(len(plant.SENSORS), plant.NU, plant.NQ),
         state=getattr(plant, f"{kind.upper()}_STATE"),
     )
 

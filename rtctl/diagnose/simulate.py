@@ -30,6 +30,7 @@ COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
 FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
 LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
+SLIPS, SEEN_AT = "transmission.slip", {"ivu": ivu.NODES["capstan"], "ldu": ldu.NODES["encoder"]}
 SHARE = {"ivu": (0.5, -0.5), "ldu": (1.0,), "axis": (1.0,)}
 CHANNELS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts", "scale_counts")}
 
@@ -87,6 +88,8 @@ class Simulator:
         stiff = any(str(getattr(t, "term", "")).startswith(STIFF) for t in model.terms)
         substeps = self.substeps * (FINER[self.record.plant] if stiff else 1)
         stride = 1
+        slips = any(str(getattr(t, "term", "")) == SLIPS for t in model.terms)
+        coarse = coarse and not slips  # when it sets in is a matter of single ticks
         if coarse and self.record.dt < COARSE:
             substeps, stride = 1, 2
         elif coarse:
@@ -101,6 +104,8 @@ class Simulator:
         job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
         if directed:
             job["rectified"] = 0
+        if slips:  # through it no drive could correct
+            job["share"], job["push"][0, SEEN_AT[self.record.plant]] = 0.0, self._lever(model.base)
         laws = np.zeros(1, record_dtype(self.law))
         fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))
@@ -113,6 +118,13 @@ class Simulator:
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         return out, written, push
+
+    def _lever(self, base: dict[str, float]) -> float:
+        """What one unit of correction by the drives pushes with at the main sensor's node, Nm."""
+        if self.record.plant == "ldu":
+            return base["K_m1"] * base["N"]
+        amp = self.case.drive.amp_per_volt
+        return 0.5 * base["R_c"] * sum(base[f"K_m{i}"] * amp[i - 1] / base[f"R{i}"] for i in (1, 2))
 
     def _job(self, params: Any, mode: int, follow: float, substeps: int, stride: int) -> np.ndarray:
         case, plant = self.case, self.record.plant

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
 from rtctl.diagnose.case import read_case
+from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.hints import grips
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.model import owner_model, plant_params
 from rtctl.diagnose.record import Record
@@ -225,3 +227,19 @@ def test_resolution_is_what_the_owner_says_or_the_smallest_step_that_occurs(blan
     unsaid = blank("axis", np.zeros(500), steps, sensors={})
     assert resolution(unsaid) == pytest.approx(4e-6)
     assert resolution(blank("ivu", np.zeros((10, 2)))) == pytest.approx(2 * np.pi / 10000)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.8])  # of what the wheel would carry of the time
+def test_a_model_that_slips_is_kept_on_the_track_of_a_machine_that_slips(case_of, share):
+    case, n = read_case(case_of("ldu"), "."), 20000
+    t, zero = 1e-4 * np.arange(n), np.zeros(n)
+    u = 1.2 * np.sin(2 * np.pi * 3.0 * t) + 0.8 * np.sin(2 * np.pi * 11.0 * t)
+    names = ("encoder_counts", "scale_counts")
+    empty = Record("ldu", case, t, 1e-4, zero, zero, u[:, None], dict.fromkeys(names, zero), {})
+    plain = owner_model(case)
+    carried = grips(empty, plain.base, Simulator(empty).run(plain, OPEN)[:, 0], (share,))["grip:wheel"][0]
+    slips = plain.add(TERMS["transmission.slip"].settings(node="wheel", F_max=carried))
+    out = Simulator(empty).run(slips, OPEN)
+    sim = Simulator(empty._replace(y={name: np.floor(out[:, c]) for c, name in enumerate(names)}))
+    well, badly = (Problem(sim).residual(model).std() for model in (slips, plain))
+    assert well < 1.0 and badly > 10.0
