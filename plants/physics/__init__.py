@@ -22,9 +22,10 @@ from rtctl.plants.physics import (
 from rtctl.plants.physics.place import Place, place
 from rtctl.plants.physics.term import Term
 
-FAMILIES = (  # in the order in which they act: what asymmetry scales and presliding replaces must be there before
-    timing, drive, drive_dynamics, friction, friction_load, load, friction_direction, presliding, transmission, contact,
-    structure, tape, ripple, ripple_tape, guide, sensor, geometry,
+FAMILIES = (  # in the order in which they act: what asymmetry scales and presliding replaces must be there before, and
+    # so must the tape that a reel winds, before anything asks for its tension
+    timing, drive, drive_dynamics, geometry, ripple_tape, friction, friction_load, load, friction_direction, presliding,
+    transmission, contact, structure, tape, ripple, guide, sensor,
 )  # fmt: skip
 TERMS: dict[str, Term] = {
     term.name: term for family in FAMILIES for term in vars(family).values() if isinstance(term, Term)

@@ -29,28 +29,31 @@ class RadiusChangeSettings(Settings):
     d: float = quantity(unit="m", ge=-0.02, le=0.02, help="growth of the radius in a turn: the thickness of the tape")
     rho_h: float = quantity(PAPER, unit="kg/m^2", ge=0, le=1e4, help="density times width of the tape, for the inertia")
     R_min: float = quantity(0.02, unit="m", gt=0, le=1, help="radius of the empty reel")
+    other: float = quantity(0.0, unit="", ge=0, le=1, help="share of d of the other reel: 1 where its tape is the same")
 
 
 class RadiusChangeParams(NamedTuple):
     grow: float  # m/rad
+    other: float  # the same of the other reel
     rho_h: float
     R_min: float
 
 
 def build_radius_change(settings: RadiusChangeSettings, h: float) -> RadiusChangeParams:
     """Nothing to discretise."""
-    return RadiusChangeParams(settings.d / (2.0 * math.pi), settings.rho_h, settings.R_min)
+    grow = settings.d / (2.0 * math.pi)
+    return RadiusChangeParams(grow, settings.other * grow, settings.rho_h, settings.R_min)
 
 
 @tick
-def radius_change(p, m, i):
+def grown(p, m, i, grow):
     """Forces on reel `i` and its tape that make its radius and inertia follow its angle."""
     j = tape_of(m, i)
     R_0 = m.link_a[j]
     q, v = m.qm[i], m.vm[i]
-    R = max(R_0 + p.grow * q, min(p.R_min, R_0))
+    R = max(R_0 + grow * q, min(p.R_min, R_0))
     extra = R - R_0
-    wound = ivu.wound(q, R_0, p.grow, min(p.R_min, R_0)) - R_0 * q
+    wound = ivu.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
     linear.pull(m, j, m.link_c[j] * wound + m.link_k[j] * extra * v)
     m.f[i] -= extra * linear.tension(m, j)
     # All that turns the reel turns another inertia: what the matrices divide by the old one is put right as a force.
@@ -71,6 +74,14 @@ def radius_change(p, m, i):
     change = J_0 / J - 1.0
     # A light reel follows its springs within a substep; held over one, the full force would make it ring ever louder.
     m.f[i] += torque * change / (1.0 + abs(change) * m.h * (k + m.h * c) / J_0)
+
+
+@tick
+def radius_change(p, m, i):
+    """Radius and inertia of reel `i`, and of the other where it is the same tape, follow their angles."""
+    grown(p, m, i, p.grow)
+    if p.other != 0.0:
+        grown(p, m, ivu.REEL1 + ivu.REEL2 - i, p.other)
 
 
 RADIUS_CHANGE = Term(

@@ -23,7 +23,12 @@ BESIDE = 0.5  # the same where more is left than noise, which the form of a law 
 QUIET = 0.85  # of the noise floor, below which models are equally good
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
 ABSURD = 30.0  # times the largest typical size
-ANGLES = ("ripple.encoder", "transmission.backlash")  # whose typical sizes are angles: those of an axis may be ways
+ELSEWHERE = (  # whose typical sizes are those of another machine: angles, or contacts of tape
+    ("ripple.encoder", "axis"),
+    ("transmission.backlash", "axis"),
+    ("transmission.creep", "ldu"),
+)
+MOST = 0.3  # of the cost: a term that leaves less is more than the form of another, whatever that does
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
 ONCE = 0.02  # the same of a further term that shows at a few places only
@@ -59,6 +64,8 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         if chance > LUCK:
             return False
         if noise and clear and chance < NEVER:
+            return True
+        if after.cost < MOST * before.cost and not same_law(before, after):
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
@@ -179,7 +186,7 @@ def unusual(fitted: Fit) -> float:
         term, values = TERMS[h.term], h.values(x)
         for name, (low, high) in term.typical.items():
             size = abs(values.get(name, 0.0))
-            angle = h.term in ANGLES and fitted.model.kind == "axis"
-            if name not in term.scale and size > 0.0 and not angle:
+            known = name not in term.scale and (h.term, fitted.model.kind) not in ELSEWHERE
+            if known and size > 0.0:
                 total -= 0.5 * min(max(np.log(low / size), np.log(size / high), 0.0) / np.log(OFTEN), 3.0) ** 2
     return float(total)

@@ -152,7 +152,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "sensor.missed_counts": (Jumps("size"),),
     "sensor.rectified": (Choice("share", (1.0,)),),
     "sensor.scale": (Size("relative", "one", 1e-3, signed=True),),
-    "geometry.radius_change": (Size("d", "one", 1e-4, signed=True),),
+    "geometry.radius_change": (Size("d", "one", 1e-4, signed=True), Choice("other", (1.0, 0.0))),
     "tape.slack": (Choice("share", (1.0,)), Choice("other", (1.0, 0.0))),
 }  # fmt: skip
 

@@ -18,7 +18,7 @@ from rtctl.diagnose.simulate import Simulator, resolution
 
 FAST = 0.7  # counts a tick: slower, the cut into counts is no white noise
 ENOUGH = 400  # rows that fast
-LEAST = 0.025  # of a tick: less is what any clock does
+LEAST, CLOCK = 0.025, 4e-6  # of a tick, and s: less is what any clock does
 LOUD = 0.15  # of the variance at the usual speed, what jitter must add
 CERTAIN = 8.0  # standard errors
 LOUDER = 1.5  # times the noise that is left: a late tick also holds the last command for longer
@@ -47,7 +47,7 @@ def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
     d, v = d[~beyond], v[~beyond]
     slope, error, floor = growth(d**2 / 1.5, v**2)
     sigma = float(np.sqrt(max(slope, 0.0)))
-    if slope < CERTAIN * error or sigma < LEAST * sim.record.dt or slope * np.mean(v**2) < LOUD * floor:
+    if slope < CERTAIN * error or sigma < max(LEAST * sim.record.dt, CLOCK) or slope * np.mean(v**2) < LOUD * floor:
         return None
     z = d / np.sqrt(floor + slope * v**2)
     mixed = float(z[1:] @ z[:-1]) / float(z @ z)

@@ -6,7 +6,7 @@ import stand
 
 from rtctl.idiom import tick
 from rtctl.plants import ivu, linear
-from rtctl.plants.physics import geometry
+from rtctl.plants.physics import TERMS, geometry
 
 
 @tick
@@ -46,6 +46,15 @@ def test_both_reels_are_the_plant_with_a_thickness(d, radii, within):
     assert (np.abs(got - expected)[:, :5].max(axis=0) < within * change).all()
 
 
+@pytest.mark.parametrize("node", ["reel1", "reel2"])
+def test_of_one_tape_both_reels_grow(node):
+    both = [stand.make("geometry.radius_change", "ivu", reel, d=5e-4) for reel in ("reel1", "reel2")]
+    one = stand.make("geometry.radius_change", "ivu", node, d=5e-4, other=1.0)
+    many, few = (stand.run("ivu", terms, volts(), d_tape=0.0).x for terms in (both, [one]))
+    alone = stand.run("ivu", [stand.make("geometry.radius_change", "ivu", node, d=5e-4)], volts(), d_tape=0.0).x
+    assert np.abs(few - many).max() < 0.02 * np.abs(few - alone).max()
+
+
 def test_the_plant_tells_the_tension_on_its_true_radius():
     p, s = stand.plant("ivu", 2.5e-4, d_tape=1e-3)
     wind(p, s, volts(600), 8, np.zeros((600, 14)))
@@ -76,3 +85,11 @@ def test_an_empty_reel_gets_no_smaller():
     wound = (linear.tension(s.m, 0) / 450.0) + 0.0125 * s.m.qm[ivu.CAPSTAN]
     turns = (0.038 - 0.02) / (1e-3 / (2 * np.pi))
     assert wound == pytest.approx(-(0.029 * turns + 0.02 * (500.0 - turns)))
+
+
+def test_what_a_reel_winds_is_there_before_anything_asks_for_its_tension():
+    """Or creep and friction under load would see the tension of another tape."""
+    names = list(TERMS)
+    winding = ("geometry.radius_change", "ripple.reel", "ripple.capstan")
+    asking = ("friction.load", "transmission.slip", "transmission.creep", "tape.slack", "tape.viscoelastic")
+    assert max(map(names.index, winding)) < min(map(names.index, asking))
