@@ -128,7 +128,8 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH
-    luck = LUCK if complete(problem, before, before) else RELEASED  # where something is missing it need be no miracle
+    freed = bool(before.bound()) and not after.bound()
+    luck = RELEASED if freed or not complete(problem, before, before) else LUCK  # where something is missing, no miracle
     return share > MOSTLY or p_value(after, before, problem.block) < luck
 
 
