@@ -128,8 +128,9 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH
+    # what frees the owner's values, or explains what is plainly there, need be no miracle
     freed = bool(before.bound()) and not after.bound()
-    luck = RELEASED if freed or not complete(problem, before, before) else LUCK  # where something is missing, no miracle
+    luck = RELEASED if freed or not complete(problem, before, before) else LUCK
     return share > MOSTLY or p_value(after, before, problem.block) < luck
 
 
