@@ -28,7 +28,7 @@ ELSEWHERE = (  # whose typical sizes are those of another machine: angles, or co
     ("transmission.backlash", "axis"),
     ("transmission.creep", "ldu"),
 )
-MOST = 0.3  # of the cost: a term that leaves less is more than the form of another, whatever that does
+MOST = 0.3  # of the cost: a term that leaves less is more than the form of another, and nothing that chance does
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
 ONCE = 0.02  # the same of a further term that shows at a few places only
@@ -47,6 +47,10 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     Below the floor there is nothing to take, and where what is left may be noise a term must take more: a lucky one may
     follow that for a while.
     """
+    alike = same_law(before, after)
+    much = after.cost < MOST * before.cost and rms(before.r) > problem.floor and problem.louder == 1.0
+    if much and not alike and by_noise(before, after) < NEVER:
+        return True
     weights = discount(problem, base, before)
     if rms(weights * before.r) < problem.floor:
         return False
@@ -57,15 +61,13 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return False  # of a machine that is known to be louder nobody knows what is noise
         if before.bound() and not after.bound() and chance < RELEASED and after.cost < (1.0 - FREE) * before.cost:
             return True  # the owner's values need not be stretched any more
-        noise = rms(before.r) < COMPLETE * problem.floor and not same_law(before, after)
+        noise = rms(before.r) < COMPLETE * problem.floor and not alike
         clear = after.cost < (1.0 - CLEAR) * before.cost
         if noise and clear and before.space.hypotheses and chance < ONCE and by_noise(before, after) < NEVER:
             return True
         if chance > LUCK:
             return False
         if noise and clear and chance < NEVER:
-            return True
-        if after.cost < MOST * before.cost and not same_law(before, after):
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
