@@ -10,6 +10,7 @@ from rtctl.diagnose.decide import (
     absurd,
     by_noise,
     complete,
+    enough,
     explained,
     p_value,
     probabilities,
@@ -226,3 +227,14 @@ def test_a_size_beyond_all_that_is_typical_is_no_machines():
     wave = ("drive.offset", "drive1")
     assert not absurd(with_terms(wave, sizes=(0.5,))) and not absurd(with_terms(wave, sizes=(1e-6,)))
     assert absurd(with_terms(wave, sizes=(-7.0,)))
+
+
+def test_what_explains_little_of_a_little_needs_more_than_luck():
+    rng = np.random.default_rng(3)
+    base = 1.8 * rng.standard_normal(4000)
+    half = made(0.7 * base, 1)
+    noise = Floor(1.0)
+    assert 1e-3 > p_value(half, made(base), 20)
+    assert enough(noise, made(base), half)  # type: ignore[arg-type]
+    weak = made(np.where(rng.random(4000) < 0.97, base, 0.9 * base), 1)
+    assert not enough(noise, made(base), weak)  # type: ignore[arg-type]
