@@ -3,8 +3,8 @@
     R = R_0 + d q / 2 pi (4.3, 4.4),  l = integral of R dq,  J = J_0 + (pi/2) rho_h (R^4 - R_0^4) (4.1, 4.2)
 
 plants/ivu.py does this for both reels with the thickness that the owner gives, and takes its matrices anew on the way;
-here it is for one reel, on top of what the model has, as forces alone. Where the owner's tape has no thickness the two
-agree to a few percent of the effect over nine turns; a reel that is nearly empty is the worst.
+here it is for one reel, or with `other` for both, on top of what the model has, as forces alone. Where the owner's tape
+has no thickness the two agree to a few percent of the effect over nine turns; a reel that is nearly empty is the worst.
 
 Source: thesis (4.1)-(4.8).
 """

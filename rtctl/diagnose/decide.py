@@ -37,7 +37,7 @@ NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of i
 CLEAR = 0.15  # share of the cost that it must take off
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
 FORM = 0.04  # of what a term does: what the form of its law may miss
-HALF = 0.5  # of the excess: less may be what any number takes off
+HALF = 0.5  # of the excess explained, and not by luck: something is there; less may be what any number takes off
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
 
@@ -131,11 +131,12 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH
+    if share > MOSTLY:
+        return True
     # what frees the owner's values, or explains what is plainly there, need be no miracle
     freed = bool(before.bound()) and not after.bound()
     plain = share > HALF and (freed or not complete(problem, before, before))
-    luck = RELEASED if plain else LUCK
-    return share > MOSTLY or p_value(after, before, problem.block) < luck
+    return p_value(after, before, problem.block) < (RELEASED if plain else LUCK)
 
 
 def explained(problem: Problem, before: Fit, after: Fit) -> float:

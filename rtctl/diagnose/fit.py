@@ -115,18 +115,22 @@ class Problem:
     def seen_by(self, model: Model) -> "Problem":
         """The same with the edges of counters that cannot tell direction, which the model tells; there must be no
         weights yet."""
+        stop = None if self.n == len(self.sim.seen) else self.n
+        return Problem(self.sim, stop, self.channels, self.mean, self._told(model))
+
+    def agrees(self, model: Model) -> bool:
+        """Whether the model tells the directions of the reels' counts as they were taken."""
+        return alike([e.between(self.rows.start, self.n) for e in self._told(model)], self.edges)
+
+    def _told(self, model: Model) -> list[Edges]:
+        """The reels' edges of the whole record as the model tells their directions, where it does."""
         names = {c: name for c, name in enumerate(self.sim.channels) if name in RECTIFIED}
         out = self.sim.run(model, directed=True) if names else np.empty((0, 0))
         found = []
         for c, name in names.items():  # a reel follows the capstan that was seen, not the one that was simulated
             gear = float(np.polyfit(out[:, 0], out[:, c], 1)[0]) if np.isfinite(out).all() else np.nan
             found.append(edges(self.sim.record.y[name], out[:, c] + gear * (self.sim.seen - out[:, 0]), c))
-        stop = None if self.n == len(self.sim.seen) else self.n
-        return Problem(self.sim, stop, self.channels, self.mean, [e for e in found if e is not None])
-
-    def agrees(self, model: Model) -> bool:
-        """Whether the model tells the directions of the reels' counts as they were taken."""
-        return alike(Problem(self.sim).seen_by(model).edges, self.edges)
+        return [e for e in found if e is not None]
 
     def weighed(self, weights: np.ndarray) -> "Problem":
         """The same with a further weight for each error."""
@@ -172,13 +176,9 @@ class Problem:
 
     def by_sensor(self, r: np.ndarray) -> dict[str, np.ndarray]:
         """The errors of a residual r by the sensor they are of, in the order of time; the main one is first."""
-        e = np.empty_like(r)
-        e[self.order] = r
-        sizes = [len(self.target)] * len(self.channels) + [len(reel.rows) for reel in self.edges]
+        scales = [1.0] * len(self.channels) + [self.balance] * len(self.edges)
         names = [self.sim.channels[c] for c in (*self.channels, *(reel.channel for reel in self.edges))]
-        parts = np.split(e, np.cumsum(sizes)[:-1])
-        return dict(zip(names, [*parts[: len(self.channels)], *(x / self.balance for x in parts[len(self.channels) :])],
-                        strict=True))  # fmt: skip
+        return {name: r[self.source == i] / scale for i, (name, scale) in enumerate(zip(names, scales, strict=True))}
 
     def loudness(self, r: np.ndarray) -> np.ndarray:
         """Rms of the errors of a residual r in the stretch that each lies in, sensor by sensor."""
@@ -202,11 +202,11 @@ class Problem:
 
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
-        main, moves = (next(iter(self.by_sensor(x).values())) for x in (r, self.moves))
+        main, *others = self.by_sensor(r).values()
+        moves = self.moves[self.source == 0]
         main = main[moves] if moves.any() else main
         loud = rms(main) / self.main_floor
-        edges = list(self.by_sensor(r).values())[len(self.channels) :]
-        if loud > LOUDEST or any(rms(e) > SHAKEN * EDGE for e in edges):
+        if loud > LOUDEST or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :]):
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
         return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.main_floor, exact)

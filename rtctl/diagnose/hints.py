@@ -60,8 +60,8 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
         ratios = {":motor": base["N"], ":wheel": 1.0}
     found: dict[str, list] = grips(record, base, read[:, 0])
     for node, ratio in ratios.items():
-        found["order" + node] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
-        found["order" + node] += [n for n in WHOLE if n not in found["order" + node]]
+        shown = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
+        found["order" + node] = [*shown, *(n for n in WHOLE if n not in shown)]
     if record.plant != "ivu":
         way = x * (base["R_c"] if record.plant == "ldu" else 1.0)
         target = d

@@ -193,9 +193,7 @@ SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
     "ripple.cogging": (Turn("A", "phi", "force", 0.05), Hint("turn", "wavelength", 0.4)),
 }
 HINTED = tuple(  # whose starts the record suggests
-    name
-    for name, parts in [*SEARCH.items(), *SLIDING.items()]
-    if any(isinstance(part, Hint | Jumps | At) for part in parts)
+    name for name, parts in (SEARCH | SLIDING).items() if any(isinstance(part, Hint | Jumps | At) for part in parts)
 )
 LEAD, RAIL = 0.045, 0.012  # m: the longest turn of a screw or encoder of a linear axis, the shortest wave of its guide
 

@@ -9,7 +9,7 @@ from rtctl.diagnose.diagnosis import Diagnosis
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.scales import SMOOTH
-from rtctl.diagnose.simulate import SHARE, Simulator, per_unit
+from rtctl.diagnose.simulate import Simulator, lever, per_unit
 from rtctl.plants.physics import TERMS
 
 FASTER = 2.0  # than the simulator's own observer
@@ -63,14 +63,7 @@ class Missing:
         """What is missing and what the terms give, both (n,), as a force on the node in its unit."""
         node = node.replace("drive", "motor") if self.kind != "axis" else "carriage"
         node = "motor" if (node, self.kind) == ("loop", "ldu") else node
-        b, amp = self.d.before.base, self.d.record.case.drive.amp_per_volt
-        if self.kind == "ivu":
-            gain = (
-                sum(abs(s) * b[f"K_m{i}"] * amp[i - 1] / b[f"R{i}"] for i, s in enumerate(SHARE["ivu"], 1)) * b["R_c"]
-            )
-        else:
-            gain = b["K_m1"] * b["N"] if self.kind == "ldu" else b["K"]
-        factor = gain / self.ratio(node)
+        factor = lever(self.d.record, self.d.before.base) / self.ratio(node)
         return factor * self.push, factor * self.law, "N" if self.slides(node) else "Nm"
 
     def reading(self) -> tuple[np.ndarray, np.ndarray, str]:

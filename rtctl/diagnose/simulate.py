@@ -85,10 +85,10 @@ class Simulator:
         """
         k = self.kernel
         n = len(self.seen) if n is None else n
-        stiff = any(str(getattr(t, "term", "")).startswith(STIFF) for t in model.terms)
+        terms = [str(getattr(t, "term", "")) for t in model.terms]
+        stiff, slips = any(term.startswith(STIFF) for term in terms), SLIPS in terms
         substeps = self.substeps * (FINER[self.record.plant] if stiff else 1)
         stride = 1
-        slips = any(str(getattr(t, "term", "")) == SLIPS for t in model.terms)
         coarse = coarse and not slips  # when it sets in is a matter of single ticks
         if coarse and self.record.dt < COARSE:
             substeps, stride = 1, 2
@@ -105,7 +105,7 @@ class Simulator:
         if directed:
             job["rectified"] = 0
         if slips:  # through it no drive could correct
-            job["share"], job["push"][0, SEEN_AT[self.record.plant]] = 0.0, self._lever(model.base)
+            job["share"], job["push"][0, SEEN_AT[self.record.plant]] = 0.0, lever(self.record, model.base)
         laws = np.zeros(1, record_dtype(self.law))
         fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))
@@ -118,13 +118,6 @@ class Simulator:
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         return out, written, push
-
-    def _lever(self, base: dict[str, float]) -> float:
-        """What one unit of correction by the drives pushes with at the main sensor's node, Nm."""
-        if self.record.plant == "ldu":
-            return base["K_m1"] * base["N"]
-        amp = self.case.drive.amp_per_volt
-        return 0.5 * base["R_c"] * sum(base[f"K_m{i}"] * amp[i - 1] / base[f"R{i}"] for i in (1, 2))
 
     def _job(self, params: Any, mode: int, follow: float, substeps: int, stride: int) -> np.ndarray:
         case, plant = self.case, self.record.plant
@@ -195,6 +188,14 @@ def resolution(record: Record) -> float:
         return float(sensors.x_resolution_m)
     steps = np.abs(np.diff(next(iter(record.y.values()))))
     return float(np.quantile(steps[steps > 0], 0.01)) if (steps > 0).any() else 1e-12
+
+
+def lever(record: Record, base: dict[str, float]) -> float:
+    """What one unit of correction by the drives pushes with at the main sensor's node, Nm (N of an axis)."""
+    if record.plant == "ivu":
+        pairs = zip(SHARE["ivu"], record.case.drive.amp_per_volt, strict=True)
+        return sum(abs(s) * base[f"K_m{i}"] * amp / base[f"R{i}"] for i, (s, amp) in enumerate(pairs, 1)) * base["R_c"]
+    return base["K_m1"] * base["N"] if record.plant == "ldu" else base["K"]
 
 
 def rigid_gain(params: Any, kind: str) -> float:

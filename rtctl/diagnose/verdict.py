@@ -17,7 +17,6 @@ from rtctl.diagnose.name import dropped
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals
 
-HALF = 0.5  # of the excess explained, and not by luck: something is there
 SURE = 0.7  # weight of a name among its rivals
 POSSIBLE = 0.05  # weight from which a rival is mentioned
 LOST = 1e3  # error of a free run that ran away, which tells nothing of the terms
@@ -56,7 +55,7 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
     if patched(best) or decide.absurd(best):
         return Verdict(UNNAMED, (), share)
     if not decide.enough(problem, base, best):
-        loud = loud or (share > HALF and decide.p_value(best, base, block) < decide.LUCK)
+        loud = loud or (share > decide.HALF and decide.p_value(best, base, block) < decide.LUCK)
         return Verdict(UNNAMED if loud else NOTHING, (), share)
     trust = 0.98 if whole else 0.6 + 0.35 * share
     own, others = [], []
