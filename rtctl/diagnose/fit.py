@@ -164,9 +164,10 @@ class Problem:
         e[:, 1:] -= e[:, 1:].mean(axis=0)
         return e
 
-    def residual(self, model: Model, coarse: bool = False) -> np.ndarray:
-        """All errors as one row of numbers; 1e6 where the model runs away."""
-        out = self.sim.run(model, TRACK, self.n, coarse, directed=bool(self.edges))
+    def residual(self, model: Model, coarse: bool = False, at: str = "") -> np.ndarray:
+        """All errors as one row of numbers; 1e6 where the model runs away. `at`: the body that is pushed to keep it on
+        track, in place of the drives."""
+        out = self.sim.run(model, TRACK, self.n, coarse, directed=bool(self.edges), at=at)
         e = np.concatenate([self._error(out).T.ravel(), *(self.balance * reel.error(out) for reel in self.edges)])
         return np.nan_to_num(e, nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)[self.order] * self.weights
 

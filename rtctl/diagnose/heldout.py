@@ -106,9 +106,9 @@ class FreeRun(Problem):
         out = free_run(self.sim, model, self.start, self.n, coarse)[self.rows, 0]
         return np.nan_to_num(self.sim.seen[: self.n][self.rows] - out, nan=1e6).clip(-1e6, 1e6)
 
-    def residual(self, model: Model, coarse: bool = False) -> np.ndarray:
+    def residual(self, model: Model, coarse: bool = False, at: str = "") -> np.ndarray:
         """Both as one row of numbers."""
-        near, far = super().residual(model, coarse) / self.near, self.drift(model, coarse) / self.far
+        near, far = super().residual(model, coarse, at) / self.near, self.drift(model, coarse) / self.far
         return np.concatenate((near, far * np.sqrt(len(near) / len(far))))
 
 

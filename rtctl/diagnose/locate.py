@@ -1,7 +1,7 @@
 """Where simulation and recording part: channel, node, axis, since when, and how much of the error lives there.
 
 With a name, node and axis are the term's own. Without one, the axis is the one along which the missing force, as a
-disturbance observer sees it, repeats itself best, and the node is that of the nearest guess.
+disturbance observer sees it, repeats itself best, and the node is where a push keeps the model right (`stands`).
 """
 
 import numpy as np
@@ -12,6 +12,7 @@ from rtctl.diagnose.hints import ORDERS, observe, spectrum
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.name import Search
 from rtctl.diagnose.simulate import Simulator, per_unit
+from rtctl.diagnose.stands import MOSTLY, stands
 from rtctl.plants.physics import TERMS
 
 BINS = 24  # along an axis
@@ -35,10 +36,12 @@ def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Sear
         return Located(channel, "loop", "time", "everywhere", since, 0.0)
     h = top.space.hypotheses[0]
     share = float(np.clip(1.0 - top.cost / base.cost, 0.0, 1.0))
-    axis = TERMS[h.term].axis
-    if not best.space.hypotheses or share < 0.5:
+    axis, node = TERMS[h.term].axis, h.node
+    if not best.space.hypotheses:
+        node = stands(problem, base.model, node, share)
+    if not best.space.hypotheses or share < MOSTLY:
         axis = repeats(sim, base.model) or axis
-    return Located(channel, h.node, axis, where(sim, problem, error, axis), since, share)
+    return Located(channel, node, axis, where(sim, problem, error, axis), since, share)
 
 
 def along(sim: Simulator) -> dict[str, np.ndarray]:

@@ -9,7 +9,7 @@ from rtctl.diagnose.diagnosis import Diagnosis
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.scales import SMOOTH
-from rtctl.diagnose.simulate import Simulator, lever, per_unit
+from rtctl.diagnose.simulate import Simulator, gear, lever, per_unit
 from rtctl.plants.physics import TERMS
 
 FASTER = 2.0  # than the simulator's own observer
@@ -52,12 +52,10 @@ class Missing:
     def ratio(self, node: str) -> float:
         """Way of the node for one of the main sensor."""
         b, node = self.d.before.base, node.replace("drive", "motor")
-        if self.kind == "ivu":
-            way = {"1": b["R_c"] / b["R1"], "2": -b["R_c"] / b["R2"]}.get(node[-1:], 1.0)
-            return b["R_c"] * np.sign(way) if node.startswith("tape") else way
-        if self.kind == "ldu":
-            return {"motor": b["N"], "carriage": b["R_c"], "scale": b["R_c"]}.get(node, 1.0)
-        return 1.0
+        turn = gear(self.kind, b, node)
+        if self.kind == "ivu" and node.startswith("tape"):
+            return float(b["R_c"] * np.sign(turn))
+        return b["R_c"] if self.kind == "ldu" and node in ("carriage", "scale") else turn
 
     def force(self, node: str) -> tuple[np.ndarray, np.ndarray, str]:
         """What is missing and what the terms give, both (n,), as a force on the node in its unit."""

@@ -30,7 +30,7 @@ COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
 FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
 LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
-SLIPS, SEEN_AT = "transmission.slip", {"ivu": ivu.NODES["capstan"], "ldu": ldu.NODES["encoder"]}
+SLIPS, SEEN_AT = "transmission.slip", {"ivu": "capstan", "ldu": "encoder", "axis": "carriage"}
 SHARE = {"ivu": (0.5, -0.5), "ldu": (1.0,), "axis": (1.0,)}
 CHANNELS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts", "scale_counts")}
 
@@ -61,13 +61,19 @@ class Simulator:
         self.law = law_params(record)
 
     def run(
-        self, model: Model, mode: int = TRACK, n: int | None = None, coarse: bool = False, directed: bool = False
+        self,
+        model: Model,
+        mode: int = TRACK,
+        n: int | None = None,
+        coarse: bool = False,
+        directed: bool = False,
+        at: str = "",
     ) -> np.ndarray:
         """Readings (n, sensors) in the sensors' units; nan from the tick on at which the model ran away.
 
-        `directed`: as if every counter knew its direction.
+        `directed`: as if every counter knew its direction; `at`: the body that the correction pushes.
         """
-        return self.everything(model, mode, n, coarse=coarse, directed=directed)[0]
+        return self.everything(model, mode, n, coarse=coarse, directed=directed, at=at)[0]
 
     def everything(
         self,
@@ -77,11 +83,13 @@ class Simulator:
         follow: float | None = None,
         coarse: bool = False,
         directed: bool = False,
+        at: str = "",
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Readings, the volts that the law wrote (CLOSED) and the correction (n,) that kept the model on track (TRACK).
 
         The correction is in the unit of the linear machine's input; `follow` is its bandwidth in rad/s. `coarse` takes
-        twice the step in half the time: good for differences, not for verdicts. `directed`: see `run`.
+        twice the step in half the time: good for differences, not for verdicts. `directed`: see `run`. With `at` the
+        drives have no part in the correction: it is a push at that body.
         """
         k = self.kernel
         n = len(self.seen) if n is None else n
@@ -104,8 +112,12 @@ class Simulator:
         job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
         if directed:
             job["rectified"] = 0
-        if slips:  # through it no drive could correct
-            job["share"], job["push"][0, SEEN_AT[self.record.plant]] = 0.0, lever(self.record, model.base)
+        if slips and not at:  # through it no drive could correct
+            at = SEEN_AT[self.record.plant]
+        if at:
+            node = PLANTS[self.record.plant].NODES[at]
+            job["share"] = 0.0
+            job["push"][0, node] = lever(self.record, model.base) / gear(self.record.plant, model.base, at)
         laws = np.zeros(1, record_dtype(self.law))
         fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))
@@ -196,6 +208,13 @@ def lever(record: Record, base: dict[str, float]) -> float:
         pairs = zip(SHARE["ivu"], record.case.drive.amp_per_volt, strict=True)
         return sum(abs(s) * base[f"K_m{i}"] * amp / base[f"R{i}"] for i, (s, amp) in enumerate(pairs, 1)) * base["R_c"]
     return base["K_m1"] * base["N"] if record.plant == "ldu" else base["K"]
+
+
+def gear(kind: str, base: dict[str, float], node: str) -> float:
+    """Turn of a body for one of the main sensor's, all springs taken as stiff."""
+    if kind == "ivu" and node[-1:] in ("1", "2"):
+        return base["R_c"] / base["R1"] if node.endswith("1") else -base["R_c"] / base["R2"]
+    return base["N"] if kind == "ldu" and node == "motor" else 1.0
 
 
 def rigid_gain(params: Any, kind: str) -> float:
