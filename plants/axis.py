@@ -87,5 +87,5 @@ def read(s):
 def state_space(p: AxisParams) -> tuple[np.ndarray, np.ndarray]:
     """A (2, 2) and B (2, 1), volts in, without dry friction."""
     A, G = np.zeros((NX, NX)), np.zeros((NX, NU + NQ))
-    assemble(p, A, G)
+    assemble.interpret(p, A, G)
     return A, G[:, :NU]

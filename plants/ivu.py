@@ -281,5 +281,5 @@ def tensions(p, s):
 def state_space(p: IvuParams) -> tuple[np.ndarray, np.ndarray]:
     """A (14, 14) and B (14, 2), volts in, at the starting radii and without dry friction, for design and tests."""
     A, G = np.zeros((NX, NX)), np.zeros((NX, NU + NQ))
-    assemble(p, p.R1, p.R2, p.J_1, p.J_2, A, G)
+    assemble.interpret(p, p.R1, p.R2, p.J_1, p.J_2, A, G)
     return A, G[:, :NU]

@@ -170,5 +170,5 @@ def read(p, s):
 def state_space(p: LduParams) -> tuple[np.ndarray, np.ndarray]:
     """A (10, 10) and B (10, 1), amperes in, without dry friction, for design and tests."""
     A, G = np.zeros((NX, NX)), np.zeros((NX, NU + NQ))
-    assemble(p, A, G)
+    assemble.interpret(p, A, G)
     return A, G[:, :NU]

@@ -10,6 +10,7 @@ In the running tick `p` and `s` are records inside shared memory; in a test they
 named tuple itself and `np.zeros(1, PD_STATE)[0]`: compiled code reads `p.gain` from either.
 """
 
+import threading
 from collections.abc import Callable
 from functools import update_wrapper
 from typing import Any
@@ -34,11 +35,19 @@ def tick(function: Callable[..., Any]) -> Any:
     return Step(function)
 
 
+class _Interpreter(threading.local):
+    runs = False  # whether steps that are called in this thread are to be interpreted
+
+
+INTERPRETER = _Interpreter()
+
+
 class Step:
     """A function compiled twice, each when it is first asked for: as compiled code calls it, and as Python does.
 
     What only compiled code calls needs no wrappers that unpack Python objects. A tick is made of a hundred steps, and
-    their wrappers, which nobody calls, would be more than a third of the time that it takes to compile.
+    their wrappers, which nobody calls, would be more than a third of the time that it takes to compile. What Python
+    calls a few times only is not worth compiling at all: see `interpret`.
     """
 
     def __init__(self, function: Callable[..., Any]):
@@ -49,7 +58,18 @@ class Step:
         self._numba_type_ = typeof(self._inner)  # what a name stands for in compiled code
 
     def __call__(self, *arguments: Any) -> Any:
-        return self._outer(*arguments)
+        return (self.py_func if INTERPRETER.runs else self._outer)(*arguments)
+
+    def interpret(self, *arguments: Any) -> Any:
+        """The same bits from Python's interpreter, in this step and in those it calls, with nothing compiled.
+
+        Params are named tuples and states records of a recarray, whose fields Python can read.
+        """
+        before, INTERPRETER.runs = INTERPRETER.runs, True
+        try:
+            return self.py_func(*arguments)
+        finally:
+            INTERPRETER.runs = before
 
     def compile(self, types: tuple[Any, ...]) -> None:
         """Compile for arguments of these types, for compiled code."""

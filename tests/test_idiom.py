@@ -60,3 +60,29 @@ def test_division_by_zero_does_not_raise():
         return a / b
 
     assert divided(1.0, 0.0) == np.inf
+
+
+def test_the_interpreter_gets_the_same_bits_and_nothing_is_compiled(s):
+    @tick
+    def ninth(s, x):
+        """A step that calls another one."""
+        return third(s, x / 3.0)
+
+    here, there = s.view(np.recarray), np.zeros(1, STATE)
+    assert ninth.interpret(here[0], 0.7) == ninth(there[0], 0.7) != 0.0
+    assert there == s
+    compiled = [len(step._outer.nopython_signatures) for step in (third, ninth)]
+    assert ninth.interpret(here[0], np.float32(0.7)) != 0.0
+    assert [len(step._outer.nopython_signatures) for step in (third, ninth)] == compiled
+
+
+def test_a_step_that_fails_in_the_interpreter_leaves_the_others_compiled(s):
+    @tick
+    def fails(s):
+        """Python alone raises here."""
+        raise KeyError(0)
+
+    with pytest.raises(KeyError):
+        fails.interpret(s[0])
+    third(s[0], np.float32(1.0))  # a type that no other test gives compiled code
+    assert any("float32" in str(types) for types in third._outer.nopython_signatures)
