@@ -1,8 +1,12 @@
 """How sure the numbers are: intervals from the Jacobian, with errors that go together for a while.
 
-cov = A^-1 (B + P C P) A^-1,  A = J'J + P, with P the weight that the owner's values have in the fit, C what they may be
-off by (evenly within their tolerance) and B the sum over blocks of J'r r'J within a block: the errors' share and the
-share of owner's values that are wrong.
+cov = A^-1 B A^-1 + D G C G' D,  G = A^-1 P, A = J'J + P, with P the weight that the owner's values have in the fit, C
+what they may be off by (evenly within their tolerance) and B the sum over blocks of J'r r'J within a block: the errors'
+share and the share of owner's values that are wrong. Nobody knows whether these are wrong each by itself or all by one
+factor, as after a force that was measured with a bad gauge: D allows for the worst, that they add up.
+
+Of a term's own numbers the record tells what suits the library's law best. The machine's law is another one, a little:
+`with_form` allows for that, by as much as it took on generated machines whose laws are richer than the library's.
 
 Source: White, Econometrica 48 (1980) for the sandwich; Kunsch, Annals of Statistics 17 (1989) for blocks.
 """
@@ -14,10 +18,15 @@ from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
 from rtctl.diagnose.hypotheses import COUNTED
 from rtctl.diagnose.model import DRY, dry_friction
-from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, Hypothesis
+from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, SINE, Hypothesis
 from rtctl.diagnose.words import unit_at
 
 Z90 = 1.645
+FORM = 0.05, 0.02  # standard deviations of sizes and of shapes, as shares, that the form of a law leaves open
+LITTLE = 0.01, 0.001  # the same of DEFINED ones
+DEFINED = (  # sizes that are numbers by definition, whatever the machine: constants, factors, times, waves
+    "drive.offset", "drive.gain_asymmetry", "drive.lag", "timing.", "ripple.", "guide.", "load.imbalance", "sensor.",
+)  # fmt: skip
 EVEN = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within one either way
 
 
@@ -35,7 +44,27 @@ def covariance(fitted: Fit, block: int) -> np.ndarray:
     white = fitted.J.T @ fitted.J * float(np.mean(fitted.r**2))
     meat = scores.T @ scores
     meat = np.where(np.eye(len(d), dtype=bool), np.maximum(meat, white), meat)
-    return inverse @ (meat + np.diag(prior * weight * EVEN**2 / PRIOR**2)) @ inverse
+    off = inverse * np.sqrt(prior * weight) * EVEN / PRIOR  # (n, n): of each unknown by each value that is off
+    one_by_one = off @ off.T
+    most = np.abs(off).sum(axis=1) / np.sqrt(np.maximum(np.diag(one_by_one), 1e-300))
+    return inverse @ meat @ inverse + one_by_one * np.outer(most, most)
+
+
+def with_form(fitted: Fit, cov: np.ndarray) -> np.ndarray:
+    """The covariance (n, n) with what the form of the laws leaves open of their terms' numbers."""
+    more = np.zeros(len(cov))
+    for index, (h, x) in enumerate(zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True)):
+        columns = fitted.space.columns(index)
+        form, shape = LITTLE if h.term.startswith(DEFINED) else FORM
+        for i, c in enumerate(h.coordinates):
+            if c.kind in (COSINE, SINE):
+                j = i if c.kind == COSINE else i - 1
+                more[columns[i]] = form * np.hypot(x[j], x[j + 1])
+            elif c.kind == SHAPE:
+                more[columns[i]] = shape
+            elif c.kind != PLACE:
+                more[columns[i]] = form * abs(x[i])
+    return cov + np.diag(more**2)
 
 
 def parameter_intervals(fitted: Fit, cov: np.ndarray) -> dict[str, Interval]:

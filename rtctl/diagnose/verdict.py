@@ -15,7 +15,7 @@ from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.jitter import Jitter, interval
 from rtctl.diagnose.name import dropped
 from rtctl.diagnose.space import Hypothesis
-from rtctl.diagnose.uncertainty import covariance, effect_intervals
+from rtctl.diagnose.uncertainty import covariance, effect_intervals, with_form
 
 SURE = 0.7  # weight of a name among its rivals
 POSSIBLE = 0.05  # weight from which a rival is mentioned
@@ -150,5 +150,5 @@ def _effect(place: Alternative, weight: float, best: Fit, rivals: Sequence[Alter
         for r in rivals
         if r.hypothesis.term != h.term
     )
-    intervals = effect_intervals(place.fit, place.at, covariance(place.fit, block))
+    intervals = effect_intervals(place.fit, place.at, with_form(place.fit, covariance(place.fit, block)))
     return Effect(h.term, h.node, min(weight, 0.99), intervals, looks)

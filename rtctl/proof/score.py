@@ -12,6 +12,13 @@ from typing import Any
 NOTHING_MISSING = ("null", "parameters", "decoy")
 VERDICTS = ("named", "ambiguous", "unnamed", "nothing")
 BINS = 10
+CALLED = {  # a size of the answers -> what a diagnosis calls it
+    "offset_V": ("offset",), "band_V": ("band",), "limit_V": ("limit",), "tau_s": ("tau",), "asymmetry": ("a",),
+    "travel": ("z_s",), "amplitude_m": ("A",), "amplitude_rad": ("A",), "amplitude_Nm": ("A",), "amplitude_N": ("A",),
+    "wavelength_m": ("wavelength", "turn"), "at_m": ("at",), "force_N": ("F",), "width_m": ("width",),
+    "torque_Nm": ("A",), "k_N_per_m": ("k",), "eccentricity_m": ("a", "e"), "mass_kg": ("mass",), "rms_s": ("sigma",),
+    "gap_rad": ("gap",), "gap_m": ("gap",), "limit_N": ("F_max",),
+}  # fmt: skip
 Json = dict[str, Any]
 
 
@@ -200,14 +207,15 @@ def _base_intervals(a: Json, d: Json | None) -> list[tuple[Any, float]]:
 
 
 def _effect_intervals(a: Json, effects: list[Json]) -> list[tuple[Any, float]]:
-    """Intervals of sizes that the answers know under the same key, for names that are right."""
+    """Intervals of sizes that the answers know, for names that are right."""
     out = []
     for e in effects:
+        said = e.get("parameters") or {}
         for true in a["effects"]:
             if e["name"] == true["name"]:
-                said = e.get("parameters") or {}
-                out += [(v.get("ci90"), true["sizes"][k]) for k, v in said.items()
-                        if isinstance(v, dict) and k in true["sizes"]]  # fmt: skip
+                for key, size in true["sizes"].items():
+                    known = next((k for k in (key, *CALLED.get(key, ())) if isinstance(said.get(k), dict)), None)
+                    out += [(said[known].get("ci90"), size)] if known else []
     return out
 
 

@@ -6,7 +6,16 @@ import pytest
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis, Space
-from rtctl.diagnose.uncertainty import Z90, covariance, effect_intervals, parameter_intervals, plant_unit
+from rtctl.diagnose.uncertainty import (
+    FORM,
+    LITTLE,
+    Z90,
+    covariance,
+    effect_intervals,
+    parameter_intervals,
+    plant_unit,
+    with_form,
+)
 
 OWNER = Model("axis", {"M": 95.0, "K": 35.0, "F_v": 200.0, "F_c": 20.0, "k": 0.0})
 SPRING = Hypothesis("load.spring", "carriage", (Coordinate("k", SIZE, 100.0),))
@@ -156,3 +165,24 @@ def test_the_sum_of_dry_friction_is_known_better_than_its_parts():
     added, total = out["F_added"], out["F_C"]
     assert total.value == pytest.approx(20.0 * np.exp(found.x[0]) + added.value)
     assert total.high - total.low < 0.2 * (added.high - added.low)
+
+
+def test_values_that_are_all_off_by_one_factor_are_held_too():
+    """A mass, a force and frictions that are right in proportion move as if nothing were wrong."""
+    names, rng = ("M", "K", "F_v", "F_c"), np.random.default_rng(9)
+    s = space(names=names, tolerance=0.15)
+    J = 1e3 * slow(rng, 3) @ np.array([[1.0, -1, 0, 0], [0, 1, -1, 0], [0, 0, 1, -1]])  # no column tells the factor
+    found = Fit(s, np.zeros(4), rng.standard_normal(ROWS), J, 1.0)
+    intervals = parameter_intervals(found, covariance(found, BLOCK))
+    for name in names:
+        assert intervals[name].high == pytest.approx(OWNER.base[name] * np.exp(0.142), rel=0.01)
+
+
+def test_of_a_term_the_form_of_its_law_stays_open():
+    s = space(STRIBECK, LIMIT, BUMP, names=("M",), tolerance=0.15)
+    x = np.array([0.02, 0.1, 2.0, 0.5, -0.7, 0.4])
+    more = np.sqrt(np.diag(with_form(Fit(s, x, np.ones(4), np.zeros((4, 6)), 1.0), np.zeros((6, 6)))))
+    assert more == pytest.approx([0.0, 0.1 * FORM[0], FORM[1], 0.5 * FORM[0], 0.7 * FORM[0], 0.0])
+    turn = space(COGGING, owner=Model("ivu", {"M": 1.0}))
+    wave = with_form(Fit(turn, np.array([3.0, 4.0]), np.ones(4), np.zeros((4, 2)), 1.0), np.zeros((2, 2)))
+    assert wave == pytest.approx(np.diag([(5.0 * LITTLE[0]) ** 2] * 2))
