@@ -22,6 +22,7 @@ from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import awake
 from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.stretches import rms
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
 from rtctl.diagnose.verdict import (
     CLOSED_BY_SEVERAL,
@@ -39,6 +40,7 @@ from rtctl.plants.physics.timing import JitterSettings
 QUICK = 10 / 3  # times the usual bandwidth of the correction
 FASTEST = 0.1  # rad a tick
 WORSE = 3.0  # times the error before: a free run this bad is judged as it is
+ASTRAY = 5.0  # times the noise of a reel's edges, where no model explains them
 SHOWS = 2.5  # times the noise floor
 HELDOUT = 0.25  # share of a record, at its end, that the prediction is judged on
 
@@ -92,6 +94,12 @@ def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
         progress("reading the reels anew, through the model that was found")
         problem = Problem(sim).seen_by(found.best.model)
         found = find(sim, problem, progress, base_fit(sim, problem, found.base.x))
+    if misread(found):
+        bare = Problem(sim)
+        alone = base_fit(sim, bare)
+        if decide.quiet(bare, alone, alone):
+            progress("leaving out the reels, which no model follows")
+            return sim, find(sim, bare, progress, alone)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or record.case.controller.kind == "none" or faster <= sim.follow:
         return sim, found
@@ -102,6 +110,13 @@ def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
     if fitted.rms < SHOWS * quick.floor:
         return sim, found
     return quick.sim, find(quick.sim, quick, progress, fitted)
+
+
+def misread(found: Found) -> bool:
+    """Whether the reels are further from every model than their edges could be: then some were taken for others."""
+    best, problem = found.best, found.problem
+    reels = list(problem.by_sensor(best.r).values())[len(problem.channels) :]
+    return any(rms(e) > ASTRAY for e in reels) and not decide.enough(problem, found.base, best)
 
 
 def base_of(sim: Simulator) -> tuple[Problem, Fit]:
@@ -142,7 +157,9 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     errors = [heldout.nrmse(judge.sim, f.model, rows, judge.edges) for f in (old, new)]
     floor = heldout.floor(judge)
     closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
-    several = again or len(verdict.effects) > 1  # what is left of several that were refused has to do as much as they
+    several = (
+        again or sum(e.instead_of is None for e in verdict.effects) > 1
+    )  # what is left of several that were refused has to do as much as they
     if other is None and errors[1] < WORSE * errors[0]:
         on_track = heldout.closed_on_track(problem, old, new, cut)
         if not decide.quiet(problem, base, best):
@@ -152,7 +169,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
             closed = on_track
     loud = decide.loud(problem, base)
     proved = proven(verdict, closed if max(errors) < LOST else np.nan, several, UNNAMED if loud else NOTHING)
-    refused = verdict.verdict == NAMED and not proved.effects
+    refused = bool(verdict.effects) and not proved.effects
     verdict = with_known(proved, known)
     if not proved.effects:
         taken, errors[1] = base, errors[0]

@@ -13,7 +13,7 @@ from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
 from rtctl.diagnose.name import Search, dropped, eliminate, enrich, look_alikes, names, polish, rivals, search
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
-from rtctl.diagnose.verdict import SURE, Alternative, standing
+from rtctl.diagnose.verdict import Alternative, standing
 from rtctl.plants.physics import TERMS
 
 CLOSE = 1.3  # times the best cost: a rival this near may be ahead in its richer form
@@ -22,6 +22,7 @@ RICH = 10.0  # the same, of one that is tried in its richer form because the bes
 EQUAL = 1.02  # times the best cost: equally good
 NEAR = 2.0  # times the best cost: a rival this near is fitted to the bottom
 SPARED = 1.5  # times the best cost: what a model may come to when it loses a term in doubt
+DOUBTFUL = 0.7  # weight among its rivals, of a name that the model may have to do without
 MOST = 4  # rivals of one hypothesis
 Progress = Callable[[str], None]
 Places = tuple[tuple[Alternative, ...], ...]
@@ -129,7 +130,7 @@ def without_doubtful(
     while len(best.space.hypotheses) > 1 and decide.enough(problem, looked.base, best):
         sure = [standing(problem, best, i, places) for i, places in enumerate(near)]
         weakest = min(range(len(sure)), key=lambda i: sure[i])
-        if sure[weakest] >= SURE:
+        if sure[weakest] >= DOUBTFUL:
             break
         less = dropped(problem, best, weakest, 10)
         if less.cost > SPARED * best.cost:

@@ -17,11 +17,13 @@ from rtctl.diagnose.name import dropped
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals, with_form
 
-SURE = 0.7  # weight of a name among its rivals
+SURE = 0.9  # weight of a name among its rivals: of generated names below it, five in six were the rival's
 POSSIBLE = 0.05  # weight from which a rival is mentioned
 LOST = 1e3  # error of a free run that ran away, which tells nothing of the terms
 TELLING = 3.0  # times the noise: a prediction that was worse than that can be made better
 CLOSED, CLOSED_BY_SEVERAL = 0.6, 0.87  # of the gap to the noise, that one named term and that several must close
+LEANS = 0.6  # confidence in a name that is not sure, above which it has to predict as a sure one does
+RIGHT = (0.98, 0.95, 0.88)  # confidence in one, two, three names of a model that is right to the noise
 KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
@@ -57,7 +59,8 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
     if not decide.enough(problem, base, best):
         loud = loud or (share > decide.HALF and decide.p_value(best, base, block) < decide.LUCK)
         return Verdict(UNNAMED if loud else NOTHING, (), share)
-    trust = 0.98 if whole else 0.6 + 0.35 * share
+    right = RIGHT[min(len(best.space.hypotheses), MOST) - 1]
+    trust = right if whole else min(right, 0.6 + 0.35 * share)
     own, others = [], []
     doubt = False
     for index in by_weight(problem, best):
@@ -96,12 +99,18 @@ def proven(verdict: Verdict, closed: float, several: bool, otherwise: str = UNNA
     Terms that only imitate what is missing fit the rows that they have seen and predict the others badly, `several` of
     them together most of all.
     """
-    if verdict.verdict != NAMED or not np.isfinite(closed):
+    if not (verdict.verdict == NAMED or leans(verdict)) or not np.isfinite(closed):
         return verdict
     if closed < (CLOSED_BY_SEVERAL if several else CLOSED):
         return Verdict(otherwise, (), verdict.explained)
     sure = 0.5 + 0.5 * min(closed, 1.0)
     return verdict._replace(effects=tuple(e._replace(confidence=min(e.confidence, sure)) for e in verdict.effects))
+
+
+def leans(verdict: Verdict) -> bool:
+    """Whether an `ambiguous` verdict holds each of its names for the likelier one by far."""
+    own = [e.confidence for e in verdict.effects if e.instead_of is None]
+    return verdict.verdict == AMBIGUOUS and min(own, default=0.0) > LEANS
 
 
 def patched(best: Fit) -> bool:

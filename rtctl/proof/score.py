@@ -207,12 +207,12 @@ def _base_intervals(a: Json, d: Json | None) -> list[tuple[Any, float]]:
 
 
 def _effect_intervals(a: Json, effects: list[Json]) -> list[tuple[Any, float]]:
-    """Intervals of sizes that the answers know, for names that are right."""
+    """Intervals of sizes that the answers know, for names that are right and where they stand."""
     out = []
     for e in effects:
         said = e.get("parameters") or {}
         for true in a["effects"]:
-            if e["name"] == true["name"]:
+            if e["name"] == true["name"] and e.get("node") in true["nodes_ok"]:
                 for key, size in true["sizes"].items():
                     known = next((k for k in (key, *CALLED.get(key, ())) if isinstance(said.get(k), dict)), None)
                     out += [(said[known].get("ci90"), size)] if known else []

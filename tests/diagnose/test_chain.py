@@ -1,11 +1,14 @@
 """The whole diagnosis on small recordings of an axis, made by the simulator itself and cut into counts."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rtctl.config.errors import NoAnswer
+from rtctl.diagnose import chain
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.chain import diagnose_record
+from rtctl.diagnose.chain import diagnose_record, misread
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
@@ -116,3 +119,14 @@ def test_rows_in_which_our_own_loop_ran(state, rows):
 def test_the_measured_amplifier_in_volts():
     u = np.array([-2.8, -0.0, 0.0, 0.5, 0.8, 2.8])
     assert 0.1 * through_amplifier(u) == pytest.approx([-0.242, -0.042, 0.042, 0.042, 0.042, 0.242])  # A, (12.3)
+
+
+@pytest.mark.parametrize(
+    ("reel", "explained", "expected"), [(9.0, False, True), (9.0, True, False), (2.0, False, False)]
+)
+def test_reels_that_no_model_follows_are_misread(monkeypatch, reel, explained, expected):
+    errors = {"capstan_counts": np.full(50, 3.0), "reel1_counts": np.ones(9), "reel2_counts": np.full(9, reel)}
+    problem = SimpleNamespace(channels=[0], by_sensor=lambda r: errors)
+    found = SimpleNamespace(problem=problem, base=None, best=SimpleNamespace(r=None))
+    monkeypatch.setattr(chain.decide, "enough", lambda problem, before, after: explained)
+    assert misread(found) == expected

@@ -59,3 +59,12 @@ def test_a_name_must_predict_and_several_must_predict_better(several, closed, ex
 def test_where_the_model_without_it_is_right_to_the_noise_a_name_that_does_not_predict_leaves_nothing():
     named = Verdict(NAMED, (Effect("structure.resonance", "carriage", 0.98, {}, ()),), 0.8)
     assert proven(named, 0.2, False, NOTHING) == Verdict(NOTHING, (), 0.8)
+
+
+@pytest.mark.parametrize(("sure", "closed", "expected"), [
+    (0.8, 0.9, AMBIGUOUS), (0.8, 0.2, NOTHING), (0.5, 0.2, AMBIGUOUS), (0.8, float("nan"), AMBIGUOUS),
+])  # fmt: skip
+def test_a_name_that_is_likelier_by_far_must_predict_too(sure, closed, expected):
+    rival = Effect("friction.asymmetry", "carriage", 0.1, {}, (), "drive.offset:drive")
+    doubt = Verdict(AMBIGUOUS, (Effect("drive.offset", "drive", sure, {}, ()), rival), 1.0)
+    assert proven(doubt, closed, False, NOTHING).verdict == expected
