@@ -68,6 +68,7 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
             more.append(f"The last {(whole - len(record.t)) * record.dt:.0f} s, in which it rests, are left out.")
         checked = replace(checked, findings=(*checked.findings, *more))
         progress("predicting rows that were not fitted")
+        sim = problem.sim
         known = [of_jitter(found.jitter)] if found.jitter is not None else []
         shown = predicted(sim, other, found, known)
         while shown.refused and len(found.best.space.hypotheses) > 1:  # several that only imitate: one may be there

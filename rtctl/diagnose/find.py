@@ -9,7 +9,7 @@ from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
-from rtctl.diagnose.jitter import Jitter, allowed_for, jitter
+from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
 from rtctl.diagnose.name import Search, dropped, eliminate, enrich, look_alikes, names, polish, rivals, search
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
@@ -58,6 +58,10 @@ def find(
     if off is not None:
         problem = allowed_for(problem, base.model, off)
         base = base_fit(sim, problem)
+        held = problem.of(pushed(sim, base.model, off))
+        other = base_fit(held.sim, held)
+        if other.cost < base.cost:
+            sim, problem, base = held.sim, held, other
     worth = partial(decide.worth, problem, base)
     propose = partial(proposed, sim)
 

@@ -132,6 +132,12 @@ class Problem:
             found.append(edges(self.sim.record.y[name], out[:, c] + gear * (self.sim.seen - out[:, 0]), c))
         return [e for e in found if e is not None]
 
+    def of(self, sim: Simulator) -> "Problem":
+        """The same of another simulator of the recording."""
+        other = copy(self)
+        other.sim = sim
+        return other
+
     def weighed(self, weights: np.ndarray) -> "Problem":
         """The same with a further weight for each error."""
         other = copy(self)

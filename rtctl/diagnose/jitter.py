@@ -3,6 +3,10 @@
 A tick that comes d late shows a reading v d further on. The d are independent, so that the error's second difference,
 which what is smooth hardly touches, has the variance 3/2 (s^2 + (v sigma)^2) and forgets after two ticks.
 
+They move the machine, too: a command acts until the next one is written, and a law with a derivative answers a late
+reading, which is v d ahead, with a command against the motion that is then cut short. On average that is a force along
+the motion, by the square of sigma. `pushed` reads each d back from the error and gives the model that force.
+
 Source: Cervin et al., How does control timing affect performance, IEEE Control Systems 23(3) (2003); Box, Jenkins &
 Reinsel, Time series analysis (2008), ch. 3 for the correlation of a differenced white series.
 """
@@ -10,6 +14,7 @@ Reinsel, Time series analysis (2008), ch. 3 for the correlation of a differenced
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm
 
 from rtctl.diagnose.fit import Problem, means
@@ -22,6 +27,8 @@ LEAST, CLOCK = 0.025, 4e-6  # of a tick, and s: less is what any clock does
 LOUD = 0.15  # of the variance at the usual speed, what jitter must add
 CERTAIN = 8.0  # standard errors
 LOUDER = 1.5  # times the noise that is left: a late tick also holds the last command for longer
+SMOOTH, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which the force is averaged
+TINY = 1e-30  # beside a power that may be 0
 MIXED = (-0.82, -0.5)  # correlation of neighbouring second differences: -2/3 where the ticks are independent
 
 
@@ -30,6 +37,7 @@ class Jitter(NamedTuple):
 
     sigma: float
     error: float
+    noise: float = 0.0  # standard deviation of the reading besides, in its unit
 
 
 def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
@@ -53,7 +61,7 @@ def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
     mixed = float(z[1:] @ z[:-1]) / float(z @ z)
     if not MIXED[0] < mixed < MIXED[1]:
         return None
-    return Jitter(sigma, 0.5 * error / sigma)
+    return Jitter(sigma, 0.5 * error / sigma, float(np.sqrt(floor)))
 
 
 def growth(power: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
@@ -82,6 +90,16 @@ def allowed_for(problem: Problem, model: Model, found: Jitter) -> Problem:
     allowing = problem.weighed(1.0 / np.sqrt(1.0 + problem.beside(spread.T.ravel())))
     allowing.louder = LOUDER
     return allowing
+
+
+def pushed(sim: Simulator, model: Model, found: Jitter) -> Simulator:
+    """The simulator whose commands allow for how long each of them was held, on average over PUSH ticks."""
+    out = sim.run(model)[:, 0]
+    e, v = sim.seen - out, np.gradient(out, sim.record.dt)
+    power = (found.sigma * v) ** 2
+    late = (e - uniform_filter1d(e, SMOOTH)) * v * found.sigma**2 / (power + found.noise**2 + TINY)
+    longer = np.append(np.diff(late), 0.0) / sim.record.dt
+    return sim.commanded(sim.volts + uniform_filter1d(sim.volts * longer[:, None], PUSH, axis=0))
 
 
 def interval(found: Jitter) -> tuple[float, float]:

@@ -8,6 +8,7 @@
 All three compare readings before they are cut into counts with counts plus a half.
 """
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,12 @@ class Simulator:
         self.volts = np.ascontiguousarray(volts if held else half_a_tick_on(volts))
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
         self.law = law_params(record)
+
+    def commanded(self, volts: np.ndarray) -> "Simulator":
+        """The same with other voltages (n, drives) than the recorded ones acting on the model."""
+        other = copy(self)
+        other.volts = np.ascontiguousarray(volts)
+        return other
 
     def run(
         self,

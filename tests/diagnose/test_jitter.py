@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.diagnose.jitter import growth, interval, jitter
+from rtctl.diagnose.jitter import Jitter, growth, interval, jitter, pushed
 
 DT, N = 2e-3, 8000
 T = DT * np.arange(N)
@@ -72,3 +72,17 @@ def test_growth_is_the_slope_of_noise_power():
     assert slope == pytest.approx(0.5, abs=4 * error)
     assert rest == pytest.approx(1.0, rel=0.1)
     assert 0.0 < error < 0.05
+
+
+def test_a_late_tick_under_a_derivative_pushes_along_the_motion():
+    """Each command answers its own tick's lateness d by -D v d, and acts d less long: D v sigma^2 a tick, on average."""
+    rng, sigma, D = np.random.default_rng(1), 3e-4, 0.02
+    late, v = sigma * rng.standard_normal(N), np.gradient(WAY, DT)
+    volts = -D * (v * late)[:, None]
+    sim = SimpleNamespace(
+        record=SimpleNamespace(dt=DT), seen=WAY + v * late, volts=volts, run=lambda model: WAY[:, None], commanded=np.copy
+    )
+    more = pushed(sim, None, Jitter(sigma, 0.0))[:, 0] - volts[:, 0]  # type: ignore[arg-type]
+    force = D * v * sigma**2 / DT
+    assert float(more @ force / (force @ force)) == pytest.approx(1.0, abs=0.1)
+    assert pushed(sim, None, Jitter(1e-9, 0.0, 1.0))[:, 0] == pytest.approx(volts[:, 0], abs=1e-6)  # type: ignore[arg-type]
