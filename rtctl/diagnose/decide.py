@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from rtctl.diagnose.fit import Fit, Problem
-from rtctl.diagnose.space import COSINE, SIZE
+from rtctl.diagnose.space import COSINE, SHAPE, SIZE
 from rtctl.diagnose.stretches import memory, rms
 from rtctl.plants.physics import TERMS
 
@@ -28,6 +28,7 @@ ELSEWHERE = (  # whose typical sizes are those of another machine: angles, or co
     ("transmission.backlash", "axis"),
     ("transmission.creep", "ldu"),
 )
+END = 1e-6  # in logarithm: as near to a bound as a fit that is held by it
 MOST = 0.3  # of the cost: a term that leaves less is more than the form of another, and nothing that chance does
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
@@ -48,6 +49,8 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     Below the floor there is nothing to take, and where what is left may be noise a term must take more: a lucky one may
     follow that for a while.
     """
+    if before.space.hypotheses and at_end(before, after):
+        return False
     alike = same_law(before, after)
     much = after.cost < MOST * before.cost and rms(before.r) > problem.floor and problem.louder == 1.0
     if much and not alike and by_noise(before, after) < NEVER:
@@ -72,6 +75,17 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
+
+
+def at_end(before: Fit, after: Fit) -> bool:
+    """Whether a term that `after` has more stands at the end of what its times, speeds or frequencies may be: it wants
+    to be something else."""
+    known = {h.name for h in before.space.hypotheses}
+    for h, x in zip(after.space.hypotheses, after.space.parts(after.x), strict=True):
+        shapes = [(c, v) for c, v in zip(h.coordinates, x, strict=True) if c.kind == SHAPE]
+        if h.name not in known and any(min(v - c.low, c.high - v) < END for c, v in shapes):
+            return True
+    return False
 
 
 def same_law(before: Fit, after: Fit) -> bool:

@@ -20,7 +20,7 @@ from rtctl.diagnose.decide import (
 )
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
+from rtctl.diagnose.space import SHAPE, SIZE, Coordinate, Hypothesis, Space
 from rtctl.diagnose.stretches import loudness
 
 
@@ -238,3 +238,18 @@ def test_what_explains_little_of_a_little_needs_more_than_luck():
     assert enough(noise, made(base), half)  # type: ignore[arg-type]
     weak = made(np.where(rng.random(4000) < 0.97, base, 0.9 * base), 1)
     assert not enough(noise, made(base), weak)  # type: ignore[arg-type]
+
+
+def test_a_further_term_at_the_end_of_its_times_is_none():
+    tape = Hypothesis(
+        "tape.viscoelastic", "tape2", (Coordinate("c", SIZE, 1.0), Coordinate("tau", SHAPE, 1.2, -4.0, 3.0))
+    )
+    before, beyond, within = (made(np.full(200, level)) for level in (9.0, 2.0, 2.0))
+    before = before._replace(space=before.space.add(made([1.0], 1).space.hypotheses[0]), x=np.zeros(1))
+    both = before.space.add(tape)
+    beyond = beyond._replace(space=both, x=np.array([0.0, 1.0, 3.0]))
+    within = within._replace(space=both, x=np.array([0.0, 1.0, 2.9]))
+    owner = made(np.full(200, 9.0))
+    assert worth(Floor(1.0), owner, before, within)  # type: ignore[arg-type]
+    assert not worth(Floor(1.0), owner, before, beyond)  # type: ignore[arg-type]
+    assert worth(Floor(1.0), owner, owner, beyond)  # type: ignore[arg-type]

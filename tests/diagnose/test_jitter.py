@@ -80,7 +80,11 @@ def test_a_late_tick_under_a_derivative_pushes_along_the_motion():
     late, v = sigma * rng.standard_normal(N), np.gradient(WAY, DT)
     volts = -D * (v * late)[:, None]
     sim = SimpleNamespace(
-        record=SimpleNamespace(dt=DT), seen=WAY + v * late, volts=volts, run=lambda model: WAY[:, None], commanded=np.copy
+        record=SimpleNamespace(dt=DT),
+        seen=WAY + v * late,
+        volts=volts,
+        run=lambda model: WAY[:, None],
+        commanded=np.copy,
     )
     more = pushed(sim, None, Jitter(sigma, 0.0))[:, 0] - volts[:, 0]  # type: ignore[arg-type]
     force = D * v * sigma**2 / DT
