@@ -75,7 +75,7 @@ def test_growth_is_the_slope_of_noise_power():
 
 
 def test_a_late_tick_under_a_derivative_pushes_along_the_motion():
-    """Each command answers its own tick's lateness d by -D v d, and acts d less long: D v sigma^2 a tick, on average."""
+    """Each command answers its own tick's lateness d by -D v d, and acts d less long: D v sigma^2 on average."""
     rng, sigma, D = np.random.default_rng(1), 3e-4, 0.02
     late, v = sigma * rng.standard_normal(N), np.gradient(WAY, DT)
     volts = -D * (v * late)[:, None]
