@@ -3,7 +3,7 @@
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -11,38 +11,28 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Evidence, Interval
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Evidence, Interval
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet, with_fewer
 from rtctl.diagnose.fit import Fit, Problem
 from rtctl.diagnose.jitter import Jitter
-from rtctl.diagnose.model import Model, owner_model
+from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.name import names
+from rtctl.diagnose.predict import Shown, cut_of, predicted
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import awake
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.stretches import rms
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
-from rtctl.diagnose.verdict import (
-    CLOSED_BY_SEVERAL,
-    LOST,
-    TELLING,
-    Verdict,
-    judged,
-    of_jitter,
-    proven,
-    with_known,
-)
+from rtctl.diagnose.verdict import of_jitter
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.timing import JitterSettings
 
 QUICK = 10 / 3  # times the usual bandwidth of the correction
 FASTEST = 0.1  # rad a tick
-WORSE = 3.0  # times the error before: a free run this bad is judged as it is
 ASTRAY = 5.0  # times the noise of a reel's edges, where no model explains them
 SHOWS = 2.5  # times the noise floor
-HELDOUT = 0.25  # share of a record, at its end, that the prediction is judged on
 
 
 def diagnose(folder: Path | str, other: Path | str | None = None, progress: Progress = quiet) -> Diagnosis:
@@ -128,60 +118,6 @@ def base_of(sim: Simulator) -> tuple[Problem, Fit]:
     return (directed, base_fit(sim, directed, base.x)) if directed.edges else (problem, base)
 
 
-class Shown(NamedTuple):
-    """A verdict, the models without and with what it names, and how well these predict."""
-
-    verdict: Verdict
-    refused: bool  # names that the fit gave and the prediction did not bear out
-    taken: Fit
-    before: Model
-    before_error: float
-    after_error: float
-    floor: float
-
-
-def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Effect], again: bool = False) -> Shown:
-    """The verdict on what was found, once its model has predicted rows that it was not fitted on; `again` where more
-    has been refused."""
-    problem, base, best = found.problem, found.base, found.best
-    verdict = judged(problem, base, best, found.rivals, problem.block)
-    if found.beyond is not None and verdict.verdict in (NAMED, AMBIGUOUS):
-        verdict = Verdict(UNNAMED, (), verdict.explained)
-    named = {e.name for e in with_known(verdict, known).effects}
-    taken = best if any(h.term in named for h in best.space.hypotheses) else base
-    cut = cut_of(sim.record)
-    if other is None:
-        judge, rows = problem, slice(cut, None)
-        old, new = (heldout.refit(sim, problem, f, cut) for f in (base, taken))
-    else:
-        judge, rows, old, new = Problem(Simulator(other)).seen_by(taken.model), slice(0, None), base, taken
-    errors = [heldout.nrmse(judge.sim, f.model, rows, judge.edges) for f in (old, new)]
-    floor = heldout.floor(judge)
-    closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
-    several = (
-        again or sum(e.instead_of is None for e in verdict.effects) > 1
-    )  # what is left of several that were refused has to do as much as they
-    if other is None and errors[1] < WORSE * errors[0]:
-        on_track = heldout.closed_on_track(problem, old, new, cut)
-        if not decide.quiet(problem, base, best):
-            if problem.hiss(best.r):  # a free run adds random forces up
-                closed, several = on_track, False
-        elif np.isnan(closed) or on_track > CLOSED_BY_SEVERAL:  # and may wander where the model is right to the noise
-            closed = on_track
-    loud = decide.loud(problem, base)
-    proved = proven(verdict, closed if max(errors) < LOST else np.nan, several, UNNAMED if loud else NOTHING)
-    refused = bool(verdict.effects) and not proved.effects
-    verdict = with_known(proved, known)
-    if not proved.effects:
-        taken, errors[1] = base, errors[0]
-    return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor)
-
-
-def cut_of(record: Record) -> int:
-    """First row of the part that is predicted and not fitted."""
-    return len(record.t) - round(HELDOUT * len(record.t))
-
-
 def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> Diagnosis:
     """Intervals and all that the report needs."""
     record, problem, base, taken, verdict = sim.record, found.problem, found.base, shown.taken, shown.verdict
@@ -208,6 +144,7 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         experiment=_experiment(sim, found) if verdict.verdict == AMBIGUOUS else None,
         fit_rows=(problem.rows.start or 0, cut_of(record)),
         seconds=0.0,
+        prediction=shown.mode,
         resembles=resembled(found) if verdict.verdict == UNNAMED else None,
     )
 

@@ -36,10 +36,10 @@ def mode_of(record: Record) -> int:
     return OPEN if record.case.controller.kind == "none" else TRACK
 
 
-def nrmse(sim: Simulator, model: Model, rows: slice, edges: Sequence[Edges] = ()) -> float:
-    """Error of the free run over `rows`, by the spread of the whole recording; rms over the main sensor and the reels
-    whose edges are known."""
-    out = sim.run(model, mode_of(sim.record), directed=bool(edges))
+def nrmse(sim: Simulator, model: Model, rows: slice, edges: Sequence[Edges] = (), mode: int | None = None) -> float:
+    """Error of the free run over `rows`, or of a run in `mode`, by the spread of the whole recording; rms over the main
+    sensor and the reels whose edges are known."""
+    out = sim.run(model, mode_of(sim.record) if mode is None else mode, directed=bool(edges))
     if not np.isfinite(out).all():
         return 1e3
     n = len(out)

@@ -31,7 +31,7 @@ COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
 FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
 LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
-SLIPS, SEEN_AT = "transmission.slip", {"ivu": "capstan", "ldu": "encoder", "axis": "carriage"}
+SLIPS, BEHIND = "transmission.slip", {"ldu": "encoder"}  # body behind the contact, where most inertia is before it
 SHARE = {"ivu": (0.5, -0.5), "ldu": (1.0,), "axis": (1.0,)}
 CHANNELS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts", "scale_counts")}
 
@@ -119,12 +119,12 @@ class Simulator:
         job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
         if directed:
             job["rectified"] = 0
-        if slips and not at:  # through it no drive could correct
-            at = SEEN_AT[self.record.plant]
-        if at:
-            node = PLANTS[self.record.plant].NODES[at]
+        if slips and not at:  # through the contact no drive could correct
+            at = BEHIND.get(self.record.plant, "")
+        if at or slips:
             job["share"] = 0.0
-            job["push"][0, node] = lever(self.record, model.base) / gear(self.record.plant, model.base, at)
+            for node, push in pushes(self.record, model.base, at).items():
+                job["push"][0, PLANTS[self.record.plant].NODES[node]] = push
         laws = np.zeros(1, record_dtype(self.law))
         fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))
@@ -222,6 +222,18 @@ def gear(kind: str, base: dict[str, float], node: str) -> float:
     if kind == "ivu" and node[-1:] in ("1", "2"):
         return base["R_c"] / base["R1"] if node.endswith("1") else -base["R_c"] / base["R2"]
     return base["N"] if kind == "ldu" and node == "motor" else 1.0
+
+
+def pushes(record: Record, b: dict[str, float], at: str) -> dict[str, float]:
+    """What one unit of correction pushes bodies with, Nm, where it does as much as by the drives: the one `at` a node,
+    else each of the reel unit as its inertia asks for, so that all would move together if no tape held them."""
+    one = lever(record, b)
+    if at:
+        return {at: one / gear(record.plant, b, at)}
+    inertia = {"motor1": b["J_m1"], "reel1": b["J_1"], "capstan": b["J_c"], "reel2": b["J_2"], "motor2": b["J_m2"]}
+    turns = {node: gear(record.plant, b, node) for node in inertia}
+    whole = sum(J * turns[node] ** 2 for node, J in inertia.items())
+    return {node: one * J * turns[node] / whole for node, J in inertia.items()}
 
 
 def rigid_gain(params: Any, kind: str) -> float:

@@ -1,0 +1,90 @@
+"""Predicts rows that were not fitted with the model that was found: what of the verdict does that bear out?
+
+Where the law is known the prediction is a free run, the loop closed. It tells nothing of terms where random forces act,
+which it adds up, where it wanders though the model is right to the noise, and of a contact that slips: whether that
+holds or lets the motor run away hangs on a hair. There the model is kept on track.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose import decide, heldout
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
+from rtctl.diagnose.find import Found
+from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.kernel import TRACK
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.simulate import SLIPS, Simulator
+from rtctl.diagnose.verdict import CLOSED_BY_SEVERAL, LOST, TELLING, Verdict, judged, proven, with_known
+
+WORSE = 3.0  # times the error before: a free run this bad is judged as it is
+HELDOUT = 0.25  # share of a record, at its end, that the prediction is judged on
+
+
+class Shown(NamedTuple):
+    """A verdict, the models without and with what it names, and how well these predict."""
+
+    verdict: Verdict
+    refused: bool  # names that the fit gave and the prediction did not bear out
+    taken: Fit
+    before: Model
+    before_error: float
+    after_error: float
+    floor: float
+    mode: int  # how the prediction ran
+
+
+def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Effect], again: bool = False) -> Shown:
+    """The verdict on what was found, once its model has predicted rows that it was not fitted on: those of `other`, or
+    the last of its own. `again` where more has been refused."""
+    problem, base, best = found.problem, found.base, found.best
+    verdict = judged(problem, base, best, found.rivals, problem.block)
+    if found.beyond is not None and verdict.verdict in (NAMED, AMBIGUOUS):
+        verdict = Verdict(UNNAMED, (), verdict.explained)
+    named = {e.name for e in with_known(verdict, known).effects}
+    taken = best if any(h.term in named for h in best.space.hypotheses) else base
+    cut = cut_of(sim.record)
+    if other is None:
+        judge, rows = problem, slice(cut, None)
+        old, new = (heldout.refit(sim, problem, f, cut) for f in (base, taken))
+    else:
+        judge, rows, old, new = Problem(Simulator(other)).seen_by(taken.model), slice(0, None), base, taken
+    errors, mode = errors_of(judge, old, new, rows, heldout.mode_of(sim.record))
+    floor = heldout.floor(judge)
+    closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
+    # what is left of several that were refused has to do as much as they
+    several = again or sum(e.instead_of is None for e in verdict.effects) > 1
+    if other is None and errors[1] < WORSE * errors[0]:
+        on_track = heldout.closed_on_track(problem, old, new, cut)
+        if not decide.quiet(problem, base, best):
+            if problem.hiss(best.r):
+                closed, several = on_track, False
+        elif np.isnan(closed) or on_track > CLOSED_BY_SEVERAL:
+            closed = on_track
+    loud = decide.loud(problem, base)
+    proved = proven(verdict, closed if max(errors) < LOST else np.nan, several, UNNAMED if loud else NOTHING)
+    refused = bool(verdict.effects) and not proved.effects
+    verdict = with_known(proved, known)
+    if not proved.effects:
+        taken, errors[1] = base, errors[0]
+    return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor, mode)
+
+
+def errors_of(judge: Problem, old: Fit, new: Fit, rows: slice, mode: int) -> tuple[list[float], int]:
+    """Held-out errors (nrmse) of the models without and with what was found, and how the prediction ran."""
+    errors = [heldout.nrmse(judge.sim, f.model, rows, judge.edges, mode) for f in (old, new)]
+    if mode != TRACK and slips(new) and errors[1] >= WORSE * errors[0]:
+        return errors_of(judge, old, new, rows, TRACK)
+    return errors, mode
+
+
+def slips(fitted: Fit) -> bool:
+    """Whether the model has a contact that slips."""
+    return any(h.term == SLIPS for h in fitted.space.hypotheses)
+
+
+def cut_of(record: Record) -> int:
+    """First row of the part that is predicted and not fitted."""
+    return len(record.t) - round(HELDOUT * len(record.t))
