@@ -104,7 +104,7 @@ class Simulator:
         stiff, slips = any(term.startswith(STIFF) for term in terms), SLIPS in terms
         substeps = self.substeps * (FINER[self.record.plant] if stiff else 1)
         stride = 1
-        coarse = coarse and not slips  # when it sets in is a matter of single ticks
+        coarse = coarse and not (slips and self.record.dt < COARSE)  # when it sets in is a matter of single ticks
         if coarse and self.record.dt < COARSE:
             substeps, stride = 1, 2
         elif coarse:
