@@ -123,8 +123,8 @@ class Simulator:
             at = BEHIND.get(self.record.plant, "")
         if at or slips:
             job["share"] = 0.0
-            for node, push in pushes(self.record, model.base, at).items():
-                job["push"][0, PLANTS[self.record.plant].NODES[node]] = push
+            for node, torque in pushes(self.record, model.base, at).items():
+                job["push"][0, PLANTS[self.record.plant].NODES[node]] = torque
         laws = np.zeros(1, record_dtype(self.law))
         fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))
