@@ -51,14 +51,13 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         progress("preflight")
         whole, record = len(record.t), awake(record)
         checked = preflight(record)
-        sim, found = searched(record, progress)
-        problem = found.problem
+        found = searched(record, progress)
+        problem, sim = found.problem, found.problem.sim
         more = [solver.finding(problem, found.best.model)]
         if len(record.t) < whole:
             more.append(f"The last {(whole - len(record.t)) * record.dt:.0f} s, in which it rests, are left out.")
         checked = replace(checked, findings=(*checked.findings, *more))
         progress("predicting rows that were not fitted")
-        sim = problem.sim
         known = [of_jitter(found.jitter)] if found.jitter is not None else []
         shown = predicted(sim, other, found, known)
         while shown.refused and len(found.best.space.hypotheses) > 1:  # several that only imitate: one may be there
@@ -67,8 +66,8 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         return _answer(sim, found, shown, checked)._replace(seconds=time.monotonic() - began)
 
 
-def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
-    """What is found in a recording, and the simulator, at the bandwidth that suits it.
+def searched(record: Record, progress: Progress) -> Found:
+    """What is found in a recording, at the bandwidth that suits it.
 
     For a machine without a controller: of a command that was held and one that was sampled, the one that fits. For an
     axis under control that no model explains down to the noise: a quicker correction, which lets less of the slow
@@ -90,17 +89,17 @@ def searched(record: Record, progress: Progress) -> tuple[Simulator, Found]:
         alone = base_fit(sim, bare)
         if decide.quiet(bare, alone, alone):
             progress("leaving out the reels, which no model follows")
-            return sim, find(sim, bare, progress, alone)
+            return find(sim, bare, progress, alone)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or record.case.controller.kind == "none" or faster <= sim.follow:
-        return sim, found
+        return found
     problem, base = found.problem, found.base
     if base.rms < decide.LOUD * problem.floor or decide.quiet(problem, base, found.best):
-        return sim, found
+        return found
     quick, fitted = base_of(Simulator(record, follow=faster))
     if fitted.rms < SHOWS * quick.floor:
-        return sim, found
-    return quick.sim, find(quick.sim, quick, progress, fitted)
+        return found
+    return find(quick.sim, quick, progress, fitted)
 
 
 def misread(found: Found) -> bool:
@@ -144,7 +143,7 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         experiment=_experiment(sim, found) if verdict.verdict == AMBIGUOUS else None,
         fit_rows=(problem.rows.start or 0, cut_of(record)),
         seconds=0.0,
-        prediction=shown.mode,
+        on_track=shown.on_track,
         resembles=resembled(found) if verdict.verdict == UNNAMED else None,
     )
 

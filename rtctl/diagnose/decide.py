@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from rtctl.diagnose.fit import Fit, Problem
-from rtctl.diagnose.space import COSINE, SHAPE, SIZE
+from rtctl.diagnose.space import COSINE, SHAPE, SIZE, Hypothesis
 from rtctl.diagnose.stretches import memory, rms
 from rtctl.plants.physics import TERMS
 
@@ -28,7 +28,6 @@ ELSEWHERE = (  # whose typical sizes are those of another machine: angles, or co
     ("transmission.backlash", "axis"),
     ("transmission.creep", "ldu"),
 )
-END = 1e-6  # in logarithm: as near to a bound as a fit that is held by it
 MOST = 0.3  # of the cost: a term that leaves less is more than the form of another, and nothing that chance does
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
@@ -80,23 +79,23 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
 def at_end(before: Fit, after: Fit) -> bool:
     """Whether a term that `after` has more stands at the end of what its times, speeds or frequencies may be: it wants
     to be something else."""
-    known = {h.name for h in before.space.hypotheses}
-    for h, x in zip(after.space.hypotheses, after.space.parts(after.x), strict=True):
-        shapes = [(c, v) for c, v in zip(h.coordinates, x, strict=True) if c.kind == SHAPE]
-        if h.name not in known and any(min(v - c.low, c.high - v) < END for c, v in shapes):
-            return True
-    return False
+    held = set(after.bound())
+    return any(f"{h.name}.{c.name}" in held for h in more(before, after) for c in h.coordinates if c.kind == SHAPE)
 
 
 def same_law(before: Fit, after: Fit) -> bool:
     """Whether what `after` has more looks like a law that `before` has at that very node: it may be its form."""
-    there = {(h.term, h.node) for h in before.space.hypotheses}
-    new = [h for h in after.space.hypotheses if (h.term, h.node) not in there]
     return any(
-        node == h.node and (h.term in TERMS[term].look_alikes or term in TERMS[h.term].look_alikes)
-        for h in new
-        for term, node in there
+        old.node == h.node and (h.term in TERMS[old.term].look_alikes or old.term in TERMS[h.term].look_alikes)
+        for h in more(before, after)
+        for old in before.space.hypotheses
     )
+
+
+def more(before: Fit, after: Fit) -> list[Hypothesis]:
+    """What `after` has and `before` has not."""
+    there = {h.name for h in before.space.hypotheses}
+    return [h for h in after.space.hypotheses if h.name not in there]
 
 
 def by_noise(before: Fit, after: Fit) -> float:

@@ -75,7 +75,7 @@ class Diagnosis(NamedTuple):
     experiment: dict[str, Any] | None
     fit_rows: tuple[int, int]  # first and last row fitted
     seconds: float
-    prediction: int | None = None  # how the rows that no fit saw were predicted: a mode of simulate; None: as usual
+    on_track: bool = False  # whether the rows that no fit saw were predicted there, since a free run ran away
     resembles: tuple[str, str] | None = None  # term that the table has no name for and its node, where it explains more
 
 

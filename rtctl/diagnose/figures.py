@@ -103,7 +103,7 @@ def stages(d: Diagnosis) -> list[tuple[str, Model, str]]:
 
 def heldout_overlay(d: Diagnosis, sim: Simulator) -> Figure:
     """Main channel on rows that no fit saw, recorded and simulated before and after, and the errors below."""
-    rows, mode = heldout_rows(d), mode_of(d.record) if d.prediction is None else d.prediction
+    rows, mode = heldout_rows(d), TRACK if d.on_track else mode_of(d.record)
     t, unit = d.record.t[rows], words.main_unit(d)
     figure, (top, low) = new(4.6, 2, 1, sharex=True, height_ratios=(1.15, 1))
     top.plot(*thin(t, sim.seen[rows]), color=SEEN, lw=2.6, label="recorded")

@@ -33,7 +33,7 @@ class Shown(NamedTuple):
     before_error: float
     after_error: float
     floor: float
-    mode: int  # how the prediction ran
+    on_track: bool  # whether the prediction was kept there, since its free run ran away
 
 
 def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Effect], again: bool = False) -> Shown:
@@ -51,7 +51,8 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
         old, new = (heldout.refit(sim, problem, f, cut) for f in (base, taken))
     else:
         judge, rows, old, new = Problem(Simulator(other)).seen_by(taken.model), slice(0, None), base, taken
-    errors, mode = errors_of(judge, old, new, rows, heldout.mode_of(sim.record))
+    usual = heldout.mode_of(judge.sim.record)
+    errors, mode = errors_of(judge, old, new, rows, usual)
     floor = heldout.floor(judge)
     closed = (errors[0] - errors[1]) / (errors[0] - floor) if errors[0] > TELLING * floor else np.nan
     # what is left of several that were refused has to do as much as they
@@ -69,7 +70,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     verdict = with_known(proved, known)
     if not proved.effects:
         taken, errors[1] = base, errors[0]
-    return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor, mode)
+    return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor, mode != usual)
 
 
 def errors_of(judge: Problem, old: Fit, new: Fit, rows: slice, mode: int) -> tuple[list[float], int]:

@@ -42,7 +42,6 @@ class Simulator:
     def __init__(
         self,
         record: Record,
-        finer: int = 1,
         follow: float | None = None,
         lead: float | None = None,
         held: bool = True,
@@ -50,7 +49,7 @@ class Simulator:
         self.record = record
         self.case: Case = record.case
         self.kernel = kernel.kernel(record.plant)
-        self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP[record.plant] - 1e-9))) * finer
+        self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP[record.plant] - 1e-9)))
         self.follow = FOLLOW[record.plant] if follow is None else follow
         self.lead = round((LEAD[record.plant] if lead is None else lead) / record.dt)
         self.channels = channels(record)
@@ -60,6 +59,12 @@ class Simulator:
         self.volts = np.ascontiguousarray(volts if held else half_a_tick_on(volts))
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
         self.law = law_params(record)
+
+    def finer(self, times: int) -> "Simulator":
+        """The same with steps that are so many `times` shorter."""
+        other = copy(self)
+        other.substeps *= times
+        return other
 
     def commanded(self, volts: np.ndarray) -> "Simulator":
         """The same with other voltages (n, drives) than the recorded ones acting on the model."""

@@ -1,8 +1,6 @@
 """Whether the simulation itself is to be trusted: the same model at half the step. A solver's error once looked like a
 delay."""
 
-from copy import copy
-
 from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.stretches import rms
@@ -12,9 +10,7 @@ LOUD = 0.5  # of the noise floor
 
 def step_error(problem: Problem, model: Model) -> float:
     """Rms change of the weighted error of `model` by half the step, over the noise floor."""
-    half = copy(problem.sim)
-    half.substeps *= 2
-    change = problem.of(half).error(model) - problem.error(model)
+    change = problem.of(problem.sim.finer(2)).error(model) - problem.error(model)
     return rms(change) / max(problem.floor, 1e-12)
 
 

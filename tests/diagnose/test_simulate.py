@@ -105,9 +105,9 @@ def test_more_delay_as_a_term_is_the_same_as_more_delay_of_the_loop(blank, late)
     record = blank("axis", volts)
     model = owner_model(record.case).change(F_c=0.0)
     out = Simulator(record).run(model.add(term("timing.delay", "loop", extra=late * 1e-3)), OPEN)[:, 0]
-    fine = Simulator(blank("axis", volts, delay_samples=late), finer=5).run(model, OPEN)[:, 0]
+    fine = Simulator(blank("axis", volts, delay_samples=late)).finer(5).run(model, OPEN)[:, 0]
     np.testing.assert_allclose(out, fine, rtol=0, atol=1e-5 * np.ptp(fine))
-    off = Simulator(blank("axis", volts, delay_samples=late + 0.05), finer=5).run(model, OPEN)[:, 0]
+    off = Simulator(blank("axis", volts, delay_samples=late + 0.05)).finer(5).run(model, OPEN)[:, 0]
     assert np.abs(out - fine).max() < 0.1 * np.abs(off - fine).max()
 
 
@@ -157,7 +157,7 @@ def test_where_a_model_runs_away_the_rest_is_nan(blank):
 def test_shorter_steps_change_next_to_nothing(plain):
     full = TERMS["friction.stribeck"].settings(node="carriage", F_s=40.0, v_s=0.05)
     model = plain.model.add(full)
-    coarse, fine = (Simulator(plain.record, finer=f).run(model, TRACK)[:, 0] for f in (1, 4))
+    coarse, fine = (Simulator(plain.record).finer(f).run(model, TRACK)[:, 0] for f in (1, 4))
     assert np.sqrt(np.mean((coarse - fine) ** 2)) < 0.25 * resolution(plain.record)
 
 
