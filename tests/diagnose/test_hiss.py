@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from rtctl.diagnose.hiss import is_hiss
@@ -21,15 +19,19 @@ def noise(seed: int) -> np.ndarray:
     return np.random.default_rng(seed).standard_normal(N)
 
 
-@settings(deadline=None, max_examples=30)
-@given(st.integers(0, 10**6), st.floats(1.0, 30.0))
+# of fixed seeds: a bound of chance is passed by chance too, at some seed in ten thousand
+
+
+@pytest.mark.parametrize("size", [1.0, 5.0, 30.0])
+@pytest.mark.parametrize("seed", range(0, 20, 2))
 def test_white_forces_are(seed, size):
     e = error(size * noise(seed)) + 0.3 * noise(seed + 1)
     assert is_hiss(e, DT, W, 0.3)
 
 
-@settings(deadline=None, max_examples=30)
-@given(st.integers(0, 10**6), st.floats(3.0, 30.0), st.floats(1e-3, 0.03))
+@pytest.mark.parametrize("size", [3.0, 30.0])
+@pytest.mark.parametrize("lag", [1e-3, 0.008, 0.03])
+@pytest.mark.parametrize("seed", range(0, 10, 2))
 def test_so_are_forces_behind_a_short_lag(seed, size, lag):
     pole = np.exp(-DT / lag)
     force = lfilter([1.0], [1.0, -pole], noise(seed)) * np.sqrt(1.0 - pole**2)
