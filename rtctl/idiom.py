@@ -11,7 +11,8 @@ named tuple itself and `np.zeros(1, PD_STATE)[0]`: compiled code reads `p.gain` 
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import update_wrapper
 from typing import Any
 
@@ -42,6 +43,17 @@ class _Interpreter(threading.local):
 INTERPRETER = _Interpreter()
 
 
+@contextmanager
+def interpreted() -> Iterator[None]:
+    """Steps that are called within are interpreted, in this thread: see `Step.interpret`."""
+    before, INTERPRETER.runs = INTERPRETER.runs, True
+    try:
+        with np.errstate(all="ignore"):  # as in compiled code: counters of random numbers wrap around
+            yield
+    finally:
+        INTERPRETER.runs = before
+
+
 class Step:
     """A function compiled twice, each when it is first asked for: as compiled code calls it, and as Python does.
 
@@ -65,11 +77,8 @@ class Step:
 
         Params are named tuples and states records of a recarray, whose fields Python can read.
         """
-        before, INTERPRETER.runs = INTERPRETER.runs, True
-        try:
+        with interpreted():
             return self.py_func(*arguments)
-        finally:
-            INTERPRETER.runs = before
 
     def compile(self, types: tuple[Any, ...]) -> None:
         """Compile for arguments of these types, for compiled code."""

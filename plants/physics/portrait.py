@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.idiom import Settings, fill_record, record_dtype
+from rtctl.idiom import Settings, interpreted
 from rtctl.plants import linear
 from rtctl.plants.physics.place import PLANTS, place
 from rtctl.plants.physics.term import SITES, Term
@@ -221,10 +221,9 @@ def measure(run: Any, acts: bool, term: Term, settings: Any, kind: str, hand: Ha
     volts = np.repeat(hand.volts[:, None], len(m.u), axis=1)
     out = [volts, np.zeros((n, len(m.y))), np.zeros((n, len(m.link_T))), np.zeros((n, nq)), np.zeros((n, nq))]
     params = term.build(settings, hand.h)
-    P = np.zeros(1, record_dtype(params)).view(np.recarray)[0]
-    fill_record(P, params)
     S = np.zeros(1, term.state if term.state is not None else [("spare", "f8")]).view(np.recarray)[0]
-    run(acts, P, S, p, s, spot.node, r, spot.link, spot.channel, q, v, *out)
+    with interpreted():  # a few hundred rows: compiling would take longer
+        run(acts, params, S, p, s, spot.node, r, spot.link, spot.channel, q, v, *out)
     for torque in out[3:]:
         torque /= r
     return dict(zip(CHANGES, out, strict=True))

@@ -332,9 +332,9 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
         if jumps:
-            at, first = jumps[0]
-            more = tuple((when, size / first) for when, size in jumps[1:])
-            yield (Coordinate(part.name, SIZE, abs(first)),), {"at": at, "more": more}
+            tick, (_, first) = m.record.dt, jumps[0]  # counts are lost between two ticks: the later one reads all of it
+            (at, _), *more = [(max(when - tick, 0.0), size / first) for when, size in jumps]
+            yield (Coordinate(part.name, SIZE, abs(first)),), {"at": at, "more": tuple(more), "over": tick}
     elif isinstance(part, At):
         s = m.scale(node)
         low, high = 0.2 * part.narrow * s.span, 4.0 * part.wide * s.span

@@ -8,6 +8,7 @@ from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import SHAPE
 from rtctl.plants.physics import TERMS
+from rtctl.plants.physics.sensor import READINGS, missed_counts
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
 HINTS = {
@@ -120,7 +121,20 @@ def test_jumps_of_a_sensor_are_one_hypothesis_with_one_size(moved):
     told = {"jump:sensor": [(3.0, -2e-3), (1.0, 1e-3)]}
     (h,) = hypotheses(record, base, told, only=("sensor.missed_counts",))
     assert h.settings([-1.0]).size == pytest.approx(-2e-3)
-    assert (h.fixed["at"], h.fixed["more"]) == (3.0, ((1.0, -0.5),))
+    before = record.dt
+    assert h.fixed == {"at": 3.0 - before, "more": ((1.0 - before, -0.5),), "over": before}
+
+
+@pytest.mark.parametrize("plant", ["axis", "ivu", "ldu"])
+def test_the_tick_that_sees_a_jump_first_sees_all_of_it(moved, plant):
+    record, base = moved(plant)
+    sensor = READINGS[plant][0]
+    told = {f"jump:{sensor}": [(40 * record.dt, 2e-3), (90 * record.dt, -1e-3)]}
+    (h,) = hypotheses(record, base, told, only=("sensor.missed_counts",))
+    term = TERMS["sensor.missed_counts"]
+    p, s = term.build(h.settings([1.0]), record.dt), np.zeros(1, term.state)[0]
+    read = [missed_counts(p, s, 0.0, k * record.dt) for k in (39, 40, 89, 90)]
+    assert read == pytest.approx([0.0, 2e-3, 2e-3, 1e-3], abs=1e-12)
 
 
 def test_forms_and_richer_forms_keep_the_term_and_its_place(moved):

@@ -1,6 +1,6 @@
 """Practice bundles with known answers, which lie beside the project where they are there at all.
 
-RTCTL_PROOF=full diagnoses all of them; otherwise three, two cut short, of which one is asked a few questions only.
+RTCTL_PROOF=full diagnoses all of them; otherwise three, cut short, of which one is asked a few questions only.
 """
 
 import json
@@ -45,12 +45,12 @@ def answers(practice: Path) -> dict[str, Any]:
 def some(practice: Path) -> dict[str, Any]:
     """Three diagnoses."""
     made = {
-        NULL: written(chain.diagnose_record(first(load_record(practice / NULL), 10.0))),
-        SINGLE: written(chain.diagnose(practice / SINGLE)),
+        NULL: written(chain.diagnose_record(first(load_record(practice / NULL), 6.0))),
+        SINGLE: written(chain.diagnose_record(first(load_record(practice / SINGLE), 10.0))),
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(find, "hypotheses", partial(hypotheses, only=PLAIN))
-        made[DRIVE] = written(chain.diagnose_record(first(load_record(practice / DRIVE), 4.0)))
+        made[DRIVE] = written(chain.diagnose_record(first(load_record(practice / DRIVE), 2.5)))
     return made
 
 

@@ -13,7 +13,7 @@ from rtctl.proof import generate as g
 from rtctl.proof.effects import TABLE
 from rtctl.proof.unknown import UNKNOWN
 
-SECONDS = {"ivu": 12.0, "ldu": 2.4, "axis": 8.0}
+SECONDS = {"ivu": 8.0, "ldu": 1.8, "axis": 5.0}
 WEAK = {("ldu", "timing.jitter"): 0.5}  # a tenth of a millisecond is short: it shows in fast moves alone
 NAMES = 34  # in the table of the exchange format
 ALL = [(plant, name) for plant in g.PLANTS for name in draw.names_on(plant)]
