@@ -20,6 +20,8 @@ FAST = {"ivu": 8.0, "ldu": 2.0, "axis": 4.0}  # times the tracking bandwidth: ho
 MOST = 4  # hints of a kind
 JUMPS = 47
 AROUND = 8  # ticks that a jump is compared with
+SURE, UNSURE = 6.0, 4.0  # times the noise from tick to tick: a jump, and one if there are others like it
+ALIKE = 2.5  # times the same: jumps that differ by less may be of one size
 SENSORS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)}
 CALM = {"ivu": 0.02, "ldu": 2e-3}  # s, over which an acceleration is taken
 SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
@@ -170,16 +172,24 @@ def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:
     """Rows and sizes of sudden steps of the error (n,) that do not come back at once, the largest first.
 
     `count` is the sensor's step in the error's unit. A jump takes one tick: it stands out of the ticks around it, which
-    a vibration or a reversal that the model misses does not.
+    a vibration or a reversal that the model misses does not. Where one is sure, others as large may be less so; and
+    where noise makes what they differ by, they are alike.
     """
     step = np.diff(error)
     quiet = 1.4826 * float(np.median(np.abs(step - np.median(step)))) + 0.3 * count
-    found = []
-    for k in np.flatnonzero(np.abs(step) > max(6 * quiet, 2.5 * count)):
+    found: list[tuple[int, float]] = []
+    unsure: list[tuple[int, float]] = []
+    for k in np.flatnonzero(np.abs(step) > max(UNSURE * quiet, 2.5 * count)):
         if not AROUND < k < len(step) - AROUND:
             continue
         near = np.abs(np.delete(step[k - AROUND : k + AROUND + 1], AROUND))
         size = float(np.median(error[k + 1 : k + 4]) - np.median(error[k - 2 : k + 1]))
         if abs(step[k]) > 4 * np.median(near) and abs(step[k]) > 2 * near.max() and abs(size) > 0.6 * abs(step[k]):
-            found.append((int(k) + 1, size))
+            (found if abs(step[k]) > SURE * quiet else unsure).append((int(k) + 1, size))
+    if not found:
+        return []
+    usual = float(np.median([abs(size) for _, size in found]))
+    found += [jump for jump in unsure if abs(abs(jump[1]) - usual) < ALIKE * quiet]
+    if all(abs(abs(size) - usual) < ALIKE * quiet for _, size in found):
+        found = [(k, float(np.copysign(usual, size))) for k, size in found]
     return sorted(found, key=lambda jump: -abs(jump[1]))[:JUMPS]

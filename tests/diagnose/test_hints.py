@@ -71,6 +71,20 @@ def test_counts_that_were_lost_for_good_are_found_largest_first():
     assert [size for _, size in found] == pytest.approx([-60.0, 20.0], abs=1.0)
 
 
+def test_jumps_that_noise_nearly_hides_count_where_one_is_sure_and_are_of_one_size():
+    rng = np.random.default_rng(2)
+    error = 0.7 * rng.standard_normal(8000)
+    for k in range(500, 8000, 500):
+        error[k:] += 7.0 if k % 1000 else -7.0
+    found = jumps(error, 1.0)
+    assert {k for k, _ in found} <= set(range(500, 8000, 500)) and len(found) >= 14
+    sizes = [abs(size) for _, size in found]
+    assert max(sizes) - min(sizes) < 1e-9 and sizes[0] == pytest.approx(7.0, abs=0.3)
+    weak = 0.7 * rng.standard_normal(8000)
+    weak[4000:] += 4.5
+    assert jumps(weak, 1.0) == []  # alone it may be chance
+
+
 def test_a_reversal_that_the_model_misses_is_no_jump():
     """An error that rings up within ticks stands out of the record, but not out of the ticks around it."""
     error = 0.2 * np.random.default_rng(0).standard_normal(4000)
