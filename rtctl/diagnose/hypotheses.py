@@ -5,7 +5,7 @@ which shapes (speeds, times, frequencies) it starts. Starts are shares of what t
 its rms speed, its span, the rms force of its drive.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -195,6 +195,7 @@ SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
 HINTED = tuple(  # whose starts the record suggests
     name for name, parts in (SEARCH | SLIDING).items() if any(isinstance(part, Hint | Jumps | At) for part in parts)
 )
+WAVES = ("wavelength", "turn")  # coordinates that are the length of a wave
 LEAD, RAIL = 0.045, 0.012  # m: the longest turn of a screw or encoder of a linear axis, the shortest wave of its guide
 
 
@@ -251,6 +252,23 @@ def is_rich(h: Hypothesis) -> bool:
     """Whether it has its richer form already."""
     more = {part[0] for part in EXTRAS.get(h.term, ()) if not isinstance(part, Choice)}
     return any(c.name.partition("|")[0] in more for c in h.coordinates)
+
+
+def as_harmonic(h: Hypothesis, x: np.ndarray) -> Iterator[tuple[Hypothesis, np.ndarray]]:
+    """The wave of a richer form as the second and the third of a longer one, which errors that are judged on track
+    show less of than of its harmonics."""
+    names = [c.name for c in h.coordinates]
+    long = next((names.index(name) for name in WAVES if name in names), None)
+    if long is None or not is_rich(h):
+        return
+    for k in (2, 3):
+        coordinates, y = list(h.coordinates), h.start()
+        coordinates[long] = coordinates[long]._replace(scale=k * coordinates[long].scale)
+        y[long] = x[long]
+        first, other = names.index("A|phi"), names.index(f"A{k}|phi{k}")
+        for i in (0, 1):  # cosine and sine
+            y[other + i] = x[first + i] * coordinates[first].scale / coordinates[other].scale
+        yield h._replace(coordinates=tuple(coordinates)), y
 
 
 def forms(h: Hypothesis) -> list[Hypothesis]:

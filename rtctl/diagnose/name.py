@@ -12,7 +12,7 @@ import numpy as np
 
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
-from rtctl.diagnose.hypotheses import HINTED, forms, richer, rounded
+from rtctl.diagnose.hypotheses import HINTED, as_harmonic, forms, richer, rounded
 from rtctl.diagnose.scan import resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
@@ -90,10 +90,10 @@ def search(
             quiet = base.rms < QUIET * problem.floor
             if not quiet and (sure or not full or not enough(full[0])):
                 progress("looking for resonances")
-                full = sorted([*full, *resonances(problem, base, scores)], key=lambda f: f.merit)
+                full = sorted([*full, *resonances(problem, base, scores)], key=sound_first)
             if base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
                 progress("looking for a slack tape")
-                full = sorted([*full, *slack(problem, base, scores)], key=lambda f: f.merit)
+                full = sorted([*full, *slack(problem, base, scores)], key=sound_first)
         if full and sure and worth(beam[0], full[0]):
             full, _ = grow(problem, parents, candidates, ROUNDS[level], away, progress)
         if not full:
@@ -145,12 +145,17 @@ def grow(
         best = min(best, fitted.cost)
         if names(fitted) not in fits or fitted.cost < fits[names(fitted)].cost:
             fits[names(fitted)] = fitted
-    full = sorted(fits.values(), key=lambda f: f.merit)
+    full = sorted(fits.values(), key=sound_first)
     near, rest = full[: breadth.keep], full[breadth.keep :]
     near = [whole_orders(problem, polish(problem, f)) if f.cost < 6 * near[0].cost else f for f in near]
     loud = decide.COMPLETE * problem.floor
     near = [enrich(problem, f, decide.better) if f.rms > loud else f for f in near]
-    return sorted([*near, *rest], key=lambda f: f.merit), first
+    return sorted([*near, *rest], key=sound_first), first
+
+
+def sound_first(fitted: Fit) -> tuple[bool, float]:
+    """What models are ordered by: a size that no machine has may follow what several real terms do."""
+    return decide.absurd(fitted), fitted.merit
 
 
 def elsewhere(problem: Problem, base: Fit) -> Fit:
@@ -345,10 +350,14 @@ def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> F
         more = richer(problem.sim.record, found.model.base, found.space.hypotheses[index])
         if more is None:
             continue
-        space = exchanged(found, index, more)
         parts = found.space.parts(found.x)
-        parts[index] = np.concatenate([parts[index], more.start()[len(h.coordinates) :]])
-        fitted = fit(problem, space, np.concatenate([found.x[: space.nb], *parts]), rounds=12)
+        own = np.concatenate([parts[index], more.start()[len(h.coordinates) :]])
+        tried = []
+        for form, x in ((more, own), *as_harmonic(more, own)):
+            parts[index] = x
+            space = exchanged(found, index, form)
+            tried.append(fit(problem, space, np.concatenate([found.x[: space.nb], *parts]), rounds=12))
+        fitted = min(tried, key=lambda f: f.merit)
         if worth(found, fitted):
             found = fitted
     return found

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.hypotheses import EXTRAS, HINTED, SEARCH, At, Choice, Turn, forms, hypotheses, richer
+from rtctl.diagnose.hypotheses import EXTRAS, HINTED, SEARCH, At, Choice, Turn, as_harmonic, forms, hypotheses, richer
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import SHAPE
 from rtctl.plants.physics import TERMS
+from rtctl.plants.physics.guide import thickness
 from rtctl.plants.physics.sensor import READINGS, missed_counts
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
@@ -147,6 +148,28 @@ def test_forms_and_richer_forms_keep_the_term_and_its_place(moved):
     assert more.name == dahl.name and more.fixed["form"] == "lugre"
     assert [c.name for c in more.coordinates] == ["z_s", "rise", "v_s", "tau_s"]
     assert richer(record, base, more) is None  # it has them already
+
+
+def test_a_wave_may_be_the_second_or_the_third_of_a_longer_one(moved):
+    record, base = moved("axis")
+    (h, *_) = hypotheses(record, base, {"wavelength": [0.05]}, only=("guide.thickness",))
+    assert list(as_harmonic(h, h.start())) == []  # in its plain form it is one wave
+    more = richer(record, base, h)
+    x = more.start()
+    x[[c.name for c in more.coordinates].index("A|phi") + 1] = 2.0
+    x[[c.name for c in more.coordinates].index("wavelength")] = 0.1
+    term, at = TERMS["guide.thickness"], np.linspace(-0.1, 0.1, 50)
+
+    def wave(settings):
+        p = term.build(settings, record.dt)
+        return [thickness(p, z) for z in at]
+
+    own = wave(more.settings(x))
+    assert np.ptp(own) > 0.0
+    longer = [form.settings(y) for form, y in as_harmonic(more, x)]
+    assert [s.wavelength / more.settings(x).wavelength for s in longer] == pytest.approx([2.0, 3.0])
+    for settings in longer:
+        assert settings.A == 0.0 and wave(settings) == pytest.approx(own, rel=1e-9, abs=1e-15)
 
 
 def test_a_hint_of_a_node_goes_before_a_hint_for_all(moved):
