@@ -278,6 +278,22 @@ def forms(h: Hypothesis) -> list[Hypothesis]:
     return [h._replace(fixed={**h.fixed, name: v}) for v in values if v != h.fixed.get(name, default)]
 
 
+def moved_into(form: Hypothesis, x: np.ndarray) -> list[np.ndarray]:
+    """Starts of another form at x of the first: as it is, and what took one flank of a hill for a bump by itself is
+    moved aside."""
+    if form.fixed.get("form") != "hill":
+        return [x]
+    names = [c.name for c in form.coordinates]
+    force, at = names.index("F"), names.index("at")
+    starts = [x]
+    for side in (-1.0, 1.0):  # it pushes on behind its middle and back before it
+        y = x.copy()
+        y[at] += side * form.values(x)["width"] / form.coordinates[at].scale
+        y[force] *= -side
+        starts.append(y)
+    return starts
+
+
 def rounded(h: Hypothesis, x: np.ndarray) -> tuple[int, Hypothesis] | None:
     """The same hypothesis with its order at the whole number that it is next to at x, and which coordinate it loses by
     that; None where it has no order or one in between."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
-from rtctl.diagnose.hypotheses import HINTED, as_harmonic, forms, richer, rounded
+from rtctl.diagnose.hypotheses import HINTED, as_harmonic, forms, moved_into, richer, rounded
 from rtctl.diagnose.scan import resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
@@ -344,9 +344,13 @@ def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> F
     """Give each term another form of the same, or a richer one (harmonics, a second branch), where that is better."""
     for index, h in enumerate(found.space.hypotheses):
         for form in forms(h):
-            other = fit(problem, exchanged(found, index, form), found.x, rounds=10, J=found.J)
-            if other.merit < found.merit:
-                found = other
+            space, at = exchanged(found, index, form), found.space.columns(index)
+            for start in moved_into(form, found.x[at]):
+                x = found.x.copy()
+                x[at] = start
+                other = fit(problem, space, x, rounds=10, J=found.J)
+                if other.merit < found.merit:
+                    found = other
         more = richer(problem.sim.record, found.model.base, found.space.hypotheses[index])
         if more is None:
             continue

@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.hypotheses import EXTRAS, HINTED, SEARCH, At, Choice, Turn, as_harmonic, forms, hypotheses, richer
+from rtctl.diagnose.hypotheses import (
+    EXTRAS,
+    HINTED,
+    SEARCH,
+    At,
+    Choice,
+    Turn,
+    as_harmonic,
+    forms,
+    hypotheses,
+    moved_into,
+    richer,
+)
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import SHAPE
@@ -148,6 +160,22 @@ def test_forms_and_richer_forms_keep_the_term_and_its_place(moved):
     assert more.name == dahl.name and more.fixed["form"] == "lugre"
     assert [c.name for c in more.coordinates] == ["z_s", "rise", "v_s", "tau_s"]
     assert richer(record, base, more) is None  # it has them already
+
+
+def test_a_flank_of_a_hill_is_moved_aside(moved):
+    """What pushes on is behind the middle of the hill that it belongs to, or the other way round before it."""
+    record, base = moved("axis")
+    h = next(h for h in hypotheses(record, base, only=("load.bump",)) if h.fixed["form"] == "push")
+    x = h.start()
+    x[0] = 1.0
+    push = h.values(x)
+    (hill,) = [f for f in forms(h) if f.fixed["form"] == "hill"]
+    found = [hill.values(y) for y in moved_into(hill, x)]
+    assert [v["F"] / push["F"] for v in found] == [1.0, 1.0, -1.0]
+    assert [(v["at"] - push["at"]) / push["width"] for v in found] == pytest.approx([0.0, -1.0, 1.0])
+    for v in found[1:]:
+        assert v["F"] * (push["at"] - v["at"]) > 0.0  # there it pushes as before
+    assert all(len(moved_into(f, x)) == 1 for f in forms(h) if f.fixed["form"] != "hill")
 
 
 def test_a_wave_may_be_the_second_or_the_third_of_a_longer_one(moved):
