@@ -13,7 +13,8 @@ run: $(VENV)/installed
 	$(BIN)/rtctl run configs/ivu.yaml --reference configs/references/steps.yaml --for 12s
 
 test: $(VENV)/installed-dev
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	@# one worker more than cores: many tests wait for a process
+	$(BIN)/python -m pytest -n 3 --dist loadgroup
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff check .
