@@ -13,8 +13,7 @@ run: $(VENV)/installed
 	$(BIN)/rtctl run configs/ivu.yaml --reference configs/references/steps.yaml --for 12s
 
 test: $(VENV)/installed-dev
-	@# one worker more than cores: many tests wait for a process
-	$(BIN)/python -m pytest -n 3 --dist loadgroup
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff check .
