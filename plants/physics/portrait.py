@@ -1,9 +1,9 @@
-"""What a term looks like: its own curve along its own axis, as it comes out of its compiled code.
+"""What a term looks like: its own curve along its own axis, as it comes out of its own code.
 
 A plant is held by the hand: its nodes are moved, its tape is pulled or its drives are commanded as the term's axis asks
 for. Nothing moves by itself, and what the term changes is read off. Nothing of the physics is written here again: the
-line of the term is compiled as in the generated plant. The machine's record is filled by the plant's own `start`, but
-without compiling that, which would take longer than all the rest.
+line of the term is that of the generated plant, and the machine's record is filled by the plant's own `start`. Neither
+is compiled, which would take longer than all the rest.
 """
 
 from types import FunctionType, SimpleNamespace
@@ -138,7 +138,7 @@ def curve(term: Term, settings: Any, kind: str) -> Curve:
     spot, link = place(kind, settings.node), place(kind, settings.node).link
     if settings.node == "capstan" and kind == "ivu":
         link = 1
-    run = compiled(term, kind)
+    run = assembled(term, kind)
     got, none = (measure(run, acts, term, settings, kind, hand, link) for acts in (True, False))
     way, push = ("m", "N") if spot.factor or settings.node.startswith("tape") else UNITS[kind]
     shown = next((name for name in CHANGES if np.abs(got[name] - none[name]).max() > 0.0), "force")
@@ -229,7 +229,7 @@ def measure(run: Any, acts: bool, term: Term, settings: Any, kind: str, hand: Ha
     return dict(zip(CHANGES, out, strict=True))
 
 
-def compiled(term: Term, kind: str) -> Any:
+def assembled(term: Term, kind: str) -> Any:
     """The stand's run with the term's lines in it."""
     names = {"p": "P", "s": "S", "m": "m", "i": "i", "r": "r", "l": "l", "c": "c"}
     lines = {

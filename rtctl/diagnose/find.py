@@ -12,6 +12,7 @@ from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
 from rtctl.diagnose.name import (
     Search,
+    absurd_last,
     dropped,
     eliminate,
     enrich,
@@ -20,7 +21,6 @@ from rtctl.diagnose.name import (
     polish,
     rivals,
     search,
-    sound_first,
 )
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
@@ -93,9 +93,9 @@ def find(
     if best.rms > decide.COMPLETE * problem.floor and best.space.hypotheses:
         close = [best, *(f for f in others if f.cost < CLOSE * best.cost)]
         others += [f for f in (enrich(problem, f, decide.better) for f in close) if f.cost < CLEARLY * best.cost]
-    ahead = min(others, key=sound_first, default=best)
+    ahead = min(others, key=absurd_last, default=best)
     looked = looked._replace(rounds=(*looked.rounds, (best, *others)))  # what came out second is a rival of the first
-    if sound_first(ahead) < sound_first(best):  # a rival came out ahead once it was fitted to the bottom
+    if absurd_last(ahead) < absurd_last(best):  # a rival came out ahead once it was fitted to the bottom
         best, near = ahead, replacements(problem, ahead, looked, (), progress)
     likelier = most_likely(problem, best, near)
     if likelier is not best:

@@ -90,10 +90,10 @@ def search(
             quiet = base.rms < QUIET * problem.floor
             if not quiet and (sure or not full or not enough(full[0])):
                 progress("looking for resonances")
-                full = sorted([*full, *resonances(problem, base, scores)], key=sound_first)
+                full = sorted([*full, *resonances(problem, base, scores)], key=absurd_last)
             if base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
                 progress("looking for a slack tape")
-                full = sorted([*full, *slack(problem, base, scores)], key=sound_first)
+                full = sorted([*full, *slack(problem, base, scores)], key=absurd_last)
         if full and sure and worth(beam[0], full[0]):
             full, _ = grow(problem, parents, candidates, ROUNDS[level], away, progress)
         if not full:
@@ -145,15 +145,15 @@ def grow(
         best = min(best, fitted.cost)
         if names(fitted) not in fits or fitted.cost < fits[names(fitted)].cost:
             fits[names(fitted)] = fitted
-    full = sorted(fits.values(), key=sound_first)
+    full = sorted(fits.values(), key=absurd_last)
     near, rest = full[: breadth.keep], full[breadth.keep :]
     near = [whole_orders(problem, polish(problem, f)) if f.cost < 6 * near[0].cost else f for f in near]
     loud = decide.COMPLETE * problem.floor
     near = [enrich(problem, f, decide.better) if f.rms > loud else f for f in near]
-    return sorted([*near, *rest], key=sound_first), first
+    return sorted([*near, *rest], key=absurd_last), first
 
 
-def sound_first(fitted: Fit) -> tuple[bool, float]:
+def absurd_last(fitted: Fit) -> tuple[bool, float]:
     """What models are ordered by: a size that no machine has may follow what several real terms do."""
     return decide.absurd(fitted), fitted.merit
 
@@ -344,27 +344,28 @@ def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> F
     """Give each term another form of the same, or a richer one (harmonics, a second branch), where that is better."""
     for index, h in enumerate(found.space.hypotheses):
         for form in forms(h):
-            space, at = exchanged(found, index, form), found.space.columns(index)
-            for start in moved_into(form, found.x[at]):
-                x = found.x.copy()
-                x[at] = start
-                other = fit(problem, space, x, rounds=10, J=found.J)
+            for start in moved_into(form, found.space.parts(found.x)[index]):
+                other = with_other(problem, found, index, form, start, 10, found.J)
                 if other.merit < found.merit:
                     found = other
         more = richer(problem.sim.record, found.model.base, found.space.hypotheses[index])
         if more is None:
             continue
-        parts = found.space.parts(found.x)
-        own = np.concatenate([parts[index], more.start()[len(h.coordinates) :]])
-        tried = []
-        for form, x in ((more, own), *as_harmonic(more, own)):
-            parts[index] = x
-            space = exchanged(found, index, form)
-            tried.append(fit(problem, space, np.concatenate([found.x[: space.nb], *parts]), rounds=12))
+        own = np.concatenate([found.space.parts(found.x)[index], more.start()[len(h.coordinates) :]])
+        tried = [with_other(problem, found, index, f, x, 12) for f, x in ((more, own), *as_harmonic(more, own))]
         fitted = min(tried, key=lambda f: f.merit)
         if worth(found, fitted):
             found = fitted
     return found
+
+
+def with_other(
+    problem: Problem, found: Fit, index: int, h: Hypothesis, start: np.ndarray, rounds: int, J: np.ndarray | None = None
+) -> Fit:
+    """The model fitted with `h`, from `start`, in the place of hypothesis `index`."""
+    parts = found.space.parts(found.x)
+    parts[index] = start
+    return fit(problem, exchanged(found, index, h), np.concatenate([found.x[: found.space.nb], *parts]), rounds, J=J)
 
 
 def exchanged(found: Fit, index: int, h: Hypothesis) -> Space:

@@ -21,6 +21,12 @@ def awake(record: Record) -> Record:
     end = int(far[-1]) + kept if len(far) else n
     if end + kept >= n or (np.ptp(record.u[end:], axis=0) > CALM * np.ptp(record.u, axis=0)).any():
         return record
+    return upto(record, end)
+
+
+def upto(record: Record, end: int) -> Record:
+    """The first `end` rows of a recording."""
+    n = len(record.t)
     return record._replace(
         t=record.t[:end], ref=record.ref[:end], w=record.w[:end], u=record.u[:end],
         y={name: values[:end] for name, values in record.y.items()},

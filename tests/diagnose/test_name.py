@@ -8,7 +8,7 @@ import pytest
 from rtctl.diagnose.decide import worth
 from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.hypotheses import hypotheses
-from rtctl.diagnose.name import Hopeless, best_starts, drop, eliminate, names, polish, rivals, shortlist, sound_first
+from rtctl.diagnose.name import Hopeless, absurd_last, best_starts, drop, eliminate, names, polish, rivals, shortlist
 from rtctl.diagnose.screen import Score
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
 
@@ -46,7 +46,7 @@ def test_sizes_that_no_machine_has_come_last_however_well_they_fit(tilted, searc
     space = base.space.add(wave)
     real, absurd = (np.append(base.x, [size, 0.0, 0.0]) for size in (1.0, 1e6))
     fits = [Fit(space, x, base.r, base.J, cost) for x, cost in ((absurd, 1.0), (real, 2.0), (real, 3.0))]
-    assert [f.cost for f in sorted(fits, key=sound_first)] == [2.0, 3.0, 1.0]
+    assert [f.cost for f in sorted(fits, key=absurd_last)] == [2.0, 3.0, 1.0]
 
 
 def test_a_dead_band_is_found_with_its_size(make_axis, searched):

@@ -15,6 +15,7 @@ from rtctl.diagnose import chain, find
 from rtctl.diagnose.diagnosis import as_json
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.record import Record, load_record
+from rtctl.diagnose.rest import upto
 from rtctl.proof.score import score
 
 FULL = os.environ.get("RTCTL_PROOF") == "full"
@@ -25,10 +26,7 @@ VISIBLE = 0.3  # times the noise floor
 
 def first(record: Record, seconds: float) -> Record:
     """The beginning of a recording."""
-    n = round(seconds / record.dt)
-    arrays = {name: getattr(record, name)[:n] for name in ("t", "ref", "w", "u")}
-    return record._replace(y={k: v[:n] for k, v in record.y.items()},
-                           columns={k: v[:n] for k, v in record.columns.items()}, **arrays)  # fmt: skip
+    return upto(record, round(seconds / record.dt))
 
 
 def written(d: Any) -> dict[str, Any]:

@@ -19,7 +19,8 @@ from rtctl.diagnose.kernel import CLOSED, OPEN
 from rtctl.diagnose.measure import compare
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.preflight import preflight
-from rtctl.diagnose.record import Record, check, load_record
+from rtctl.diagnose.record import Record, load_record
+from rtctl.diagnose.rest import upto
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.turn import over_turn
 
@@ -194,7 +195,5 @@ def test_three_recordings_of_a_motor_give_one_torque_over_the_turn(motors):
 
 def test_what_keeps_one_speed_only_is_given_no_wrong_name(motors):
     """The controller answers the torque with the command: a drive that did nothing would look alike."""
-    whole = motors[0]
-    half = slice(0, len(whole.t) // 2)
-    found = chain.diagnose_record(check({name: column[half] for name, column in whole.columns.items()}, whole.case))
+    found = chain.diagnose_record(upto(motors[0], len(motors[0].t) // 2))
     assert {e.name for e in found.effects} <= {"ripple.cogging", "friction.coulomb", "friction.viscous"}

@@ -11,7 +11,7 @@ from rtctl.plants.physics.portrait import curve, portrait, typical
 
 @cache
 def drawn(name):
-    """The portrait of a term, compiled once."""
+    """The portrait of a term, made once."""
     return portrait(TERMS[name])
 
 
