@@ -18,6 +18,9 @@ from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.physics.drive import DRIVES
 from rtctl.plants.physics.term import Node, Term
 
+THERMAL_FORMS = ("exponential", "linear", "hyperbolic")
+LEAST = 0.05  # of the cold one, that is always left
+
 
 class LagSettings(Settings):
     """tau is the size. Order 2 has the natural frequency 1/tau rad/s and the damping zeta."""
@@ -72,17 +75,23 @@ def lag(p, s, u):
 
 
 class ThermalSettings(Settings):
-    """a is the size: exp(-a) of the gain, or of the friction, is left after a long time at V_ref."""
+    """a is the size: exp(-a) of the gain, or of the friction, is left after a long time at V_ref; little differs by form
+    where little is lost."""
 
     term: Literal["drive.thermal"] = "drive.thermal"
     node: Node
     a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm through; negative where it gains")
     tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time that it takes to warm")
     V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command at which it is warm")
+    form: Literal["exponential", "linear", "hyperbolic"] = Field(
+        default="exponential",
+        description="of what is left at heat h: exp(-a h), 1 - a h (magnets), 1/(1 + a h) (resistance)",
+    )
 
 
 class ThermalParams(NamedTuple):
     a: float
+    form: int
     end: float  # exp(-h/tau)
     per_volt2: float
     channel: int
@@ -96,7 +105,19 @@ def build_thermal(settings: ThermalSettings, h: float) -> ThermalParams:
     """Exact decay over `h` s; a node that is no drive has the friction of what that drive moves."""
     at_drive = settings.node.startswith("drive")
     channel = 1 if settings.node.endswith("2") else 0
-    return ThermalParams(settings.a, math.exp(-h / settings.tau), settings.V_ref**-2, channel, int(not at_drive))
+    form = THERMAL_FORMS.index(settings.form)
+    return ThermalParams(settings.a, form, math.exp(-h / settings.tau), settings.V_ref**-2, channel, int(not at_drive))
+
+
+@tick
+def what_is_left(p, heat):
+    """Share of the cold one."""
+    lost = p.a * heat
+    if p.form == 0:
+        return math.exp(-lost)
+    if p.form == 1:
+        return max(1.0 - lost, LEAST)
+    return 1.0 / max(1.0 + lost, LEAST)
 
 
 @tick
@@ -105,14 +126,14 @@ def thermal_gain(p, s, volts):
     u = volts[p.channel]
     load = u * u * p.per_volt2
     if p.friction == 0:
-        volts[p.channel] = u * math.exp(-p.a * s.heat)
+        volts[p.channel] = u * what_is_left(p, s.heat)
     s.heat = load + (s.heat - load) * p.end
 
 
 @tick
 def thermal_friction(p, s, dry):
     """Dry friction of a warm motor whose cold one is `dry`, Nm or N."""
-    return dry * math.exp(-p.a * s.heat) if p.friction != 0 else dry
+    return dry * what_is_left(p, s.heat) if p.friction != 0 else dry
 
 
 LAG = Term(
@@ -138,7 +159,7 @@ LAG = Term(
 THERMAL = Term(
     name="drive.thermal",
     words="it changes as it warms: after hard work the same command gives another push, or the grease runs easier",
-    equation="gain exp(-a h), tau h' = (u/V_ref)^2 - h",
+    equation="gain exp(-a h), 1 - a h, or 1/(1 + a h); tau h' = (u/V_ref)^2 - h",
     source="Krishnan 2001, 2.8",
     settings=ThermalSettings,
     build=build_thermal,

@@ -46,16 +46,28 @@ def build_radius_change(settings: RadiusChangeSettings, h: float) -> RadiusChang
 
 
 @tick
-def grown(p, m, i, grow):
-    """Forces on reel `i` and its tape that make its radius and inertia follow its angle."""
+def radius(p, m, i, grow):
+    """Of reel `i` at its angle, m."""
+    R_0 = m.link_a[tape_of(m, i)]
+    return max(R_0 + grow * m.qm[i], min(p.R_min, R_0))
+
+
+@tick
+def wound(p, m, i, grow):
+    """Stretch the tape of reel `i` by what the reel has wound at another radius."""
     j = tape_of(m, i)
-    R_0 = m.link_a[j]
-    q, v = m.qm[i], m.vm[i]
-    R = max(R_0 + grow * q, min(p.R_min, R_0))
-    extra = R - R_0
-    wound = ivu.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
-    linear.pull(m, j, m.link_c[j] * wound + m.link_k[j] * extra * v)
-    m.f[i] -= extra * linear.tension(m, j)
+    R_0, q = m.link_a[j], m.qm[i]
+    way = ivu.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
+    linear.pull(m, j, m.link_c[j] * way + m.link_k[j] * (radius(p, m, i, grow) - R_0) * m.vm[i])
+
+
+@tick
+def turned(p, m, i, grow):
+    """Let all that pulls at the tape of reel `i` do so at the reel's radius, and all that turns the reel turn its
+    inertia."""
+    j = tape_of(m, i)
+    R_0, R = m.link_a[j], radius(p, m, i, grow)
+    m.f[i] -= (R - R_0) * linear.tension(m, j)
     # All that turns the reel turns another inertia: what the matrices divide by the old one is put right as a force.
     torque, c, k = m.f[i], 0.0, 0.0
     for n in range(m.link_i.shape[0]):
@@ -77,11 +89,19 @@ def grown(p, m, i, grow):
 
 
 @tick
-def radius_change(p, m, i):
-    """Radius and inertia of reel `i`, and of the other where it is the same tape, follow their angles."""
-    grown(p, m, i, p.grow)
+def wind(p, m, i):
+    """The radius of reel `i`, and of the other where it is the same tape, follows its angle."""
+    wound(p, m, i, p.grow)
     if p.other != 0.0:
-        grown(p, m, ivu.REEL1 + ivu.REEL2 - i, p.other)
+        wound(p, m, ivu.REEL1 + ivu.REEL2 - i, p.other)
+
+
+@tick
+def turn(p, m, i):
+    """So do its arm and its inertia, for all that pulls and turns: after every other force."""
+    turned(p, m, i, p.grow)
+    if p.other != 0.0:
+        turned(p, m, ivu.REEL1 + ivu.REEL2 - i, p.other)
 
 
 RADIUS_CHANGE = Term(
@@ -91,7 +111,7 @@ RADIUS_CHANGE = Term(
     source="thesis (4.1)-(4.8)",
     settings=RadiusChangeSettings,
     build=build_radius_change,
-    act={"force": "geometry.radius_change({p}, {m}, {i})"},
+    act={"force": "geometry.wind({p}, {m}, {i})", "last": "geometry.turn({p}, {m}, {i})"},
     nodes={"ivu": ("reel1", "reel2")},
     look_alikes={
         "sensor.scale": "two turns and two more: a growing reel goes with the square of the way, a factor does not",

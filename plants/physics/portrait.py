@@ -65,6 +65,7 @@ def run(acts, P, S, p, s, i, r, l, c, q, v, volts, read, pull, dry, force):
         m.u[:] = m.volts
         if acts:
             {force}
+            {last}
         m.t += m.h
         for n in range(nq):
             m.r[n] = -np.sign(v[k, n]) * m.dry[n]

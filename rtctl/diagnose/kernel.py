@@ -61,6 +61,7 @@ def substep(job, p, s, q, z):
     linear.midpoint(m)
     {follow}
     force(q, z, m)
+    last(q, z, m)
     for i in range(m.f.shape[0]):
         m.f[i] += job.correction * job.push[i]
     linear.advance(m)

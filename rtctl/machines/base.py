@@ -195,4 +195,5 @@ def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
                     r=f"p.plant.{spot.factor}" if spot.factor else "1.0",
                 )  # fmt: skip
                 lines[site] += line.split("\n")
-    return PhysicsLines(tuple(dict.fromkeys(uses)), tuple(blocks), *(tuple(lines[site]) for site in SITES))
+    force = (*lines["force"], *lines["last"])
+    return PhysicsLines(tuple(dict.fromkeys(uses)), tuple(blocks), tuple(lines["command"]), force, tuple(lines["reading"]))

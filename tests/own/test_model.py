@@ -160,7 +160,7 @@ def test_an_own_term_stands_beside_those_of_the_library(config_file):
     ("old", "new", "message"),
     [
         ("MY_TERM = Term", "TERM = Term", "there is no term MY_TERM; did you mean ./my_term.py:TERM"),
-        ('act={"force"', 'act={"push"', "there is no site 'push'; it is command, force, reading"),
+        ('act={"force"', 'act={"push"', "there is no site 'push'; it is command, force, last, reading"),
         ('("reel1", ', '("reel7", ', "the ivu has no node 'reel7'; did you mean 'reel"),
         ('"axis": (', '"axes": (', "there is no plant 'axes'; there is ivu, ldu, axis"),
         ("    node: str\n", "", "MyTermSettings has no key `node`"),

@@ -64,6 +64,7 @@ def run(q, z, p, s, volts, substeps, x, y):
                 m.u[c] = m.volts[c]
             linear.midpoint(m)
             force(q, z, m)
+            last(q, z, m)
             linear.advance(m)
         {read}
         reading(q, z, m)

@@ -81,6 +81,23 @@ def test_gain_falls_as_it_warms_and_comes_back():
     assert drive_dynamics.thermal_friction(p, s, 3.0) == 3.0  # that of a drive leaves friction alone
 
 
+@pytest.mark.parametrize(
+    ("form", "left"), [("exponential", math.exp(-0.5)), ("linear", 0.5), ("hyperbolic", 1.0 / 1.5)]
+)
+def test_what_is_left_of_a_warm_drive_by_the_form_of_the_loss(form, left):
+    def gain(a: float, volts: float = 2.0) -> float:
+        p = build_thermal(ThermalSettings(node="drive", a=a, tau=2.0, V_ref=2.0, form=form), 1e-2)
+        s = zeros(drive_dynamics.THERMAL_STATE)
+        for _ in range(4000):
+            u = np.array([volts])
+            drive_dynamics.thermal_gain(p, s, u)
+        return u[0] / volts
+
+    assert gain(0.5) == pytest.approx(left, rel=1e-6)
+    assert gain(0.01) == pytest.approx(0.99, rel=1e-3)  # of a small loss the form says nothing
+    assert 0.0 < gain(2.0, 20.0) < 0.1  # however warm, it never pushes back
+
+
 def test_friction_falls_at_a_motor_and_its_gain_stays():
     p, s = warm("motor2")
     for _ in range(200):

@@ -6,18 +6,21 @@ import stand
 
 from rtctl.idiom import tick
 from rtctl.plants import ivu, linear
-from rtctl.plants.physics import TERMS, geometry
+from rtctl.plants.physics import TERMS, geometry, ripple_tape
+
+ROUND = ripple_tape.build_reel(ripple_tape.ReelSettings(node="reel2", e=0.0), 5e-4)
 
 
 @tick
-def wind(p, s, volts, substeps, x):
-    """The plant with its own radii that follow the tape."""
+def wind(p, s, volts, substeps, x, reel):
+    """The plant with its own radii that follow the tape, and a second reel out of round."""
     m = s.m
     for k in range(volts.shape[0]):
         for _ in range(substeps):
             m.u[0], m.u[1] = volts[k, 0], volts[k, 1]
             linear.midpoint(m)
             ivu.follow_tape(p, s)
+            ripple_tape.reel(reel, m, ivu.REEL2)
             linear.advance(m)
         for i in range(m.x.shape[0]):
             x[k, i] = m.x[i]
@@ -39,7 +42,7 @@ def test_both_reels_are_the_plant_with_a_thickness(d, radii, within):
     base = stand.run("ivu", [], u, d_tape=0.0, **radii).x
     p, s = stand.plant("ivu", 5e-4, d_tape=d, **radii)
     expected = np.zeros_like(got)
-    wind(p, s, u, 4, expected)
+    wind(p, s, u, 4, expected, ROUND)
     assert np.abs(expected[:, :5]).max(axis=0).min() > 3 * 2 * np.pi
     change = np.abs(expected - base)[:, :5].max(axis=0)
     assert (change > 0.1).all()
@@ -57,7 +60,7 @@ def test_of_one_tape_both_reels_grow(node):
 
 def test_the_plant_tells_the_tension_on_its_true_radius():
     p, s = stand.plant("ivu", 2.5e-4, d_tape=1e-3)
-    wind(p, s, volts(600), 8, np.zeros((600, 14)))
+    wind(p, s, volts(600), 8, np.zeros((600, 14)), ROUND)
     linear.midpoint(s.m)
     ivu.follow_tape(p, s)
     ivu.tensions(p, s)
@@ -81,10 +84,26 @@ def test_an_empty_reel_gets_no_smaller():
     _, s = stand.plant("ivu", 2.5e-4, d_tape=0.0)
     p = geometry.build_radius_change(geometry.RadiusChangeSettings(node="reel1", d=1e-3), 2.5e-4)
     s.m.qm[ivu.REEL1], s.m.qm[ivu.CAPSTAN] = -500.0, -500.0 * 0.02 / 0.0125
-    geometry.radius_change(p, s.m, ivu.REEL1)
+    geometry.wind(p, s.m, ivu.REEL1)
     wound = (linear.tension(s.m, 0) / 450.0) + 0.0125 * s.m.qm[ivu.CAPSTAN]
     turns = (0.038 - 0.02) / (1e-3 / (2 * np.pi))
     assert wound == pytest.approx(-(0.029 * turns + 0.02 * (500.0 - turns)))
+
+
+def test_a_ripple_pulls_at_the_radius_and_turns_the_inertia_that_the_reel_has():
+    """Left to itself the ripple would pull at the radius and turn the inertia of the machine at its start: that was off
+    by three times what it does."""
+    ripple = stand.make("ripple.reel", "ivu", "reel2", e=4e-4, phi=0.3)
+    tape = stand.make("geometry.radius_change", "ivu", "reel2", d=5e-4, other=1.0)
+    u, own = volts(), []
+    for e in (0.0, 4e-4):
+        p, s = stand.plant("ivu", 5e-4, d_tape=5e-4, R1=0.035, R2=0.028)
+        own.append(np.zeros((len(u), 14)))
+        wind(p, s, u, 4, own[-1], ripple_tape.build_reel(ripple.model_copy(update={"e": e}), 5e-4))
+
+    runs = [stand.run("ivu", terms, u, d_tape=0.0, R1=0.035, R2=0.028).x for terms in ([tape], [tape, ripple])]
+    expected, got = ((two - one)[:, :5] for one, two in (own, runs))
+    assert np.abs(got - expected).max() < 0.4 * np.abs(expected).max()
 
 
 def test_what_a_reel_winds_is_there_before_anything_asks_for_its_tension():
