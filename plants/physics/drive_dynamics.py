@@ -75,8 +75,8 @@ def lag(p, s, u):
 
 
 class ThermalSettings(Settings):
-    """a is the size: exp(-a) of the gain, or of the friction, is left after a long time at V_ref; little differs by form
-    where little is lost."""
+    """a is the size: exp(-a) of the gain, or of the friction, is left after a long time at V_ref. Where little is lost
+    the forms are alike."""
 
     term: Literal["drive.thermal"] = "drive.thermal"
     node: Node

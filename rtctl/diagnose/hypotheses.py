@@ -179,6 +179,7 @@ FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in 
     "drive.supply_sag": ("form", ("current", "power", "drawn")),
     "drive.deadband": ("form", ("shift", "cut", "floor")),
     "load.bump": ("form", ("drag", "hill", "push")),
+    "drive.thermal": ("form", ("exponential", "linear", "hyperbolic")),
 }
 BEYOND: dict[str, tuple[Part, ...]] = {  # what has no name in the table, looked for where a name may stand for it
     "friction.quadratic": (Size("Q", "drag2", 0.1),),

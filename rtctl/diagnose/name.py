@@ -88,7 +88,7 @@ def search(
         if level == 0:
             first, candidates = tuple(scores), best_starts(scores)
             quiet = base.rms < QUIET * problem.floor
-            if not quiet and (sure or not full or not enough(full[0])):
+            if not quiet and not (full and not sure and enough(full[0]) and worth(base, full[0])):
                 progress("looking for resonances")
                 full = sorted([*full, *resonances(problem, base, scores)], key=absurd_last)
             if base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):

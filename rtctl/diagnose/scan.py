@@ -23,21 +23,22 @@ from rtctl.diagnose.space import Hypothesis
 TERM = "structure.resonance"
 STEP = 1.2  # between frequencies: with this damping a fit finds the way from half of it
 HEAVY, BROAD = 0.25, 0.05  # of a tenth of the machine's inertia; damping ratio
-NODES = {"ldu": 1, "ivu": 3, "axis": 1}  # that are looked at
+FASTEST = 0.2  # of the rate of the record: above it a part on a spring only shows as more inertia
 ROUGH, FULL = 4, 2  # rounds of a rough fit, full fits
 SLACK, ELSEWHERE, DEEP = "tape.slack", 32, 3  # values tried all over their tolerance, and full fits
 INSIDE = 0.9  # of the tolerance
 
 
 def resonances(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
-    """Full fits with a resonance on top of `base`, from the frequencies that do best in a rough one; at the usual nodes
-    first, then in the order of the screening."""
+    """Full fits with a resonance on top of `base`, from the frequencies that do best in a rough one: at every node of
+    the reel unit, whose reels shake beside their motors, else at the usual one."""
     plant = problem.sim.record.plant
     nodes: dict[str, Hypothesis] = {}
-    for score in sorted(scores, key=lambda s: (plant, s.hypothesis.node) not in USUAL):
-        if score.hypothesis.term == TERM:
-            nodes.setdefault(score.hypothesis.node, score.hypothesis)
-    rough = [trial for h in list(nodes.values())[: NODES[plant]] for trial in _tried(problem, base, h)]
+    for score in scores:
+        h = score.hypothesis
+        if h.term == TERM and (plant == "ivu" or (plant, h.node) in USUAL):
+            nodes.setdefault(h.node, h)
+    rough = [trial for h in nodes.values() for trial in _tried(problem, base, h)]
     best = sorted(rough, key=lambda f: f.merit)[:FULL]
     return [fit(problem, f.space, f.x, rounds=16, J=f.J) for f in best]
 
@@ -48,7 +49,8 @@ def _tried(problem: Problem, base: Fit, h: Hypothesis) -> list[Fit]:
     place = {c.name: i for i, c in enumerate(h.coordinates)}
     f, zeta = (h.coordinates[place[name]] for name in ("f_Hz", "zeta"))
     fits = []
-    for at in np.arange(f.low, f.high, np.log(STEP)):
+    fastest = np.log(FASTEST / problem.sim.record.dt / f.scale)
+    for at in np.arange(f.low, min(f.high, fastest), np.log(STEP)):
         x = h.start()
         x[place["mass"]], x[place["f_Hz"]], x[place["zeta"]] = HEAVY, at, np.log(BROAD / zeta.scale)
         start = np.concatenate([base.x, x])

@@ -196,4 +196,6 @@ def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
                 )  # fmt: skip
                 lines[site] += line.split("\n")
     force = (*lines["force"], *lines["last"])
-    return PhysicsLines(tuple(dict.fromkeys(uses)), tuple(blocks), tuple(lines["command"]), force, tuple(lines["reading"]))
+    return PhysicsLines(
+        tuple(dict.fromkeys(uses)), tuple(blocks), tuple(lines["command"]), force, tuple(lines["reading"])
+    )
