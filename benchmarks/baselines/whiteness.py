@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from baselines.form import diagnosis
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 from rtctl.diagnose.decide import COMPLETE
-from rtctl.diagnose.fit import Fit, Problem, fit
+from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.model import free_parameters, owner_model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Space
 

@@ -7,9 +7,10 @@ some sticking. A name that gives way to such a law is not to be told.
 from collections.abc import Callable
 
 from rtctl.diagnose import decide
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.name import dropped, look_alikes, polish
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.screen import screen
 
 IMITATED = {  # by which names of the table

@@ -14,12 +14,13 @@ from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Evidence, Interval
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet, with_fewer
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.name import names
 from rtctl.diagnose.predict import Shown, cut_of, predicted
 from rtctl.diagnose.preflight import Preflight, preflight
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import awake
 from rtctl.diagnose.simulate import Simulator

@@ -11,7 +11,8 @@ Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Ec
 import numpy as np
 from scipy.stats import chi2, norm
 
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import COSINE, SHAPE, SIZE, Hypothesis
 from rtctl.diagnose.stretches import memory, rms
 from rtctl.plants.physics import TERMS

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import NoAnswer
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.kernel import CLOSED, TRACK
 from rtctl.diagnose.law import LawParams
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.motions import MENU, Limits, Motion
 from rtctl.diagnose.numbers import nice
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SHARE, Simulator, resolution
 from rtctl.diagnose.words import at

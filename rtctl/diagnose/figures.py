@@ -17,12 +17,12 @@ from scipy.stats import chi2
 
 from rtctl.diagnose import turn, words
 from rtctl.diagnose.diagnosis import Diagnosis
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.heldout import mode_of
 from rtctl.diagnose.hints import ORDERS, spectrum
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.missing import BLOCK, Missing, binned, observe, speed
 from rtctl.diagnose.model import FITTED, Model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 

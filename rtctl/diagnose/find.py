@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from rtctl.diagnose import beyond, decide
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
@@ -22,6 +22,7 @@ from rtctl.diagnose.name import (
     rivals,
     search,
 )
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.verdict import Alternative, standing

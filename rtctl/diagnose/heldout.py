@@ -14,11 +14,12 @@ import numpy as np
 
 from rtctl.diagnose.decide import better
 from rtctl.diagnose.edges import Edges
-from rtctl.diagnose.fit import EDGE, Fit, Problem, fit
+from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.name import enrich
+from rtctl.diagnose.problem import EDGE, Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.stretches import rms

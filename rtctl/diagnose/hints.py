@@ -11,8 +11,8 @@ squares on cosine and sine of the angle, since angles are not evenly sampled.
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rtctl.diagnose.fit import settled
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.problem import settled
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import TRACK, Simulator, per_unit, resolution
 

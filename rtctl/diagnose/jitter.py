@@ -17,8 +17,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm
 
-from rtctl.diagnose.fit import Problem, means
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.problem import Problem, means
 from rtctl.diagnose.simulate import Simulator, resolution
 
 FAST = 0.7  # counts a tick: slower, the cut into counts is no white noise

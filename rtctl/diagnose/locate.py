@@ -7,10 +7,11 @@ disturbance observer sees it, repeats itself best, and the node is where a push 
 import numpy as np
 
 from rtctl.diagnose.diagnosis import Located
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hints import ORDERS, observe, spectrum
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.name import Search
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator, per_unit
 from rtctl.diagnose.stands import MOSTLY, stands
 from rtctl.plants.physics import TERMS

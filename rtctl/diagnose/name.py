@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose import decide
-from rtctl.diagnose.fit import Fit, Problem, fit, jacobian
+from rtctl.diagnose.fit import Fit, fit, jacobian
 from rtctl.diagnose.hypotheses import HINTED, as_harmonic, forms, moved_into, richer, rounded
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.scan import resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space

@@ -12,9 +12,10 @@ import numpy as np
 from rtctl.diagnose import decide, heldout
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
 from rtctl.diagnose.find import Found
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SLIPS, Simulator
 from rtctl.diagnose.verdict import CLOSED_BY_SEVERAL, LOST, TELLING, Verdict, judged, proven, with_known

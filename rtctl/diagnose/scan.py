@@ -15,8 +15,9 @@ from functools import partial
 import numpy as np
 from scipy.stats import qmc
 
-from rtctl.diagnose.fit import Fit, Problem, fit, jacobian, parallel
+from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import USUAL
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.screen import Score
 from rtctl.diagnose.space import Hypothesis
 

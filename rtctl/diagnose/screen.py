@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.fit import Fit, Problem, bounded_step, parallel, trust
+from rtctl.diagnose.fit import Fit, bounded_step, parallel, trust
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import INVERSE, Hypothesis
 
 TRIES = 3

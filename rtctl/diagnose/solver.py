@@ -1,8 +1,8 @@
 """Whether the simulation itself is to be trusted: the same model at half the step. A solver's error once looked like a
 delay."""
 
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.stretches import rms
 
 LOUD = 0.5  # of the noise floor

@@ -12,8 +12,8 @@ from copy import copy
 
 import numpy as np
 
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import per_unit
 
 MOTORS = ("motor1", "motor2")

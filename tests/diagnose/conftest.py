@@ -13,11 +13,12 @@ from threadpoolctl import threadpool_limits
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.decide import complete, worth
-from rtctl.diagnose.fit import Fit, Problem
+from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.name import Search, search
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, check
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS

@@ -5,7 +5,7 @@ import pytest
 
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.decide import complete
-from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 
 

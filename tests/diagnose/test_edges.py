@@ -6,9 +6,9 @@ import pytest
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.edges import alike, directions, edges
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS

@@ -6,9 +6,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from rtctl.diagnose.fit import Fit, Problem, bounded_step, fit, jacobian, main_channels, parallel, settled, trust
-from rtctl.diagnose.kernel import TRACK
+from rtctl.diagnose.fit import Fit, bounded_step, fit, jacobian, parallel, trust
 from rtctl.diagnose.model import free_parameters, owner_model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
 
 TRUE = {"M": 100.0, "F_v": 180.0, "F_c": 22.0}
@@ -181,14 +181,6 @@ def test_a_column_that_hardly_matters_is_kept(exact):
     np.testing.assert_array_equal(again[:, [0, 2, 3, 4]], old[:, [0, 2, 3, 4]])
 
 
-def test_weights_weigh_errors_and_multiply(exact):
-    problem, model = Problem(exact.sim), owners(exact.record).owner
-    r = problem.residual(model)
-    w = np.linspace(0.1, 1.0, len(r))
-    np.testing.assert_allclose(problem.weighed(w).weighed(w).residual(model), w * w * r)
-    np.testing.assert_array_equal(problem.residual(model), r)
-
-
 def test_a_fit_that_is_given_up_ends_there(exact):
     seen = []
     fit(Problem(exact.sim), owners(exact.record), give_up=lambda cost: seen.append(cost) or True)
@@ -215,39 +207,6 @@ def test_every_further_number_of_a_term_costs_something(fitted):
 def test_errors_of_a_model_that_lacks_something_weigh_less_against_the_owner():
     assert trust(np.full(10, 0.5)) == trust(np.ones(10))
     assert trust(np.full(10, 3.0)) == pytest.approx(9.0 * trust(np.ones(10)))
-
-
-def test_a_model_that_runs_away_is_a_large_but_finite_error(plain):
-    problem = Problem(plain.sim)
-    r = problem.residual(plain.model.change(k=-1e9))
-    assert np.isfinite(r).all()
-    assert np.abs(r).max() > 1e5
-
-
-def test_rows_that_count_begin_once_the_machine_has_moved(plain):
-    first = settled(plain.sim)
-    seen = plain.sim.seen
-    assert abs(seen[first] - seen[0]) > 0.01 * np.ptp(seen)
-    assert first <= len(seen) // 5
-    problem = Problem(plain.sim, stop=2000)
-    assert len(problem.residual(plain.model)) == (2000 - first) // problem.mean
-    assert Problem(plain.sim, stop=2000, mean=4).residual(plain.model).shape == ((2000 - first) // 4,)
-
-
-def test_an_error_is_reading_less_simulation_by_half_a_step(plain):
-    problem = Problem(plain.sim, mean=1)
-    out = plain.sim.run(plain.model, TRACK)[:, 0]
-    wanted = ((plain.record.y["x"] - out) / 1e-6)[problem.rows]
-    np.testing.assert_allclose(problem.error(plain.model)[:, 0], wanted, rtol=1e-9, atol=1e-9)
-
-
-def test_what_cannot_tell_direction_is_not_fitted():
-    class Told:
-        channels = ("capstan_counts", "reel1_counts", "reel2_counts")
-
-    assert main_channels(Told()) == [0]  # type: ignore[arg-type]
-    Told.channels = ("encoder_counts", "scale_counts")  # type: ignore[assignment]
-    assert main_channels(Told()) == [0, 1]  # type: ignore[arg-type]
 
 
 def test_jobs_side_by_side_come_back_in_their_order():

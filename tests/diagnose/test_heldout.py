@@ -5,11 +5,12 @@ import pytest
 
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import NoLaw
-from rtctl.diagnose.fit import Problem, fit
+from rtctl.diagnose.fit import fit
 from rtctl.diagnose.heldout import free_fit, mode_of, nrmse, refit, rms
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 
 

@@ -13,12 +13,13 @@ import pytest
 from rtctl.diagnose import chain, heldout
 from rtctl.diagnose import find as finding
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.fit import Fit, Problem, fit
+from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.hypotheses import hypotheses, richer
 from rtctl.diagnose.kernel import CLOSED, OPEN
 from rtctl.diagnose.measure import compare
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.preflight import preflight
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import upto
 from rtctl.diagnose.simulate import Simulator

@@ -8,10 +8,10 @@ import pytest
 from rtctl.diagnose import scan
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scan import SLACK, TERM, resonances, slack
 from rtctl.diagnose.screen import screen

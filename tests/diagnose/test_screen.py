@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.screen import screen
 from rtctl.diagnose.space import INVERSE, SIZE, Coordinate, Hypothesis
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.hints import grips
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.model import owner_model, plant_params
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator, channels, gear, lever, per_unit, pushes, resolution, rigid_gain
 from rtctl.idiom import tick

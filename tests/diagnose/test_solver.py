@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rtctl.diagnose.fit import Problem
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.solver import finding, step_error
 
 

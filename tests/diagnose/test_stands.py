@@ -5,9 +5,9 @@ import pytest
 
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.fit import Problem
 from rtctl.diagnose.kernel import CLOSED, OPEN
 from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator, gear
 from rtctl.diagnose.stands import stands

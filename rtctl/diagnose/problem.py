@@ -1,0 +1,207 @@
+"""A recording as a fit sees it: the errors of a simulation that follows it, what they weigh, what noise leaves of them.
+
+Source: Ljung, System Identification (1999), ch. 7 for the prediction error in closed loop.
+"""
+
+from collections.abc import Sequence
+from copy import copy
+
+import numpy as np
+
+from rtctl.diagnose.edges import Edges, alike, edges
+from rtctl.diagnose.hiss import is_hiss
+from rtctl.diagnose.kernel import TRACK
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.rest import shares
+from rtctl.diagnose.simulate import Simulator, resolution
+from rtctl.diagnose.stretches import loudness, rms
+
+EDGE = 0.6  # of an edge's sigma, on quiet machines
+EDGES = 0.5  # share of the main sensor's rows that all edges count for: they are few, but each is worth many rows
+FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # of SIGMA, on quiet machines
+RECTIFIED = ("reel1_counts", "reel2_counts")
+FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
+LOUDEST = 20.0  # times the floor, of what random forces leave
+EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond which that has to have their very pattern
+SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
+MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
+FORGOTTEN = 4.0  # the same, after which errors no longer go together
+FORGET = 8.0  # over the bandwidth of the correction
+SIGMA = {"encoder": 0.4, "scale": 0.5}  # counts: what quantisation and a quiet machine leave
+
+
+class Problem:
+    """A recording, how its errors are weighed, and the rows that count.
+
+    Errors are those of the sensors that know direction, averaged over `mean` ticks, sensor by sensor, and between them,
+    in the order of time, those of the edges that reels were seen at.
+    """
+
+    def __init__(
+        self,
+        sim: Simulator,
+        stop: int | None = None,
+        channels: Sequence[int] | None = None,
+        mean: int | None = None,
+        edges: Sequence[Edges] = (),
+    ):
+        self.sim = sim
+        self.rows = slice(settled(sim), stop)
+        self.mean = max(1, round(MEAN / sim.record.dt)) if mean is None else mean  # ticks averaged into one error
+        self.channels = list(channels if channels is not None else main_channels(sim))
+        seen = np.stack([sim.record.y[sim.channels[c]] + sim.half for c in self.channels], axis=1)
+        self.target = means(seen[self.rows], self.mean)
+        self.sigma = np.array([_sigma(sim, c) for c in self.channels])
+        self.n = len(seen) if stop is None else stop
+        self.edges = tuple(e.between(self.rows.start, self.n) for e in edges)
+        ticks = np.tile(self.rows.start + self.mean * np.arange(len(self.target)), len(self.channels))
+        rows = np.concatenate([ticks, *(e.rows for e in self.edges)])
+        self.order = np.argsort(rows, kind="stable") if self.edges else np.arange(len(rows))
+        self.time_rows = rows[self.order]  # of each error
+        sizes = [len(self.target)] * len(self.channels) + [len(e.rows) for e in self.edges]
+        self.source = np.repeat(np.arange(len(sizes)), sizes)[self.order]  # number of the sensor that it is of
+        few = sum(len(e.rows) for e in self.edges)
+        self.balance = float(np.sqrt(EDGES * len(self.target) / few)) if few else 1.0  # what an edge counts for
+        grain = resolution(sim.record) if sim.record.plant == "axis" else 1.0
+        share = shares(sim.seen[: self.n], grain, self.block * self.mean)[self.time_rows]
+        self.moves = share == 1.0  # (errors,): the machine does
+        self.weights = np.sqrt(share / share.mean())
+        self.louder = 1.0  # than a quiet machine, as far as is known
+
+    def seen_by(self, model: Model) -> "Problem":
+        """The same with the edges of counters that cannot tell direction, which the model tells; there must be no
+        weights yet."""
+        stop = None if self.n == len(self.sim.seen) else self.n
+        return Problem(self.sim, stop, self.channels, self.mean, self._told(model))
+
+    def agrees(self, model: Model) -> bool:
+        """Whether the model tells the directions of the reels' counts as they were taken."""
+        return alike([e.between(self.rows.start, self.n) for e in self._told(model)], self.edges)
+
+    def _told(self, model: Model) -> list[Edges]:
+        """The reels' edges of the whole record as the model tells their directions, where it does."""
+        names = {c: name for c, name in enumerate(self.sim.channels) if name in RECTIFIED}
+        out = self.sim.run(model, directed=True) if names else np.empty((0, 0))
+        found = []
+        for c, name in names.items():  # a reel follows the capstan that was seen, not the one that was simulated
+            gear = float(np.polyfit(out[:, 0], out[:, c], 1)[0]) if np.isfinite(out).all() else np.nan
+            found.append(edges(self.sim.record.y[name], out[:, c] + gear * (self.sim.seen - out[:, 0]), c))
+        return [e for e in found if e is not None]
+
+    def of(self, sim: Simulator) -> "Problem":
+        """The same of another simulator of the recording."""
+        other = copy(self)
+        other.sim = sim
+        return other
+
+    def weighed(self, weights: np.ndarray) -> "Problem":
+        """The same with a further weight for each error."""
+        other = copy(self)
+        other.weights = self.weights * weights
+        return other
+
+    @property
+    def main_floor(self) -> float:
+        """Weighted rms of the error where nothing is missing, of the sensors that know direction: what counts leave,
+        and a machine that is never quiet."""
+        share = [FLOOR.get(self.sim.channels[c], 0.0) for c in self.channels]
+        if not any(share):
+            return FINEST * self.louder
+        mean = 0.62 if self.mean > 1 else 1.0
+        return self.louder * mean * rms(np.array(share))
+
+    @property
+    def floor(self) -> float:
+        """The same of all errors."""
+        known = len(self.target) * len(self.channels)
+        power = known * self.main_floor**2 + (len(self.order) - known) * (EDGE * self.balance * self.louder) ** 2
+        return float(np.sqrt(power / len(self.order)))
+
+    def error(self, model: Model, coarse: bool = False) -> np.ndarray:
+        """Readings less simulation by their noise (rows, channels), without a constant offset of a second sensor."""
+        return self._error(self.sim.run(model, TRACK, self.n, coarse))
+
+    def _error(self, out: np.ndarray) -> np.ndarray:
+        e = (self.target - means(out[:, self.channels][self.rows], self.mean)) / self.sigma
+        e[:, 1:] -= e[:, 1:].mean(axis=0)
+        return e
+
+    def residual(self, model: Model, coarse: bool = False, at: str = "") -> np.ndarray:
+        """All errors as one row of numbers; 1e6 where the model runs away. `at`: the body that is pushed to keep it on
+        track, in place of the drives."""
+        out = self.sim.run(model, TRACK, self.n, coarse, directed=bool(self.edges), at=at)
+        e = np.concatenate([self._error(out).T.ravel(), *(self.balance * reel.error(out) for reel in self.edges)])
+        return np.nan_to_num(e, nan=1e6, posinf=1e6, neginf=-1e6).clip(-1e6, 1e6)[self.order] * self.weights
+
+    def beside(self, values: np.ndarray) -> np.ndarray:
+        """Values of the sensors that know direction, sensor by sensor, in the order of the errors; 0 for edges."""
+        return np.concatenate([values, np.zeros(len(self.order) - len(values))])[self.order]
+
+    def by_sensor(self, r: np.ndarray) -> dict[str, np.ndarray]:
+        """The errors of a residual r by the sensor they are of, in the order of time; the main one is first."""
+        scales = [1.0] * len(self.channels) + [self.balance] * len(self.edges)
+        names = [self.sim.channels[c] for c in (*self.channels, *(reel.channel for reel in self.edges))]
+        return {name: r[self.source == i] / scale for i, (name, scale) in enumerate(zip(names, scales, strict=True))}
+
+    def loudness(self, r: np.ndarray) -> np.ndarray:
+        """Rms of the errors of a residual r in the stretch that each lies in, sensor by sensor."""
+        out = np.empty_like(r)
+        for sensor in np.unique(self.source):
+            out[self.source == sensor] = loudness(r[self.source == sensor])
+        return out
+
+    def at_rows(self, channel: str, errors: np.ndarray) -> np.ndarray:
+        """The errors of a sensor at the rows of those that know direction, where they are of edges."""
+        for reel in self.edges:
+            if self.sim.channels[reel.channel] == channel:
+                rows = self.rows.start + self.mean * np.arange(len(self.target))
+                return np.interp(rows, reel.rows, errors)
+        return errors
+
+    @property
+    def block(self) -> int:
+        """Errors after which a model on track has forgotten."""
+        return max(2, round(FORGOTTEN / (self.sim.follow * self.sim.record.dt * self.mean)))
+
+    def hiss(self, r: np.ndarray) -> bool:
+        """Whether the errors r of a fit are what random forces leave."""
+        main, *others = self.by_sensor(r).values()
+        moves = self.moves[self.source == 0]
+        main = main[moves] if moves.any() else main
+        loud = rms(main) / self.main_floor
+        if loud > LOUDEST or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :]):
+            return False
+        exact = loud > EXACTLY[self.sim.record.plant]
+        return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.main_floor, exact)
+
+
+def means(x: np.ndarray, count: int) -> np.ndarray:
+    """Means over `count` rows each, the rest left out."""
+    if count == 1:
+        return x
+    keep = len(x) // count * count
+    out = x[0:keep:count].copy()
+    for k in range(1, count):
+        out += x[k:keep:count]
+    return out / count
+
+
+def settled(sim: Simulator) -> int:
+    """First row whose error counts: the machine has moved and forgotten how it stood before the recording began."""
+    y = sim.seen
+    moved = int(np.argmax(np.abs(y - y[0]) > 0.01 * np.ptp(y)))
+    return min(moved + round(FORGET / sim.follow / sim.record.dt), len(y) // 5)
+
+
+def main_channels(sim: Simulator) -> list[int]:
+    """Sensors that know direction: rectified counters lose the way at every turn."""
+    return [i for i, name in enumerate(sim.channels) if not name.startswith("reel")]
+
+
+def _sigma(sim: Simulator, channel: int) -> float:
+    name = sim.channels[channel]
+    if name == "scale_counts":
+        return SIGMA["scale"]
+    if name.endswith("counts"):
+        return SIGMA["encoder"]
+    return 0.5 * resolution(sim.record)
