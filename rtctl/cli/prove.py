@@ -17,6 +17,7 @@ def prove(
         "ivu,ldu,axis"
     ),
     jobs: Annotated[int, typer.Option(metavar="N", min=1, help="Processes side by side.")] = 1,
+    limit: Annotated[str, typer.Option("--limit", metavar="T", help="Longest time for a case, e.g. 600s.")] = "600s",
     generate_only: Annotated[bool, typer.Option("--generate-only", help="Write and seal the cases; stop.")] = False,
     heldout: Annotated[bool, typer.Option("--heldout", help="Record each machine a second time as well.")] = False,
     json_: Annotated[bool, typer.Option("--json", help="Print the scores as JSON.")] = False,
@@ -34,8 +35,10 @@ def prove(
     """
     import json
 
+    from rtctl.cli import common
     from rtctl.proof import prove as proof
 
+    longest = common.seconds(limit, "--limit")
     which = tuple(p.strip() for p in plants.split(",") if p.strip())
     sha = proof.prepare(out, count, seed, which, jobs, heldout, lambda n, of: _note("generated", n, of))
     typer.echo(f"{count} cases in {out}, answers sealed: sha256 {sha}", err=True)
@@ -43,7 +46,7 @@ def prove(
         if json_:
             typer.echo(json.dumps({"folder": str(out), "cases": count, "seed": seed, "sha256": sha}))
         return
-    proof.diagnose_all(out, jobs, lambda n, of: _note("diagnosed", n, of))
+    proof.diagnose_all(out, jobs, lambda n, of: _note("diagnosed", n, of), limit=longest)
     result = proof.score_all(out)
     if json_:
         typer.echo(json.dumps(result, sort_keys=True))

@@ -1,6 +1,7 @@
 """The whole proof with a diagnosis that is made up: goes on where it stopped, survives failures, keeps the seal."""
 
 import json
+from threading import Event
 
 import pytest
 from typer.testing import CliRunner
@@ -50,6 +51,17 @@ def test_diagnoses_once_and_scores(folder):
     assert "no such column" in (folder / "case-0002" / "diagnosis" / prove.FAILED).read_text()
     assert json.loads((folder / prove.SCORES).read_text())["single"]["top1"] == 1.0
     assert "Concealed cases" in (folder / prove.REPORT).read_text()
+
+
+def endless(task, report):
+    """Never done."""
+    Event().wait()
+
+
+def test_a_case_that_takes_too_long_is_written_down_with_what_would_help(folder):
+    prove.diagnose_all(folder, work=endless, limit=0.2)
+    failed = (folder / "case-0001" / "diagnosis" / prove.FAILED).read_text()
+    assert "not done within --limit 0.2 s" in failed
 
 
 def test_a_broken_seal_stops_the_scoring(folder):
