@@ -26,6 +26,7 @@ STARTS = 3  # of one hypothesis that later rounds try
 ORDERS = {"ripple.cogging": 6}  # more of them: of orders that pass slowly at a few places only, a look shows little
 MOST = 3  # terms at once
 ROUGH = 4  # rounds of a rough fit
+RICHER, LIKELY = 3.0, 4  # times the best cost, up to which models are tried in richer forms, and how many of them
 
 
 class Breadth(NamedTuple):
@@ -38,6 +39,7 @@ class Breadth(NamedTuple):
 
 
 ROUNDS = (Breadth(14, 5, 2, 3), Breadth(9, 4, 0, 2), Breadth(7, 3, 0, 2))
+ALIKE = 1.01  # times the cost: the same terms at other nodes do the same
 QUIET = 1.2  # times the noise floor: a heavy resonance leaves more
 QUICK = Breadth(8, 2, 0, 2)  # where the model is already down to the noise
 
@@ -134,7 +136,7 @@ def grow(
                 likely.append(trial)
             if names(trial) not in rough or trial.cost < rough[names(trial)].cost:
                 rough[names(trial)] = trial
-    ranked = sorted(rough.values(), key=lambda f: f.merit)[: breadth.full]
+    ranked = various(sorted(rough.values(), key=lambda f: f.merit), breadth.full)
     if not ranked:
         return [], first
     progress("fitting " + ", ".join(" + ".join(names(f)) for f in ranked[:3]))
@@ -147,11 +149,29 @@ def grow(
         if names(fitted) not in fits or fitted.cost < fits[names(fitted)].cost:
             fits[names(fitted)] = fitted
     full = sorted(fits.values(), key=absurd_last)
-    near, rest = full[: breadth.keep], full[breadth.keep :]
+    near = [f for i, f in enumerate(full) if i < breadth.keep or f.cost < RICHER * full[0].cost]
+    near = various(near, max(breadth.keep, LIKELY))
+    rest = [f for f in full if not any(f is n for n in near)]
     near = [whole_orders(problem, polish(problem, f)) if f.cost < 6 * near[0].cost else f for f in near]
     loud = decide.COMPLETE * problem.floor
     near = [enrich(problem, f, decide.better) if f.rms > loud else f for f in near]
     return sorted([*near, *rest], key=absurd_last), first
+
+
+def various(ranked: Sequence[Fit], count: int) -> list[Fit]:
+    """The first `count` that are not the same terms doing the same at other nodes; those only of the very first."""
+    kinds: list[tuple[list[str], float]] = []
+    out = []
+    for trial in ranked:
+        terms = sorted(h.term for h in trial.space.hypotheses)
+        same = [i for i, (other, cost) in enumerate(kinds) if other == terms and trial.cost < ALIKE * cost]
+        if not same:
+            if len(kinds) == count:
+                break
+            kinds.append((terms, trial.cost))
+        if not same or same[0] == 0:
+            out.append(trial)
+    return out
 
 
 def absurd_last(fitted: Fit) -> tuple[bool, float]:

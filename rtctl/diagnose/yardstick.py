@@ -8,6 +8,8 @@ from rtctl.diagnose.scales import Scales
 from rtctl.diagnose.simulate import per_unit, resolution
 from rtctl.plants.physics import TERMS
 
+LITTLE = 0.05  # of the command of all drives: one that does less has no measure of its own
+
 
 class Measures:
     """What a size or a shape is measured by, at a node."""
@@ -50,7 +52,7 @@ class Measures:
             "hertz": 1.0,
             "tick": self.record.dt,
             "duration": len(self.record.t) * self.record.dt,
-            "volts": volts,
+            "volts": max(self.volts(node), LITTLE * volts),
             "grain": resolution(self.record) * s.span / (self.scales.get("encoder") or self.scales["sensor"]).span,
             "counts": 1.0 / per_unit(self.record.case)[-1 if node == "scale" else 0],
             "per_volt": 1.0 / volts,
@@ -58,6 +60,12 @@ class Measures:
             "peak": float(np.abs(self.record.u).max()),
         }
         return table[measure]
+
+    def volts(self, node: str) -> float:
+        """Rms command of the drive that the node names, or of all."""
+        u = self.record.u
+        one = u[:, int(node[-1]) - 1] if node[-1].isdigit() and u.shape[1] > 1 else u
+        return float(np.sqrt(np.mean(one**2)))
 
     def dry(self, node: str) -> float:
         """Dry friction of the base at a node, in its own unit."""
