@@ -19,6 +19,7 @@ CARRIAGE = 0
 NODES = {"carriage": CARRIAGE}
 LINKS = {"carriage": 0}  # the spring to the frame
 DRIVES = {"drive": 0}
+RUBS = {"drive": CARRIAGE}  # where the dry friction is that a drive works against
 SENSORS = {"sensor": 0}
 NQ, NU, NX = 1, 1, 2
 

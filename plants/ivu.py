@@ -30,6 +30,7 @@ MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 = range(5)
 NODES = {"motor1": MOTOR1, "reel1": REEL1, "capstan": CAPSTAN, "reel2": REEL2, "motor2": MOTOR2}
 LINKS = {"tape1": 0, "tape2": 1, "motor1": 2, "motor2": 3}  # the tapes, and the shaft behind each motor
 DRIVES = {"drive1": 0, "drive2": 1}
+RUBS = {"drive1": MOTOR1, "drive2": MOTOR2}  # where the dry friction is that a drive works against
 SENSORS = {"encoder": 0, "reel1": 1, "reel2": 2}
 NQ, NU, NX = 5, 2, 14  # five rotations and their speeds, two states of each motor driver
 RELINEARISE = 5e-3  # of a radius: the explicit correction forces stay a hundred times below the linear ones

@@ -32,6 +32,7 @@ LINKS = {
     "encoder": 2,
 }  # the shaft between motor and wheel, the two halves of the capstan
 DRIVES = {"drive": 0}
+RUBS = {"drive": CAPSTAN}  # where the dry friction is that a drive works against
 SENSORS = {"encoder": 0, "scale": 1}
 NQ, NU, NX = 4, 1, 10  # four rotations and their speeds, two states of the amplifier
 

@@ -1,7 +1,8 @@
 """Drives with memory: a lag of the current, and a motor that warms.
 
 Both steps are exact for a command that is held over the substep; the lag gives the mean of its response over it.
-`drive.thermal` at a drive takes from the gain (resistance and magnets), at a node with dry friction from that (grease).
+`drive.thermal` at a drive takes from the gain (resistance and magnets), and with `ease` from the dry friction that it
+works against (grease); at a node with dry friction from that alone.
 Either way the heat is that of the motor's current.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3 for the held input; Krishnan, Electric Motor
@@ -83,6 +84,9 @@ class ThermalSettings(Settings):
     a: float = quantity(unit="", ge=-2, le=5, help="loss at V_ref when warm through; negative where it gains")
     tau: float = quantity(30.0, unit="s", gt=0, le=1e5, help="time that it takes to warm")
     V_ref: float = quantity(1.0, unit="V", gt=0, le=100, help="steady command at which it is warm")
+    ease: float = quantity(
+        0.0, unit="", ge=-2, le=5, help="of a drive: loss of the dry friction that it works against, in the same way"
+    )
     form: Literal["exponential", "linear", "hyperbolic"] = Field(
         default="exponential",
         description="of what is left at heat h: exp(-a h), 1 - a h (magnets), 1/(1 + a h) (resistance)",
@@ -90,12 +94,12 @@ class ThermalSettings(Settings):
 
 
 class ThermalParams(NamedTuple):
-    a: float
+    gain: float  # loss of each at V_ref
+    friction: float
     form: int
     end: float  # exp(-h/tau)
     per_volt2: float
     channel: int
-    friction: int  # 1: at a node with dry friction
 
 
 THERMAL_STATE = state(heat=float)
@@ -103,16 +107,14 @@ THERMAL_STATE = state(heat=float)
 
 def build_thermal(settings: ThermalSettings, h: float) -> ThermalParams:
     """Exact decay over `h` s; a node that is no drive has the friction of what that drive moves."""
-    at_drive = settings.node.startswith("drive")
-    channel = 1 if settings.node.endswith("2") else 0
-    form = THERMAL_FORMS.index(settings.form)
-    return ThermalParams(settings.a, form, math.exp(-h / settings.tau), settings.V_ref**-2, channel, int(not at_drive))
+    losses = (settings.a, settings.ease) if settings.node.startswith("drive") else (0.0, settings.a)
+    form, channel = THERMAL_FORMS.index(settings.form), 1 if settings.node.endswith("2") else 0
+    return ThermalParams(*losses, form, math.exp(-h / settings.tau), settings.V_ref**-2, channel)
 
 
 @tick
-def what_is_left(p, heat):
-    """Share of the cold one."""
-    lost = p.a * heat
+def left(p, lost):
+    """Share of the cold one that is left."""
     if p.form == 0:
         return math.exp(-lost)
     if p.form == 1:
@@ -122,18 +124,17 @@ def what_is_left(p, heat):
 
 @tick
 def thermal_gain(p, s, volts):
-    """Warm the motor by its own of the `volts` (n,) over a substep and lower them where it takes from the gain."""
+    """Warm the motor by its own of the `volts` (n,) over a substep and lower them by what it has lost."""
     u = volts[p.channel]
     load = u * u * p.per_volt2
-    if p.friction == 0:
-        volts[p.channel] = u * what_is_left(p, s.heat)
+    volts[p.channel] = u * left(p, p.gain * s.heat)
     s.heat = load + (s.heat - load) * p.end
 
 
 @tick
 def thermal_friction(p, s, dry):
     """Dry friction of a warm motor whose cold one is `dry`, Nm or N."""
-    return dry * what_is_left(p, s.heat) if p.friction != 0 else dry
+    return dry * left(p, p.friction * s.heat)
 
 
 LAG = Term(

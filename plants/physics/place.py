@@ -17,7 +17,7 @@ class Place(NamedTuple):
 def place(kind: str, node: str) -> Place:
     """Place of a node by its name; what the node does not have is 0, since no term of that node asks for it."""
     plant = PLANTS[kind]
-    index, factor = plant.NODES.get(node, 0), ""
+    index, factor = plant.NODES.get(node, plant.RUBS.get(node, 0)), ""
     channel = plant.DRIVES.get(node, plant.SENSORS.get(node, 0))
     if kind == "ldu" and node in ("carriage", "scale"):
         index, factor, channel = ldu.CAPSTAN, "R_c", ldu.SENSORS["scale"]

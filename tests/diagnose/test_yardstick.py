@@ -26,7 +26,7 @@ def of(case_of):
 
 
 def test_a_drive_is_measured_by_its_own_command(of):
-    """Heat of one that hardly works, by the command of the other, would make a loss of some per cent a loss of twenty."""
+    """Heat of one that hardly works, by the command of the other, makes a loss of some per cent one of twenty."""
     measures = of(0.1, 1.2)
     assert measures.of("volts", "drive1") == measures.of("volts", "motor1") == pytest.approx(0.1)
     assert measures.of("volts", "drive2") == pytest.approx(1.2)

@@ -8,7 +8,8 @@ import stand
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.plants.physics import drive_dynamics
+from rtctl.plants import axis, ivu, ldu
+from rtctl.plants.physics import drive_dynamics, place
 from rtctl.plants.physics.drive_dynamics import LagSettings, ThermalSettings, build_lag, build_thermal
 
 
@@ -105,6 +106,19 @@ def test_friction_falls_at_a_motor_and_its_gain_stays():
         drive_dynamics.thermal_gain(p, s, u)
         assert list(u) == [9.0, 2.0]
     assert drive_dynamics.thermal_friction(p, s, 3.0) == pytest.approx(3.0 * math.exp(-0.5 * (1 - math.exp(-1.0))))
+
+
+def test_a_warm_drive_runs_easier_where_its_own_motor_rubs():
+    p = build_thermal(ThermalSettings(node="drive2", a=0.0, ease=0.4, tau=2.0, V_ref=2.0), 1e-2)
+    s = zeros(drive_dynamics.THERMAL_STATE)
+    for _ in range(4000):
+        u = np.array([0.0, 2.0])
+        drive_dynamics.thermal_gain(p, s, u)
+    assert list(u) == [0.0, 2.0]
+    assert drive_dynamics.thermal_friction(p, s, 3.0) == pytest.approx(3.0 * math.exp(-0.4), rel=1e-6)
+    assert [place(*at).node for at in (("ivu", "drive1"), ("ivu", "drive2"), ("ldu", "drive"), ("axis", "drive"))] == [
+        ivu.MOTOR1, ivu.MOTOR2, ldu.CAPSTAN, axis.CARRIAGE,
+    ]  # fmt: skip
 
 
 def test_each_drive_is_warmed_by_its_own_motor():
