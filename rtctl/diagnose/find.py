@@ -97,7 +97,8 @@ def find(
     ahead = min(others, key=absurd_last, default=best)
     looked = looked._replace(rounds=(*looked.rounds, (best, *others)))  # what came out second is a rival of the first
     if absurd_last(ahead) < absurd_last(best):  # a rival came out ahead once it was fitted to the bottom
-        best, near = ahead, replacements(problem, ahead, looked, (), progress)
+        best = polish(problem, eliminate(problem, ahead, worth))  # beside it another may be needed no more
+        near = replacements(problem, best, looked, (), progress)
     likelier = most_likely(problem, best, near)
     if likelier is not best:
         best, near = likelier, replacements(problem, likelier, looked, (), progress)
