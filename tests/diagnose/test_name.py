@@ -1,6 +1,7 @@
 """The search: single effects, a pair, and what is taken out again."""
 
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,18 @@ import pytest
 from rtctl.diagnose.decide import worth
 from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.hypotheses import hypotheses
-from rtctl.diagnose.name import Hopeless, absurd_last, best_starts, drop, eliminate, names, polish, rivals, shortlist
+from rtctl.diagnose.name import (
+    Hopeless,
+    absurd_last,
+    best_starts,
+    drop,
+    eliminate,
+    names,
+    polish,
+    rivals,
+    shortlist,
+    various,
+)
 from rtctl.diagnose.screen import Score
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
 
@@ -165,3 +177,25 @@ def test_a_fit_far_behind_is_hopeless_only_after_some_rounds():
     assert [hopeless(100.0) for _ in range(4)] == [False, False, True, True]
     near = Hopeless(1.0, factor=5.0, rounds=3)
     assert not any(near(4.0) for _ in range(5))
+
+
+def doing(cost, *names):
+    """A fit of these terms at these nodes, by its cost alone."""
+    hypotheses = tuple(Hypothesis(*name.split(":"), ()) for name in names)
+    return SimpleNamespace(cost=cost, space=SimpleNamespace(hypotheses=hypotheses))
+
+
+def test_full_fits_go_to_various_terms():
+    """One term at nodes that move together would fill all of the places."""
+    ranked = [
+        doing(1.0, "drive.lag:drive", "guide.thickness:carriage"),
+        doing(1.001, "drive.lag:drive", "guide.thickness:scale"),
+        doing(1.2, "guide.thickness:carriage", "timing.delay:loop"),
+        doing(1.2, "guide.thickness:scale", "timing.delay:loop"),
+        doing(1.5, "drive.lag:drive", "guide.thickness:encoder"),  # does something else there
+        doing(1.7, "drive.lag:drive", "ripple.capstan:capstan"),
+        doing(1.8, "drive.lag:drive", "load.spring:carriage"),
+    ]
+    assert various(ranked, 4) == [ranked[i] for i in (0, 1, 2, 4, 5)]  # nodes of the best stay open
+    assert various(ranked, 1) == ranked[:2]
+    assert various([], 3) == []
