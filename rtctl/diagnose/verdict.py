@@ -27,6 +27,7 @@ LEANS = 0.6  # confidence in a name that is not sure, above which it has to pred
 RIGHT = (0.98, 0.95, 0.88)  # confidence in one, two, three names of a model that is right to the noise
 KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
+BESIDE = 2  # rivals of three names
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
 
 
@@ -80,7 +81,12 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
     if not doubt:
         return Verdict(NAMED, tuple(own), share)
     new = [e for e in others if e.name not in {o.name for o in own}]
-    return Verdict(AMBIGUOUS, tuple([*own, *new][:MOST]), share)
+    return Verdict(AMBIGUOUS, listed(own, new), share)
+
+
+def listed(own: Sequence[Effect], rivals: Sequence[Effect]) -> tuple[Effect, ...]:
+    """What is there, and what could stand in its place: three names at most, but rivals of three are told besides."""
+    return tuple([*own, *rivals][: MOST if len(own) < MOST else len(own) + BESIDE])
 
 
 def by_weight(problem: Problem, best: Fit) -> list[int]:

@@ -8,7 +8,7 @@ from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
-from rtctl.diagnose.verdict import Verdict, of_jitter, patched, proven, with_known
+from rtctl.diagnose.verdict import Verdict, listed, of_jitter, patched, proven, with_known
 
 
 def fitted(**sizes):
@@ -43,6 +43,14 @@ def test_what_shows_elsewhere_stands_beside_a_verdict():
 def test_it_is_not_told_twice():
     named = Verdict(NAMED, (Effect("sensor.scale", "encoder", 0.9, {}, ()),), 1.0)
     assert with_known(named, [Effect("sensor.scale", "encoder", 0.95, {}, ())]).effects == named.effects
+
+
+def test_rivals_of_three_are_told_beside_them():
+    own = [Effect(name, "drive", 0.9, {}, ()) for name in ("drive.lag", "drive.offset", "load.bump")]
+    rivals = [Effect(name, "drive", 0.4, {}, (), "drive.offset:drive") for name in "abc"]
+    assert listed(own, rivals) == (*own, *rivals[:2])
+    assert listed(own[:2], rivals) == (*own[:2], rivals[0])
+    assert listed(own[:1], []) == tuple(own[:1])
 
 
 @pytest.mark.parametrize(("several", "closed", "expected"), [
