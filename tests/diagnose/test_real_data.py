@@ -196,5 +196,5 @@ def test_three_recordings_of_a_motor_give_one_torque_over_the_turn(motors):
 
 def test_what_keeps_one_speed_only_is_given_no_wrong_name(motors):
     """The controller answers the torque with the command: a drive that did nothing would look alike."""
-    found = chain.diagnose_record(upto(motors[0], len(motors[0].t) // 2))
+    found = chain.diagnose_record(upto(motors[0], len(motors[0].t) // 4))
     assert {e.name for e in found.effects} <= {"ripple.cogging", "friction.coulomb", "friction.viscous"}
