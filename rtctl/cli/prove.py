@@ -39,7 +39,6 @@ def prove(
     from rtctl.proof import prove as proof
 
     longest = common.seconds(limit, "--limit")
-    assert longest is not None
     which = tuple(p.strip() for p in plants.split(",") if p.strip())
     sha = proof.prepare(out, count, seed, which, jobs, heldout, lambda n, of: _note("generated", n, of))
     typer.echo(f"{count} cases in {out}, answers sealed: sha256 {sha}", err=True)

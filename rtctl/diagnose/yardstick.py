@@ -6,6 +6,7 @@ from rtctl.diagnose.model import dry_friction
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import Scales
 from rtctl.diagnose.simulate import per_unit, resolution
+from rtctl.diagnose.stretches import rms
 from rtctl.plants.physics import TERMS
 
 LITTLE = 0.05  # of the command of all drives: one that does less has no measure of its own
@@ -30,7 +31,7 @@ class Measures:
     def of(self, measure: str, node: str) -> float:
         """The measure in SI at a node."""
         s = self.scale(node)
-        volts = float(np.sqrt(np.mean(self.record.u**2)))
+        volts = rms(self.record.u)
         drive = self.record.case.drive
         table = {
             "one": 1.0,
@@ -64,8 +65,7 @@ class Measures:
     def volts(self, node: str) -> float:
         """Rms command of the drive that the node names, or of all."""
         u = self.record.u
-        one = u[:, int(node[-1]) - 1] if node[-1].isdigit() and u.shape[1] > 1 else u
-        return float(np.sqrt(np.mean(one**2)))
+        return rms(u[:, int(node[-1]) - 1] if node[-1].isdigit() and u.shape[1] > 1 else u)
 
     def dry(self, node: str) -> float:
         """Dry friction of the base at a node, in its own unit."""

@@ -12,8 +12,6 @@ from rtctl.proof import report, seal
 SCORES, REPORT, RESULT = "scores.json", "report.md", "diagnosis.json"
 FAILED = "failed.json"  # beside a case: what went wrong, so that it is not tried again
 
-LIMIT = 600.0  # s
-
 Progress = Callable[[int, int], None]
 
 
@@ -50,18 +48,18 @@ def cases(folder: Path) -> list[Path]:
 
 
 def diagnose_all(
-    folder: Path | str, jobs: int = 1, progress: Progress | None = None, work: Any = None, limit: float = LIMIT
+    folder: Path | str, jobs: int = 1, progress: Progress | None = None, work: Any = None, limit: float | None = None
 ) -> None:
-    """Diagnose every case that has neither a diagnosis nor a failure on record, none for longer than `limit` s; `work`
-    stands in for it in tests."""
+    """Diagnose every case that has neither a diagnosis nor a failure on record, none for longer than `limit` s, or
+    than a folder's usual one; `work` stands in for it in tests."""
     from rtctl.diagnose import folder as many
 
     every = cases(Path(folder))
     left = [c for c in every if not any((c / "diagnosis" / f).exists() for f in (RESULT, FAILED))]
     done = len(every) - len(left)
     tasks = [many.Task(c.name, c, c / "diagnosis") for c in left]
-    jobs = min(jobs, os.cpu_count() or 1)
-    for outcome in many.diagnose_all(tasks, jobs, limit, report=False, work=work or many.one):
+    jobs, longest = min(jobs, os.cpu_count() or 1), many.LIMIT if limit is None else limit
+    for outcome in many.diagnose_all(tasks, jobs, longest, report=False, work=work or many.one):
         out = Path(folder) / outcome.name / "diagnosis"
         out.mkdir(exist_ok=True)
         if outcome.code:  # a failure of the tool is written down, not raised
