@@ -243,6 +243,7 @@ def advance(m):
         if force != 0.0:
             _add_row(m.x_next, m.Gamma_T, nu + j, force)
     for _ in range(SWEEPS if dry_nodes > 1 else dry_nodes):  # one alone is exact at once
+        settled = True
         for j in range(nq):
             if m.dry[j] > 0.0:
                 gain = m.Gamma_T[nu + j, nq + j]
@@ -250,6 +251,9 @@ def advance(m):
                 if r != m.r[j]:
                     _add_row(m.x_next, m.Gamma_T, nu + j, r - m.r[j])
                     m.r[j] = r
+                    settled = False
+        if settled:  # as it is while they slide
+            break
     for i in range(nx):
         m.x[i] = m.x_next[i]
 

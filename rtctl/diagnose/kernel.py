@@ -23,7 +23,7 @@ from rtctl.plants.physics.place import PLANTS
 from rtctl.plants.physics.term import SITES, Term
 
 OPEN, TRACK, CLOSED = range(3)
-SLOTS = 8  # terms at once
+SLOTS = 32  # terms at once
 
 HEADER = '''"""The {kind} with every term of physics in slots, for fits.
 
@@ -51,28 +51,28 @@ READ = {"ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)", "axis": "axis.read(s)"}
 
 RUN = '''
 @compiled
-def substep(job, p, s, q, z):
+def substep(job, p, s, t):
     """One substep under the volts in s.m.volts and the correction in job.correction."""
     m = s.m
-    command(q, z, m)
+    command(t, m)
     {drives}
     for c in range(m.u.shape[0]):
         m.u[c] += job.correction * job.share[c]
     linear.midpoint(m)
     {follow}
-    force(q, z, m)
-    last(q, z, m)
+    force(t, m)
+    last(t, m)
     for i in range(m.f.shape[0]):
         m.f[i] += job.correction * job.push[i]
     linear.advance(m)
 
 
 @compiled
-def look(job, p, s, q, z):
+def look(job, p, s, t):
     """Readings of all sensors in their own unit into job.y; a rectified counter adds up the way."""
     m = s.m
     {read}
-    reading(q, z, m)
+    reading(t, m)
     for c in range(m.y.shape[0]):
         y = m.y[c] * job.per_unit[c]
         if job.rectified[c] != 0:
@@ -84,13 +84,13 @@ def look(job, p, s, q, z):
 
 
 @entry
-def run(jobs, ps, ss, q, z, laws, law_states, lead, ref, w, volts, seen, out, written, push):
+def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, written, push):
     """Simulate len(ref) ticks after `lead` ticks at the first row's voltage; readings go to out (n, sensors).
 
     jobs.mode 0 applies the recorded `volts` (n, drives); 1 adds a correction that makes the first sensor follow `seen`
     (n,) and leaves it in `push` (n,); 2 closes the loop by the law and leaves what it writes in `written` (n, drives).
     """
-    job, p, s, the_law, law_state = jobs[0], ps[0], ss[0], laws[0], law_states[0]
+    job, p, s, t, the_law, law_state = jobs[0], ps[0], ss[0], ts[0], laws[0], law_states[0]
     {kind}.start(p, s)
     m = s.m
     n, drives = volts.shape
@@ -98,10 +98,10 @@ def run(jobs, ps, ss, q, z, laws, law_states, lead, ref, w, volts, seen, out, wr
     for k in range(-(lead // stride) * stride, n + stride - 1, stride):
         if k == 0:  # counters and the clock start at zero here
             m.t = 0.0
-            look(job, p, s, q, z)
+            look(job, p, s, t)
             for c in range(m.y.shape[0]):
                 job.zero[c] = job.y[c]
-        look(job, p, s, q, z)
+        look(job, p, s, t)
         at = min(k, n - 1)
         job.correction = 0.0
         if k < 0 or job.mode == 1:  # at first it is held where it will start
@@ -130,7 +130,7 @@ def run(jobs, ps, ss, q, z, laws, law_states, lead, ref, w, volts, seen, out, wr
                 at = min(max(k + tick + (i - job.delay) // job.substeps, 0), n - 1)
                 for c in range(drives):
                     m.volts[c] += (written[at, c] if job.mode == 2 and k >= 0 else volts[at, c]) / stride
-            substep(job, p, s, q, z)
+            substep(job, p, s, t)
         if not (abs(job.y[0]) < 1e12):
             return max(k, 0)
     return n
@@ -144,7 +144,7 @@ class Kernel(NamedTuple):
     module: ModuleType
     names: tuple[str, ...]  # of terms, by their number in a slot less one
     slot: np.dtype
-    slot_state: np.dtype
+    slots: np.dtype  # all of them in one record: arrays of their own would be counted references at every step
     job: np.dtype
     state: np.dtype
 
@@ -229,10 +229,10 @@ def source(kind: str) -> str:
 
 
 def _site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
-    lines = ["@compiled", f"def {site}(q, z, m):", f'    """Every term that acts at the {site}."""']
+    lines = ["@compiled", f"def {site}(t, m):", f'    """Every term that acts at the {site}."""']
     lines += [
-        "    for k in range(q.shape[0]):",
-        "        kind = q[k].kind",
+        "    for k in range(t.q.shape[0]):",
+        "        kind = t.q[k].kind",
         "        if kind == 0:",
         "            break",
     ]
@@ -240,8 +240,8 @@ def _site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
         act = term.act_at(site, kind)
         if act is not None:
             name = field(term.name)
-            line = act.format(p=f"q[k].{name}", s=f"z[k].{name}", m="m", i="q[k].node", r="q[k].factor", l="q[k].link",
-                              c="q[k].channel")  # fmt: skip
+            line = act.format(p=f"t.q[k].{name}", s=f"t.z[k].{name}", m="m", i="t.q[k].node", r="t.q[k].factor",
+                              l="t.q[k].link", c="t.q[k].channel")  # fmt: skip
             lines += [f"        if kind == {number}:", *(f"            {part}" for part in line.split("\n"))]
     return "\n".join(lines)
 
@@ -277,12 +277,13 @@ def kernel(kind: str) -> Kernel:
     params = [(field(t.name), record_dtype(sample(t))) for t in terms]
     states = [(field(t.name), t.state) for t in terms if t.state is not None]
     head = [("kind", np.int64), ("node", np.int64), ("link", np.int64), ("channel", np.int64), ("factor", np.float64)]
+    slot = np.dtype(head + params, align=True)
     return Kernel(
         kind=kind,
         module=generate.load(path),
         names=tuple(t.name for t in terms),
-        slot=np.dtype(head + params, align=True),
-        slot_state=np.dtype([*states, ("spare", np.float64)], align=True),
+        slot=slot,
+        slots=state(q=(slot, SLOTS), z=(np.dtype([*states, ("spare", np.float64)], align=True), SLOTS)),
         job=job_dtype(len(plant.SENSORS), plant.NU, plant.NQ),
         state=getattr(plant, f"{kind.upper()}_STATE"),
     )

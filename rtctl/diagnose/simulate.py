@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from rtctl.config.errors import UserError
 from rtctl.diagnose import kernel, law
 from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
@@ -118,8 +119,10 @@ class Simulator:
         params = plant_params(model, self.case, h)
         p = np.zeros(1, _dtype(params))
         fill_record(p[0], params)
-        slots = np.zeros(max(len(model.terms), 1), k.slot)
-        for slot, settings in zip(slots, ordered(list(model.terms)), strict=False):
+        if len(model.terms) > kernel.SLOTS:
+            raise UserError(f"physics: has {len(model.terms)} terms; {kernel.SLOTS} is the most that can be simulated")
+        slots = np.zeros(1, k.slots)
+        for slot, settings in zip(slots[0]["q"], ordered(list(model.terms)), strict=False):
             kernel.fill_slot(k, slot, settings, params)
         job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
         if directed:
@@ -136,9 +139,8 @@ class Simulator:
         written = np.zeros((n if mode == CLOSED else 1, self.volts.shape[1]))
         push = np.zeros(n)
         done = k.module.run(
-            job, p, np.zeros(1, k.state), slots, np.zeros(len(slots), k.slot_state), laws,
-            np.zeros(1, law.LAW_STATE), self.lead, self.ref[:n], self.record.w[:n], self.volts[:n], self.seen[:n], out,
-            written, push,
+            job, p, np.zeros(1, k.state), slots, laws, np.zeros(1, law.LAW_STATE), self.lead, self.ref[:n],
+            self.record.w[:n], self.volts[:n], self.seen[:n], out, written, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         return out, written, push

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
+from rtctl.config.errors import UserError
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.hints import grips
-from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
+from rtctl.diagnose.kernel import CLOSED, OPEN, SLOTS, TRACK
 from rtctl.diagnose.model import owner_model, plant_params
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
@@ -152,6 +153,17 @@ def test_where_a_model_runs_away_the_rest_is_nan(blank):
     first = int(np.argmax(~np.isfinite(out)))
     assert 10 < first < 2000
     assert np.isnan(out[first:]).all()
+
+
+def test_as_many_terms_as_there_are_slots_all_act_and_one_more_is_refused(blank):
+    record = blank("axis", noise(200))
+    many = [term("load.spring", "axis", k=1.0)] * SLOTS
+    one = owner_model(record.case)._replace(terms=[term("load.spring", "axis", k=float(SLOTS))])
+    sim = Simulator(record)
+    both = [sim.run(m, OPEN) for m in (one, one._replace(terms=many))]
+    np.testing.assert_allclose(both[1], both[0], rtol=1e-9)
+    with pytest.raises(UserError, match=f"{SLOTS + 1} terms; {SLOTS} is the most"):
+        sim.run(one._replace(terms=[*many, many[0]]))
 
 
 def test_shorter_steps_change_next_to_nothing(plain):
