@@ -36,6 +36,7 @@ ONCE = 0.02  # the same of a further term that shows at a few places only
 SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 CLEAR = 0.15  # share of the cost that it must take off
+LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
 FORM = 0.04  # of what a term does: what the form of its law may miss
 HALF = 0.5  # of the excess explained, and not by luck: something is there; less may be what any number takes off
@@ -201,10 +202,13 @@ def unusual(fitted: Fit) -> float:
     """Minus the logarithm of how likely sizes like these are: only what tells two equal laws apart.
 
     Within the term's typical range all are alike; beyond it a factor of OFTEN counts as one standard deviation.
+    Friction that takes away counts as two: what a model lacks rubs, and an owner's value is right to its tolerance.
     """
     total = 0.0
     for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True):
         term, values = TERMS[h.term], h.values(x)
+        if values.get(LESS.get(h.term, ""), 0.0) < 0.0:
+            total -= 2.0
         for name, (low, high) in term.typical.items():
             size = abs(values.get(name, 0.0))
             known = name not in term.scale and (h.term, fitted.model.kind) not in ELSEWHERE

@@ -10,19 +10,9 @@ from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
-from rtctl.diagnose.name import (
-    Search,
-    absurd_last,
-    dropped,
-    eliminate,
-    enrich,
-    look_alikes,
-    names,
-    polish,
-    rivals,
-    search,
-)
+from rtctl.diagnose.name import Search, absurd_last, look_alikes, names, rivals, search
 from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.rework import dropped, eliminate, enrich, polish
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.verdict import Alternative, standing

@@ -18,9 +18,9 @@ from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.name import enrich
 from rtctl.diagnose.problem import EDGE, Problem
 from rtctl.diagnose.record import Record
+from rtctl.diagnose.rework import enrich
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.stretches import rms
 
@@ -77,6 +77,17 @@ def closed_on_track(problem: Problem, before: Fit, after: Fit, cut: int) -> floa
     if gap < NO_GAP * rms(new[~late]) ** 2:
         return float("nan")
     return (rms(old[late]) ** 2 - rms(new[late]) ** 2) / gap
+
+
+def faint(problem: Problem, before: Fit, after: Fit, cut: int) -> bool:
+    """Whether what tells `after` from `before` acts before row `cut`, and beyond it is less than what `after` leaves.
+
+    As a limit that is reached in two moments: a free run beyond tells of all else and next to nothing of it.
+    """
+    late = problem.time_rows >= cut
+    new = problem.residual(after.model)
+    apart = problem.residual(before.model) - new
+    return rms(apart[late]) < rms(new[late]) and rms(apart[~late]) > rms(new[~late])
 
 
 def refit(sim: Simulator, problem: Problem, fitted: Fit, stop: int) -> Fit:

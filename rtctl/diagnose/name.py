@@ -12,8 +12,9 @@ import numpy as np
 
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, fit, jacobian
-from rtctl.diagnose.hypotheses import HINTED, as_harmonic, forms, moved_into, richer, rounded
+from rtctl.diagnose.hypotheses import HINTED
 from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.rework import dropped, enrich, polish, whole_orders
 from rtctl.diagnose.scan import resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
@@ -130,12 +131,16 @@ def grow(
         scores = screen(problem, parent, [h for h in candidates if h.name not in taken])
         if not first:
             first, candidates = scores, best_starts(scores) if len(parents) > 1 and not taken else candidates
+        own = []
         for rank, score in enumerate(shortlist(scores, breadth.likely)):
             trial = roughly(problem, parent, score)
+            own.append(trial)
             if rank < breadth.sure:  # fitted in full, however bad the rough fit is
                 likely.append(trial)
             if names(trial) not in rough or trial.cost < rough[names(trial)].cost:
                 rough[names(trial)] = trial
+        if own:  # what does best beside it, though other parents may have more that look better
+            likely.append(min(own, key=lambda f: f.merit))
     ranked = various(sorted(rough.values(), key=lambda f: f.merit), breadth.full)
     if not ranked:
         return [], first
@@ -261,26 +266,6 @@ class Hopeless:
         return self.seen >= self.rounds and cost > self.factor * self.best
 
 
-def polish(problem: Problem, fitted: Fit, rounds: int = 6) -> Fit:
-    """Full rounds with a fresh Jacobian each, to the bottom."""
-    return fit(problem, fitted.space, fitted.x, rounds=rounds, enough=2e-4, J=fitted.J)
-
-
-def whole_orders(problem: Problem, fitted: Fit) -> Fit:
-    """With orders that are next to a whole number at that number, where this costs little: a ripple whose order is off
-    by a thousandth is out of step where the record has not been."""
-    for index, (h, x) in enumerate(zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True)):
-        found = rounded(h, x)
-        if found is None:
-            continue
-        at = int(fitted.space.columns(index)[found[0]])
-        J = np.delete(fitted.J, at, axis=1)
-        other = fit(problem, exchanged(fitted, index, found[1]), np.delete(fitted.x, at), rounds=6, J=J)
-        if other.merit < fitted.merit:
-            fitted = other
-    return fitted
-
-
 def shortlist(scores: Sequence[Score], count: int) -> list[Score]:
     """The best scores, at most two starts of one hypothesis (of a ripple more, beside the count) and at most three
     nodes of one term."""
@@ -313,31 +298,6 @@ def roughly(problem: Problem, parent: Fit, score: Score) -> Fit:
     return fit(problem, space, x, rounds=ROUGH, J=J, rough=True)
 
 
-def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:
-    """Take out, one by one, every term without which the model is as good, in another of its forms if need be."""
-    while len(found.space.hypotheses) > 1:
-        indices = range(len(found.space.hypotheses))
-        trials = [dropped(problem, found, i, 10) for i in indices]
-        less = min(trials, key=lambda f: f.merit)
-        if less.rms > decide.COMPLETE * problem.floor:
-            less = enrich(problem, less, decide.better)
-        if worth(less, found):
-            return found
-        found = less
-    return found
-
-
-def dropped(problem: Problem, found: Fit, index: int, rounds: int) -> Fit:
-    """The model fitted without one of its hypotheses."""
-    J = np.delete(found.J, found.space.columns(index), axis=1)
-    return fit(problem, found.space.without(index), drop(found, index), rounds=rounds, J=J)
-
-
-def drop(found: Fit, index: int) -> np.ndarray:
-    """x without the coordinates of one hypothesis."""
-    return np.delete(found.x, found.space.columns(index))
-
-
 def rivals(
     problem: Problem, found: Fit, index: int, candidates: Sequence[Hypothesis], alike: Collection[str], most: int = 3
 ) -> list[Fit]:
@@ -359,38 +319,3 @@ def look_alikes(problem: Problem, rest: Fit, scores: Sequence[Score], terms: Col
             first.setdefault(score.hypothesis.term, score)
     rough = [roughly(problem, rest, score) for score in first.values()]
     return [fit(problem, f.space, f.x, rounds=16, J=f.J, give_up=Hopeless(cost)) for f in rough]
-
-
-def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:
-    """Give each term another form of the same, or a richer one (harmonics, a second branch), where that is better."""
-    for index, h in enumerate(found.space.hypotheses):
-        for form in forms(h):
-            for start in moved_into(form, found.space.parts(found.x)[index]):
-                other = with_other(problem, found, index, form, start, 10, found.J)
-                if other.merit < found.merit:
-                    found = other
-        more = richer(problem.sim.record, found.model.base, found.space.hypotheses[index])
-        if more is None:
-            continue
-        own = np.concatenate([found.space.parts(found.x)[index], more.start()[len(h.coordinates) :]])
-        tried = [with_other(problem, found, index, f, x, 12) for f, x in ((more, own), *as_harmonic(more, own))]
-        fitted = min(tried, key=lambda f: f.merit)
-        if worth(found, fitted):
-            found = fitted
-    return found
-
-
-def with_other(
-    problem: Problem, found: Fit, index: int, h: Hypothesis, start: np.ndarray, rounds: int, J: np.ndarray | None = None
-) -> Fit:
-    """The model fitted with `h`, from `start`, in the place of hypothesis `index`."""
-    parts = found.space.parts(found.x)
-    parts[index] = start
-    return fit(problem, exchanged(found, index, h), np.concatenate([found.x[: found.space.nb], *parts]), rounds, J=J)
-
-
-def exchanged(found: Fit, index: int, h: Hypothesis) -> Space:
-    """The space with hypothesis `index` replaced."""
-    hypotheses = list(found.space.hypotheses)
-    hypotheses[index] = h
-    return found.space._replace(hypotheses=tuple(hypotheses))

@@ -1,8 +1,8 @@
 """Predicts rows that were not fitted with the model that was found: what of the verdict does that bear out?
 
 Where the law is known the prediction is a free run, the loop closed. It tells nothing of terms where random forces act,
-which it adds up, where it wanders though the model is right to the noise, and of a contact that slips: whether that
-holds or lets the motor run away hangs on a hair. There the model is kept on track.
+which it adds up, where it wanders though the model is right to the noise, of what hardly acts in these rows, and of a
+contact that slips: whether that holds or lets the motor run away hangs on a hair. There the model is kept on track.
 """
 
 from typing import NamedTuple
@@ -60,10 +60,11 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     several = again or sum(e.instead_of is None for e in verdict.effects) > 1
     if other is None and errors[1] < WORSE * errors[0]:
         on_track = heldout.closed_on_track(problem, old, new, cut)
-        if not decide.quiet(problem, base, best):
-            if problem.hiss(best.r):
-                closed, several = on_track, False
-        elif np.isnan(closed) or on_track > CLOSED_BY_SEVERAL:
+        quiet = decide.quiet(problem, base, best)
+        hiss = not quiet and problem.hiss(best.r)
+        if hiss or heldout.faint(problem, old, new, cut):
+            closed, several = on_track, several and not hiss
+        elif quiet and (np.isnan(closed) or on_track > CLOSED_BY_SEVERAL):
             closed = on_track
     loud = decide.loud(problem, base)
     proved = proven(verdict, closed if max(errors) < LOST else np.nan, several, UNNAMED if loud else NOTHING)

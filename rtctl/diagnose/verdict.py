@@ -13,8 +13,8 @@ from rtctl.diagnose import decide
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.jitter import Jitter, interval
-from rtctl.diagnose.name import dropped
 from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.rework import dropped
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals, with_form
 

@@ -203,7 +203,7 @@ def test_of_two_equal_laws_the_one_with_the_usual_size_is_likelier():
 
 
 def with_terms(*terms, kind="ivu", sizes=(1.0, 1.0, 1.0)):
-    names = {"ripple.encoder": "A", "drive.offset": "offset"}
+    names = {"ripple.encoder": "A", "drive.offset": "offset", "friction.viscous": "B"}
     found = tuple(Hypothesis(t, node, (Coordinate(names.get(t, "a"), SIZE, 1.0),)) for t, node in terms)
     space = Space(Model(kind, {}), (), lambda name: 0.1, found)
     x = np.array(sizes[: len(terms)])
@@ -221,6 +221,11 @@ def test_typical_angles_say_nothing_of_ways():
     ripple = ("ripple.encoder", "encoder")
     assert unusual(with_terms(ripple, sizes=(3e-5,))) < -1.0
     assert unusual(with_terms(("ripple.encoder", "sensor"), kind="axis", sizes=(3e-5,))) == 0.0
+
+
+def test_less_friction_than_the_owners_is_less_likely_than_more():
+    more, less = (with_terms(("friction.viscous", "carriage"), kind="axis", sizes=(B,)) for B in (5.0, -5.0))
+    assert unusual(more) == unusual(less) + 2.0
 
 
 def test_a_size_beyond_all_that_is_typical_is_no_machines():

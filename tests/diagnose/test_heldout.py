@@ -1,12 +1,14 @@
 """Prediction: free runs on rows that no fit saw."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import NoLaw
 from rtctl.diagnose.fit import fit
-from rtctl.diagnose.heldout import free_fit, mode_of, nrmse, refit, rms
+from rtctl.diagnose.heldout import faint, free_fit, mode_of, nrmse, refit, rms
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
@@ -58,6 +60,16 @@ def test_a_fit_on_the_first_rows_does_not_see_the_last(tilted, searched):
     np.testing.assert_array_equal(one.x, two.x)
     assert len(one.r) < len(found.r)
     np.testing.assert_allclose(two.x, found.x, atol=0.1)
+
+
+def test_a_limit_that_is_reached_once_at_the_beginning_is_too_faint_to_be_judged_by_the_end():
+    late = np.arange(400) >= 300
+    noise = np.random.default_rng(3).standard_normal(400)
+    once, always = np.where(np.arange(400) < 20, 30.0, 0.3), np.full(400, 5.0)
+    errors = {"right": noise, "once": noise + once, "always": noise + always, "late": noise + np.where(late, 9.0, 0.0)}
+    problem = SimpleNamespace(time_rows=np.arange(400), residual=errors.get)
+    right, *others = (SimpleNamespace(model=name) for name in errors)
+    assert [faint(problem, other, right, 300) for other in others] == [True, False, False]
 
 
 def test_what_was_found_predicts_better_than_the_base(tilted, searched):
