@@ -73,7 +73,8 @@ def searched(record: Record, progress: Progress) -> Found:
     For a machine without a controller: of a command that was held and one that was sampled, the one that fits. For an
     axis under control that no model explains down to the noise: a quicker correction, which lets less of the slow
     wandering through that random forces make and that a small difference between two hypotheses drowns in; but only
-    if what is missing still shows.
+    if what is missing still shows, or if no hypothesis explained any of the wandering and what is left without it is
+    hiss.
     """
     progress("fitting the owner's parameters")
     held = base_of(Simulator(record))
@@ -98,9 +99,14 @@ def searched(record: Record, progress: Progress) -> Found:
     if base.rms < decide.LOUD * problem.floor or decide.quiet(problem, base, found.best):
         return found
     quick, fitted = base_of(Simulator(record, follow=faster))
-    if fitted.rms < SHOWS * quick.floor:
-        return found
-    return find(quick.sim, quick, progress, fitted)
+    return find(quick.sim, quick, progress, fitted) if tells(found, quick, fitted) else found
+
+
+def tells(found: Found, quick: Problem, fitted: Fit) -> bool:
+    """Whether the base, `fitted` under a quicker correction, is to be asked in place of what was `found`."""
+    if fitted.rms >= SHOWS * quick.floor:  # what is missing still shows
+        return True
+    return not found.best.space.hypotheses and quick.hiss(fitted.r)  # all the rest was wandering
 
 
 def misread(found: Found) -> bool:

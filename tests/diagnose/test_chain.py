@@ -8,7 +8,7 @@ import pytest
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import chain
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.chain import diagnose_record, misread
+from rtctl.diagnose.chain import diagnose_record, misread, tells
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
@@ -130,3 +130,18 @@ def test_reels_that_no_model_follows_are_misread(monkeypatch, reel, explained, e
     found = SimpleNamespace(problem=problem, base=None, best=SimpleNamespace(r=None))
     monkeypatch.setattr(chain.decide, "enough", lambda problem, before, after: explained)
     assert misread(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("left", "names", "hiss", "expected"),
+    [
+        (3.0, ("load.spring",), False, True),
+        (2.0, ("load.spring",), True, False),
+        (2.0, (), False, False),
+        (2.0, (), True, True),
+    ],
+)
+def test_a_quicker_correction_is_asked_where_something_shows_or_where_all_was_wandering(left, names, hiss, expected):
+    found = SimpleNamespace(best=SimpleNamespace(space=SimpleNamespace(hypotheses=names)))
+    quick = SimpleNamespace(floor=1.0, hiss=lambda r: hiss)
+    assert tells(found, quick, SimpleNamespace(rms=left, r=None)) == expected
