@@ -99,8 +99,9 @@ def main() -> int:
         print(json.dumps(result))
         return 0
     for machine, r in result.items():
-        print(f"{machine}: {r['seconds_recorded']} s recorded, {r['verdict']} {' '.join(r['names'])} in {r['wall_s']} s,"
-              f" {r['cpu_s']} s of CPU or {r['in_simulations']} simulations, {r['peak_MB']} MB")  # fmt: skip
+        told = " ".join([r["verdict"], *r["names"]])
+        print(f"{machine}: {r['seconds_recorded']} s recorded, {told} in {r['wall_s']} s, {r['cpu_s']} s of CPU"
+              f" or {r['in_simulations']} simulations, {r['peak_MB']} MB")  # fmt: skip
     return 0
 
 
