@@ -40,7 +40,7 @@ def test_the_kernel_of_the_fits_holds_it():
     module = Source("./my_term.py", "MyTerm", TEXT).module
     assert module not in before
     assert f"import {module}" in after.splitlines()
-    assert f"{module}.drag(q[k].__my_term_py_MyTerm, " in after
+    assert f"{module}.drag(t.q[k].__my_term_py_MyTerm, " in after
     ast.parse(after)
 
 
