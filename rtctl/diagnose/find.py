@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from rtctl.diagnose import beyond, decide
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.fit import Fit, parallel
 from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
@@ -187,13 +187,17 @@ def replacements(
         for f in sorted(tried, key=lambda f: f.merit):
             if names(f) != names(best):
                 nearest.setdefault(names(f), f)
-        fits = list(nearest.values())[:MOST]
-        if is_rich(h):  # so shall they be
-            fits = [enrich(problem, f, decide.better) if f.cost < RICH * best.cost else f for f in fits]
-        fits = [polish(problem, f) if f.cost < NEAR * best.cost else f for f in fits]
+        fits = parallel([partial(deepened, problem, f, best.cost, is_rich(h)) for f in list(nearest.values())[:MOST]])
         places = [Alternative(f, _other(f, rest)) for f in sorted(fits, key=lambda f: f.merit)]
         out.append(tuple(places))
     return tuple(out)
+
+
+def deepened(problem: Problem, rival: Fit, cost: float, rich: bool) -> Fit:
+    """To the bottom where it is near the `cost` of the best, and in a richer form where the best is `rich`."""
+    if rich and rival.cost < RICH * cost:
+        rival = enrich(problem, rival, decide.better)
+    return polish(problem, rival) if rival.cost < NEAR * cost else rival
 
 
 def _other(fitted: Fit, rest: set[str]) -> int:

@@ -11,7 +11,7 @@ prediction error in closed loop.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ TOLL = 0.08  # share of the cost that a further number of a term must take off
 THREADS = 2
 IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
 TOGETHER = 100.0  # errors that count as one
+
+Result = TypeVar("Result")
 
 
 class Fit(NamedTuple):
@@ -57,8 +59,8 @@ class Fit(NamedTuple):
         return [name for name, is_near in zip(self.space.labels(), near, strict=True) if is_near]
 
 
-def parallel(jobs: Sequence[Callable[[], np.ndarray]]) -> list[np.ndarray]:
-    """Run simulations side by side: compiled code lets go of the interpreter."""
+def parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
+    """Run simulations, or fits that consist of them, side by side: compiled code lets go of the interpreter."""
     if len(jobs) < 2:
         return [job() for job in jobs]
     with ThreadPoolExecutor(THREADS) as pool:

@@ -6,12 +6,13 @@ something else is still found. Then what is no longer needed is taken out.
 """
 
 from collections.abc import Callable, Collection, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from rtctl.diagnose import decide
-from rtctl.diagnose.fit import Fit, fit, jacobian
+from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import HINTED
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, enrich, polish, whole_orders
@@ -131,12 +132,9 @@ def grow(
         scores = screen(problem, parent, [h for h in candidates if h.name not in taken])
         if not first:
             first, candidates = scores, best_starts(scores) if len(parents) > 1 and not taken else candidates
-        own = []
-        for rank, score in enumerate(shortlist(scores, breadth.likely)):
-            trial = roughly(problem, parent, score)
-            own.append(trial)
-            if rank < breadth.sure:  # fitted in full, however bad the rough fit is
-                likely.append(trial)
+        own = parallel([partial(roughly, problem, parent, score) for score in shortlist(scores, breadth.likely)])
+        likely += own[: breadth.sure]  # fitted in full, however bad the rough fit is
+        for trial in own:
             if names(trial) not in rough or trial.cost < rough[names(trial)].cost:
                 rough[names(trial)] = trial
         if own:  # what does best beside it, though other parents may have more that look better
@@ -157,10 +155,15 @@ def grow(
     near = [f for i, f in enumerate(full) if i < breadth.keep or f.cost < RICHER * full[0].cost]
     near = various(near, max(breadth.keep, LIKELY))
     rest = [f for f in full if not any(f is n for n in near)]
-    near = [whole_orders(problem, polish(problem, f)) if f.cost < 6 * near[0].cost else f for f in near]
-    loud = decide.COMPLETE * problem.floor
-    near = [enrich(problem, f, decide.better) if f.rms > loud else f for f in near]
+    near = parallel([partial(finish, problem, f, f.cost < 6 * near[0].cost) for f in near])
     return sorted([*near, *rest], key=absurd_last), first
+
+
+def finish(problem: Problem, fitted: Fit, close: bool) -> Fit:
+    """To the bottom, if it is `close` to the best, and in a richer form where more than noise is left."""
+    if close:
+        fitted = whole_orders(problem, polish(problem, fitted))
+    return enrich(problem, fitted, decide.better) if fitted.rms > decide.COMPLETE * problem.floor else fitted
 
 
 def various(ranked: Sequence[Fit], count: int) -> list[Fit]:
@@ -219,11 +222,15 @@ def calm_fit(problem: Problem, fitted: Fit) -> Fit:
 
 def from_both(problem: Problem, trial: Fit, best: float, other: np.ndarray | None = None) -> Fit:
     """The better of two full fits: from where the trial stands, and from other plant parameters, else the owner's."""
-    one = fit(problem, trial.space, trial.x, rounds=16, J=trial.J, give_up=Hopeless(best))
     x = trial.x.copy()
     x[: trial.space.nb] = 0.0 if other is None else other[: trial.space.nb]
-    two = fit(problem, trial.space, x, rounds=16, J=trial.J, give_up=Hopeless(min(best, one.cost)))
+    one, two = parallel([partial(well, problem, trial, start, best) for start in (trial.x, x)])
     return one if one.cost <= two.cost else two
+
+
+def well(problem: Problem, trial: Fit, x: np.ndarray, best: float) -> Fit:
+    """A full fit of a trial's model from `x`, as long as it may come near the cost of the best."""
+    return fit(problem, trial.space, x, rounds=16, J=trial.J, give_up=Hopeless(best))
 
 
 def best_starts(scores: Sequence[Score]) -> list[Hypothesis]:
@@ -305,8 +312,9 @@ def rivals(
     rest = dropped(problem, found, index, 4)
     taken = {h.name for h in found.space.hypotheses}
     scores = screen(problem, rest, [h for h in candidates if h.name not in taken])
-    rough = sorted((roughly(problem, rest, score) for score in shortlist(scores, 8)), key=lambda f: f.merit)
-    best = [fit(problem, f.space, f.x, rounds=16, J=f.J, give_up=Hopeless(found.cost)) for f in rough[:most]]
+    rough = parallel([partial(roughly, problem, rest, score) for score in shortlist(scores, 8)])
+    rough = sorted(rough, key=lambda f: f.merit)[:most]
+    best = parallel([partial(well, problem, f, f.x, found.cost) for f in rough])
     seen = {f.space.hypotheses[-1].term for f in best}
     return sorted([*best, *look_alikes(problem, rest, scores, set(alike) - seen, found.cost)], key=lambda f: f.merit)
 
@@ -317,5 +325,5 @@ def look_alikes(problem: Problem, rest: Fit, scores: Sequence[Score], terms: Col
     for score in scores:
         if score.hypothesis.term in terms and np.isfinite(score.gain):
             first.setdefault(score.hypothesis.term, score)
-    rough = [roughly(problem, rest, score) for score in first.values()]
-    return [fit(problem, f.space, f.x, rounds=16, J=f.J, give_up=Hopeless(cost)) for f in rough]
+    rough = parallel([partial(roughly, problem, rest, score) for score in first.values()])
+    return parallel([partial(well, problem, f, f.x, cost) for f in rough])

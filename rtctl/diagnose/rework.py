@@ -1,11 +1,12 @@
 """Takes a model that was found in hand: to the bottom of its fit, in richer forms, without what it does not need."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from rtctl.diagnose import decide
-from rtctl.diagnose.fit import Fit, fit
+from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.hypotheses import as_harmonic, forms, moved_into, richer, rounded
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import Hypothesis, Space
@@ -41,7 +42,7 @@ def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -
     """
     while len(found.space.hypotheses) > 1:
         indices = range(len(found.space.hypotheses))
-        trials = [dropped(problem, found, i, 10) for i in indices]
+        trials = parallel([partial(dropped, problem, found, i, 10) for i in indices])
         less = min(trials, key=lambda f: f.merit)
         if less.cost < IN_REACH * found.cost:
             richest = enrich(problem, less, lambda before, after: after.cost < before.cost)
@@ -79,7 +80,8 @@ def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> F
         if more is None:
             continue
         own = np.concatenate([found.space.parts(found.x)[index], more.start()[len(h.coordinates) :]])
-        tried = [with_other(problem, found, index, f, x, 12) for f, x in ((more, own), *as_harmonic(more, own))]
+        starts = ((more, own), *as_harmonic(more, own))
+        tried = parallel([partial(with_other, problem, found, index, f, x, 12) for f, x in starts])
         fitted = min(tried, key=lambda f: f.merit)
         if worth(found, fitted):
             found = fitted
