@@ -8,13 +8,14 @@ them all.
 import json
 import os
 import signal
+import threading
 import time
 import traceback
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -275,6 +276,7 @@ class _Worker:
 def _serve(pipe: Connection, jobs: int, report: bool, work: Work) -> None:
     """Work through what comes in until the other side is gone. Ctrl-C is the other side's to handle."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     warnings.simplefilter("ignore", RuntimeWarning)  # a model that runs away overflows; the outcome says so
     if jobs > 1:
         from rtctl.diagnose import fit
@@ -286,6 +288,14 @@ def _serve(pipe: Connection, jobs: int, report: bool, work: Work) -> None:
         except EOFError:
             return
         pipe.send(work(task, report))
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that gives it work is killed: nobody would have the rest of a diagnosis."""
+    parent = parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(OURS)
 
 
 @contextmanager

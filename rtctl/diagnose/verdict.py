@@ -27,7 +27,7 @@ LEANS = 0.6  # confidence in a name that is not sure, above which it has to pred
 RIGHT = (0.98, 0.95, 0.88)  # confidence in one, two, three names of a model that is right to the noise
 KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
-BESIDE = 2  # rivals of three names
+BESIDE = 2  # rivals told besides
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
 
 
@@ -85,8 +85,8 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
 
 
 def listed(own: Sequence[Effect], rivals: Sequence[Effect]) -> tuple[Effect, ...]:
-    """What is there, and what could stand in its place: three names at most, but rivals of three are told besides."""
-    return tuple([*own, *rivals][: MOST if len(own) < MOST else len(own) + BESIDE])
+    """What is there, and the likeliest that could stand in its place, so that a sure name beside takes no rival's."""
+    return (*own, *rivals[:BESIDE])
 
 
 def by_weight(problem: Problem, best: Fit) -> list[int]:
@@ -136,7 +136,7 @@ def with_known(verdict: Verdict, known: Sequence[Effect]) -> Verdict:
         return verdict
     effects = [*(e for e in known if e.name not in {v.name for v in verdict.effects}), *verdict.effects]
     named = NAMED if verdict.verdict == NOTHING else verdict.verdict
-    return verdict._replace(verdict=named, effects=tuple(effects[:MOST]))
+    return verdict._replace(verdict=named, effects=tuple(effects[:MOST] if named == NAMED else effects))
 
 
 def of_jitter(found: Jitter) -> Effect:

@@ -2,6 +2,9 @@
 
 import json
 import os
+import select
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -26,12 +29,25 @@ def work(task, report):
     """Does as the bundle's name says."""
     if task.name == "stuck":
         time.sleep(600)
+    if task.name == "tells":
+        print(os.getpid(), flush=True)
+        time.sleep(600)
     if task.name == "dies":
         os._exit(7)
     from rtctl.diagnose import fit
     alone = os.environ.get("OPENBLAS_NUM_THREADS")
     return Outcome(task.name, 0, 0.1, {"threads": fit.THREADS, "blas": alone, "report": report, "pid": os.getpid()})
 '''
+
+
+SCRIPT = """
+from pathlib import Path
+import quick_work
+from rtctl.diagnose.folder import Task, diagnose_all
+
+if __name__ == "__main__":
+    list(diagnose_all([Task("tells", Path(), Path())], work=quick_work.work))
+"""
 
 
 @pytest.fixture
@@ -88,6 +104,17 @@ def test_leaving_early_ends_the_processes(work):
     running.close()
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+def test_killing_ends_the_processes(work, tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as main:
+        worker = os.pidfd_open(int(main.stdout.readline()))
+        main.kill()
+        assert select.select([worker], [], [], 60)[0]  # readable once it has ended
+        os.close(worker)
+        assert main.stderr.read() == b""
 
 
 def test_nothing_to_do():

@@ -49,7 +49,8 @@ def test_rivals_of_three_are_told_beside_them():
     own = [Effect(name, "drive", 0.9, {}, ()) for name in ("drive.lag", "drive.offset", "load.bump")]
     rivals = [Effect(name, "drive", 0.4, {}, (), "drive.offset:drive") for name in "abc"]
     assert listed(own, rivals) == (*own, *rivals[:2])
-    assert listed(own[:2], rivals) == (*own[:2], rivals[0])
+    assert listed(own[:2], rivals) == (*own[:2], *rivals[:2])
+    assert listed(own[:1], rivals) == (own[0], *rivals[:2])
     assert listed(own[:1], []) == tuple(own[:1])
 
 
