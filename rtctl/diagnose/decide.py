@@ -78,6 +78,13 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
 
 
+def spent(problem: Problem, base: Fit, fitted: Fit) -> bool:
+    """Whether no further term can be `worth` a place beside those of `fitted`: what is left is noise, and no model can
+    be much better than that."""
+    below = rms(discount(problem, base, fitted) * fitted.r) < problem.floor
+    return below and bool(np.sqrt(MOST) * rms(fitted.r) < QUIET * problem.floor)
+
+
 def at_end(before: Fit, after: Fit) -> bool:
     """Whether a term that `after` has more stands at the end of what its times, speeds or frequencies may be: it wants
     to be something else."""

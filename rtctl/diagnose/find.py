@@ -70,7 +70,8 @@ def find(
     def sound(first: Fit) -> bool:
         return not unless_misread or not worth(base, first) or problem.agrees(first.model)
 
-    looked = search(problem, base, propose, partial(decide.complete, problem, base), worth, progress, sound)
+    enough, spent = partial(decide.complete, problem, base), partial(decide.spent, problem, base)
+    looked = search(problem, base, propose, enough, worth, progress, sound, spent)
     if len(looked.rounds) == 1 and not sound(looked.rounds[0][0]):
         return Found(problem, off, base, looked.rounds[0][0], looked, ())
     best = base

@@ -72,8 +72,10 @@ def search(
     worth: Callable[[Fit, Fit], bool],
     progress: Callable[[str], None] = lambda text: None,
     sound: Callable[[Fit], bool] = lambda first: True,
+    spent: Callable[[Fit], bool] = lambda best: False,
 ) -> Search:
-    """Grow models until a further term does not earn its place by `worth(before, after)`.
+    """Grow models until a further term does not earn its place by `worth(before, after)`, or `spent(best)` says that
+    none can.
 
     `propose(model)` lists hypotheses with the starts that the record suggests once it is seen through that model.
     Where a model is `enough`, down to the noise, a quick round looks for what may still hide beside it, and only if
@@ -107,6 +109,8 @@ def search(
         if level == 0 and not sound(full[0]):
             break
         if not worth(beam[0], full[0]) or (level == 1 and full[0].cost > FAR * base.cost):
+            break
+        if spent(full[0]):
             break
         sure = enough(full[0])
         beam = full[:1] if sure else [f for f in full[: ROUNDS[level].keep] if f.cost < 30 * full[0].cost]

@@ -15,6 +15,7 @@ from rtctl.diagnose.decide import (
     p_value,
     probabilities,
     same_law,
+    spent,
     unusual,
     worth,
 )
@@ -79,6 +80,25 @@ def test_what_many_numbers_gain_is_less_worth_than_what_one_does():
 def test_below_the_noise_there_is_nothing_to_take():
     quiet = made(np.full(1000, 0.9))
     assert not worth(Floor(1.0), quiet, quiet, made(np.full(1000, 0.1), 1))  # type: ignore[arg-type]
+
+
+@settings(deadline=None)
+@given(st.floats(0.5, 4.0), st.floats(0.85, 4.0), st.floats(0.0, 300.0), st.integers(0, 2**32))
+def test_beside_what_is_spent_no_term_is_worth_it(one, two, did, seed):
+    """Whatever its errors are, as long as it follows no noise."""
+    rng = np.random.default_rng(seed)
+    shape = rng.standard_normal((2, 2000))
+    left, better = shape / np.sqrt(np.mean(shape**2, axis=1, keepdims=True)) * [[one], [two]]
+    base, before = made(left + did * (np.arange(2000) < 300)), made(left, 1)
+    if spent(Floor(1.0), base, before):  # type: ignore[arg-type]
+        assert not worth(Floor(1.0), base, before, made(better, 2))  # type: ignore[arg-type]
+
+
+def test_what_is_spent():
+    quiet, loud, base = made(np.full(1000, 0.9), 1), made(np.full(1000, 1.1), 1), made(np.full(1000, 20.0))
+    assert spent(Floor(1.0), quiet, quiet)  # type: ignore[arg-type]
+    assert not spent(Floor(1.0), loud, loud)  # type: ignore[arg-type]
+    assert spent(Floor(1.0), base, loud)  # as much as the form of its law may miss  # type: ignore[arg-type]
 
 
 def test_near_the_noise_a_term_must_take_more():
