@@ -32,12 +32,11 @@ def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Sear
     since = float(first + step * loud[0]) if len(loud) else 0.0
     if ticks and not best.space.hypotheses:
         return Located(channel, "loop", "time", "at every tick, the more the faster it moves", first, 1.0)
-    top = best if best.space.hypotheses else looked.fits[0] if looked.fits else None
-    if top is None or not top.space.hypotheses:
-        return Located(channel, "loop", "time", "everywhere", since, 0.0)
-    h = top.space.hypotheses[0]
-    share = float(np.clip(1.0 - top.cost / base.cost, 0.0, 1.0))
-    axis, node = TERMS[h.term].axis, h.node
+    share, axis, node = 0.0, "time", ""
+    for top in (f for f in (best, *looked.fits) if f.space.hypotheses):
+        share = float(np.clip(1.0 - top.cost / base.cost, 0.0, 1.0))
+        axis, node = TERMS[top.space.hypotheses[0].term].axis, top.space.hypotheses[0].node
+        break
     if not best.space.hypotheses:
         node = stands(problem, base.model, node, share)
     if not best.space.hypotheses or share < MOSTLY:

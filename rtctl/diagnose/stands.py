@@ -20,13 +20,19 @@ MOTORS = ("motor1", "motor2")
 FASTER = 3.0  # than the correction that fits are made with
 STAYS = 0.57  # of the error and of the reels' together, under the faster correction: then it is the reading
 APART = 2.0  # times the error of the encoder, on the way: by so much is the scale off where the encoder misreads
+TOGETHER = {  # bodies on one shaft or a stiff train: a push at one is a push at the other, where most is amiss
+    "ivu": {"reel1": "motor1", "reel2": "motor2"},
+    "ldu": {"motor": "carriage", "wheel": "carriage", "capstan": "carriage"},
+}
 MOSTLY = 0.5  # share of the error that a guess must explain to be believed about where it stands
 
 
 def stands(problem: Problem, model: Model, guess: str, share: float) -> str:
     """The node, where the nearest `guess` explains this `share` of the error: that is believed if it moves with the
     body that was found, or where no other sensor tells of bodies."""
-    node = {"ivu": of_reels, "ldu": of_scale}.get(problem.sim.record.plant, of_one)(problem, model)
+    plant = problem.sim.record.plant
+    node = {"ivu": of_reels, "ldu": of_scale}.get(plant, of_one)(problem, model)
+    guess = TOGETHER.get(plant, {}).get(guess, guess)
     if share < MOSTLY or node == "encoder":
         return node or "capstan"
     return node if node in MOTORS and guess[-1:] != node[-1:] else guess

@@ -118,11 +118,12 @@ def test_a_bump_on_the_way_is_suggested_as_a_spot(make_axis):
     assert set(WHOLE) <= set(found["order"]) and len(found["order"]) <= MOST + len(WHOLE)
 
 
-def test_a_short_wave_of_the_drive_is_suggested(make_axis):
+@pytest.mark.parametrize(("turn", "A"), [(4e-3, 4.0), (4e-4, 40.0)])
+def test_a_short_wave_of_the_drive_is_suggested(make_axis, turn, A):
     """Shorter than a tenth of the way, where it passes slowly enough for the observer."""
-    made = make_axis({"term": "ripple.cogging", "node": "carriage", "A": 4.0, "turn": 4e-3})
+    made = make_axis({"term": "ripple.cogging", "node": "carriage", "A": A, "turn": turn})
     found = hints(made.sim, made.model._replace(terms=()))
-    assert min(abs(w / 4e-3 - 1) for w in found["wavelength"]) < 0.03
+    assert min(abs(w / turn - 1) for w in found["wavelength"]) < 0.03
 
 
 def test_a_two_reel_unit_is_asked_about_each_of_its_motors(monkeypatch, plain, blank):

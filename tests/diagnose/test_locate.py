@@ -34,10 +34,24 @@ def test_without_a_name_the_nearest_one_tells_where(tilted, searched):
     assert 0.0 <= told.share <= 1.0
 
 
-def test_where_nothing_was_even_tried_it_is_the_loop(tilted, searched):
+def test_a_name_that_was_tried_tells_where_though_none_would_be_better(tilted, searched):
+    problem, base, looked = searched(tilted)
+    faint = looked.rounds[0][0]._replace(cost=0.99 * base.cost)  # less than its numbers cost
+    told = located(tilted.sim, problem, base, base, looked._replace(rounds=((base, faint),)))
+    assert (told.node, told.share) == ("carriage", pytest.approx(0.01))
+
+
+def test_where_nothing_was_even_tried_it_is_the_body(tilted, searched):
     problem, base, _ = searched(tilted)
     told = located(tilted.sim, problem, base, base, Search(base, (), ()))
-    assert (told.node, told.axis, told.share) == ("loop", "time", 0.0)
+    assert (told.node, told.share) == ("carriage", 0.0)
+    assert told.axis == (repeats(tilted.sim, base.model) or "time")
+
+
+def test_ticks_off_their_times_are_the_loops(tilted, searched):
+    problem, base, looked = searched(tilted)
+    told = located(tilted.sim, problem, base, base, looked, ticks=True)
+    assert (told.node, told.axis, told.share) == ("loop", "time", 1.0)
 
 
 def test_an_error_that_comes_late_is_there_since_then(tilted, searched):

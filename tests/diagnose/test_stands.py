@@ -54,6 +54,12 @@ def test_the_reels_tell_which_motor(case_of, node):
     assert stands(problem, model, node.replace("motor", "drive"), 0.9) == node.replace("motor", "drive")
 
 
+def test_what_moves_together_is_told_where_most_is_amiss(case_of):
+    problem, model = reel_unit(case_of, "motor1")
+    assert stands(problem, model, "reel1", 0.9) == "motor1"
+    assert stands(problem, model, "tape1", 0.9) == "tape1"
+
+
 def test_a_reading_that_wanders_is_no_force(case_of):
     problem, model = reel_unit(case_of, misread=60.0)
     assert stands(problem, model, "motor1", 0.3) == "encoder"
@@ -72,6 +78,7 @@ def test_the_scale_tells_of_an_encoder_that_misreads(case_of, misread, node):
     out[:, 0] += misread * np.sin(2 * np.pi * 0.7 * t)
     problem = Problem(Simulator(empty._replace(y={name: np.floor(out[:, c]) for c, name in enumerate(names)})))
     assert stands(problem, model, "", 0.0) == node
+    assert stands(problem, model, "wheel", 0.9) == node
 
 
 def test_of_one_body_there_is_no_choice_but_what_is_guessed(tilted):
