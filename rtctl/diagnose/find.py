@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 from rtctl.diagnose import beyond, decide
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.fit import Fit, parallel
+from rtctl.diagnose.fit import Fit, fit, parallel
+from rtctl.diagnose.forms import is_rich, renamed
 from rtctl.diagnose.hints import hints
-from rtctl.diagnose.hypotheses import USUAL, hypotheses, is_rich
+from rtctl.diagnose.hypotheses import USUAL, hypotheses
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
 from rtctl.diagnose.name import Search, absurd_last, look_alikes, names, rivals, search
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.rework import dropped, eliminate, enrich, polish
+from rtctl.diagnose.rework import dropped, eliminate, enrich, exchanged, polish
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.verdict import Alternative, standing
@@ -170,7 +171,8 @@ def replacements(
 ) -> Places:
     """For each hypothesis of the best model, fits with another one in its place, nearest first.
 
-    They are those that the search has fitted and, where there are `candidates`, the most likely of these.
+    They are those that the search has fitted, the same law by another name if it has one, and, where there are
+    `candidates`, the most likely of these.
     """
     out = []
     for index, h in enumerate(best.space.hypotheses):
@@ -184,6 +186,9 @@ def replacements(
             else:
                 alike -= {f.space.hypotheses[0].term for f in tried}
                 tried += look_alikes(problem, looked.base, looked.scores, alike, best.cost)
+        other = renamed(h, best.space.parts(best.x)[index])
+        if other is not None:
+            tried.append(fit(problem, exchanged(best, index, other), best.x, rounds=2, J=best.J))
         nearest: dict[tuple[str, ...], Fit] = {}
         for f in sorted(tried, key=lambda f: f.merit):
             if names(f) != names(best):

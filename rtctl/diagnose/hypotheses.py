@@ -5,9 +5,9 @@ which shapes (speeds, times, frequencies) it starts. Starts are shares of what t
 its rms speed, its span, the rms force of its drive.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -103,7 +103,6 @@ class Choice(NamedTuple):
 USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
 SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
-COUNTED, NEARLY_WHOLE = ("per_turn",), 1e-3  # slots and poles are; and how near a fit comes to them
 Part = Size | Limit | Shape | Turn | At | Hint | Where | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),
@@ -157,33 +156,6 @@ SEARCH: dict[str, tuple[Part, ...]] = {
 }  # fmt: skip
 
 
-EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, tried once the plain form stands
-    "ripple.cogging": (Turn("A2", "phi2", "force", 0.02), Turn("A3", "phi3", "force", 0.02)),
-    "ripple.encoder": (Turn("A2", "phi2", "one", 5e-4), Turn("A3", "phi3", "one", 5e-4)),
-    "ripple.reel": (Turn("e2", "phi2", "one", 3e-5), Turn("e3", "phi3", "one", 3e-5)),
-    "ripple.capstan": (Turn("a2", "phi2", "one", 3e-6), Turn("a3", "phi3", "one", 3e-6)),
-    "guide.thickness": (Turn("A2", "phi2", "one", 1e-6), Turn("A3", "phi3", "one", 1e-6)),
-    "tape.viscoelastic": (Size("c_branch2", "stiffness", 0.2), Shape("tau2", "seconds", (0.5,), 60.0)),
-    "friction.asymmetry": (Size("B_a", "drag", 0.05, signed=True),),
-    "friction.presliding": (
-        Size("rise", "one", 0.1, most=3.0), Shape("v_s", "speed", (0.1,), 50.0),
-        Shape("tau_s", "seconds", (3e-3,), 300.0), Choice("form", ("lugre",)),
-    ),
-    "drive.lag": (Shape("zeta", "one", (0.7,), 20.0),),
-    "drive.saturation": (Shape("knee", "one", (0.15,), 6.0),),
-    "drive.supply_sag": (Shape("tau", "seconds", (0.02,), 30.0),),
-    "drive.thermal": (Size("ease", "one", 0.1, signed=True),),
-    "structure.stiffening": (Size("c2", "square", 0.05, signed=True), Size("b2", "swell", 0.05)),
-}  # fmt: skip
-RICH_AT = {"drive.thermal": "drive"}  # nodes at which alone there is more
-FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in its other values once the term stands
-    "friction.stribeck": ("form", ("gaussian", "exponential", "tustin")),
-    "transmission.backlash": ("damping", (0.0, 1.0)),
-    "drive.supply_sag": ("form", ("current", "power", "drawn")),
-    "drive.deadband": ("form", ("shift", "cut", "floor")),
-    "load.bump": ("form", ("drag", "hill", "push")),
-    "drive.thermal": ("form", ("exponential", "linear", "hyperbolic")),
-}
 BEYOND: dict[str, tuple[Part, ...]] = {  # what has no name in the table, looked for where a name may stand for it
     "friction.quadratic": (Size("Q", "drag2", 0.1),),
 }
@@ -199,7 +171,6 @@ SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
 HINTED = tuple(  # whose starts the record suggests
     name for name, parts in (SEARCH | SLIDING).items() if any(isinstance(part, Hint | Jumps | At) for part in parts)
 )
-WAVES = ("wavelength", "turn")  # coordinates that are the length of a wave
 LEAD, RAIL = 0.045, 0.012  # m: the longest turn of a screw or encoder of a linear axis, the shortest wave of its guide
 
 
@@ -227,7 +198,7 @@ def hypotheses(
                     or (name == "friction.stribeck" and measures.dry(node) <= SLIGHT * measures.of("force", node))
                 ):  # falls to what the base has
                     continue
-                out += _starts(name, node, (slides and SLIDING.get(name)) or parts_of(name), measures)
+                out += starts_of(name, node, (slides and SLIDING.get(name)) or parts_of(name), measures)
     return out
 
 
@@ -240,76 +211,7 @@ def parts_of(name: str) -> tuple[Part, ...]:
     return (Size(first, "one", (low * high) ** 0.5), *more)
 
 
-def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis | None:
-    """The same hypothesis with the further parameters of its richer form; None where it has none."""
-    parts = EXTRAS.get(h.term)
-    if parts is None or not h.node.startswith(RICH_AT.get(h.term, "")):
-        return None
-    measures = Measures(record, base, node_scales(record, base), {})
-    if is_rich(h):
-        return None
-    more = _starts(h.term, h.node, parts, measures)[0]
-    return h._replace(coordinates=(*h.coordinates, *more.coordinates), fixed={**h.fixed, **more.fixed})
-
-
-def is_rich(h: Hypothesis) -> bool:
-    """Whether it has its richer form already."""
-    more = {part[0] for part in EXTRAS.get(h.term, ()) if not isinstance(part, Choice)}
-    return any(c.name.partition("|")[0] in more for c in h.coordinates)
-
-
-def as_harmonic(h: Hypothesis, x: np.ndarray) -> Iterator[tuple[Hypothesis, np.ndarray]]:
-    """The wave of a richer form as the second and the third of a longer one, which errors that are judged on track
-    show less of than of its harmonics."""
-    names = [c.name for c in h.coordinates]
-    long = next((names.index(name) for name in WAVES if name in names), None)
-    if long is None or not is_rich(h):
-        return
-    for k in (2, 3):
-        coordinates, y = list(h.coordinates), h.start()
-        coordinates[long] = coordinates[long]._replace(scale=k * coordinates[long].scale)
-        y[long] = x[long]
-        first, other = names.index("A|phi"), names.index(f"A{k}|phi{k}")
-        for i in (0, 1):  # cosine and sine
-            y[other + i] = x[first + i] * coordinates[first].scale / coordinates[other].scale
-        yield h._replace(coordinates=tuple(coordinates)), y
-
-
-def forms(h: Hypothesis) -> list[Hypothesis]:
-    """The same hypothesis in each of its other forms."""
-    name, values = FORMS.get(h.term, ("", ()))
-    default = TERMS[h.term].settings.model_fields[name].default if name else None
-    return [h._replace(fixed={**h.fixed, name: v}) for v in values if v != h.fixed.get(name, default)]
-
-
-def moved_into(form: Hypothesis, x: np.ndarray) -> list[np.ndarray]:
-    """Starts of another form at x of the first: as it is, and what took one flank of a hill for a bump by itself is
-    moved aside."""
-    if form.fixed.get("form") != "hill":
-        return [x]
-    names = [c.name for c in form.coordinates]
-    force, at = names.index("F"), names.index("at")
-    starts = [x]
-    for side in (-1.0, 1.0):  # it pushes on behind its middle and back before it
-        y = x.copy()
-        y[at] += side * form.values(x)["width"] / form.coordinates[at].scale
-        y[force] *= -side
-        starts.append(y)
-    return starts
-
-
-def rounded(h: Hypothesis, x: np.ndarray) -> tuple[int, Hypothesis] | None:
-    """The same hypothesis with its order at the whole number that it is next to at x, and which coordinate it loses by
-    that; None where it has no order or one in between."""
-    for i, c in enumerate(h.coordinates):
-        order = c.scale * float(np.exp(x[i])) if c.name in COUNTED else 0.0
-        if order > 0.5 and abs(order / round(order) - 1.0) < NEARLY_WHOLE:
-            rest = (*h.coordinates[:i], *h.coordinates[i + 1 :])
-            return i, h._replace(coordinates=rest, fixed={**h.fixed, c.name: float(round(order))})
-    return None
-
-
-def _starts(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[Hypothesis]:
+def starts_of(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[Hypothesis]:
     """One hypothesis for each combination of starts."""
     m.term = term
     axes: list[list[tuple[tuple[Coordinate, ...], dict]]] = [list(_options(part, node, m)) for part in parts]

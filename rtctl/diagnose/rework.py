@@ -7,7 +7,7 @@ import numpy as np
 
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, fit, parallel
-from rtctl.diagnose.hypotheses import as_harmonic, forms, moved_into, richer, rounded
+from rtctl.diagnose.forms import as_harmonic, forms, moved_into, richer, rounded
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import Hypothesis, Space
 

@@ -16,7 +16,7 @@ import numpy as np
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
-from rtctl.diagnose.hypotheses import COUNTED
+from rtctl.diagnose.forms import COUNTED
 from rtctl.diagnose.model import DRY, dry_friction
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, SINE, Hypothesis
 from rtctl.diagnose.words import unit_at

@@ -247,3 +247,18 @@ def case_of():
         return case
 
     return make
+
+
+@pytest.fixture(scope="module")
+def moved(blank):
+    """A record of each plant that moves to and fro, with the model of its owner."""
+
+    def make(kind):
+        rate = {"axis": 1000, "ivu": 500, "ldu": 10000}[kind]
+        t = np.arange(2 * rate) / rate
+        u = np.sin(2 * np.pi * t)
+        counts = {"axis": 0.05, "ivu": 5000.0, "ldu": 20000.0}[kind] * (1 - np.cos(2 * np.pi * t))
+        record = blank(kind, np.stack([u, 0.5 - u], axis=1) if kind == "ivu" else u, counts)
+        return record, owner_model(record.case).base
+
+    return make

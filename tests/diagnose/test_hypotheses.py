@@ -3,24 +3,12 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.hypotheses import (
-    EXTRAS,
-    HINTED,
-    SEARCH,
-    At,
-    Choice,
-    Turn,
-    as_harmonic,
-    forms,
-    hypotheses,
-    moved_into,
-    richer,
-)
+from rtctl.diagnose.forms import EXTRAS
+from rtctl.diagnose.hypotheses import HINTED, SEARCH, At, Choice, Turn, hypotheses
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import SHAPE
 from rtctl.plants.physics import TERMS
-from rtctl.plants.physics.guide import thickness
 from rtctl.plants.physics.sensor import READINGS, missed_counts
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
@@ -28,21 +16,6 @@ HINTS = {
     "order": [2.0, 7.0], "wavelength": [0.01, 0.1], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
     "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
 }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def moved(blank):
-    """A record of each plant that moves to and fro, with the model of its owner."""
-
-    def make(kind):
-        rate = {"axis": 1000, "ivu": 500, "ldu": 10000}[kind]
-        t = np.arange(2 * rate) / rate
-        u = np.sin(2 * np.pi * t)
-        counts = {"axis": 0.05, "ivu": 5000.0, "ldu": 20000.0}[kind] * (1 - np.cos(2 * np.pi * t))
-        record = blank(kind, np.stack([u, 0.5 - u], axis=1) if kind == "ivu" else u, counts)
-        return record, owner_model(record.case).base
-
-    return make
 
 
 def names(parts):
@@ -61,10 +34,6 @@ def test_the_search_walks_along_settings_that_the_term_has(term):
     given = set(names(SEARCH[term]))
     needed = {name for name, info in fields.items() if info.is_required() and name != "node"}
     assert needed <= given
-
-
-def test_extras_belong_to_a_form_that_is_searched_for():
-    assert set(EXTRAS) <= set(SEARCH)
 
 
 @pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
@@ -148,56 +117,6 @@ def test_the_tick_that_sees_a_jump_first_sees_all_of_it(moved, plant):
     p, s = term.build(h.settings([1.0]), record.dt), np.zeros(1, term.state)[0]
     read = [missed_counts(p, s, 0.0, k * record.dt) for k in (39, 40, 89, 90)]
     assert read == pytest.approx([0.0, 2e-3, 2e-3, 1e-3], abs=1e-12)
-
-
-def test_forms_and_richer_forms_keep_the_term_and_its_place(moved):
-    record, base = moved("axis")
-    (h, *_) = hypotheses(record, base, only=("friction.stribeck",))
-    assert [f.fixed["form"] for f in forms(h)] == ["exponential", "tustin"]
-    assert forms(forms(h)[0])[0].fixed["form"] == "gaussian"
-    (dahl, *_) = hypotheses(record, base, only=("friction.presliding",))
-    more = richer(record, base, dahl)
-    assert more.name == dahl.name and more.fixed["form"] == "lugre"
-    assert [c.name for c in more.coordinates] == ["z_s", "rise", "v_s", "tau_s"]
-    assert richer(record, base, more) is None  # it has them already
-
-
-def test_a_flank_of_a_hill_is_moved_aside(moved):
-    """What pushes on is behind the middle of the hill that it belongs to, or the other way round before it."""
-    record, base = moved("axis")
-    h = next(h for h in hypotheses(record, base, only=("load.bump",)) if h.fixed["form"] == "push")
-    x = h.start()
-    x[0] = 1.0
-    push = h.values(x)
-    (hill,) = [f for f in forms(h) if f.fixed["form"] == "hill"]
-    found = [hill.values(y) for y in moved_into(hill, x)]
-    assert [v["F"] / push["F"] for v in found] == [1.0, 1.0, -1.0]
-    assert [(v["at"] - push["at"]) / push["width"] for v in found] == pytest.approx([0.0, -1.0, 1.0])
-    for v in found[1:]:
-        assert v["F"] * (push["at"] - v["at"]) > 0.0  # there it pushes as before
-    assert all(len(moved_into(f, x)) == 1 for f in forms(h) if f.fixed["form"] != "hill")
-
-
-def test_a_wave_may_be_the_second_or_the_third_of_a_longer_one(moved):
-    record, base = moved("axis")
-    (h, *_) = hypotheses(record, base, {"wavelength": [0.05]}, only=("guide.thickness",))
-    assert list(as_harmonic(h, h.start())) == []  # in its plain form it is one wave
-    more = richer(record, base, h)
-    x = more.start()
-    x[[c.name for c in more.coordinates].index("A|phi") + 1] = 2.0
-    x[[c.name for c in more.coordinates].index("wavelength")] = 0.1
-    term, at = TERMS["guide.thickness"], np.linspace(-0.1, 0.1, 50)
-
-    def wave(settings):
-        p = term.build(settings, record.dt)
-        return [thickness(p, z) for z in at]
-
-    own = wave(more.settings(x))
-    assert np.ptp(own) > 0.0
-    longer = [form.settings(y) for form, y in as_harmonic(more, x)]
-    assert [s.wavelength / more.settings(x).wavelength for s in longer] == pytest.approx([2.0, 3.0])
-    for settings in longer:
-        assert settings.A == 0.0 and wave(settings) == pytest.approx(own, rel=1e-9, abs=1e-15)
 
 
 def test_a_hint_of_a_node_goes_before_a_hint_for_all(moved):

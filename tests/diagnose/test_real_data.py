@@ -14,7 +14,8 @@ from rtctl.diagnose import chain, heldout
 from rtctl.diagnose import find as finding
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.fit import Fit, fit
-from rtctl.diagnose.hypotheses import hypotheses, richer
+from rtctl.diagnose.forms import richer
+from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED, OPEN
 from rtctl.diagnose.measure import compare
 from rtctl.diagnose.model import Model, owner_model

@@ -1,0 +1,86 @@
+"""Other forms of a hypothesis keep what they are forms of."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.forms import EXTRAS, as_harmonic, forms, moved_into, renamed, richer
+from rtctl.diagnose.hypotheses import SEARCH, hypotheses
+from rtctl.plants.physics import TERMS
+from rtctl.plants.physics.guide import thickness
+from rtctl.plants.physics.ripple import encoder
+
+
+def test_extras_belong_to_a_form_that_is_searched_for():
+    assert set(EXTRAS) <= set(SEARCH)
+
+
+def test_forms_and_richer_forms_keep_the_term_and_its_place(moved):
+    record, base = moved("axis")
+    (h, *_) = hypotheses(record, base, only=("friction.stribeck",))
+    assert [f.fixed["form"] for f in forms(h)] == ["exponential", "tustin"]
+    assert forms(forms(h)[0])[0].fixed["form"] == "gaussian"
+    (dahl, *_) = hypotheses(record, base, only=("friction.presliding",))
+    more = richer(record, base, dahl)
+    assert more.name == dahl.name and more.fixed["form"] == "lugre"
+    assert [c.name for c in more.coordinates] == ["z_s", "rise", "v_s", "tau_s"]
+    assert richer(record, base, more) is None  # it has them already
+
+
+def test_a_flank_of_a_hill_is_moved_aside(moved):
+    """What pushes on is behind the middle of the hill that it belongs to, or the other way round before it."""
+    record, base = moved("axis")
+    h = next(h for h in hypotheses(record, base, only=("load.bump",)) if h.fixed["form"] == "push")
+    x = h.start()
+    x[0] = 1.0
+    push = h.values(x)
+    (hill,) = [f for f in forms(h) if f.fixed["form"] == "hill"]
+    found = [hill.values(y) for y in moved_into(hill, x)]
+    assert [v["F"] / push["F"] for v in found] == [1.0, 1.0, -1.0]
+    assert [(v["at"] - push["at"]) / push["width"] for v in found] == pytest.approx([0.0, -1.0, 1.0])
+    for v in found[1:]:
+        assert v["F"] * (push["at"] - v["at"]) > 0.0  # there it pushes as before
+    assert all(len(moved_into(f, x)) == 1 for f in forms(h) if f.fixed["form"] != "hill")
+
+
+def test_a_wave_may_be_the_second_or_the_third_of_a_longer_one(moved):
+    record, base = moved("axis")
+    (h, *_) = hypotheses(record, base, {"wavelength": [0.05]}, only=("guide.thickness",))
+    assert list(as_harmonic(h, h.start())) == []  # in its plain form it is one wave
+    more = richer(record, base, h)
+    x = more.start()
+    x[[c.name for c in more.coordinates].index("A|phi") + 1] = 2.0
+    x[[c.name for c in more.coordinates].index("wavelength")] = 0.1
+    term, at = TERMS["guide.thickness"], np.linspace(-0.1, 0.1, 50)
+
+    def wave(settings):
+        p = term.build(settings, record.dt)
+        return [thickness(p, z) for z in at]
+
+    own = wave(more.settings(x))
+    assert np.ptp(own) > 0.0
+    longer = [form.settings(y) for form, y in as_harmonic(more, x)]
+    assert [s.wavelength / more.settings(x).wavelength for s in longer] == pytest.approx([2.0, 3.0])
+    for settings in longer:
+        assert settings.A == 0.0 and wave(settings) == pytest.approx(own, rel=1e-9, abs=1e-15)
+
+
+def test_a_wave_of_a_reading_has_two_names_where_its_length_may_be_either(moved):
+    record, base = moved("axis")
+    found = hypotheses(record, base, {"wavelength": [0.01, 0.02, 0.15]}, only=("ripple.encoder", "guide.thickness"))
+    other = {(h.term, h.coordinates[-1].scale): renamed(h, h.start()) for h in found}
+    assert {key for key, h in other.items() if h is not None} == {("ripple.encoder", 0.02), ("guide.thickness", 0.02)}
+    own = next(h for h in found if h.term == "ripple.encoder" and h.coordinates[-1].scale == 0.02)
+    x = richer(record, base, own).start() + 0.3
+    laws = [richer(record, base, own), renamed(richer(record, base, own), x)]
+    p, q = (TERMS[h.term].build(h.settings(x), record.dt) for h in laws)
+    at = np.linspace(-0.1, 0.1, 50)
+    assert [encoder(p, z) - z for z in at] == pytest.approx([thickness(q, z) for z in at], abs=1e-15)
+    again = renamed(laws[1], x)
+    assert (again.term, again.coordinates) == (laws[0].term, laws[0].coordinates)
+
+
+@pytest.mark.parametrize(("kind", "term"), [("ldu", "guide.thickness"), ("ivu", "ripple.encoder")])
+def test_elsewhere_a_wave_has_one_name(moved, kind, term):
+    record, base = moved(kind)
+    for h in hypotheses(record, base, {"wavelength": [0.02]}, only=(term,)):
+        assert renamed(h, h.start()) is None
