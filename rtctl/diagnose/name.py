@@ -91,7 +91,7 @@ def search(
         if level > 0:
             candidates = [*candidates, *new_starts(propose(beam[0]), known)]
         parents = [*beam, away] if level == 0 and away is not None else beam
-        full, scores = grow(problem, parents, candidates, QUICK if sure else ROUNDS[level], away, progress)
+        full, scores = grow(problem, parents, candidates, QUICK if sure else ROUNDS[level], away, enough, progress)
         if level == 0:
             first, candidates = tuple(scores), best_starts(scores)
             quiet = base.rms < QUIET * problem.floor
@@ -102,7 +102,7 @@ def search(
                 progress("looking for a slack tape")
                 full = sorted([*full, *slack(problem, base, scores)], key=absurd_last)
         if full and sure and worth(beam[0], full[0]):
-            full, _ = grow(problem, parents, candidates, ROUNDS[level], away, progress)
+            full, _ = grow(problem, parents, candidates, ROUNDS[level], away, enough, progress)
         if not full:
             break
         rounds.append(tuple(full))
@@ -123,9 +123,13 @@ def grow(
     candidates: Sequence[Hypothesis],
     breadth: Breadth,
     away: Fit | None,
+    enough: Callable[[Fit], bool],
     progress: Callable[[str], None],
 ) -> tuple[list[Fit], list[Score]]:
-    """One term more on top of each parent: fits, best first, and the scores beside the first parent."""
+    """One term more on top of each parent: fits, best first, and the scores beside the first parent.
+
+    Where a model is `enough`, what is far behind it is not tried from elsewhere.
+    """
     rough: dict[tuple[str, ...], Fit] = {}
     likely: list[Fit] = []
     first: list[Score] = []
@@ -143,16 +147,19 @@ def grow(
                 rough[names(trial)] = trial
         if own:  # what does best beside it, though other parents may have more that look better
             likely.append(min(own, key=lambda f: f.merit))
+            if not taken and enough(likely[-1]):
+                break
     ranked = various(sorted(rough.values(), key=lambda f: f.merit), breadth.full)
     if not ranked:
         return [], first
     progress("fitting " + ", ".join(" + ".join(names(f)) for f in ranked[:3]))
     ranked += [trial for trial in likely if not any(trial is f for f in ranked)]
-    best = min(f.cost for f in ranked)
+    best, limit = min(f.cost for f in ranked), np.inf
     fits: dict[tuple[str, ...], Fit] = {}
     for trial in ranked:
-        fitted = from_both(problem, trial, best, None if away is None else away.x)
+        fitted = from_both(problem, trial, best, None if away is None else away.x, limit * best)
         best = min(best, fitted.cost)
+        limit = RICHER if enough(fitted) else limit
         if names(fitted) not in fits or fitted.cost < fits[names(fitted)].cost:
             fits[names(fitted)] = fitted
     full = sorted(fits.values(), key=absurd_last)
@@ -224,10 +231,19 @@ def calm_fit(problem: Problem, fitted: Fit) -> Fit:
     return fitted
 
 
-def from_both(problem: Problem, trial: Fit, best: float, other: np.ndarray | None = None) -> Fit:
-    """The better of two full fits: from where the trial stands, and from other plant parameters, else the owner's."""
+def from_both(
+    problem: Problem, trial: Fit, best: float, other: np.ndarray | None = None, limit: float = np.inf
+) -> Fit:
+    """The better of two full fits: from where the trial stands, and from other plant parameters, else the owner's; the
+    second only if the first comes below the `limit`."""
     x = trial.x.copy()
     x[: trial.space.nb] = 0.0 if other is None else other[: trial.space.nb]
+    if limit < np.inf:
+        one = well(problem, trial, trial.x, best)
+        if one.cost > limit:
+            return one
+        two = well(problem, trial, x, best)
+        return one if one.cost <= two.cost else two
     one, two = parallel([partial(well, problem, trial, start, best) for start in (trial.x, x)])
     return one if one.cost <= two.cost else two
 

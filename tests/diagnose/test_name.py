@@ -6,10 +6,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rtctl.diagnose import name
 from rtctl.diagnose.decide import worth
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hypotheses import hypotheses
-from rtctl.diagnose.name import Hopeless, absurd_last, best_starts, names, rivals, shortlist, various
+from rtctl.diagnose.name import (
+    ROUNDS,
+    Hopeless,
+    absurd_last,
+    best_starts,
+    from_both,
+    grow,
+    names,
+    rivals,
+    shortlist,
+    various,
+)
 from rtctl.diagnose.rework import eliminate, polish
 from rtctl.diagnose.screen import Score
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
@@ -115,6 +127,35 @@ def test_rivals_stand_in_the_place_of_the_term_and_do_worse(tilted, searched):
 def scores(*told):
     made = [Hypothesis(t, n, (Coordinate("x", SIZE, 1.0),), {"start": i}) for i, (t, n, _) in enumerate(told)]
     return [Score(h, gain, np.zeros(1), 0.0, 1.0) for h, (_, _, gain) in zip(made, told, strict=True)]
+
+
+def test_what_is_far_behind_is_not_tried_from_elsewhere(tilted, searched, monkeypatch):
+    problem, base, looked = searched(tilted)
+    trial = looked.rounds[0][0]
+    from_where = []
+
+    def well(problem, trial, x, best):
+        from_where.append(x[: trial.space.nb].copy())
+        return trial._replace(x=x, cost=2.0 if len(from_where) % 2 else 1.0)
+
+    monkeypatch.setattr(name, "well", well)
+    other = np.full(base.space.nb, 0.01)
+    assert from_both(problem, trial, 1.0, other, limit=1.9).cost == 2.0
+    assert len(from_where) == 1
+    from_where.clear()
+    assert from_both(problem, trial, 1.0, other, limit=2.1).cost == 1.0
+    assert [list(x) for x in from_where] == [list(trial.x[: trial.space.nb]), list(other)]
+
+
+def test_where_one_model_is_enough_the_next_start_is_not_screened(tilted, searched):
+    problem, base, looked = searched(tilted)
+    candidates = [h for h in hypotheses(tilted.record, base.model.base) if h.term == "friction.asymmetry"]
+    told = []
+    for enough, screened in ((lambda f: False, 2), (lambda f: True, 1)):
+        told.clear()
+        full, _ = grow(problem, [base, base], candidates, ROUNDS[0], base, enough, told.append)
+        assert sum(text.startswith("screening") for text in told) == screened
+        assert full[0].cost == pytest.approx(looked.rounds[0][0].cost, rel=0.02)
 
 
 def test_a_shortlist_has_two_starts_of_one_and_three_nodes_of_one_at_most():
