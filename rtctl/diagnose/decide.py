@@ -11,6 +11,7 @@ Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Ec
 import numpy as np
 from scipy.stats import chi2, norm
 
+from rtctl.diagnose.anylaw import freed, static
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import COSINE, SHAPE, SIZE, Hypothesis
@@ -35,6 +36,7 @@ RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant paramete
 ONCE = 0.02  # the same of a further term that shows at a few places only
 SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
+BEYOND, UNLIKELY = 0.75, 1e-5  # of the cost, and chance, once the laws beside a term may have any form
 CLEAR = 0.15  # share of the cost that it must take off
 LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
@@ -48,10 +50,15 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     """Whether a further term took enough off.
 
     Below the floor there is nothing to take, and where what is left may be noise a term must take more: a lucky one may
-    follow that for a while.
+    follow that for a while. Less is enough of what no form of the laws beside it could do.
     """
     if before.space.hypotheses and at_end(before, after):
         return False
+    return earns(problem, base, before, after) or no_form(problem, before, after)
+
+
+def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
+    """As `worth`, where what the laws miss by their form is forgiven them as a share of what they do."""
     alike = same_law(before, after)
     much = after.cost < MOST * before.cost and rms(before.r) > problem.floor and problem.louder == 1.0
     if much and not alike and by_noise(before, after) < NEVER:
@@ -61,26 +68,41 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         return False
     share = MATERIAL
     if complete(problem, base, before):
-        chance = p_value(after, before, max(problem.block, round(SPANS * memory(after.r, LONGEST))))
+        luck = p_value(after, before, max(problem.block, round(SPANS * memory(after.r, LONGEST))))
         if problem.louder > 1.0:
             return False  # of a machine that is known to be louder nobody knows what is noise
-        if before.bound() and not after.bound() and chance < RELEASED and after.cost < (1.0 - FREE) * before.cost:
+        if before.bound() and not after.bound() and luck < RELEASED and after.cost < (1.0 - FREE) * before.cost:
             return True  # the owner's values need not be stretched any more
         noise = rms(before.r) < COMPLETE * problem.floor and not alike
         clear = after.cost < (1.0 - CLEAR) * before.cost
-        if noise and clear and before.space.hypotheses and chance < ONCE and by_noise(before, after) < NEVER:
+        if noise and clear and before.space.hypotheses and luck < ONCE and by_noise(before, after) < NEVER:
             return True
-        if chance > LUCK:
+        if luck > LUCK:
             return False
-        if noise and clear and chance < NEVER:
+        if noise and clear and luck < NEVER:
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
 
 
+def no_form(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether what a further term takes off is more than any function in the place of the laws beside it could."""
+    if not (before.space.hypotheses and static(before)) or same_law(before, after) or problem.louder > 1.0:
+        return False
+    if rms(before.r) < problem.floor:
+        return False
+    block = max(problem.block, round(SPANS * memory(after.r, LONGEST)))
+    if after.cost > BEYOND * before.cost or by_noise(before, after) > NEVER or p_value(after, before, block) > LUCK:
+        return False
+    least, other = freed(problem, before, after)
+    return rms(other) < np.sqrt(BEYOND) * rms(least) and chance(other, least, block) < UNLIKELY
+
+
 def spent(problem: Problem, base: Fit, fitted: Fit) -> bool:
     """Whether no further term can be `worth` a place beside those of `fitted`: what is left is noise, and no model can
     be much better than that."""
+    if static(fitted) and np.sqrt(BEYOND) * rms(fitted.r) > QUIET * problem.floor:
+        return False
     below = rms(discount(problem, base, fitted) * fitted.r) < problem.floor
     return below and bool(np.sqrt(MOST) * rms(fitted.r) < QUIET * problem.floor)
 
@@ -169,7 +191,12 @@ def explained(problem: Problem, before: Fit, after: Fit) -> float:
 
 def p_value(best: Fit, rival: Fit, block: int) -> float:
     """Chance that the rival explains the record as well as the best does (one-sided Vuong test on blocks)."""
-    d = 0.5 * (rival.r**2 - best.r**2)
+    return chance(best.r, rival.r, block)
+
+
+def chance(best: np.ndarray, rival: np.ndarray, block: int) -> float:
+    """As `p_value`, of the errors (errors,) themselves."""
+    d = 0.5 * (rival**2 - best**2)
     sums = d[: len(d) // block * block].reshape(-1, block).sum(axis=1)
     if len(sums) < 4:
         return 1.0

@@ -231,9 +231,7 @@ def calm_fit(problem: Problem, fitted: Fit) -> Fit:
     return fitted
 
 
-def from_both(
-    problem: Problem, trial: Fit, best: float, other: np.ndarray | None = None, limit: float = np.inf
-) -> Fit:
+def from_both(problem: Problem, trial: Fit, best: float, other: np.ndarray | None = None, limit: float = np.inf) -> Fit:
     """The better of two full fits: from where the trial stands, and from other plant parameters, else the owner's; the
     second only if the first comes below the `limit`."""
     x = trial.x.copy()

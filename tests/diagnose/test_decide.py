@@ -34,7 +34,7 @@ class Floor:
 
 
 def made(r, terms=0, x=None):
-    one = Hypothesis("friction.viscous", "carriage", (Coordinate("B", SIZE, 1.0),))
+    one = Hypothesis("structure.stiffening", "carriage", (Coordinate("c3", SIZE, 1.0),))
     space = Space(Model("axis", {"M": 1.0}), (), lambda name: 0.1, (one,) * terms)
     r = np.asarray(r, float)
     x = np.zeros(terms) if x is None else x
