@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import decide, heldout, locate, solver
 from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Evidence, Interval
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet, with_fewer
 from rtctl.diagnose.fit import Fit
@@ -133,9 +133,7 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         preflight=checked,
         verdict=verdict.verdict,
         effects=verdict.effects,
-        located=None
-        if verdict.verdict == NOTHING
-        else locate.located(sim, problem, base, found.best, found.search, found.jitter is not None),
+        located=None if verdict.verdict == NOTHING else _located(sim, found, verdict.verdict != UNNAMED),
         parameters=parameter_intervals(taken, covariance(taken, problem.block)),
         owner=owner_model(record.case, record),
         before=base.model,
@@ -153,6 +151,12 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         on_track=shown.on_track,
         resembles=resembled(found) if verdict.verdict == UNNAMED else None,
     )
+
+
+def _located(sim: Simulator, found: Found, named: bool) -> Located:
+    """Where the error of the fitted base lives."""
+    ticks = found.jitter is not None
+    return locate.located(sim, found.problem, found.base, found.best, found.search, named, ticks)
 
 
 def resembled(found: Found) -> tuple[str, str] | None:

@@ -21,8 +21,14 @@ REPEATS = 0.35  # share of the missing force that must repeat along an axis, to 
 UNITS = {"velocity": ("rad/s", "m/s"), "position": ("rad", "m"), "angle": ("rad", "m"), "command": ("V", "V")}
 
 
-def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Search, ticks: bool = False) -> Located:
-    """Of the fitted base's error; `ticks`: they come off their times, and no hypothesis may be needed beside that."""
+def located(
+    sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Search, named: bool = True, ticks: bool = False
+) -> Located:
+    """Of the fitted base's error.
+
+    `named`: the terms of `best` are there, else they are a guess; `ticks`: ticks come off their times, and no
+    hypothesis may be needed beside that.
+    """
     errors = problem.by_sensor(base.r)
     channel = max(errors, key=lambda name: float(np.mean(errors[name] ** 2)))
     error = problem.at_rows(channel, errors[channel])
@@ -37,9 +43,10 @@ def located(sim: Simulator, problem: Problem, base: Fit, best: Fit, looked: Sear
         share = float(np.clip(1.0 - top.cost / base.cost, 0.0, 1.0))
         axis, node = TERMS[top.space.hypotheses[0].term].axis, top.space.hypotheses[0].node
         break
-    if not best.space.hypotheses:
+    named = named and bool(best.space.hypotheses)
+    if not named:
         node = stands(problem, base.model, node, share)
-    if not best.space.hypotheses or share < MOSTLY:
+    if not named or share < MOSTLY:
         axis = repeats(sim, base.model) or axis
     return Located(channel, node, axis, where(sim, problem, error, axis), since, share)
 

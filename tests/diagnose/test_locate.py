@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rtctl.diagnose import locate
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.locate import located, repeats, where
 from rtctl.diagnose.name import Search
@@ -32,6 +33,17 @@ def test_without_a_name_the_nearest_one_tells_where(tilted, searched):
     told = located(tilted.sim, problem, base, base, looked)
     assert told.node == looked.fits[0].space.hypotheses[0].node
     assert 0.0 <= told.share <= 1.0
+
+
+def test_what_is_found_and_not_named_is_a_guess(tilted, searched, monkeypatch):
+    problem, base, looked = searched(tilted)
+    best = looked.rounds[0][0]
+    asked = []
+    monkeypatch.setattr(locate, "stands", lambda *a: asked.append(a[2:]) or "elsewhere")
+    told = located(tilted.sim, problem, base, best, looked, named=False)
+    assert told.node == "elsewhere"
+    assert asked == [(best.space.hypotheses[0].node, told.share)]
+    assert told.axis == (repeats(tilted.sim, base.model) or TERMS[best.space.hypotheses[0].term].axis)
 
 
 def test_a_name_that_was_tried_tells_where_though_none_would_be_better(tilted, searched):
