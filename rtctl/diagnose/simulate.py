@@ -59,6 +59,7 @@ class Simulator:
         volts = record.u.reshape(len(record.t), -1)
         self.volts = np.ascontiguousarray(volts if held else half_a_tick_on(volts))
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
+        self.w = np.array(record.w, float)  # of a file it cannot be written to, which would be compiled for anew
         self.law = law_params(record)
 
     def finer(self, times: int) -> "Simulator":
@@ -140,7 +141,7 @@ class Simulator:
         push = np.zeros(n)
         done = k.module.run(
             job, p, np.zeros(1, k.state), slots, laws, np.zeros(1, law.LAW_STATE), self.lead, self.ref[:n],
-            self.record.w[:n], self.volts[:n], self.seen[:n], out, written, push,
+            self.w[:n], self.volts[:n], self.seen[:n], out, written, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         return out, written, push
