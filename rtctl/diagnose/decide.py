@@ -66,9 +66,9 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     weights = discount(problem, base, before)
     if rms(weights * before.r) < problem.floor:
         return False
-    share = MATERIAL
+    share, block = MATERIAL, max(problem.block, round(SPANS * memory(after.r, LONGEST)))
     if complete(problem, base, before):
-        luck = p_value(after, before, max(problem.block, round(SPANS * memory(after.r, LONGEST))))
+        luck = p_value(after, before, block)
         if problem.louder > 1.0:
             return False  # of a machine that is known to be louder nobody knows what is noise
         if before.bound() and not after.bound() and luck < RELEASED and after.cost < (1.0 - FREE) * before.cost:
@@ -82,6 +82,12 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         if noise and clear and luck < NEVER:
             return True
         share = NEARLY if noise else BESIDE  # the pattern that a law's form leaves is followed by some other law
+    elif (
+        before.space.hypotheses
+        and explained(problem, base, before) > ENOUGH  # nearly all has a name: chance may follow the rest
+        and p_value(after, before, block) > RELEASED
+    ):
+        return False
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
 
 

@@ -135,6 +135,20 @@ def test_a_second_term_may_show_at_a_few_places_only_if_noise_cannot():
     assert not worth(Floor(0.8), made(base), lucky, two)  # type: ignore[arg-type]
 
 
+def test_beside_what_has_a_name_for_nearly_all_a_term_must_beat_chance():
+    noise, rows = 4.0 * np.random.default_rng(4).standard_normal(8000), np.arange(8000)
+    left = noise + 30.0 * (rows // 20 % 100 == 50)  # at four places
+    base, little = made(left + 200.0 * (rows < 400)), made(left + 20.0 * (rows < 400))
+    one, some, all_over = made(left, 1), made(noise, 2), made(0.8 * left, 2)
+    assert not complete(Floor(1.0), base, one)  # type: ignore[arg-type]
+    assert explained(Floor(1.0), base, one) > 0.97 > explained(Floor(1.0), little, one)  # type: ignore[arg-type]
+    assert some.cost < all_over.cost
+    assert p_value(some, one, 20) > 2e-3
+    assert not worth(Floor(1.0), base, one, some)  # type: ignore[arg-type]
+    assert worth(Floor(1.0), little, one, some)  # type: ignore[arg-type]
+    assert worth(Floor(1.0), base, one, made(0.7 * left, 2))  # type: ignore[arg-type]
+
+
 def test_a_fit_is_complete_near_the_floor():
     for rms, expected in ((0.5, True), (1.0, True), (2.0, False)):
         fitted = made(np.full(10, rms))
