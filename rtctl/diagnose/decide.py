@@ -36,7 +36,8 @@ RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant paramete
 ONCE = 0.02  # the same of a further term that shows at a few places only
 SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
-BEYOND, UNLIKELY = 0.75, 1e-5  # of the cost, and chance, once the laws beside a term may have any form
+BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
+UNLIKELY = 1e-5  # chance of that, and of a name that explains less than most of what random forces may have done
 CLEAR = 0.15  # share of the cost that it must take off
 LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
@@ -181,6 +182,10 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH
+    near = before.rms < LOUD * problem.floor or not quiet(problem, before, after)  # a machine that is not quiet
+    block = max(problem.block, round(SPANS * memory(after.r, LONGEST)))
+    if near and after.cost > MOST * before.cost and p_value(after, before, block) > UNLIKELY:
+        return False
     if share > MOSTLY:
         return True
     # what frees the owner's values, or explains what is plainly there, need be no miracle

@@ -279,6 +279,19 @@ def test_what_explains_little_of_a_little_needs_more_than_luck():
     assert not enough(noise, made(base), weak)  # type: ignore[arg-type]
 
 
+def test_what_may_be_a_machine_that_is_not_quiet_needs_a_miracle_or_to_be_most_of_it():
+    rows = np.arange(8000)
+    noise = np.random.default_rng(6).standard_normal(8000)
+    push = 6.0 * (rows // 50 % 32 == 5) * np.where(rows // 1600 % 2, 1.0, -1.0)  # at five places
+    base, after = made(noise + push), made(noise, 1)
+    assert 1e-5 < p_value(after, base, 20) < 2e-2
+    assert 0.3 * base.cost < after.cost < 0.6 * base.cost
+    assert not enough(Floor(1.0), base, after)  # type: ignore[arg-type]
+    assert enough(Floor(1.0), base, made(0.5 * noise, 1))  # type: ignore[arg-type]
+    assert enough(Floor(1.0), made(noise + 4.0 * push), after)  # type: ignore[arg-type]
+    assert enough(Floor(1.0), made(1.4 * noise), made(0.9 * noise, 1))  # type: ignore[arg-type]
+
+
 def test_a_further_term_at_the_end_of_its_times_is_none():
     tape = Hypothesis(
         "tape.viscoelastic", "tape2", (Coordinate("c", SIZE, 1.0), Coordinate("tau", SHAPE, 1.2, -4.0, 3.0))
