@@ -38,6 +38,7 @@ SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where th
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
 UNLIKELY = 1e-5  # chance of that, and of a name that explains less than most of what random forces may have done
+NOWHERE = 1e-100  # chance of the same by noise at a few places: at rest, where friction creeps, 1e-72 was seen
 CLEAR = 0.15  # share of the cost that it must take off
 LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
@@ -184,7 +185,8 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
         return share > ENOUGH
     near = before.rms < LOUD * problem.floor or not quiet(problem, before, after)  # a machine that is not quiet
     block = max(problem.block, round(SPANS * memory(after.r, LONGEST)))
-    if near and after.cost > MOST * before.cost and p_value(after, before, block) > UNLIKELY:
+    lucky = p_value(after, before, block) > UNLIKELY and by_noise(before, after) > NOWHERE
+    if near and lucky and after.cost > MOST * before.cost:
         return False
     if share > MOSTLY:
         return True
