@@ -10,12 +10,11 @@ Source: Robinson, Root-N-consistent semiparametric regression, Econometrica 56 (
 from functools import partial
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.fit import Fit, parallel, trust
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.scales import SMOOTH
+from rtctl.diagnose.scales import spaced, speed
 from rtctl.diagnose.simulate import Simulator, gear, per_unit
 from rtctl.diagnose.space import Hypothesis
 
@@ -76,12 +75,11 @@ def abscissa(sim: Simulator, model: Model, law: Hypothesis) -> np.ndarray:
     x = record.y[sim.channels[0]] / per_unit(record.case)[0]
     along = LAWS[law.term]
     if along == "velocity":
-        return np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH[record.plant] / record.dt)) + 1), record.dt)
+        return speed(x, record.plant, record.dt)
     if along == "command":
         return sim.volts @ np.abs(drives(sim, law.node))
     if along == "angle" and record.case.sensors.unit != "m":
-        node = law.node.replace("drive", "motor") if record.plant != "axis" else law.node
-        return np.mod(gear(record.plant, model.base, node) * x, 2 * np.pi)
+        return np.mod(gear(record.plant, model.base, law.node) * x, 2 * np.pi)
     return x
 
 
@@ -91,8 +89,7 @@ def hats(values: np.ndarray) -> np.ndarray:
     Knots are dense where the values are, but reach to where they seldom are.
     """
     low, high = np.quantile(values, (1e-3, 1.0 - 1e-3))
-    share = 0.5 * ((np.sort(values) - low) / ((high - low) or 1.0) + np.linspace(0.0, 1.0, len(values)))
-    knots = np.unique(np.interp(np.linspace(0.0, 1.0, HATS), share, np.sort(values)))
+    knots = np.unique(spaced(np.sort(values), low, high, HATS))
     return np.array([np.interp(values, knots, one) for one in np.eye(len(knots))])
 
 

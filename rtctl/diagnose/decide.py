@@ -68,9 +68,9 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     weights = discount(problem, base, before)
     if rms(weights * before.r) < problem.floor:
         return False
-    share, block = MATERIAL, max(problem.block, round(SPANS * memory(after.r, LONGEST)))
+    share = MATERIAL
     if complete(problem, base, before):
-        luck = p_value(after, before, block)
+        luck = p_value(after, before, blocks(problem, after))
         if problem.louder > 1.0:
             return False  # of a machine that is known to be louder nobody knows what is noise
         if before.bound() and not after.bound() and luck < RELEASED and after.cost < (1.0 - FREE) * before.cost:
@@ -87,7 +87,7 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     elif (
         before.space.hypotheses
         and explained(problem, base, before) > ENOUGH  # nearly all has a name: chance may follow the rest
-        and p_value(after, before, block) > RELEASED
+        and p_value(after, before, blocks(problem, after)) > RELEASED
     ):
         return False
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
@@ -99,7 +99,7 @@ def no_form(problem: Problem, before: Fit, after: Fit) -> bool:
         return False
     if rms(before.r) < problem.floor:
         return False
-    block = max(problem.block, round(SPANS * memory(after.r, LONGEST)))
+    block = blocks(problem, after)
     if after.cost > BEYOND * before.cost or by_noise(before, after) > NEVER or p_value(after, before, block) > LUCK:
         return False
     least, other = freed(problem, before, after)
@@ -183,16 +183,15 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH
-    near = before.rms < LOUD * problem.floor or not quiet(problem, before, after)  # a machine that is not quiet
-    block = max(problem.block, round(SPANS * memory(after.r, LONGEST)))
-    lucky = p_value(after, before, block) > UNLIKELY and by_noise(before, after) > NOWHERE
-    if near and lucky and after.cost > MOST * before.cost:
+    restless = before.rms < LOUD * problem.floor or not quiet(problem, before, after)
+    lucky = restless and after.cost > MOST * before.cost and by_noise(before, after) > NOWHERE
+    if lucky and p_value(after, before, blocks(problem, after)) > UNLIKELY:
         return False
     if share > MOSTLY:
         return True
     # what frees the owner's values, or explains what is plainly there, need be no miracle
-    freed = bool(before.bound()) and not after.bound()
-    plain = share > HALF and (freed or not complete(problem, before, before))
+    released = bool(before.bound()) and not after.bound()
+    plain = share > HALF and (released or not complete(problem, before, before))
     return p_value(after, before, problem.block) < (RELEASED if plain else LUCK)
 
 
@@ -200,6 +199,11 @@ def explained(problem: Problem, before: Fit, after: Fit) -> float:
     """Share of the error's excess over the noise floor that the terms of `after` explain."""
     floor = min(problem.floor, after.rms) ** 2
     return float(np.clip((before.rms**2 - after.rms**2) / max(before.rms**2 - floor, 1e-12), 0.0, 1.0))
+
+
+def blocks(problem: Problem, fitted: Fit) -> int:
+    """Errors in a block of a test where what is left need be no noise: longer than the memory of that."""
+    return max(problem.block, round(SPANS * memory(fitted.r, LONGEST)))
 
 
 def p_value(best: Fit, rival: Fit, block: int) -> float:

@@ -20,9 +20,10 @@ from rtctl.diagnose.diagnosis import Diagnosis
 from rtctl.diagnose.heldout import mode_of
 from rtctl.diagnose.hints import ORDERS, spectrum
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
-from rtctl.diagnose.missing import BLOCK, Missing, binned, observe, speed
+from rtctl.diagnose.missing import BLOCK, Missing, binned, observe
 from rtctl.diagnose.model import FITTED, Model
 from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.scales import speed
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.diagnose.hypotheses import LEAD, RAIL, Choice, Part, Shape, Size, Turn, starts_of
+from rtctl.diagnose.hypotheses import LENGTHS, Choice, Part, Shape, Size, Turn, starts_of
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import Hypothesis
@@ -17,7 +17,6 @@ from rtctl.diagnose.yardstick import Measures
 from rtctl.plants.physics import TERMS
 
 COUNTED, NEARLY_WHOLE = ("per_turn",), 1e-3  # slots and poles are; and how near a fit comes to them
-WAVES = ("wavelength", "turn")  # coordinates that are the length of a wave
 EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, tried once the plain form stands
     "ripple.cogging": (Turn("A2", "phi2", "force", 0.02), Turn("A3", "phi3", "force", 0.02)),
     "ripple.encoder": (Turn("A2", "phi2", "one", 5e-4), Turn("A3", "phi3", "one", 5e-4)),
@@ -45,9 +44,9 @@ FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in 
     "load.bump": ("form", ("drag", "hill", "push")),
     "drive.thermal": ("form", ("exponential", "linear", "hyperbolic")),
 }
-OTHER_NAMES = {  # name and length of a wave: the other name, its length, and between which lengths
-    ("ripple.encoder", "turn"): ("guide.thickness", "wavelength", RAIL, np.inf),
-    ("guide.thickness", "wavelength"): ("ripple.encoder", "turn", 0.0, LEAD),
+OTHER_NAMES = {  # of a wave that a sliding axis misreads: what its length is called, the other name, its length there
+    "ripple.encoder": ("turn", "guide.thickness", "wavelength"),
+    "guide.thickness": ("wavelength", "ripple.encoder", "turn"),
 }
 
 
@@ -73,7 +72,7 @@ def as_harmonic(h: Hypothesis, x: np.ndarray) -> Iterator[tuple[Hypothesis, np.n
     """The wave of a richer form as the second and the third of a longer one, which errors that are judged on track
     show less of than of its harmonics."""
     names = [c.name for c in h.coordinates]
-    long = next((names.index(name) for name in WAVES if name in names), None)
+    long = next((names.index(name) for name in LENGTHS if name in names), None)
     if long is None or not is_rich(h):
         return
     for k in (2, 3):
@@ -123,10 +122,11 @@ def rounded(h: Hypothesis, x: np.ndarray) -> tuple[int, Hypothesis] | None:
 def renamed(h: Hypothesis, x: np.ndarray) -> Hypothesis | None:
     """The same law by its other name, at the same x: a wave that a sliding axis misreads is of its screw or encoder, or
     of its guide, and at lengths that both may have nothing tells them apart. None where it has no other name."""
-    for (term, own), (other, name, low, high) in OTHER_NAMES.items():
-        if h.term == term and h.node == "sensor" and own in (c.name for c in h.coordinates):
-            if not low < h.values(x)[own] < high:
-                return None
-            coordinates = tuple(c._replace(name=name) if c.name == own else c for c in h.coordinates)
-            return h._replace(term=other, coordinates=coordinates)
-    return None
+    own, other, name = OTHER_NAMES.get(h.term, ("", "", ""))
+    if h.node != "sensor" or own not in (c.name for c in h.coordinates):
+        return None
+    shortest, longest = LENGTHS[name]
+    if not shortest < h.values(x)[own] < longest:
+        return None
+    coordinates = tuple(c._replace(name=name) if c.name == own else c for c in h.coordinates)
+    return h._replace(term=other, coordinates=coordinates)

@@ -171,7 +171,10 @@ SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
 HINTED = tuple(  # whose starts the record suggests
     name for name, parts in (SEARCH | SLIDING).items() if any(isinstance(part, Hint | Jumps | At) for part in parts)
 )
-LEAD, RAIL = 0.045, 0.012  # m: the longest turn of a screw or encoder of a linear axis, the shortest wave of its guide
+LENGTHS = {  # m, between which a wave that a linear axis misreads is of its screw or encoder, and of its guide
+    "turn": (0.0, 0.045),
+    "wavelength": (0.012, np.inf),
+}
 
 
 def hypotheses(
@@ -255,7 +258,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
         found = m.hints.get(f"{part.kind}:{node}", m.hints.get(part.kind, []))
         s = m.scale(node)
         if node == "sensor" and part.kind == "wavelength":
-            found = [value for value in found if (value < LEAD if part.name == "turn" else value > RAIL)]
+            low, high = LENGTHS[part.name]
+            found = [value for value in found if low < value < high]
         for value in found:
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}

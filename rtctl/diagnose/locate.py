@@ -39,10 +39,11 @@ def located(
     if ticks and not best.space.hypotheses:
         return Located(channel, "loop", "time", "at every tick, the more the faster it moves", first, 1.0)
     share, axis, node = 0.0, "time", ""
-    for top in (f for f in (best, *looked.fits) if f.space.hypotheses):
+    top = next((f for f in (best, *looked.fits) if f.space.hypotheses), None)
+    if top is not None:
+        h = top.space.hypotheses[0]
         share = float(np.clip(1.0 - top.cost / base.cost, 0.0, 1.0))
-        axis, node = TERMS[top.space.hypotheses[0].term].axis, top.space.hypotheses[0].node
-        break
+        axis, node = TERMS[h.term].axis, h.node
     named = named and bool(best.space.hypotheses)
     if not named:
         node = stands(problem, base.model, node, share)

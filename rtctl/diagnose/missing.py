@@ -1,14 +1,13 @@
 """What a model lacks, as a force or a reading, against the axis where it lives."""
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 from scipy.stats import t
 
 from rtctl.diagnose import words
 from rtctl.diagnose.diagnosis import Diagnosis
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.scales import SMOOTH
+from rtctl.diagnose.scales import spaced, speed
 from rtctl.diagnose.simulate import Simulator, gear, lever, per_unit
 from rtctl.plants.physics import TERMS
 
@@ -26,11 +25,6 @@ def observe(sim: Simulator, model: Model) -> tuple[np.ndarray, np.ndarray]:
         if np.isfinite(out).all():
             break
     return out, np.nan_to_num(push)
-
-
-def speed(x: np.ndarray, kind: str, dt: float) -> np.ndarray:
-    """Rate (n,) of a reading, over a few ticks."""
-    return np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH[kind] / dt)) + 1), dt)
 
 
 class Missing:
@@ -103,9 +97,7 @@ def binned(x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int
     nan.
     """
     lo, hi = np.quantile(x, (0.002, 0.998))
-    inside = np.sort(x[(x >= lo) & (x <= hi)])
-    share = 0.5 * ((inside - lo) / ((hi - lo) or 1.0) + np.linspace(0, 1, len(inside)))
-    edges = np.interp(np.linspace(0, 1, count + 1), share, inside)
+    edges = spaced(np.sort(x[(x >= lo) & (x <= hi)]), lo, hi, count + 1)
     index = np.searchsorted(edges, x) - 1
     out: list[tuple[float, ...]] = []
     for k in range(len(edges) - 1):

@@ -236,14 +236,14 @@ def from_both(problem: Problem, trial: Fit, best: float, other: np.ndarray | Non
     second only if the first comes below the `limit`."""
     x = trial.x.copy()
     x[: trial.space.nb] = 0.0 if other is None else other[: trial.space.nb]
-    if limit < np.inf:
-        one = well(problem, trial, trial.x, best)
-        if one.cost > limit:
-            return one
-        two = well(problem, trial, x, best)
-        return one if one.cost <= two.cost else two
-    one, two = parallel([partial(well, problem, trial, start, best) for start in (trial.x, x)])
-    return one if one.cost <= two.cost else two
+    one, two = (partial(well, problem, trial, start, best) for start in (trial.x, x))
+    if limit == np.inf:
+        fits = parallel([one, two])
+    else:
+        fits = [one()]
+        if fits[0].cost <= limit:
+            fits.append(two())
+    return min(fits, key=lambda f: f.cost)
 
 
 def well(problem: Problem, trial: Fit, x: np.ndarray, best: float) -> Fit:

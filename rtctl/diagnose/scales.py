@@ -3,11 +3,24 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import per_unit
 
 SMOOTH = {"ivu": 0.01, "ldu": 2e-3, "axis": 5e-3}  # s, over which a speed is taken
+
+
+def speed(x: np.ndarray, kind: str, dt: float) -> np.ndarray:
+    """Rate (n,) of a reading, over a few ticks."""
+    return np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH[kind] / dt)) + 1), dt)
+
+
+def spaced(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
+    """Places (count,) among sorted values (n,): each step has the same sum of its shares of the way from low to high
+    and of the values."""
+    share = 0.5 * ((values - low) / ((high - low) or 1.0) + np.linspace(0.0, 1.0, len(values)))
+    return np.interp(np.linspace(0.0, 1.0, count), share, values)
 
 
 class Scales(NamedTuple):
