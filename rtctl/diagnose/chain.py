@@ -87,11 +87,7 @@ def searched(record: Record, progress: Progress) -> Found:
         problem = Problem(sim).seen_by(found.best.model)
         found = find(sim, problem, progress, base_fit(sim, problem, found.base.x))
     if misread(found):
-        bare = Problem(sim)
-        alone = base_fit(sim, bare)
-        if decide.quiet(bare, alone, alone):
-            progress("leaving out the reels, which no model follows")
-            return find(sim, bare, progress, alone)
+        found = without_reels(sim, found, progress)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or record.case.controller.kind == "none" or faster <= sim.follow:
         return found
@@ -107,6 +103,23 @@ def tells(found: Found, quick: Problem, fitted: Fit) -> bool:
     if fitted.rms >= SHOWS * quick.floor:  # what is missing still shows
         return True
     return not found.best.space.hypotheses and quick.hiss(fitted.r)  # all the rest was wandering
+
+
+def without_reels(sim: Simulator, found: Found, progress: Progress) -> Found:
+    """What the capstan shows alone, where no model follows the reels; if something is missing there, what all show once
+    the reels are read through that, and `found` if no model follows them even so."""
+    progress("leaving out the reels, which no model follows")
+    bare = Problem(sim)
+    alone = base_fit(sim, bare)
+    apart = find(sim, bare, progress, alone)
+    if decide.quiet(bare, alone, alone):
+        return apart
+    if not apart.best.space.hypotheses:
+        return found
+    progress("reading the reels anew, through what the capstan shows")
+    problem = bare.seen_by(apart.best.model)
+    again = find(sim, problem, progress, base_fit(sim, problem, apart.base.x))
+    return found if misread(again) else again
 
 
 def misread(found: Found) -> bool:

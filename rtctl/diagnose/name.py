@@ -105,6 +105,8 @@ def search(
             full, _ = grow(problem, parents, candidates, ROUNDS[level], away, enough, progress)
         if not full:
             break
+        if level > 0:  # what wants to be something else is no ground to build on, however much it takes off
+            full = sorted(full, key=partial(held, beam[0]))
         rounds.append(tuple(full))
         if level == 0 and not sound(full[0]):
             break
@@ -196,6 +198,11 @@ def various(ranked: Sequence[Fit], count: int) -> list[Fit]:
 def absurd_last(fitted: Fit) -> tuple[bool, float]:
     """What models are ordered by: a size that no machine has may follow what several real terms do."""
     return decide.absurd(fitted), fitted.merit
+
+
+def held(before: Fit, after: Fit) -> tuple[bool, bool]:
+    """What models of a round come after the others by: a size that no machine has, then a shape at its end."""
+    return decide.absurd(after), decide.at_end(before, after)
 
 
 def elsewhere(problem: Problem, base: Fit) -> Fit:

@@ -8,7 +8,7 @@ import pytest
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import chain
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.chain import diagnose_record, misread, tells
+from rtctl.diagnose.chain import diagnose_record, misread, tells, without_reels
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
@@ -130,6 +130,40 @@ def test_reels_that_no_model_follows_are_misread(monkeypatch, reel, explained, e
     found = SimpleNamespace(problem=problem, base=None, best=SimpleNamespace(r=None))
     monkeypatch.setattr(chain.decide, "enough", lambda problem, before, after: explained)
     assert misread(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("quiet", "names", "again", "expected"),
+    [
+        (True, (), "followed", "of the capstan"),  # nothing is missing there
+        (False, (), "followed", "first"),
+        (False, ("friction.coulomb",), "followed", "through the capstan"),
+        (False, ("friction.coulomb",), "misread", "first"),
+    ],
+)
+def test_reels_that_no_model_follows_are_read_through_what_the_capstan_shows(
+    monkeypatch, quiet, names, again, expected
+):
+    class Capstan:
+        def __init__(self, sim):
+            assert sim == "sim"
+
+        def seen_by(self, model):
+            return f"reels by {model}"
+
+    def find(sim, problem, progress, base):
+        if isinstance(problem, Capstan):
+            best = SimpleNamespace(space=SimpleNamespace(hypotheses=names), model="capstan's")
+            return SimpleNamespace(told="of the capstan", base=base, best=best)
+        assert problem == "reels by capstan's"
+        return SimpleNamespace(told="through the capstan")
+
+    monkeypatch.setattr(chain, "Problem", Capstan)
+    monkeypatch.setattr(chain, "base_fit", lambda sim, problem, x=None: SimpleNamespace(x=x))
+    monkeypatch.setattr(chain, "find", find)
+    monkeypatch.setattr(chain, "misread", lambda found: again == "misread")
+    monkeypatch.setattr(chain.decide, "quiet", lambda problem, before, after: quiet)
+    assert without_reels("sim", SimpleNamespace(told="first"), lambda text: None).told == expected
 
 
 @pytest.mark.parametrize(

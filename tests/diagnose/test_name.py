@@ -17,6 +17,7 @@ from rtctl.diagnose.name import (
     best_starts,
     from_both,
     grow,
+    held,
     names,
     rivals,
     shortlist,
@@ -24,7 +25,7 @@ from rtctl.diagnose.name import (
 )
 from rtctl.diagnose.rework import eliminate, polish
 from rtctl.diagnose.screen import Score
-from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
+from rtctl.diagnose.space import SHAPE, SIZE, Coordinate, Hypothesis
 
 DEADBAND = {"term": "drive.deadband", "node": "drive", "band": 0.12}
 SPRING = {"term": "load.spring", "node": "carriage", "k": 600.0}
@@ -61,6 +62,15 @@ def test_sizes_that_no_machine_has_come_last_however_well_they_fit(tilted, searc
     real, absurd = (np.append(base.x, [size, 0.0, 0.0]) for size in (1.0, 1e6))
     fits = [Fit(space, x, base.r, base.J, cost) for x, cost in ((absurd, 1.0), (real, 2.0), (real, 3.0))]
     assert [f.cost for f in sorted(fits, key=absurd_last)] == [2.0, 3.0, 1.0]
+
+
+def test_what_wants_to_be_something_else_is_no_ground_to_build_on(tilted, searched):
+    _, base, _ = searched(tilted)
+    tape = Hypothesis("tape.viscoelastic", "tape2", (Coordinate("tau", SHAPE, 1.2, -4.0, 3.0),))
+    space = base.space.add(tape)
+    fits = [Fit(space, np.append(base.x, tau), base.r, base.J, cost) for tau, cost in ((3.0, 1.0), (2.9, 2.0))]
+    assert [f.cost for f in sorted(fits, key=partial(held, base))] == [2.0, 1.0]
+    assert [f.cost for f in sorted(fits, key=partial(held, fits[0]))] == [1.0, 2.0]  # it was there before
 
 
 def test_a_dead_band_is_found_with_its_size(make_axis, searched):
