@@ -1,16 +1,25 @@
-"""Fits the owner's parameters first: a wrong value is not missing physics."""
+"""Fits the owner's parameters first: a wrong value is not missing physics.
+
+Where dry friction holds and lets go, a small change of a parameter moves the moment at which a machine breaks loose.
+The cost has troughs of its own then, and what a fit from the owner's values leaves looks like an effect. So a base that
+is near the noise is fitted from places all over the tolerance as well.
+"""
+
+from functools import partial
 
 import numpy as np
 
 from rtctl.diagnose.decide import COMPLETE
-from rtctl.diagnose.fit import Fit, fit
+from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.model import free_parameters, owner_model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
-from rtctl.diagnose.space import Space
+from rtctl.diagnose.space import WIDE, Space
 
 AGAIN = 4  # fits from where the last one stopped
 NEAR = 2.5  # times the noise floor: a base this close is worth every round
+TROUGHS = (1.1, 4.5)  # times the noise floor: below there is nothing to gain, above one trough takes all
+SPREAD = 8  # other starts
 RINGS = {"ivu": (), "ldu": (("k_c", "M"),), "axis": ()}  # spring and mass: another frequency is a trough of its own
 AWAY = 0.8  # of the tolerance
 
@@ -20,19 +29,34 @@ def base_fit(sim: Simulator, problem: Problem, start: np.ndarray | None = None) 
     owner = owner_model(sim.case, sim.record)
     space = Space(owner, free_parameters(sim.case, owner), sim.case.tolerance)
     fitted = settle(problem, fit(problem, space, start))
-    if fitted.rms < COMPLETE * problem.floor:
-        return fitted
-    low, high = space.bounds()
-    for spring, mass in RINGS[sim.record.plant]:
-        for up, down in ((high, low), (low, high)):
-            x = fitted.x.copy()
-            for name, side in ((spring, up), (mass, down)):
-                if name in space.names:
-                    x[space.names.index(name)] = AWAY * side[space.names.index(name)]
-            other = fit(problem, space, x, rounds=12)
-            if other.cost < 0.98 * fitted.cost:
-                fitted = settle(problem, other)
+    starts = []
+    if space.names and TROUGHS[0] * problem.floor < fitted.rms < TROUGHS[1] * problem.floor:
+        starts += spread(space, fitted.x)
+    if fitted.rms > COMPLETE * problem.floor:
+        starts += rings(space, fitted.x, sim.record.plant)
+    for other in parallel([partial(fit, problem, space, x, rounds=12) for x in starts]):
+        if other.cost < 0.98 * fitted.cost:
+            fitted = settle(problem, other)
     return fitted
+
+
+def spread(space: Space, x: np.ndarray) -> list[np.ndarray]:
+    """Places all over the tolerance; what has none stays where it is in x (parameters,)."""
+    return [np.where(space.reach() < WIDE, other, x) for other in space.spread(SPREAD)]
+
+
+def rings(space: Space, x: np.ndarray, plant: str) -> list[np.ndarray]:
+    """Places beside x (parameters,) where a spring and its mass ring higher and lower."""
+    low, high = space.bounds()
+    out = []
+    for pair in RINGS[plant]:
+        for sides in ((high, low), (low, high)):
+            other = x.copy()
+            for name, side in zip(pair, sides, strict=True):
+                if name in space.names:
+                    other[space.names.index(name)] = AWAY * side[space.names.index(name)]
+            out.append(other)
+    return out
 
 
 def settle(problem: Problem, fitted: Fit) -> Fit:

@@ -9,7 +9,7 @@ Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Ec
 """
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.stats import chi2, t
 
 from rtctl.diagnose.anylaw import freed, static
 from rtctl.diagnose.fit import Fit
@@ -33,7 +33,7 @@ ELSEWHERE = (  # whose typical sizes are those of another machine: angles, or co
 MOST = 0.3  # of the cost: a term that leaves less is more than the form of another, and nothing that chance does
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
-ONCE = 0.02  # the same of a further term that shows at a few places only
+SELDOM = 1e-8  # chance that a further term does by accident what it does, wherever that is
 SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
@@ -77,7 +77,8 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return True  # the owner's values need not be stretched any more
         noise = rms(before.r) < COMPLETE * problem.floor and not alike
         clear = after.cost < (1.0 - CLEAR) * before.cost
-        if noise and clear and before.space.hypotheses and luck < ONCE and by_noise(before, after) < NEVER:
+        some = before.space.hypotheses and after.cost < (1.0 - NEARLY) * before.cost
+        if noise and some and by_accident(before, after, blocks(problem, after)) < SELDOM:
             return True
         if luck > LUCK:
             return False
@@ -146,6 +147,21 @@ def by_noise(before: Fit, after: Fit) -> float:
     return float(chi2.sf(2.0 * (before.cost - after.cost) / level, len(after.x) - len(before.x)))
 
 
+def by_accident(before: Fit, after: Fit, block: int) -> float:
+    """Chance that what `after` does otherwise than `before` has nothing to do with the machine.
+
+    Its size is as sure as what is left lets it be, block by block: a term that acts at a few places is judged by the
+    errors there, and one that acts everywhere but fits in one place is not borne out by the others. Counts as many
+    blocks as share in what it does. Source: Liang & Zeger, Biometrika 73 (1986), for the spread; Satterthwaite,
+    Biometrics Bulletin 2 (1946), for the count.
+    """
+    does = before.r - after.r
+    whole = len(does) // block * block
+    power, agrees = (np.sum((does * e)[:whole].reshape(-1, block), axis=1) for e in (does, after.r))
+    count = float(power.sum() ** 2 / max(float(power @ power), 1e-300))
+    return float(t.sf(power.sum() / max(float(np.sqrt(agrees @ agrees)), 1e-300), max(count - 1.0, 1.0)))
+
+
 def better(before: Fit, after: Fit) -> bool:
     """Whether a richer form of the same terms earns its numbers, whatever else is left over."""
     return after.merit < (1.0 - MATERIAL) * before.merit
@@ -212,13 +228,13 @@ def p_value(best: Fit, rival: Fit, block: int) -> float:
 
 
 def chance(best: np.ndarray, rival: np.ndarray, block: int) -> float:
-    """As `p_value`, of the errors (errors,) themselves."""
+    """As `p_value`, of the errors (errors,) themselves; by Student's t, since few blocks do not tell their spread."""
     d = 0.5 * (rival**2 - best**2)
     sums = d[: len(d) // block * block].reshape(-1, block).sum(axis=1)
     if len(sums) < 4:
         return 1.0
     spread = float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
-    return float(norm.sf(sums.sum() / max(spread, 1e-12)))
+    return float(t.sf(sums.sum() / max(spread, 1e-12), len(sums) - 1))
 
 
 def probabilities(fits: list[Fit], floor: float = 0.0) -> np.ndarray:

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from scipy.stats import qmc
 
 from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import USUAL
@@ -27,7 +26,6 @@ HEAVY, BROAD = 0.25, 0.05  # of a tenth of the machine's inertia; damping ratio
 FASTEST = 0.2  # of the rate of the record: above it a part on a spring only shows as more inertia
 ROUGH, FULL = 4, 2  # rounds of a rough fit, full fits
 SLACK, ELSEWHERE, DEEP = "tape.slack", 32, 3  # values tried all over their tolerance, and full fits
-INSIDE = 0.9  # of the tolerance
 
 
 def resonances(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
@@ -67,8 +65,7 @@ def slack(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
     starts: list[Fit] = []
     for h in (h for h in kinds.values() if h.term == SLACK):
         space = base.space.add(h)
-        low, high = space.bounds()
-        xs = INSIDE * (low + (high - low) * qmc.Sobol(len(low), seed=0).random(ELSEWHERE))
+        xs = space.spread(ELSEWHERE)
         errors = parallel([partial(problem.residual, space.model(x), True) for x in xs])
         starts += [Fit(space, x, r, np.empty((0, 0)), 0.5 * float(r @ r)) for x, r in zip(xs, errors, strict=True)]
     return [fit(problem, f.space, f.x, rounds=12) for f in sorted(starts, key=lambda f: f.cost)[:DEEP]]

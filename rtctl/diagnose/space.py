@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.stats import qmc
 
 from rtctl.diagnose.model import Model
 from rtctl.idiom import Settings
@@ -16,6 +17,7 @@ from rtctl.plants.physics import TERMS
 
 PRIOR = 0.7  # of the tolerance: standard deviation of the owner's error, between uniform and certain
 WIDE = 7.0  # in logarithm, of a parameter of which the owner knows nothing
+INSIDE = 0.9  # of the bounds: places to start from
 SIZE, INVERSE, SHAPE, COSINE, SINE, PLACE = "size", "inverse", "shape", "cosine", "sine", "place"
 
 
@@ -145,6 +147,14 @@ class Space(NamedTuple):
             low += [c.low for c in h.coordinates]
             high += [c.high for c in h.coordinates]
         return np.array(low, float), np.array(high, float)
+
+    def spread(self, count: int) -> np.ndarray:
+        """Places (count, unknowns) all over the bounds, which are finite; the same every time.
+
+        Source: Sobol, USSR Computational Mathematics and Mathematical Physics 7 (1967).
+        """
+        low, high = self.bounds()
+        return INSIDE * (low + (high - low) * qmc.Sobol(len(low), seed=0).random(count))
 
     def reach(self) -> np.ndarray:
         """How far each plant parameter may go, in logarithm."""

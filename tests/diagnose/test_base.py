@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.base import base_fit
+from rtctl.diagnose import base
+from rtctl.diagnose.base import SPREAD, base_fit
 from rtctl.diagnose.decide import complete
+from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.model import Model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.space import Space
 
 
 def test_wrong_values_alone_are_explained_down_to_the_noise(plain, searched):
@@ -44,3 +48,29 @@ def test_where_nothing_may_move_the_owner_is_taken_at_his_word(plain):
     assert found.x.shape == (0,)
     assert found.model.base["M"] == 95.0
     assert np.isfinite(found.cost)
+
+
+@pytest.mark.parametrize(("left", "more"), [(1.0, 0), (2.0, SPREAD), (9.0, 0)])
+def test_near_the_noise_other_places_are_tried_as_well(plain, monkeypatch, left, more):
+    tried = []
+
+    def fit(problem, space, x, rounds=20):
+        tried.append(x)
+        better = 0.5 if len(tried) == 3 else 1.0
+        r = np.full(50, left * problem.floor * np.sqrt(better))
+        return Fit(space, space.start() if x is None else x, r, np.zeros((50, 3)), 0.5 * float(r @ r))
+
+    monkeypatch.setattr(base, "fit", fit)
+    monkeypatch.setattr(base, "settle", lambda problem, fitted: fitted)
+    monkeypatch.setattr(base, "parallel", lambda jobs: [job() for job in jobs])
+    found = base_fit(plain.sim, Problem(plain.sim))
+    assert len(tried) == 1 + more
+    assert (found.x == tried[2]).all() if more else (found.x == 0.0).all()
+
+
+def test_places_to_start_from_are_within_the_tolerance_and_what_has_none_stays():
+    space = Space(Model("axis", {"M": 1.0, "K": 2.0}), ("M", "K"), lambda name: 0.15 if name == "M" else np.inf)
+    places = np.array(base.spread(space, np.array([0.1, 0.2])))
+    assert places.shape == (SPREAD, 2)
+    assert (places[:, 1] == 0.2).all()
+    assert np.log(0.85) < places[:, 0].min() < -0.05 < 0.05 < places[:, 0].max() < np.log(1.15)

@@ -8,6 +8,7 @@ from scipy.stats import kstest
 
 from rtctl.diagnose.decide import (
     absurd,
+    by_accident,
     by_noise,
     complete,
     enough,
@@ -133,6 +134,28 @@ def test_a_second_term_may_show_at_a_few_places_only_if_noise_cannot():
     lucky = made(noise + 0.02 * push, 1)
     assert by_noise(lucky, two) > 1e-4
     assert not worth(Floor(0.8), made(base), lucky, two)  # type: ignore[arg-type]
+
+
+def test_what_acts_everywhere_and_fits_in_one_place_is_an_accident():
+    rng = np.random.default_rng(5)
+    noise, rows = rng.standard_normal(8000), np.arange(8000)
+    wave, once = np.sin(0.01 * rows), 3.0 * ((rows >= 3000) & (rows < 3300))
+    there = made(noise + wave, 1), made(noise, 2)
+    fits = made(noise + once, 1), made(noise + once - wave * float(wave @ once) / float(wave @ wave), 2)
+    assert by_accident(*there, 200) < 1e-20
+    assert by_accident(*fits, 200) > 1e-2
+    gone = made(noise + once, 1), made(noise, 2)
+    assert by_accident(*gone, 300) > 1e-3 > by_noise(*gone)  # what is seen once is no law
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_number_that_follows_noise_does_so_by_accident_as_often_as_chance_has_it(seed):
+    rng = np.random.default_rng(seed)
+    own, luck = rng.standard_normal((2, 8000)), []
+    for k in range(40):
+        e, wave = np.roll(own[0], 37 * k), np.sin((0.003 + 0.0007 * k) * np.arange(8000))
+        luck.append(by_accident(made(e, 1), made(e - wave * float(wave @ e) / float(wave @ wave), 2), 200))
+    assert min(luck) > 1e-4
 
 
 def test_beside_what_has_a_name_for_nearly_all_a_term_must_beat_chance():
