@@ -61,10 +61,13 @@ def find(
     if off is not None:
         problem = allowed_for(problem, base.model, off)
         base = base_fit(sim, problem)
-        held = problem.of(pushed(sim, base.model, off))
-        other = base_fit(held.sim, held)
-        if other.cost < base.cost:
-            sim, problem, base = held.sim, held, other
+        if off.told:
+            held = problem.of(pushed(sim, base.model, off))
+            other = base_fit(held.sim, held)
+            if other.cost < base.cost:
+                sim, problem, base = held.sim, held, other
+        else:
+            off = None
     worth = partial(decide.worth, problem, base)
     propose = partial(proposed, sim)
 

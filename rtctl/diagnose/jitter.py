@@ -38,6 +38,12 @@ class Jitter(NamedTuple):
     sigma: float
     error: float
     noise: float = 0.0  # standard deviation of the reading besides, in its unit
+    dt: float = 0.0  # s, a tick
+
+    @property
+    def told(self) -> bool:
+        """Whether it is more than what any clock does, which makes noise but is no fault."""
+        return self.sigma >= max(LEAST * self.dt, CLOCK)
 
 
 def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
@@ -55,13 +61,13 @@ def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
     d, v = d[~beyond], v[~beyond]
     slope, error, floor = growth(d**2 / 1.5, v**2)
     sigma = float(np.sqrt(max(slope, 0.0)))
-    if slope < CERTAIN * error or sigma < max(LEAST * sim.record.dt, CLOCK) or slope * np.mean(v**2) < LOUD * floor:
+    if slope < CERTAIN * error or slope * np.mean(v**2) < LOUD * floor:
         return None
     z = d / np.sqrt(floor + slope * v**2)
     mixed = float(z[1:] @ z[:-1]) / float(z @ z)
     if not MIXED[0] < mixed < MIXED[1]:
         return None
-    return Jitter(sigma, 0.5 * error / sigma, float(np.sqrt(floor)))
+    return Jitter(sigma, 0.5 * error / sigma, float(np.sqrt(floor)), sim.record.dt)
 
 
 def growth(power: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
@@ -88,7 +94,7 @@ def allowed_for(problem: Problem, model: Model, found: Jitter) -> Problem:
     v = np.gradient(out, problem.sim.record.dt, axis=0)[problem.rows]
     spread = means((v * found.sigma / problem.sigma) ** 2, problem.mean) / problem.mean
     allowing = problem.weighed(1.0 / np.sqrt(1.0 + problem.beside(spread.T.ravel())))
-    allowing.louder = LOUDER
+    allowing.louder = LOUDER if found.told else 1.0
     return allowing
 
 

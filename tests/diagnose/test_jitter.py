@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.diagnose.jitter import Jitter, growth, interval, jitter, pushed
+from rtctl.diagnose.jitter import Jitter, allowed_for, growth, interval, jitter, pushed
 
 DT, N = 2e-3, 8000
 T = DT * np.arange(N)
@@ -41,6 +41,25 @@ def test_its_size_is_found_within_its_interval(sigma, seed):
 def test_where_ticks_are_on_time_there_is_none():
     assert found(off(0.0)) is None
     assert found(off(2e-6)) is None
+
+
+def test_what_any_clock_does_is_allowed_for_and_not_told():
+    seen = found(off(4e-5))  # a fiftieth of a tick
+    assert seen.sigma == pytest.approx(4e-5, rel=0.1) and not seen.told
+    assert found(off(1e-4)).told
+    weighed = []
+
+    def again(weights):
+        weighed.append(weights)
+        return SimpleNamespace(louder=1.0)
+
+    problem = SimpleNamespace(
+        sim=stand(0.0), channels=[0], rows=slice(0, None), sigma=0.35, mean=1, weighed=again, beside=lambda s: s
+    )
+    assert allowed_for(problem, None, seen).louder == 1.0  # type: ignore[arg-type]
+    speed = np.abs(np.gradient(WAY, DT))
+    np.testing.assert_allclose(weighed[0], 0.35 / np.hypot(0.35, speed * seen.sigma))
+    assert allowed_for(problem, None, seen._replace(sigma=1e-4)).louder > 1.0  # type: ignore[arg-type]
 
 
 def test_an_error_that_is_smooth_is_none_however_much_it_grows_with_speed():
