@@ -19,19 +19,20 @@ from rtctl.diagnose.space import WIDE, Space
 AGAIN = 4  # fits from where the last one stopped
 NEAR = 2.5  # times the noise floor: a base this close is worth every round
 TROUGHS = (1.1, 4.5)  # times the noise floor: below there is nothing to gain, above one trough takes all
-SPREAD = 8  # other starts
+SPREAD = {"ivu": 2, "ldu": 8, "axis": 2}  # other starts: a reel unit and an axis seldom have two troughs
 RINGS = {"ivu": (), "ldu": (("k_c", "M"),), "axis": ()}  # spring and mass: another frequency is a trough of its own
 AWAY = 0.8  # of the tolerance
 
 
 def base_fit(sim: Simulator, problem: Problem, start: np.ndarray | None = None) -> Fit:
-    """The owner's model with its parameters as the record wants them, within their tolerance; from x = `start`."""
+    """The owner's model with its parameters as the record wants them, within their tolerance; from x = `start` alone if
+    it is given."""
     owner = owner_model(sim.case, sim.record)
     space = Space(owner, free_parameters(sim.case, owner), sim.case.tolerance)
     fitted = settle(problem, fit(problem, space, start))
     starts = []
-    if space.names and TROUGHS[0] * problem.floor < fitted.rms < TROUGHS[1] * problem.floor:
-        starts += spread(space, fitted.x)
+    if start is None and space.names and TROUGHS[0] * problem.floor < fitted.rms < TROUGHS[1] * problem.floor:
+        starts += spread(space, fitted.x, SPREAD[sim.record.plant])
     if fitted.rms > COMPLETE * problem.floor:
         starts += rings(space, fitted.x, sim.record.plant)
     for other in parallel([partial(fit, problem, space, x, rounds=12) for x in starts]):
@@ -40,9 +41,9 @@ def base_fit(sim: Simulator, problem: Problem, start: np.ndarray | None = None) 
     return fitted
 
 
-def spread(space: Space, x: np.ndarray) -> list[np.ndarray]:
+def spread(space: Space, x: np.ndarray, count: int) -> list[np.ndarray]:
     """Places all over the tolerance; what has none stays where it is in x (parameters,)."""
-    return [np.where(space.reach() < WIDE, other, x) for other in space.spread(SPREAD)]
+    return [np.where(space.reach() < WIDE, other, x) for other in space.spread(count)]
 
 
 def rings(space: Space, x: np.ndarray, plant: str) -> list[np.ndarray]:

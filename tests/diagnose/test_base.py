@@ -50,7 +50,7 @@ def test_where_nothing_may_move_the_owner_is_taken_at_his_word(plain):
     assert np.isfinite(found.cost)
 
 
-@pytest.mark.parametrize(("left", "more"), [(1.0, 0), (2.0, SPREAD), (9.0, 0)])
+@pytest.mark.parametrize(("left", "more"), [(1.0, 0), (2.0, SPREAD["axis"]), (9.0, 0)])
 def test_near_the_noise_other_places_are_tried_as_well(plain, monkeypatch, left, more):
     tried = []
 
@@ -70,7 +70,7 @@ def test_near_the_noise_other_places_are_tried_as_well(plain, monkeypatch, left,
 
 def test_places_to_start_from_are_within_the_tolerance_and_what_has_none_stays():
     space = Space(Model("axis", {"M": 1.0, "K": 2.0}), ("M", "K"), lambda name: 0.15 if name == "M" else np.inf)
-    places = np.array(base.spread(space, np.array([0.1, 0.2])))
-    assert places.shape == (SPREAD, 2)
+    places = np.array(base.spread(space, np.array([0.1, 0.2]), 8))
+    assert places.shape == (8, 2)
     assert (places[:, 1] == 0.2).all()
     assert np.log(0.85) < places[:, 0].min() < -0.05 < 0.05 < places[:, 0].max() < np.log(1.15)
