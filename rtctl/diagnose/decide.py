@@ -70,15 +70,16 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         return False
     share = MATERIAL
     if complete(problem, base, before):
-        luck = p_value(after, before, blocks(problem, after))
         if problem.louder > 1.0:
             return False  # of a machine that is known to be louder nobody knows what is noise
+        block = blocks(problem, after)
+        luck = p_value(after, before, block)
         if before.bound() and not after.bound() and luck < RELEASED and after.cost < (1.0 - FREE) * before.cost:
             return True  # the owner's values need not be stretched any more
         noise = rms(before.r) < COMPLETE * problem.floor and not alike
         clear = after.cost < (1.0 - CLEAR) * before.cost
         some = before.space.hypotheses and after.cost < (1.0 - NEARLY) * before.cost
-        if noise and some and by_accident(before, after, blocks(problem, after)) < SELDOM:
+        if noise and some and by_accident(before, after, block) < SELDOM:
             return True
         if luck > LUCK:
             return False
