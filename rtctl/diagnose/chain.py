@@ -84,8 +84,7 @@ def searched(record: Record, progress: Progress) -> Found:
     found = find(sim, held[0], progress, held[1], unless_misread=True)
     if not found.problem.agrees(found.best.model):
         progress("reading the reels anew, through the model that was found")
-        problem = Problem(sim).seen_by(found.best.model)
-        found = find(sim, problem, progress, base_fit(sim, problem, found.base.x))
+        found = read_through(sim, found, progress)
     if misread(found):
         found = without_reels(sim, found, progress)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
@@ -105,6 +104,12 @@ def tells(found: Found, quick: Problem, fitted: Fit) -> bool:
     return not found.best.space.hypotheses and quick.hiss(fitted.r)  # all the rest was wandering
 
 
+def read_through(sim: Simulator, found: Found, progress: Progress) -> Found:
+    """What is found once the reels are read through the model that was `found`."""
+    problem = Problem(sim).seen_by(found.best.model)
+    return find(sim, problem, progress, base_fit(sim, problem, found.base.x))
+
+
 def without_reels(sim: Simulator, found: Found, progress: Progress) -> Found:
     """What the capstan shows alone, where no model follows the reels; if something is missing there, what all show once
     the reels are read through that, and `found` if no model follows them even so."""
@@ -117,8 +122,7 @@ def without_reels(sim: Simulator, found: Found, progress: Progress) -> Found:
     if not apart.best.space.hypotheses:
         return found
     progress("reading the reels anew, through what the capstan shows")
-    problem = bare.seen_by(apart.best.model)
-    again = find(sim, problem, progress, base_fit(sim, problem, apart.base.x))
+    again = read_through(sim, apart, progress)
     return found if misread(again) else again
 
 
