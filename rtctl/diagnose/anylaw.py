@@ -15,7 +15,7 @@ from rtctl.diagnose.fit import Fit, parallel, trust
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.scales import spaced, speed
-from rtctl.diagnose.simulate import Simulator, gear, per_unit
+from rtctl.diagnose.simulate import Simulator, gear, way
 from rtctl.diagnose.space import Hypothesis
 
 HATS = 10
@@ -72,7 +72,7 @@ def drives(sim: Simulator, node: str) -> np.ndarray:
 def abscissa(sim: Simulator, model: Model, law: Hypothesis) -> np.ndarray:
     """Values (n,) of what a law depends on, up to a factor."""
     record = sim.record
-    x = record.y[sim.channels[0]] / per_unit(record.case)[0]
+    x = way(record)
     along = LAWS[law.term]
     if along == "velocity":
         return speed(x, record.plant, record.dt)

@@ -2,7 +2,8 @@
 
 Where dry friction holds and lets go, a small change of a parameter moves the moment at which a machine breaks loose.
 The cost has troughs of its own then, and what a fit from the owner's values leaves looks like an effect. So a base that
-is near the noise is fitted from places all over the tolerance as well.
+is near the noise is fitted from places all over the tolerance as well. A speed that is shown without its sign would be
+followed by absurd values: they are fitted as if that were known.
 """
 
 from functools import partial
@@ -11,16 +12,19 @@ import numpy as np
 
 from rtctl.diagnose.decide import COMPLETE
 from rtctl.diagnose.fit import Fit, fit, parallel
+from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.model import free_parameters, owner_model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import WIDE, Space
+from rtctl.diagnose.tacho import folded
 
 AGAIN = 4  # fits from where the last one stopped
 NEAR = 2.5  # times the noise floor: a base this close is worth every round
 TROUGHS = (1.1, 4.5)  # times the noise floor: below there is nothing to gain, above one trough takes all
 SPREAD = {"ivu": 2, "ldu": 8, "axis": 2}  # other starts: a reel unit and an axis seldom have two troughs
 RINGS = {"ivu": (), "ldu": (("k_c", "M"),), "axis": ()}  # spring and mass: another frequency is a trough of its own
+UNFOLDED = 0.8  # of the cost
 AWAY = 0.8  # of the tolerance
 
 
@@ -38,7 +42,17 @@ def base_fit(sim: Simulator, problem: Problem, start: np.ndarray | None = None) 
     for other in parallel([partial(fit, problem, space, x, rounds=12) for x in starts]):
         if other.cost < 0.98 * fitted.cost:
             fitted = settle(problem, other)
-    return fitted
+    shows_speed = sim.shows_speed and folded(sim.seen, sim.record.u[:, 0])
+    return unfolded(problem, fitted) if shows_speed else fitted
+
+
+def unfolded(problem: Problem, fitted: Fit) -> Fit:
+    """The parameters that follow a speed without its sign best once the sensor is told not to know direction; `fitted`
+    where that explains no more. No values of theirs make a machine go one way only."""
+    space, record = fitted.space, problem.sim.record
+    (blind,) = hypotheses(record, fitted.model.base, only=("sensor.rectified",))
+    both = settle(problem, fit(problem, space.add(blind)))
+    return fit(problem, space, both.x[: space.nb], rounds=0) if both.cost < UNFOLDED * fitted.cost else fitted
 
 
 def spread(space: Space, x: np.ndarray, count: int) -> list[np.ndarray]:

@@ -14,7 +14,7 @@ from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NOTHING, UNNAMED, Diagnosis, Evidence, Interval, Located
 from rtctl.diagnose.experiment import design
 from rtctl.diagnose.find import Found, Progress, find, quiet, with_fewer
-from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.name import names
@@ -32,6 +32,7 @@ from rtctl.plants.physics.timing import JitterSettings
 
 QUICK = 10 / 3  # times the usual bandwidth of the correction
 FASTEST = 0.1  # rad a tick
+OTHERWISE = 0.9  # of the cost
 ASTRAY = 5.0  # times the noise of a reel's edges, where no model explains them
 SHOWS = 2.5  # times the noise floor
 
@@ -70,31 +71,43 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
 def searched(record: Record, progress: Progress) -> Found:
     """What is found in a recording, at the bandwidth that suits it.
 
-    For a machine without a controller: of a command that was held and one that was sampled, the one that fits. For an
-    axis under control that no model explains down to the noise: a quicker correction, which lets less of the slow
-    wandering through that random forces make and that a small difference between two hypotheses drowns in; but only
-    if what is missing still shows, or if no hypothesis explained any of the wandering and what is left without it is
-    hiss.
+    For an axis under control that no model explains down to the noise: a quicker correction, which lets less of the
+    slow wandering through that random forces make and that a small difference between two hypotheses drowns in; but
+    only if what is missing still shows, or if no hypothesis explained any of the wandering and what is left without it
+    is hiss.
     """
     progress("fitting the owner's parameters")
-    held = base_of(Simulator(record))
     if record.plant == "axis" and record.case.controller.kind == "none":
-        held = min(held, base_of(Simulator(record, held=False)), key=lambda pair: pair[1].cost)
-    sim = held[0].sim
-    found = find(sim, held[0], progress, held[1], unless_misread=True)
+        return held_or_smooth(record, progress)
+    problem, base = base_of(Simulator(record))
+    sim = problem.sim
+    found = find(sim, problem, progress, base, unless_misread=True)
     if not found.problem.agrees(found.best.model):
         progress("reading the reels anew, through the model that was found")
         found = read_through(sim, found, progress)
     if misread(found):
         found = without_reels(sim, found, progress)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
-    if record.plant != "axis" or record.case.controller.kind == "none" or faster <= sim.follow:
+    if record.plant != "axis" or faster <= sim.follow:
         return found
     problem, base = found.problem, found.base
     if base.rms < decide.LOUD * problem.floor or decide.quiet(problem, base, found.best):
         return found
     quick, fitted = base_of(Simulator(record, follow=faster))
     return find(quick.sim, quick, progress, fitted) if tells(found, quick, fitted) else found
+
+
+def held_or_smooth(record: Record, progress: Progress) -> Found:
+    """What is found where nobody wrote down what the command did between its samples: held or sampled from a smooth
+    one, whichever the owner's model fits, and the other one where what was found follows that clearly better."""
+    both = [base_of(Simulator(record, held=held)) for held in (True, False)]
+    (problem, base), (other, instead) = sorted(both, key=lambda pair: pair[1].cost)
+    found = find(problem.sim, problem, progress, base)
+    best = found.best
+    if not best.space.hypotheses or fit(other, best.space, best.x, rounds=8).cost > OTHERWISE * best.cost:
+        return found
+    progress("taking the command the other way between its samples")
+    return find(other.sim, other, progress, instead)
 
 
 def tells(found: Found, quick: Problem, fitted: Fit) -> bool:

@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.problem import settled
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import TRACK, Simulator, per_unit, resolution
+from rtctl.diagnose.simulate import TRACK, Simulator, per_unit, resolution, way
 
 FAST = {"ivu": 8.0, "ldu": 2.0, "axis": 4.0}  # times the tracking bandwidth: how quickly the observer follows
 MOST = 4  # hints of a kind
@@ -48,7 +48,8 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
     start = settled(sim)
     read = sim.run(model)
     _, push = observe(sim, model)
-    x = (record.y[sim.channels[0]] / per_unit(record.case)[0])[start:]
+    whole = way(record)
+    x = whole[start:]
     d = push[start:]
     thin = max(1, len(x) // 8000)
     rate = uniform_filter1d(np.abs(np.gradient(x)) / record.dt, SMOOTH)[::thin]
@@ -65,26 +66,25 @@ def hints(sim: Simulator, model: Model) -> dict[str, list]:
         shown = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
         found["order" + node] = [*shown, *(n for n in WHOLE if n not in shown)]
     if record.plant != "ivu":
-        way = x * (base["R_c"] if record.plant == "ldu" else 1.0)
+        gone = x * (base["R_c"] if record.plant == "ldu" else 1.0)
         target = d
         if "scale_counts" in record.y:
             target = _second(sim, model, start)[::thin]
-        span = float(np.ptp(way)) or 1.0
+        span = float(np.ptp(gone)) or 1.0
         waves = span * np.geomspace(0.1, 2.0, WAVES)
-        found["wavelength"] = peaks(waves, spectrum(way, target, 2 * np.pi / waves), MOST)
+        found["wavelength"] = peaks(waves, spectrum(gone, target, 2 * np.pi / waves), MOST)
         if record.plant == "axis":  # of forces and of readings, whose errors the observer takes for forces
             turns = np.arange(2.5, FINEST, 0.25)  # waves along the whole way
-            height = seen(way, target, rate, 2 * np.pi * turns / span, quick)
+            height = seen(gone, target, rate, 2 * np.pi * turns / span, quick)
             fine = peaks(span / turns, height, MOST)
             found["wavelength"] += [w for w in fine if all(abs(w / v - 1) > 0.1 for v in found["wavelength"])]
         found["spot"] = spots(x, target, MOST)
     else:
         found["spot"] = spots(x, d, MOST)
-    whole = record.y[sim.channels[0]] / per_unit(record.case)[0]
     low, span = float(whole.min()), float(np.ptp(whole)) or 1.0
     found["spot"] = [float((x.min() + share * np.ptp(x) - low) / span) for share in found["spot"]]
     for channel, sensor in enumerate(SENSORS[record.plant]):
-        if channel < len(sim.channels):
+        if channel < len(sim.channels) and sim.channels[channel] != "speed":  # of which no jump stays
             error = record.y[sim.channels[channel]] - read[:, channel]
             unit = per_unit(record.case)[channel]
             count = 1.0 if record.plant != "axis" else resolution(record) * unit

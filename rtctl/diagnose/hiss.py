@@ -5,13 +5,14 @@ e'' + 1.4 w e' + w^2 e = d. Where d is white, or white noise through a lag that 
 and the sensor's noise is white beside it, the spectrum of e has that shape, with a level and a lag that are unknown.
 Friction, drifts and ripples have another: a peak, a rise to low frequencies, or more error than that level accounts
 for, are no hiss. Nor are errors that come in bursts, where it turns or where it moves: the sum of many small forces is
-normal, with a kurtosis of 3.
+normal, with a kurtosis of 3. Nor is what the command of a machine without a controller foretells.
 
 Source: Bartlett, An introduction to stochastic processes (1955), for the cumulative periodogram and its bound; Whittle,
 Arkiv for Matematik 2 (1953), for the likelihood of a spectrum.
 """
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.stretches import memory
 
@@ -22,18 +23,22 @@ MORE = 1.6  # times the error that the level accounts for
 FEWEST = 20  # frequencies
 BURSTS, CHANCE = 1.2, 3.0  # kurtosis above 3, and the same in standard deviations of so many independent errors
 ROUNDS = 20
+EACH, BLOCKS = 8, 4  # lags in a block, and blocks
+SHIFTS = 20  # other times
+FORETOLD = 0.2  # share of what chance leaves
 LAGS = (0.1, 0.2, 0.4, 0.7, 1.0)  # of the correction's own time
 
 
-def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float, exact: bool = False) -> bool:
+def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float, exact: bool = False, speed: bool = False) -> bool:
     """Of the error e (n,), `dt` s apart, of a model that follows at `follow` rad/s and whose sensor leaves `floor`.
 
-    `exact`: with no more deviation than chance makes in one of a hundred.
+    `exact`: with no more deviation than chance makes in one of a hundred. `speed`: what the sensor shows is one.
     """
     n = len(e)
     taper = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.05 * n))
     w = 2 * np.pi * np.fft.rfftfreq(n, dt)
     through = 1.0 / np.abs((follow**2 - w**2) + 1.4j * follow * w) ** 2
+    through = through * (w if speed else 1.0) ** 2
     power = np.abs(np.fft.rfft((e - e.mean()) * taper)) ** 2 / float(np.sum(taper**2))
     band = (w > 2 * np.pi * FROM / (n * dt)) & (w < UPTO * follow)
     count = int(band.sum())
@@ -55,6 +60,30 @@ def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float, exact: bool =
         return False
     accounted = level * float(np.sum(through[1:])) * 2 / n
     return float(np.var(e)) < MORE * (accounted + floor**2)
+
+
+def commanded(e: np.ndarray, inputs: np.ndarray, block: int) -> bool:
+    """Whether the inputs (n, k) of the last few `block` rows foretell the errors e (n,), which last for a block.
+
+    Where no controller answers the error, hiss has nothing to do with what was commanded: it is foretold no better than
+    by the same inputs at any other time.
+    """
+    step = max(1, block // EACH)
+    u, e = (uniform_filter1d(x, step, axis=0)[::step] for x in (inputs, e))
+    most = EACH * BLOCKS
+    if len(e) < 3 * most:
+        return False
+    b = e[most:] - e[most:].mean()
+
+    def share(shift: int) -> float:
+        moved = np.roll(u, shift, axis=0)
+        A = np.column_stack([moved[most - lag : len(e) - lag] for lag in range(most)])
+        A = A - A.mean(axis=0)
+        return 1.0 - float(np.var(b - A @ np.linalg.lstsq(A, b, rcond=1e-6)[0]) / np.var(b))
+
+    others = [share(int(k)) for k in np.linspace(0.1, 0.9, SHIFTS) * len(e)]
+    usual = float(np.median(others))
+    return share(0) > max(*others, usual + FORETOLD * (1.0 - usual))
 
 
 def bursts(e: np.ndarray) -> bool:

@@ -118,7 +118,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "transmission.creep": (Size("kappa", "compliance", 1e-3),),
     "structure.resonance": (
         Size("mass", "inertia", 0.1),
-        Shape("f_Hz", "hertz", (3.0, 6.0, 11.0, 19.0, 30.0, 43.0, 60.0, 85.0, 120.0, 165.0, 225.0), 1.4),
+        Shape("f_Hz", "ring", (3.0, 6.0, 11.0, 19.0, 30.0, 43.0, 60.0, 85.0, 120.0, 165.0, 225.0), 1.4),
         Shape("zeta", "one", (0.02,), 30.0),
     ),
     "structure.stiffening": (Size("c3", "cubic", 0.2, signed=True),),
@@ -186,6 +186,7 @@ def hypotheses(
     """
     scales = node_scales(record, base)
     measures = Measures(record, base, scales, hints or {})
+    alone = set(ALONE) - ({"sensor.rectified"} if "speed" in record.y else set())  # which never falls below zero
     out = []
     for name, term in TERMS.items():
         if (
@@ -196,7 +197,7 @@ def hypotheses(
             for node in term.nodes.get(record.plant, ()):
                 slides = record.plant == "axis" and record.case.sensors.unit != "rad"
                 if (
-                    (node == "sensor" and name in ALONE and not (slides and name == "guide.thickness"))
+                    (node == "sensor" and name in alone and not (slides and name == "guide.thickness"))
                     or (record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ()))
                     or (name == "friction.stribeck" and measures.dry(node) <= SLIGHT * measures.of("force", node))
                 ):  # falls to what the base has

@@ -48,6 +48,25 @@ DRIVES = {
 }
 FOLLOW = {"ivu": ("if p.d_tape > 0.0:", "    ivu.follow_tape(p, s)")}
 READ = {"ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)", "axis": "axis.read(s)"}
+RATE = {"axis": ("if job.speed != 0:", "    rate(s, t)")}
+SPEED = {  # a sensor of speed shows how a sensor of position would change: what misleads the one misleads the other
+    "axis": '''
+@compiled
+def rate(s, t):
+    """Change of the reading over a substep around now, into s.m.y."""
+    m = s.m
+    x, way = m.x[axis.CARRIAGE], m.h * m.x[axis.NQ + axis.CARRIAGE]
+    m.x[axis.CARRIAGE] = x - 0.5 * way
+    axis.read(s)
+    reading(t, m)
+    before = m.y[0]
+    m.x[axis.CARRIAGE] = x + 0.5 * way
+    axis.read(s)
+    reading(t, m)
+    m.x[axis.CARRIAGE] = x
+    m.y[0] = (m.y[0] - before) / m.h
+'''
+}
 
 RUN = '''
 @compiled
@@ -73,6 +92,7 @@ def look(job, p, s, t):
     m = s.m
     {read}
     reading(t, m)
+    {rate}
     for c in range(m.y.shape[0]):
         y = m.y[c] * job.per_unit[c]
         if job.rectified[c] != 0:
@@ -100,17 +120,21 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
             m.t = 0.0
             look(job, p, s, t)
             for c in range(m.y.shape[0]):
-                job.zero[c] = job.y[c]
+                job.zero[c] = job.y[c] * (job.speed == 0)
         look(job, p, s, t)
         at = min(k, n - 1)
         job.correction = 0.0
         if k < 0 or job.mode == 1:  # at first it is held where it will start
             e = ((seen[at] if k >= 0 else 0.0) - (job.y[0] - job.zero[0])) / job.per_unit[0]
             if k < stride - lead or k == 0:
+                job.e = e * (job.speed == 0)
+            if job.speed != 0:  # of a sensor that may not know direction
+                job.d = -e if job.y[0] * m.x[{kind}.NQ] < 0.0 else e
+                job.e += job.d / job.rate
+            else:
+                job.d += job.a * ((e - job.e) * job.rate - job.d)
                 job.e = e
-            job.d += job.a * ((e - job.e) * job.rate - job.d)
-            job.e = e
-            job.correction = job.P * e + job.D * job.d
+            job.correction = job.P * job.e + job.D * job.d
         if k >= 0:
             for c in range(m.y.shape[0]):
                 y = job.y[c] - job.zero[c]
@@ -127,9 +151,11 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
             for c in range(drives):
                 m.volts[c] = 0.0
             for tick in range(stride):
-                at = min(max(k + tick + (i - job.delay) // job.substeps, 0), n - 1)
-                for c in range(drives):
-                    m.volts[c] += (written[at, c] if job.mode == 2 and k >= 0 else volts[at, c]) / stride
+                for late in range(2):  # what is held over a substep is the mean of two, as in physics/timing.py
+                    at = min(max(k + tick + (i - job.delay - late) // job.substeps, 0), n - 1)
+                    share = (job.part if late == 1 else 1.0 - job.part) / stride
+                    for c in range(drives):
+                        m.volts[c] += share * (written[at, c] if job.mode == 2 and k >= 0 else volts[at, c])
             substep(job, p, s, t)
         if not (abs(job.y[0]) < 1e12):
             return max(k, 0)
@@ -166,12 +192,14 @@ def job_dtype(ny: int, nu: int, nq: int) -> np.dtype:
         substeps=int,
         stride=int,  # ticks a substep, where it is longer than one
         delay=int,  # substeps from a write until it acts
+        part=float,  # and a part of one
         rate=float,  # Hz
         half=float,  # counts between the true position and what a counter shows, on average
         gain=float,  # A/V
         current_limit=float,  # A
         per_unit=(float, ny),  # counts a rad or m
         rectified=(int, ny),
+        speed=int,  # 1: the first sensor shows a speed
         P=float,  # of the correction, in the input's unit a rad or m
         D=float,
         a=float,
@@ -216,6 +244,7 @@ def source(kind: str) -> str:
     imports = "\n".join(generate.imported(m) for m in modules if "physics" in m or "." not in m)
     parts = [HEADER.format(kind=kind, imports=imports)]
     parts += [_site(site, kind, terms) for site in SITES]
+    parts += [SPEED[kind]] if kind in SPEED else []
     indent = "\n    "
     parts.append(
         RUN.format(
@@ -223,6 +252,7 @@ def source(kind: str) -> str:
             drives=indent.join(DRIVES[kind]),
             follow=indent.join(FOLLOW.get(kind, ("pass",))),
             read=READ[kind],
+            rate=indent.join(RATE.get(kind, ("pass",))),
         )
     )
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)

@@ -12,7 +12,7 @@ from rtctl.diagnose.hints import ORDERS, observe, spectrum
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.name import Search
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.simulate import Simulator, per_unit
+from rtctl.diagnose.simulate import Simulator, way
 from rtctl.diagnose.stands import MOSTLY, stands
 from rtctl.plants.physics import TERMS
 
@@ -54,7 +54,7 @@ def located(
 
 def along(sim: Simulator) -> dict[str, np.ndarray]:
     """Values (n,) of each axis that every record has."""
-    x = sim.record.y[sim.channels[0]] / per_unit(sim.record.case)[0]
+    x = way(sim.record)
     return {
         "velocity": np.gradient(x, sim.record.dt),
         "position": x,

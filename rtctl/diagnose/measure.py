@@ -72,15 +72,24 @@ class Begun:
 def begin(sim: Simulator, model: Model, rows: int = FIRST) -> np.ndarray | None:
     """Position and speed (2,) of an axis from which its free run passes the first `rows` rows best.
 
-    Gauss-Newton from the first reading at rest. None where the machine is no axis or shows no position, and where the
-    model runs away: it begins at rest then.
+    Gauss-Newton from the first reading at rest, or from the first speed either way, since its sensor may not know
+    direction. None where the machine is no axis, and where the model runs away: it begins at rest then.
     """
-    if sim.record.plant != "axis" or sim.channels[0] != "x":
+    if sim.record.plant != "axis":
         return None
     rows = min(rows, len(sim.seen))
-    seen = sim.seen[:rows]
-    x = np.array([seen[0], 0.0])
-    steps = np.array([1.0, 1.0 / (rows * sim.record.dt)]) * max(float(np.ptp(seen)), 1e-9)
+    if not sim.shows_speed:
+        return _begin(sim, model, rows, np.array([sim.seen[0], 0.0]))
+    found = [_begin(sim, model, rows, np.array([0.0, v])) for v in (sim.seen[0], -sim.seen[0])]
+    ways = [x for x in found if x is not None]
+    errors = [float(np.sum((sim.seen[:rows] - free_run(sim, model, x, rows)[:, 0]) ** 2)) for x in ways]
+    return ways[int(np.argmin(errors))] if ways else None
+
+
+def _begin(sim: Simulator, model: Model, rows: int, x: np.ndarray) -> np.ndarray | None:
+    """The same from a first guess `x`."""
+    seen, per_s = sim.seen[:rows], 1.0 / (rows * sim.record.dt)
+    steps = max(float(np.ptp(seen)), 1e-9) * np.array([1.0 / per_s, 1.0] if sim.shows_speed else [1.0, per_s])
     for _ in range(ROUNDS):
         e = seen - free_run(sim, model, x, rows)[:, 0]
         columns = [(seen - free_run(sim, model, x + step, rows)[:, 0] - e) for step in np.diag(steps)]
@@ -99,7 +108,8 @@ def free_run(
         return sim.run(model, OPEN, n, coarse)
     moving = copy.copy(sim)
     moving.kernel = sim.kernel._replace(module=cast(ModuleType, Begun(sim.kernel.module, start)))
-    return moving.run(model, OPEN, n, coarse) + start[0]  # readings count from where the machine began
+    out = moving.run(model, OPEN, n, coarse)
+    return out if sim.shows_speed else out + start[0]  # readings of a position count from where the machine began
 
 
 def between(record: Record, model: Model) -> Simulator:
@@ -126,9 +136,8 @@ def compare(record: Record, model: Model, mode: int | None = None, skip: int = 0
 
     OPEN runs on the recorded command, an axis from the position and speed that its first 20 rows show (the first `skip`
     if those are more); CLOSED on the reference with the known law, and then what the law writes is compared too. A
-    counter that shows n stands for n + 1/2 on average. A recorded speed is compared with the difference quotient of
-    the simulated position. Raises UserError where the law is not known or `skip` leaves less than two rows, NoAnswer
-    where the model runs away.
+    counter that shows n stands for n + 1/2 on average. Raises UserError where the law is not known or `skip` leaves
+    less than two rows, NoAnswer where the model runs away.
     """
     mode = default_mode(record) if mode is None else mode
     n = len(record.t)
@@ -150,8 +159,7 @@ def compare(record: Record, model: Model, mode: int | None = None, skip: int = 0
     channels = {}
     for column, name in enumerate(simulator.channels):
         seen = np.asarray(record.y[name], float) + simulator.half
-        made = np.gradient(readings[:, column], record.dt) if name == "speed" else readings[:, column]
-        seen, made = seen[skip:], made[skip:]
+        seen, made = seen[skip:], readings[skip:, column]
         if name in RECTIFIED:
             made = made + np.mean(seen - made)
         channels[name] = Channel(seen, made, _unit(record, name))

@@ -8,7 +8,7 @@ from rtctl.diagnose.diagnosis import Diagnosis
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.scales import spaced, speed
-from rtctl.diagnose.simulate import Simulator, gear, lever, per_unit
+from rtctl.diagnose.simulate import Simulator, gear, lever, per_unit, way
 from rtctl.plants.physics import TERMS
 
 FASTER = 2.0  # than the simulator's own observer
@@ -37,7 +37,7 @@ class Missing:
         self.out, self.push = observe(sim, d.before)
         after, push = observe(sim, d.after) if d.after.terms else (self.out, self.push)
         self.law, self.shift = self.push - push, after - self.out
-        self.x = record.y[sim.channels[0]] / per_unit(record.case)[0]
+        self.x = way(record)
 
     def slides(self, node: str) -> bool:
         """Whether the node moves in m and not in rad."""

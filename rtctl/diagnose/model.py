@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rtctl.diagnose.case import Case, believed
+from rtctl.diagnose.tacho import signed
 from rtctl.idiom import Settings
 from rtctl.plants import axis, ivu, ldu
 
@@ -63,11 +64,16 @@ def guess(record: "Record", base: dict[str, float]) -> dict[str, float]:
     Identification (2012), ch. 8.
     """
     window = np.hanning(len(record.t))
-    x = np.fft.rfft((record.y[next(iter(record.y))] - np.mean(record.y[next(iter(record.y))])) * window)
+    name, y = next(iter(record.y.items()))
+    if name == "speed":
+        y = signed(y, record.u[:, 0])
+    x = np.fft.rfft((y - np.mean(y)) * window)
     u = np.fft.rfft((record.u[:, 0] - np.mean(record.u[:, 0])) * window) * base.get("K", 1.0)
     w = 2 * np.pi * np.fft.rfftfreq(len(record.t), record.dt)
     loud = (np.abs(u) > 0.05 * np.abs(u).max()) & (w > 0)
     u = u[loud] * np.exp(-0.5j * w[loud] * record.dt)
+    if name == "speed":
+        x[loud] /= 1j * w[loud]
     A = np.stack([x[loud], 1j * w[loud] * x[loud], -(w[loud] ** 2) * x[loud]], axis=1)
     size = np.abs(A).max(axis=0)
     A, b = np.concatenate([A.real, A.imag]) / size, np.concatenate([u.real, u.imag])

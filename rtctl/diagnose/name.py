@@ -101,6 +101,10 @@ def search(
             if base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
                 progress("looking for a slack tape")
                 full = sorted([*full, *slack(problem, base, scores)], key=absurd_last)
+        elif problem.sim.record.plant == "axis" and not (full and enough(full[0])):  # whose simulation is soon done
+            progress(f"looking for resonances beside {' + '.join(names(beam[0]))}")
+            further = [score for score in scores if score.hypothesis.name not in names(beam[0])]
+            full = sorted([*full, *resonances(problem, beam[0], further)], key=absurd_last)
         if full and sure and worth(beam[0], full[0]):
             full, _ = grow(problem, parents, candidates, ROUNDS[level], away, enough, progress)
         if not full:

@@ -16,6 +16,7 @@ from scipy.signal import welch
 
 from rtctl.diagnose.case import NoLaw, believed
 from rtctl.diagnose.record import Record, law_agreement, unwrap
+from rtctl.diagnose.simulate import way
 from rtctl.plants.physics import TERMS
 
 LOOK = 0.02  # s over which a speed is a difference
@@ -118,10 +119,7 @@ def shafts(record: Record) -> list[Shaft]:
             Shaft("motor", turned * p["N"], step * p["N"], ("motor",), {"ripple.cogging": "motor"}, True),
             Shaft("carriage", turned * p["R_c"], step * p["R_c"], ("carriage",), {}, False),
         ]
-    if "speed" in y:
-        q = np.concatenate(([0.0], np.cumsum(y["speed"][:-1] * np.diff(record.t))))
-    else:
-        q = y["x"]
+    q = way(record)
     rotary = case.sensors.unit == "rad"
     per_rev = case.sensors.x_counts_per_rev
     quantum = 2 * np.pi / per_rev if per_rev and rotary else (case.sensors.x_resolution_m or _smallest_step(q))

@@ -9,7 +9,7 @@ from copy import copy
 import numpy as np
 
 from rtctl.diagnose.edges import Edges, alike, edges
-from rtctl.diagnose.hiss import is_hiss
+from rtctl.diagnose.hiss import commanded, is_hiss
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.rest import shares
@@ -63,7 +63,9 @@ class Problem:
         few = sum(len(e.rows) for e in self.edges)
         self.balance = float(np.sqrt(EDGES * len(self.target) / few)) if few else 1.0  # what an edge counts for
         grain = resolution(sim.record) if sim.record.plant == "axis" else 1.0
-        share = shares(sim.seen[: self.n], grain, self.block * self.mean)[self.time_rows]
+        memory = self.block * self.mean
+        gone = np.cumsum(sim.seen) / memory if sim.shows_speed else sim.seen  # a stop is where it gets nowhere
+        share = shares(gone[: self.n], grain, memory)[self.time_rows]
         self.moves = share == 1.0  # (errors,): the machine does
         self.weights = np.sqrt(share / share.mean())
         self.louder = 1.0  # than a quiet machine, as far as is known
@@ -163,6 +165,13 @@ class Problem:
         """Errors after which a model on track has forgotten."""
         return max(2, round(FORGOTTEN / (self.sim.follow * self.sim.record.dt * self.mean)))
 
+    def commanded(self, r: np.ndarray) -> bool:
+        """Whether the command of a machine without a controller foretells the main sensor's errors in r."""
+        if self.sim.case.controller.kind != "none":
+            return False
+        u = means(self.sim.record.u[self.rows], self.mean)
+        return commanded(self.by_sensor(r)[self.sim.channels[0]], np.column_stack((u, np.abs(u))), self.block)
+
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
         main, *others = self.by_sensor(r).values()
@@ -172,7 +181,8 @@ class Problem:
         if loud > LOUDEST or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :]):
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
-        return is_hiss(main, self.sim.record.dt * self.mean, self.sim.follow, self.main_floor, exact)
+        dt, speed = self.sim.record.dt * self.mean, self.sim.shows_speed
+        return is_hiss(main, dt, self.sim.follow, self.main_floor, exact, speed) and not self.commanded(r)
 
 
 def means(x: np.ndarray, count: int) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import per_unit
+from rtctl.diagnose.simulate import way
 
 SMOOTH = {"ivu": 0.01, "ldu": 2e-3, "axis": 5e-3}  # s, over which a speed is taken
 
@@ -39,7 +39,7 @@ class Scales(NamedTuple):
 
 def node_scales(record: Record, base: dict[str, float]) -> dict[str, Scales]:
     """Scales of every node in its own unit, from the main sensor and the owner's gear ratios."""
-    x = next(iter(record.y.values())) / per_unit(record.case)[0]
+    x = way(record)
     step = max(1, round(SMOOTH[record.plant] / record.dt))
     v = (x[step:] - x[:-step]) / (step * record.dt)
     moving = np.abs(v) > 0.02 * np.abs(v).max(initial=1e-12)

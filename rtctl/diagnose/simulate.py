@@ -12,6 +12,7 @@ from copy import copy
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose import kernel, law
@@ -19,6 +20,7 @@ from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.model import DAMPING, Model, plant_params
 from rtctl.diagnose.record import Record
+from rtctl.diagnose.tacho import noise
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import ordered
@@ -31,6 +33,7 @@ STIFF = ("transmission.", "tape.", "structure.")  # terms that alter a spring ne
 COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
 FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
+QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
 LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
 SLIPS, BEHIND = "transmission.slip", {"ldu": "encoder"}  # body behind the contact, where most inertia is before it
 SHARE = {"ivu": (0.5, -0.5), "ldu": (1.0,), "axis": (1.0,)}
@@ -51,9 +54,10 @@ class Simulator:
         self.case: Case = record.case
         self.kernel = kernel.kernel(record.plant)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP[record.plant] - 1e-9)))
-        self.follow = FOLLOW[record.plant] if follow is None else follow
+        self.follow = min(FOLLOW[record.plant] if follow is None else follow, QUICKEST / record.dt)
         self.lead = round((LEAD[record.plant] if lead is None else lead) / record.dt)
         self.channels = channels(record)
+        self.shows_speed = self.channels[0] == "speed"
         self.half = 0.5 if record.plant != "axis" else 0.0
         self.seen = np.ascontiguousarray(record.y[self.channels[0]] + self.half)
         volts = record.u.reshape(len(record.t), -1)
@@ -155,11 +159,12 @@ class Simulator:
         late = case.delay_samples * self.record.dt
         if plant == "axis" and case.drive.bandwidth_hz:  # its plant has no driver: what that holds back is a delay
             late += 2 * (case.drive.damping or DAMPING) / (2 * np.pi * case.drive.bandwidth_hz)
-        j["delay"] = round(late / self.record.dt * substeps)
+        j["part"], j["delay"] = np.modf(late / self.record.dt * substeps)
         j["gain"] = case.drive.amp_per_volt[0] if case.drive.amp_per_volt else 1.0
         j["current_limit"] = case.drive.current_limit or np.inf
         j["per_unit"] = per_unit(case)
         j["rectified"] = [0, 1, 1] if plant == "ivu" else 0
+        j["speed"] = self.shows_speed
         j["share"] = SHARE[plant]
         rigid = rigid_gain(params, plant)
         j["P"], j["D"] = follow**2 / rigid, 1.4 * follow / rigid
@@ -204,8 +209,17 @@ def per_unit(case: Case) -> Any:
     return [1.0]
 
 
+def way(record: Record) -> np.ndarray:
+    """Where the main sensor's body was as that saw it, (n,) rad or m; of a sensor of speed the way since row 0."""
+    main = channels(record)[0]
+    if main != "speed":
+        return np.asarray(record.y[main] / per_unit(record.case)[0])
+    return np.asarray(cumulative_trapezoid(record.y[main], dx=record.dt, initial=0.0))
+
+
 def resolution(record: Record) -> float:
-    """Step of the main sensor in rad or m: one count, what the owner says, or the smallest step that occurs."""
+    """Step of the main sensor in rad or m: one count, what the owner says, or the smallest step that occurs. Of a
+    sensor of speed its noise, per s."""
     sensors, plant = record.case.sensors, record.plant
     if plant != "axis":
         return float(1.0 / per_unit(record.case)[0])
@@ -213,8 +227,10 @@ def resolution(record: Record) -> float:
         return float(2 * np.pi / sensors.x_counts_per_rev)
     if sensors.x_resolution_m:
         return float(sensors.x_resolution_m)
-    steps = np.abs(np.diff(next(iter(record.y.values()))))
-    return float(np.quantile(steps[steps > 0], 0.01)) if (steps > 0).any() else 1e-12
+    main, values = next(iter(record.y.items()))
+    steps = np.abs(np.diff(values))
+    smallest = float(np.quantile(steps[steps > 0], 0.01)) if (steps > 0).any() else 1e-12
+    return max(smallest, noise(values, record.u)) if main == "speed" else smallest
 
 
 def lever(record: Record, base: dict[str, float]) -> float:

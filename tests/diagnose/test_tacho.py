@@ -1,0 +1,149 @@
+"""Recordings that show a speed: its noise, its reading in the simulation, and a sensor that does not know direction."""
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose import chain, find
+from rtctl.diagnose.base import base_fit
+from rtctl.diagnose.case import read_case
+from rtctl.diagnose.hypotheses import hypotheses
+from rtctl.diagnose.kernel import OPEN, TRACK
+from rtctl.diagnose.measure import begin, compare, free_run
+from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.preflight import preflight
+from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.record import Record
+from rtctl.diagnose.simulate import Simulator, resolution, way
+from rtctl.diagnose.tacho import folded, noise, signed
+from rtctl.plants.physics import TERMS
+
+RATE, ROWS, NOISE = 50.0, 500, 0.01
+CASE = {
+    "plant": "axis", "sample_rate": RATE, "parameters": {"M": 1.0, "F_v": 2.0}, "controller": {"kind": "none"},
+    "drive": {"newton_per_volt": 4.0, "limit_volt": 10.0}, "reaches": {"parameter_tolerance": 0.5},
+}  # fmt: skip
+BLIND = TERMS["sensor.rectified"].settings(node="sensor")
+RINGS = TERMS["structure.resonance"].settings(node="carriage", f_Hz=1.7, mass=0.6, zeta=0.12)
+
+
+def steps(seed: int = 0) -> np.ndarray:
+    """Volts (n,) that go either way every tenth of a second."""
+    return np.repeat(np.random.default_rng(seed).choice([-1.0, 1.0], ROWS // 5), 5)
+
+
+def recorded(*terms, case=None, u=None, noisy=NOISE, **parameters):
+    """What an axis with these terms and parameters shows of its speed."""
+    case, u, zero = read_case({**CASE, **(case or {})}, "."), steps() if u is None else u, np.zeros(ROWS)
+    blank = Record("axis", case, np.arange(ROWS) / RATE, 1 / RATE, zero, zero, u[:, None], {"speed": zero}, {})
+    model = owner_model(read_case(CASE, ".")).change(**parameters).add(*terms)
+    shown = Simulator(blank).run(model, OPEN)[:, 0] + noisy * np.random.default_rng(1).standard_normal(ROWS)
+    return blank._replace(y={"speed": shown}), model
+
+
+def test_a_free_run_shows_the_speed_of_the_exact_solution():
+    record, _ = recorded(u=np.ones(ROWS), noisy=0.0)
+    t = record.t
+    np.testing.assert_allclose(record.y["speed"], 2.0 * (1.0 - np.exp(-2.0 * t)), atol=1e-6)
+    np.testing.assert_allclose(way(record), 2.0 * t - (1.0 - np.exp(-2.0 * t)), atol=1e-3)
+
+
+def test_what_misleads_a_position_misleads_a_speed():
+    true = recorded(noisy=0.0)[0].y["speed"]
+    np.testing.assert_allclose(recorded(BLIND, noisy=0.0)[0].y["speed"], np.abs(true), atol=2e-3)
+    off = TERMS["sensor.scale"].settings(node="sensor", relative=0.1)
+    np.testing.assert_allclose(recorded(off, noisy=0.0)[0].y["speed"], 1.1 * true, rtol=1e-6)
+
+
+@pytest.mark.parametrize("terms", [(), (BLIND,), (BLIND, RINGS)])
+def test_the_true_model_keeps_to_the_track_and_a_wrong_one_is_kept_near(terms):
+    record, model = recorded(*terms, noisy=0.0)
+    sim = Simulator(record)
+    assert np.abs(sim.run(model, TRACK)[:, 0] - sim.seen).max() < 1e-9
+    heavy = model.change(M=1.3)
+    off = [np.std(sim.run(heavy, mode)[50:, 0] - sim.seen[50:]) for mode in (TRACK, OPEN)]
+    assert off[0] < 0.5 * off[1]
+
+
+@pytest.mark.parametrize("terms", [(), (RINGS,), (BLIND, RINGS)])
+def test_noise_is_what_no_regression_foretells(terms):
+    """Within a factor of two and a half of a machine that is not even linear."""
+    record, _ = recorded(*terms)
+    found = noise(record.y["speed"], record.u)
+    assert 0.8 * NOISE < found < 2.5 * NOISE
+    assert resolution(record) == found
+
+
+def test_few_rows_tell_no_noise():
+    assert noise(np.ones(20), np.ones((20, 1))) == 0.0
+    assert noise(np.zeros(200), np.zeros((200, 1))) == 0.0
+
+
+def test_a_folded_speed_gets_its_sign_from_the_command():
+    true = recorded()[0].y["speed"]
+    record, _ = recorded(BLIND)
+    shown, u = record.y["speed"], record.u[:, 0]
+    assert folded(shown, u) and not folded(true, u) and not folded(shown, np.abs(u))
+    fast = np.abs(true) > 0.1
+    assert np.mean(np.sign(signed(shown, u)[fast]) == np.sign(true[fast])) > 0.97
+    np.testing.assert_array_equal(signed(true, u), true)
+
+
+@pytest.mark.parametrize("blind", [False, True])
+def test_a_free_run_begins_with_the_speed_that_the_first_rows_have_either_way(blind):
+    whole, model = recorded(*((BLIND,) if blind else ()), noisy=0.0)
+    true = recorded(noisy=0.0)[0].y["speed"]
+    k = int(np.flatnonzero((true < -0.5) & (np.arange(ROWS) > 50))[0])
+    cut = whole._replace(
+        t=whole.t[k:], ref=whole.ref[k:], w=whole.w[k:], u=whole.u[k:], y={"speed": whole.y["speed"][k:]}
+    )
+    sim = Simulator(cut)
+    start = begin(sim, model)
+    assert start[1] == pytest.approx(true[k], abs=1e-3)
+    np.testing.assert_allclose(free_run(sim, model, start)[:, 0], cut.y["speed"], atol=2e-3)
+    assert compare(cut, model, OPEN, skip=20).as_json()["unit"] == {"speed": "m/s"}
+
+
+@pytest.mark.parametrize(("terms", "hisses"), [((), True), ((RINGS,), False)])
+def test_what_the_command_foretells_is_no_hiss(terms, hisses):
+    """Random commands make what is missing look random; random forces know nothing of them."""
+    record, model = recorded(*terms)
+    shaken = 2.0 * np.random.default_rng(3).standard_normal(ROWS) * hisses
+    forced = Simulator(record).commanded(record.u + shaken[:, None]).run(model, OPEN)[:, 0]
+    noisy = forced + NOISE * np.random.default_rng(4).standard_normal(ROWS)
+    sim = Simulator(record._replace(y={"speed": noisy}))
+    problem = Problem(sim)
+    assert problem.commanded(base_fit(sim, problem).r) != hisses
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_parameters_are_fitted_as_if_the_missing_sign_were_known(known):
+    nothing = {"parameters": {}, "drive": {"newton_per_volt": 4.0}, "reaches": {"parameter_tolerance": None}}
+    record, _ = recorded(BLIND, case=None if known else nothing, M=1.2, F_v=1.6)
+    sim = Simulator(record)
+    fitted = base_fit(sim, Problem(sim)).model.base
+    assert fitted["M"] / fitted["K"] == pytest.approx(1.2 / 4.0, rel=0.02)
+    assert fitted["F_v"] / fitted["K"] == pytest.approx(1.6 / 4.0, rel=0.15)
+    assert not {t.term for t in base_fit(sim, Problem(sim)).model.terms}
+
+
+def test_a_sensor_without_direction_is_asked_for_where_a_speed_is_shown_and_can_only_then_be_told():
+    record, _ = recorded(BLIND)
+    found = {h.name for h in hypotheses(record, owner_model(record.case).base)}
+    assert "sensor.rectified:sensor" in found and "sensor.scale:sensor" not in found
+    assert "sensor.rectified:sensor" not in preflight(recorded()[0]).cannot_test
+    assert "sensor.rectified:sensor" in preflight(recorded(u=np.ones(ROWS))[0]).cannot_test
+
+
+@pytest.mark.parametrize("terms", [(), (BLIND, RINGS)])
+def test_it_is_named(terms, monkeypatch):
+    """Two effects at once, of machines like the coupled drives of Wigren & Schoukens (2013), or none."""
+    names = ("sensor.rectified", "structure.resonance", "friction.coulomb", "drive.deadband", "drive.lag")
+    monkeypatch.setattr(find, "hypotheses", lambda *given: hypotheses(*given, only=names))
+    record, _ = recorded(*terms, M=1.1, F_v=1.7)
+    told = chain.diagnose_record(record)
+    assert told.verdict == ("named" if terms else "nothing")
+    assert {e.name for e in told.effects} == {t.term for t in terms}
+    if terms:
+        f = next(e.parameters["f_Hz"] for e in told.effects if "f_Hz" in e.parameters)
+        assert f.value == pytest.approx(1.7, rel=0.03)
+        assert told.heldout_after < 3.0 * told.noise_floor < 0.5 * told.heldout_before
