@@ -98,7 +98,8 @@ def search(
             if not quiet and not (full and not sure and enough(full[0]) and worth(base, full[0])):
                 progress("looking for resonances")
                 full = sorted([*full, *resonances(problem, base, scores)], key=absurd_last)
-            if base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
+            tape = problem.sim.record.plant == "ivu"
+            if tape and base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
                 progress("looking for a slack tape")
                 full = sorted([*full, *slack(problem, base, scores)], key=absurd_last)
         elif problem.sim.record.plant == "axis" and not (full and enough(full[0])):  # whose simulation is soon done
