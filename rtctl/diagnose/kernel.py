@@ -127,10 +127,9 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
         if k < 0 or job.mode == 1:  # at first it is held where it will start
             e = ((seen[at] if k >= 0 else 0.0) - (job.y[0] - job.zero[0])) / job.per_unit[0]
             if k < stride - lead or k == 0:
-                job.e = e * (job.speed == 0)
+                job.e = e
             if job.speed != 0:  # of a sensor that may not know direction
-                job.d = -e if job.y[0] * m.x[{kind}.NQ] < 0.0 else e
-                job.e += job.d / job.rate
+                job.e, job.d = 0.0, -e if job.y[0] * m.x[{kind}.NQ] < 0.0 else e
             else:
                 job.d += job.a * ((e - job.e) * job.rate - job.d)
                 job.e = e

@@ -33,6 +33,7 @@ STIFF = ("transmission.", "tape.", "structure.")  # terms that alter a spring ne
 COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
 FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
+FOLLOW_SPEED = 5.0  # rad/s: a speed does not drift, has more noise to average, and a constant force must show in it
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
 LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
 SLIPS, BEHIND = "transmission.slip", {"ldu": "encoder"}  # body behind the contact, where most inertia is before it
@@ -54,10 +55,11 @@ class Simulator:
         self.case: Case = record.case
         self.kernel = kernel.kernel(record.plant)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP[record.plant] - 1e-9)))
-        self.follow = min(FOLLOW[record.plant] if follow is None else follow, QUICKEST / record.dt)
-        self.lead = round((LEAD[record.plant] if lead is None else lead) / record.dt)
         self.channels = channels(record)
         self.shows_speed = self.channels[0] == "speed"
+        usual = FOLLOW_SPEED if self.shows_speed else FOLLOW[record.plant]
+        self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
+        self.lead = round((LEAD[record.plant] if lead is None else lead) / record.dt)
         self.half = 0.5 if record.plant != "axis" else 0.0
         self.seen = np.ascontiguousarray(record.y[self.channels[0]] + self.half)
         volts = record.u.reshape(len(record.t), -1)

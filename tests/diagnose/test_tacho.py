@@ -61,7 +61,7 @@ def test_the_true_model_keeps_to_the_track_and_a_wrong_one_is_kept_near(terms):
     assert np.abs(sim.run(model, TRACK)[:, 0] - sim.seen).max() < 1e-9
     heavy = model.change(M=1.3)
     off = [np.std(sim.run(heavy, mode)[50:, 0] - sim.seen[50:]) for mode in (TRACK, OPEN)]
-    assert off[0] < 0.5 * off[1]
+    assert off[0] < 0.8 * off[1]
 
 
 @pytest.mark.parametrize("terms", [(), (RINGS,), (BLIND, RINGS)])
