@@ -23,6 +23,7 @@ from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import awake
+from rtctl.diagnose.rework import drop
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.stretches import rms
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
@@ -32,7 +33,8 @@ from rtctl.plants.physics.timing import JitterSettings
 
 QUICK = 10 / 3  # times the usual bandwidth of the correction
 FASTEST = 0.1  # rad a tick
-OTHERWISE = 0.9  # of the cost
+OTHERWISE, AS_WELL = 0.9, 1.05  # of the cost
+LATE = ("drive.lag", "timing.delay")
 ASTRAY = 5.0  # times the noise of a reel's edges, where no model explains them
 SHOWS = 2.5  # times the noise floor
 
@@ -103,11 +105,22 @@ def held_or_smooth(record: Record, progress: Progress) -> Found:
     both = [base_of(Simulator(record, held=held)) for held in (True, False)]
     (problem, base), (other, instead) = sorted(both, key=lambda pair: pair[1].cost)
     found = find(problem.sim, problem, progress, base)
-    best = found.best
-    if not best.space.hypotheses or fit(other, best.space, best.x, rounds=8).cost > OTHERWISE * best.cost:
+    if not suits(other, found.best):
         return found
     progress("taking the command the other way between its samples")
     return find(other.sim, other, progress, instead)
+
+
+def suits(other: Problem, best: Fit) -> bool:
+    """Whether the `best` model of a problem follows the record clearly better in the `other` one, or as well without a
+    lag or delay that made up for half a tick."""
+    if not best.space.hypotheses:
+        return False
+    space, x, limit = best.space, best.x, OTHERWISE
+    for index in reversed(range(len(best.space.hypotheses))):
+        if best.space.hypotheses[index].term in LATE:
+            x, space, limit = drop(best._replace(space=space, x=x), index), space.without(index), AS_WELL
+    return fit(other, space, x, rounds=8).cost < limit * best.cost
 
 
 def tells(found: Found, quick: Problem, fitted: Fit) -> bool:

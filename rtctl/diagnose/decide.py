@@ -34,6 +34,7 @@ MOST = 0.3  # of the cost: a term that leaves less is more than the form of anot
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
 SELDOM = 1e-8  # chance that a further term does by accident what it does, wherever that is
+MEASURED = 1e-6  # the same of a first term, where the floor is the noise of this very record
 SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
@@ -78,8 +79,9 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
             return True  # the owner's values need not be stretched any more
         noise = rms(before.r) < COMPLETE * problem.floor and not alike
         clear = after.cost < (1.0 - CLEAR) * before.cost
-        some = before.space.hypotheses and after.cost < (1.0 - NEARLY) * before.cost
-        if noise and some and by_accident(before, after, block) < SELDOM:
+        some = after.cost < (1.0 - NEARLY) * before.cost
+        seldom = SELDOM if before.space.hypotheses else MEASURED * problem.sim.shows_speed
+        if noise and some and by_accident(before, after, block) < seldom:
             return True
         if luck > LUCK:
             return False
