@@ -80,7 +80,7 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         noise = rms(before.r) < COMPLETE * problem.floor and not alike
         clear = after.cost < (1.0 - CLEAR) * before.cost
         some = after.cost < (1.0 - NEARLY) * before.cost
-        seldom = SELDOM if before.space.hypotheses else MEASURED * problem.sim.shows_speed
+        seldom = SELDOM if before.space.hypotheses else MEASURED * problem.measured
         if noise and some and by_accident(before, after, block) < seldom:
             return True
         if luck > LUCK:

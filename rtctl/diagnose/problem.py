@@ -69,6 +69,7 @@ class Problem:
         self.moves = share == 1.0  # (errors,): the machine does
         self.weights = np.sqrt(share / share.mean())
         self.louder = 1.0  # than a quiet machine, as far as is known
+        self.measured = sim.shows_speed  # the floor is the noise of this very record
 
     def seen_by(self, model: Model) -> "Problem":
         """The same with the edges of counters that cannot tell direction, which the model tells; there must be no

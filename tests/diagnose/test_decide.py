@@ -31,7 +31,7 @@ class Floor:
 
     def __init__(self, floor, hiss=False):
         self.floor, self.hiss, self.block, self.louder = floor, lambda r: hiss, 20, 1.0
-        self.loudness = loudness
+        self.loudness, self.measured = loudness, False
 
 
 def made(r, terms=0, x=None):

@@ -1,0 +1,191 @@
+"""Drives without a controller that show a speed and no position, with an effect concealed in some of them.
+
+    python benchmarks/speed_machines.py [--count 48] [--seed 60] [--jobs 2] [--out FOLDER] [--json]
+
+`rtctl prove` conceals effects in machines that are controlled by their position. These are of the other kind, as
+benchmarks of system identification have them: 10 to 20 s at 50 to 1000 Hz of a motor with viscous friction under random
+steps, levels or a multisine, its speed with 0.3 to 1.5 % of noise, the owner's values off by up to 12 %. The equations
+here share nothing with plants/ or rtctl/diagnose/. Case k of a seed is the same in every run.
+
+Source for the kind: Wigren & Schoukens, Three free data sets for development and benchmarking in nonlinear system
+identification, ECC 2013 (coupled electric drives, whose sensor does not know direction).
+"""
+
+import argparse
+import json
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from lateness import rtctl_command
+from numba import njit
+
+STEP = 50e-6  # s, of the integration
+FIT = ("heldout_nrmse_before", "heldout_nrmse_after", "noise_floor")
+OFF = 0.12  # of the owner's values, at most
+NAMES = {
+    "dry": "friction.coulomb", "dead": "drive.deadband", "unequal": "drive.gain_asymmetry", "offset": "drive.offset",
+    "limit": "drive.saturation", "lag": "drive.lag", "delay": "timing.delay", "rings": "structure.resonance",
+    "blind": "sensor.rectified", "spring": "load.spring",
+}  # fmt: skip
+KINDS = (
+    (), (), ("dry",), ("dead",), ("unequal",), ("offset",), ("limit",), ("lag",), ("delay",), ("rings",), ("blind",),
+    ("spring",), ("blind", "rings"), ("blind", "dry"), (),
+)  # fmt: skip
+
+
+class Drive(NamedTuple):
+    """A motor, what it turns, and what may be there besides; 0 where it is not."""
+
+    M: float
+    F: float
+    K: float
+    dry: float = 0.0  # N
+    dead: float = 0.0  # V
+    unequal: float = 0.0
+    offset: float = 0.0  # V
+    limit: float = 1e9  # V
+    lag: float = 0.0  # s
+    delay: float = 0.0  # s
+    spring: float = 0.0  # N/m
+    part: float = 0.0  # kg, that swings
+    stiff: float = 0.0  # N/m, that it swings on
+    damp: float = 0.0  # N s/m
+
+
+@njit
+def speed_of(d: Drive, u: np.ndarray, dt: float, fine: int) -> np.ndarray:
+    """Speed at each sample (n,) under held volts (n,), in `fine` steps a sample: semi-implicit Euler."""
+    out, h, late = np.zeros(len(u)), dt / fine, round(d.delay / dt * fine)
+    x = v = y = w = a = 0.0
+    for k in range(len(u)):
+        out[k] = v
+        for i in range(fine):
+            at = k * fine + i - late
+            c = (u[at // fine] if at >= 0 else 0.0) + d.offset
+            c = np.sign(c) * max(abs(c) - d.dead, 0.0)
+            c = min(max(c * (1.0 + d.unequal * np.sign(c)), -d.limit), d.limit)
+            a = a + h / d.lag * (c - a) if d.lag > 0.0 else c
+            pull = d.stiff * (x - y) + d.damp * (v - w)
+            v += h / d.M * (d.K * a - d.F * v - d.dry * np.tanh(v / 3e-3) - d.spring * x - pull)
+            x += h * v
+            if d.part > 0.0:
+                w += h / d.part * pull
+                y += h * w
+    return out
+
+
+def volts(rng: np.random.Generator, t: np.ndarray) -> np.ndarray:
+    """Random signs, random levels, or a sum of sines."""
+    n, rate = len(t), 1.0 / (t[1] - t[0])
+    kind = rng.integers(3)
+    if kind == 2:
+        sines = [np.sin(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi)) for f in np.arange(0.2, 3.0, 0.37)]
+        return np.sum(sines, axis=0) / np.std(np.sum(sines, axis=0))
+    hold = max(2 + kind, int(rate * (rng.uniform(0.05, 0.25) if kind == 0 else rng.uniform(0.3, 1.0))))
+    levels = rng.choice([-1.0, 1.0], n // hold + 1) if kind == 0 else rng.uniform(-1.5, 1.5, n // hold + 1)
+    return np.repeat(levels, hold)[:n]
+
+
+def drawn(rng: np.random.Generator, what: tuple[str, ...], u: np.ndarray, rate: float) -> Drive:
+    """A drive with these effects, sized by its command and its time constant."""
+    slow, M = rng.uniform(0.1, 0.6), rng.uniform(0.5, 3.0)
+    d, rms = Drive(M, M / slow, rng.uniform(0.5, 3.0) * M / slow), float(np.std(u))
+    part = rng.uniform(0.2, 0.7) * M
+    ring = 2 * np.pi * (rng.uniform(1.5, 4.0) * min(1.0, rate / 100) if rate < 500 else rng.uniform(4.0, 20.0))
+    sizes: dict[str, dict[str, float]] = {
+        "dry": {"dry": 0.15 * d.K * rms}, "dead": {"dead": 0.12 * rms}, "unequal": {"unequal": 0.08},
+        "offset": {"offset": 0.08 * rms}, "limit": {"limit": 0.75 * float(np.abs(u).max())},
+        "lag": {"lag": max(0.06 * slow, 1.2 / rate)}, "delay": {"delay": max(0.05 * slow, 1.5 / rate)},
+        "spring": {"spring": 0.5 * M / slow**2}, "blind": {},
+        "rings": {"part": part, "stiff": part * ring**2, "damp": 0.16 * part * ring},
+    }  # fmt: skip
+    return d._replace(**{name: size for effect in what for name, size in sizes[effect].items()})
+
+
+def conceal(folder: Path, seed: int, k: int) -> tuple[str, ...]:
+    """Write case k as a bundle; what is in it comes back."""
+    rng, what = np.random.default_rng([seed, k]), KINDS[k % len(KINDS)]
+    rate = float(rng.choice([50.0, 100.0, 200.0, 1000.0]))
+    t = np.arange(int(rate * (rng.uniform(10, 20) if rate < 1000 else 10))) / rate
+    u = volts(rng, t)
+    d = drawn(rng, what, u, rate)
+    v = speed_of(d, u, 1 / rate, round(1 / rate / STEP))
+    shown = (np.abs(v) if "blind" in what else v) + rng.uniform(0.003, 0.015) * np.std(v) * rng.standard_normal(len(v))
+    M, F, K = (value * (1.0 + rng.uniform(-OFF, OFF)) for value in (d.M, d.F, d.K))
+    folder.mkdir(parents=True)
+    zero = np.zeros(len(t))
+    pq.write_table(pa.table({"t": t, "ref": zero, "w": zero, "u": u, "speed": shown}), folder / "recording.parquet")
+    case = {
+        "format": 1, "plant": "axis", "sample_rate": rate, "parameters": {"M": M, "F_v": F}, "sensors": {},
+        "drive": {"newton_per_volt": K, "limit_volt": 10.0}, "delay_samples": 0.0, "controller": {"kind": "none"},
+        "controller_known": False, "reaches": {"parameter_tolerance": 0.15},
+    }  # fmt: skip
+    (folder / "case.json").write_text(json.dumps(case))
+    return tuple(sorted(NAMES[name] for name in what))
+
+
+def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
+    """How many were told rightly; a verdict `ambiguous` that has the right names among others counts apart."""
+    right, among, names, alarms, gaps, wrong = 0, 0, [], 0, [], {}
+    for case, true in hidden.items():
+        told = json.loads((out / case / "diagnosis.json").read_text())
+        given, verdict = sorted(e["name"] for e in told["effects"]), told["verdict"]
+        exact = verdict in ("named", "nothing") and tuple(given) == true
+        tie = verdict == "ambiguous" and bool(true) and set(true) <= set(given)
+        right, among, alarms = right + exact, among + tie, alarms + (not true and verdict != "nothing")
+        names += [name in true for name in given] if verdict == "named" else []
+        if verdict == "named":
+            before, after, floor = (
+                told["fit"][k] for k in ("heldout_nrmse_before", "heldout_nrmse_after", "noise_floor")
+            )
+            gaps.append((before - after) / (before - floor))
+        if not exact and not tie:
+            wrong[case] = {"true": true, "verdict": verdict, "told": given}
+    return {
+        "cases": len(hidden), "right": right, "ambiguous_with_it": among, "false_alarms": alarms,
+        "nothing_missing": sum(not true for true in hidden.values()), "names_given": len(names),
+        "names_right": int(sum(names)), "gap_closed_median": float(np.median(gaps)) if gaps else None, "others": wrong,
+    }  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=48)
+    parser.add_argument("--seed", type=int, default=60)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, help="keep cases and diagnoses here")
+    parser.add_argument("--json", action="store_true")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:
+        out = given.out or Path(name)
+        cases = {f"case-{k:04d}": conceal(out / "cases" / f"case-{k:04d}", given.seed, k) for k in range(given.count)}
+        command = (
+            *rtctl_command(),
+            "diagnose",
+            str(out / "cases"),
+            "--out",
+            str(out / "told"),
+            "--jobs",
+            str(given.jobs),
+        )
+        subprocess.run(command, check=True, capture_output=True)
+        found = judged(cases, out / "told")
+    if given.json:
+        print(json.dumps(found))
+        return
+    print(
+        f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with the right names"
+    )
+    print(f"false alarms {found['false_alarms']} of {found['nothing_missing']}")
+    print(f"names right {found['names_right']} of {found['names_given']}, gap closed {found['gap_closed_median']}")
+    for case, entry in found["others"].items():
+        print(f"{case}: {entry}")
+
+
+if __name__ == "__main__":
+    main()
