@@ -331,3 +331,18 @@ def test_a_further_term_at_the_end_of_its_times_is_none():
     assert worth(Floor(1.0), owner, before, within)  # type: ignore[arg-type]
     assert not worth(Floor(1.0), owner, before, beyond)  # type: ignore[arg-type]
     assert worth(Floor(1.0), owner, owner, beyond)  # type: ignore[arg-type]
+
+
+def test_where_the_noise_is_measured_a_first_term_may_be_borne_out_by_few_blocks():
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal(600)
+    bursts = np.exp(0.8 * rng.standard_normal(15)).repeat(2) * rng.choice([-1, 1], 30)  # of very different size
+    push = 0.9 * bursts.repeat(20) / np.std(bursts)
+    before, after = made(noise + push), made(noise, 1)
+    assert p_value(after, before, 20) > 1e-4 and by_accident(before, after, 20) < 1e-6
+    floor = Floor(0.85)
+    assert not worth(floor, before, before, after)  # type: ignore[arg-type]
+    floor.measured = True
+    assert worth(floor, before, before, after)  # type: ignore[arg-type]
+    slight = made(noise + 0.97 * push, 1)
+    assert not worth(floor, before, before, slight)  # type: ignore[arg-type]
