@@ -102,7 +102,7 @@ def search(
             if tape and base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
                 progress("looking for a slack tape")
                 full = sorted([*full, *slack(problem, base, scores)], key=absurd_last)
-        elif problem.sim.record.plant == "axis" and not (full and enough(full[0])):  # whose simulation is soon done
+        elif problem.sim.case.controller.kind == "none" and not (full and enough(full[0])):  # most ring freely then
             progress(f"looking for resonances beside {' + '.join(names(beam[0]))}")
             further = [score for score in scores if score.hypothesis.name not in names(beam[0])]
             full = sorted([*full, *resonances(problem, beam[0], further)], key=absurd_last)
