@@ -59,7 +59,8 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
     if patched(best) or decide.absurd(best):
         return Verdict(UNNAMED, (), share)
     if not decide.enough(problem, base, best):
-        loud = loud or (share > decide.HALF and decide.p_value(best, base, block) < decide.UNLIKELY)
+        longer = decide.blocks(problem, best)
+        loud = loud or (share > decide.HALF and decide.p_value(best, base, longer) < decide.UNLIKELY)
         return Verdict(UNNAMED if loud else NOTHING, (), share)
     right = RIGHT[min(len(best.space.hypotheses), MOST) - 1]
     trust = right if whole else min(right, 0.6 + 0.35 * share)
