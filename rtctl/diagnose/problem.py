@@ -22,6 +22,7 @@ FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # 
 RECTIFIED = ("reel1_counts", "reel2_counts")
 FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
 LOUDEST = 20.0  # times the floor, of what random forces leave
+ADDED = 2.0  # the same by what a white force adds up to, of a speed
 EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond which that has to have their very pattern
 SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
@@ -166,6 +167,14 @@ class Problem:
         """Errors after which a model on track has forgotten."""
         return max(2, round(FORGOTTEN / (self.sim.follow * self.sim.record.dt * self.mean)))
 
+    @property
+    def loudest(self) -> float:
+        """Times the floor, of what random forces leave. Where the floor is the record's own they are in it, and what
+        they do from one row to the next adds up for as long as the correction remembers."""
+        if not self.measured:
+            return LOUDEST
+        return ADDED / float(np.sqrt(2.8 * self.sim.follow * self.sim.record.dt * self.mean))
+
     def commanded(self, r: np.ndarray) -> bool:
         """Whether the command of a machine without a controller foretells the main sensor's errors in r."""
         if self.sim.case.controller.kind != "none":
@@ -179,7 +188,7 @@ class Problem:
         moves = self.moves[self.source == 0]
         main = main[moves] if moves.any() else main
         loud = rms(main) / self.main_floor
-        if loud > LOUDEST or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :]):
+        if loud > self.loudest or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :]):
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
         dt, speed = self.sim.record.dt * self.mean, self.sim.shows_speed

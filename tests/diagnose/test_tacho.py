@@ -115,6 +115,17 @@ def test_what_the_command_foretells_is_no_hiss(terms, hisses):
     assert problem.commanded(base_fit(sim, problem).r) != hisses
 
 
+def test_random_forces_leave_no_more_than_they_do_from_row_to_row():
+    record, model = recorded(noisy=0.0)
+    pushed = record.u + 0.5 * np.random.default_rng(3).standard_normal((ROWS, 1))
+    shaken = Simulator(record).commanded(pushed).run(model, OPEN)[:, 0]
+    problem = Problem(Simulator(record._replace(y={"speed": shaken})))
+    left = problem.residual(model)
+    assert 1.2 * problem.floor < np.std(left) < problem.loudest * problem.floor
+    assert problem.loudest < 4.0
+    assert not problem.hiss(left * 2.0 * problem.loudest)
+
+
 @pytest.mark.parametrize("known", [True, False])
 def test_parameters_are_fitted_as_if_the_missing_sign_were_known(known):
     nothing = {"parameters": {}, "drive": {"newton_per_volt": 4.0}, "reaches": {"parameter_tolerance": None}}
