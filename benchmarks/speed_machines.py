@@ -161,9 +161,7 @@ def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
         right, among, alarms = right + exact, among + tie, alarms + (not true and verdict != "nothing")
         names += [name in true for name in given] if verdict == "named" else []
         if verdict == "named":
-            before, after, floor = (
-                told["fit"][k] for k in ("heldout_nrmse_before", "heldout_nrmse_after", "noise_floor")
-            )
+            before, after, floor = (told["fit"][key] for key in FIT)
             gaps.append((before - after) / (before - floor))
         if not exact and not tie:
             wrong[case] = {"true": true, "verdict": verdict, "told": given}
@@ -185,16 +183,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:
         out = given.out or Path(name)
         cases = {f"case-{k:04d}": conceal(out / "cases" / f"case-{k:04d}", given.seed, k) for k in range(given.count)}
-        command = (
-            *rtctl_command(),
-            "diagnose",
-            str(out / "cases"),
-            "--out",
-            str(out / "told"),
-            "--jobs",
-            str(given.jobs),
-        )
-        subprocess.run(command, check=True, capture_output=True)
+        command = (*rtctl_command(), "diagnose", str(out / "cases"), "--out", str(out / "told"))
+        subprocess.run((*command, "--jobs", str(given.jobs)), check=True, capture_output=True)
         found = judged(cases, out / "told")
     if given.json:
         print(json.dumps(found))

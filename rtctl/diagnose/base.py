@@ -17,7 +17,7 @@ from rtctl.diagnose.model import free_parameters, owner_model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import WIDE, Space
-from rtctl.diagnose.tacho import folded
+from rtctl.diagnose.tacho import unsigned
 
 AGAIN = 4  # fits from where the last one stopped
 NEAR = 2.5  # times the noise floor: a base this close is worth every round
@@ -42,8 +42,7 @@ def base_fit(sim: Simulator, problem: Problem, start: np.ndarray | None = None) 
     for other in parallel([partial(fit, problem, space, x, rounds=12) for x in starts]):
         if other.cost < 0.98 * fitted.cost:
             fitted = settle(problem, other)
-    shows_speed = sim.shows_speed and folded(sim.seen, sim.record.u[:, 0])
-    return unfolded(problem, fitted) if shows_speed else fitted
+    return unfolded(problem, fitted) if unsigned(sim.record) else fitted
 
 
 def unfolded(problem: Problem, fitted: Fit) -> Fit:

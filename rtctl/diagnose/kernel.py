@@ -150,7 +150,7 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
             for c in range(drives):
                 m.volts[c] = 0.0
             for tick in range(stride):
-                for late in range(2):  # what is held over a substep is the mean of two, as in physics/timing.py
+                for late in range(2 if job.part > 0.0 else 1):  # mean of two, as in physics/timing.py
                     at = min(max(k + tick + (i - job.delay - late) // job.substeps, 0), n - 1)
                     share = (job.part if late == 1 else 1.0 - job.part) / stride
                     for c in range(drives):

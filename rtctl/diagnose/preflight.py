@@ -17,7 +17,7 @@ from scipy.signal import welch
 from rtctl.diagnose.case import NoLaw, believed
 from rtctl.diagnose.record import Record, law_agreement, unwrap
 from rtctl.diagnose.simulate import way
-from rtctl.diagnose.tacho import folded
+from rtctl.diagnose.tacho import unsigned
 from rtctl.plants.physics import TERMS
 
 LOOK = 0.02  # s over which a speed is a difference
@@ -302,10 +302,9 @@ def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str,
             cannot.append(f"{name}:{node}")
     if shaft.turns and m.turns < 1.0:
         findings.append(f"{shaft.name} turns {m.turns:.2f} of a turn only; what repeats each turn is hard to see.")
-    unsigned = "speed" in record.y and folded(record.y["speed"], record.u[:, 0])
-    if unsigned:
+    if unsigned(record):
         findings.append("The speed never goes below zero although the command pushes both ways.")
-    one_way = min(m.forward, m.backward) < SOME and not unsigned
+    one_way = min(m.forward, m.backward) < SOME and not unsigned(record)
     mechanical = [node for node in shaft.nodes if node not in ("encoder", "sensor")]
     commands = record.u[:, 0 if shaft.name != "reel2" else 1]
     pushed_both_ways = min(np.mean(commands > 0), np.mean(commands < 0)) >= SOME

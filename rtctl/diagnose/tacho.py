@@ -10,8 +10,13 @@ Source: Ljung, System Identification (1999), 10.3 for high-order ARX models; Hol
 iteratively reweighted least-squares, Communications in Statistics A6 (1977), for the weights.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.signal import lfilter
+
+if TYPE_CHECKING:
+    from rtctl.diagnose.record import Record
 
 ORDER = 8  # rows of the past
 ROUNDS = 15
@@ -43,6 +48,11 @@ def noise(y: np.ndarray, u: np.ndarray) -> float:
 def folded(speed: np.ndarray, u: np.ndarray) -> bool:
     """Whether a speed (n,) never goes below zero although the command (n,) pushes both ways."""
     return bool(speed.min() > -BACK * speed.max() and min(np.mean(u > 0), np.mean(u < 0)) > BACK)
+
+
+def unsigned(record: "Record") -> bool:
+    """Whether a recording shows a speed without its sign."""
+    return "speed" in record.y and folded(record.y["speed"], record.u[:, 0])
 
 
 def signed(speed: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ class Measures:
 
     def __init__(self, record: Record, base: dict[str, float], scales: dict[str, Scales], hints: dict[str, list]):
         self.record, self.base, self.scales, self.hints = record, base, scales, hints
+        self.grain = resolution(record)  # of a speed it is a regression, and a table asks for it with every measure
         self.term = ""
 
     def most(self, parameter: str) -> float:
@@ -55,7 +56,7 @@ class Measures:
             "tick": self.record.dt,
             "duration": len(self.record.t) * self.record.dt,
             "volts": max(self.volts(node), LITTLE * volts),
-            "grain": resolution(self.record) * s.span / (self.scales.get("encoder") or self.scales["sensor"]).span,
+            "grain": self.grain * s.span / (self.scales.get("encoder") or self.scales["sensor"]).span,
             "counts": 1.0 / per_unit(self.record.case)[-1 if node == "scale" else 0],
             "per_volt": 1.0 / volts,
             "limit": drive.limit_volt or float(np.abs(self.record.u).max()),
