@@ -186,7 +186,7 @@ def hypotheses(
     """
     scales = node_scales(record, base)
     measures = Measures(record, base, scales, hints or {})
-    alone = set(ALONE) - ({"sensor.rectified"} if "speed" in record.y else set())  # which never falls below zero
+    alone = set(ALONE) - ({"sensor.rectified"} if record.shows_speed else set())  # which never falls below zero
     out = []
     for name, term in TERMS.items():
         if (

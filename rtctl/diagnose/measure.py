@@ -78,7 +78,7 @@ def begin(sim: Simulator, model: Model, rows: int = FIRST) -> np.ndarray | None:
     if sim.record.plant != "axis":
         return None
     rows = min(rows, len(sim.seen))
-    if not sim.shows_speed:
+    if not sim.record.shows_speed:
         return _begin(sim, model, rows, np.array([sim.seen[0], 0.0]))
     found = [_begin(sim, model, rows, np.array([0.0, v])) for v in (sim.seen[0], -sim.seen[0])]
     ways = [x for x in found if x is not None]
@@ -89,7 +89,7 @@ def begin(sim: Simulator, model: Model, rows: int = FIRST) -> np.ndarray | None:
 def _begin(sim: Simulator, model: Model, rows: int, x: np.ndarray) -> np.ndarray | None:
     """The same from a first guess `x`."""
     seen, per_s = sim.seen[:rows], 1.0 / (rows * sim.record.dt)
-    steps = max(float(np.ptp(seen)), 1e-9) * np.array([1.0 / per_s, 1.0] if sim.shows_speed else [1.0, per_s])
+    steps = max(float(np.ptp(seen)), 1e-9) * np.array([1.0 / per_s, 1.0] if sim.record.shows_speed else [1.0, per_s])
     for _ in range(ROUNDS):
         e = seen - free_run(sim, model, x, rows)[:, 0]
         columns = [(seen - free_run(sim, model, x + step, rows)[:, 0] - e) for step in np.diag(steps)]
@@ -109,7 +109,7 @@ def free_run(
     moving = copy.copy(sim)
     moving.kernel = sim.kernel._replace(module=cast(ModuleType, Begun(sim.kernel.module, start)))
     out = moving.run(model, OPEN, n, coarse)
-    return out if sim.shows_speed else out + start[0]  # readings of a position count from where the machine began
+    return out if sim.record.shows_speed else out + start[0]  # readings of a position count from where it began
 
 
 def between(record: Record, model: Model) -> Simulator:

@@ -15,7 +15,8 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import welch
 
 from rtctl.diagnose.case import NoLaw, believed
-from rtctl.diagnose.record import Record, law_agreement, unwrap
+from rtctl.diagnose.columns import unwrap
+from rtctl.diagnose.record import Record, law_agreement
 from rtctl.diagnose.simulate import way
 from rtctl.diagnose.tacho import unsigned
 from rtctl.plants.physics import TERMS

@@ -65,12 +65,12 @@ class Problem:
         self.balance = float(np.sqrt(EDGES * len(self.target) / few)) if few else 1.0  # what an edge counts for
         grain = resolution(sim.record) if sim.record.plant == "axis" else 1.0
         memory = self.block * self.mean
-        gone = np.cumsum(sim.seen) / memory if sim.shows_speed else sim.seen  # a stop is where it gets nowhere
+        gone = np.cumsum(sim.seen) / memory if sim.record.shows_speed else sim.seen  # a stop is where it gets nowhere
         share = shares(gone[: self.n], grain, memory)[self.time_rows]
         self.moves = share == 1.0  # (errors,): the machine does
         self.weights = np.sqrt(share / share.mean())
         self.louder = 1.0  # than a quiet machine, as far as is known
-        self.measured = sim.shows_speed  # the floor is the noise of this very record
+        self.measured = sim.record.shows_speed  # the floor is the noise of this very record
 
     def seen_by(self, model: Model) -> "Problem":
         """The same with the edges of counters that cannot tell direction, which the model tells; there must be no
@@ -191,7 +191,7 @@ class Problem:
         if loud > self.loudest or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :]):
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
-        dt, speed = self.sim.record.dt * self.mean, self.sim.shows_speed
+        dt, speed = self.sim.record.dt * self.mean, self.sim.record.shows_speed
         return is_hiss(main, dt, self.sim.follow, self.main_floor, exact, speed) and not self.commanded(r)
 
 

@@ -13,14 +13,21 @@ from numba import njit
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed, read_case
-from rtctl.drivers import ldu_amplifier
+from rtctl.diagnose.columns import (
+    even_clock,
+    is_counter,
+    laid,
+    measured_amplifier,
+    running,
+    through_amplifier,
+    unwrap,
+    unwrap_turns,
+)
 from rtctl.trace.bundle import PARQUET, load_bundle
 
 COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
 READINGS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts",), "axis": ()}
-WRAPS = (16, 24, 32)  # bits of the counters in use
 COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
-RUNNING = 2  # in the column `state` of our own recordings
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
 RATE_OFF = 0.01  # share by which the median tick may differ from the sample rate
 AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
@@ -42,6 +49,11 @@ class Record(NamedTuple):
     def closed_loop(self) -> bool:
         """Whether the law is known, so that the reference is the input; otherwise the recorded command is."""
         return self.case.controller_known and isinstance(self.case.controller, PdLaw | SectionsLaw | CascadeLaw)
+
+    @property
+    def shows_speed(self) -> bool:
+        """Whether an axis is seen by its speed and not by its position."""
+        return "speed" in self.y
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -82,34 +94,9 @@ def load_record(folder: Path | str) -> Record:
             told = f"{bundle.folder / PARQUET}: rows {rows.start} to {rows.stop - 1} are taken, where the loop ran"
             case = case._replace(warnings=(*case.warnings, told))
         columns = {name: values[rows] for name, values in columns.items()}
-        if case.plant == "ldu" and "u" in columns and _measured_amplifier(bundle.case["config"]):
+        if case.plant == "ldu" and "u" in columns and measured_amplifier(bundle.case["config"]):
             columns["u"] = through_amplifier(columns["u"])
     return check(columns, case, bundle.folder)
-
-
-def through_amplifier(u: np.ndarray) -> np.ndarray:
-    """Volts (n,) that give a current of 0.1 A/V what the measured amplifier gives at `u`, below where it runs away.
-
-    At 0 V it still has a current, whose direction is in the sign of that zero (12.3).
-    """
-    offset, knee = ldu_amplifier.OFFSET_VOLTS, ldu_amplifier.KNEE_VOLTS
-    return np.copysign(offset + np.maximum(np.abs(u) - knee, 0.0), u)
-
-
-def _measured_amplifier(config: dict) -> bool:
-    plant = config.get("plant")
-    amplifier = plant.get("amplifier") if isinstance(plant, dict) else None
-    return isinstance(amplifier, dict) and amplifier.get("kind") == "measured"
-
-
-def running(state: np.ndarray) -> slice:
-    """The longest stretch of rows in which our own loop ran: neither on its way there nor stopped by a trip."""
-    edges = np.diff(np.concatenate(([0], state == RUNNING, [0])).astype(np.int8))
-    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    if not len(first):
-        return slice(0, 0)
-    longest = int(np.argmax(last - first))
-    return slice(int(first[longest]), int(last[longest]))
 
 
 def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") -> Record:
@@ -126,7 +113,7 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
         case = case._replace(controller_known=False)
     y = {}
     for name, values in raw.items():
-        if _is_counter(name):
+        if is_counter(name):
             off = np.flatnonzero(values != np.round(values))
             if len(off):
                 raise UserError(
@@ -137,9 +124,9 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
             y[name] = unwrap_turns(values) if case.sensors.unit == "rad" else values
     if case.sample_rate is None:
         even = even_clock(t, dt)
-        y = {name: _laid(even, t, values, whole=_is_counter(name)) for name, values in y.items()}
-        ref, w = _laid(even, t, ref), _laid(even, t, w)
-        u = np.column_stack([_laid(even, t, values) for values in u.T])
+        y = {name: laid(even, t, values, whole=is_counter(name)) for name, values in y.items()}
+        ref, w = laid(even, t, ref), laid(even, t, w)
+        u = np.column_stack([laid(even, t, values) for values in u.T])
         t = even
     _supports(path, t, u, y, case, warnings)
     record = Record(case.plant, case, t, dt, ref, w, u, y, columns)
@@ -148,17 +135,6 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
         warnings.append(f"{path.parent}: {_disagrees(case, agreement)}; the recorded command is taken as the input")
         case = case._replace(controller_known=False)
     return record._replace(case=case._replace(warnings=tuple(warnings)))
-
-
-def even_clock(t: np.ndarray, dt: float) -> np.ndarray:
-    """Times (m,) s, `dt` apart, from the first to the last of the uneven times `t` (n,)."""
-    return t[0] + dt * np.arange(int((t[-1] - t[0]) / dt + 1e-9) + 1)
-
-
-def _laid(even: np.ndarray, t: np.ndarray, values: np.ndarray, whole: bool = False) -> np.ndarray:
-    """Readings (n,) at times `t` on the line between neighbours at times `even`; a counter stays `whole`."""
-    line = np.interp(even, t, values)
-    return np.round(line) if whole else line
 
 
 def split(record: Record, heldout: float = 0.25) -> tuple[slice, slice]:
@@ -230,28 +206,6 @@ def to_dac(u: np.ndarray, case: Case) -> np.ndarray:
     if step is None:
         return u
     return np.clip(np.floor(u / step + 0.5) * step, -drive.dac_range_volt, drive.dac_range_volt - step)
-
-
-def unwrap(counts: np.ndarray) -> tuple[np.ndarray, int | None, int]:
-    """Counts (n,) without the wraps of their counter, the counter's bits (None: it never wrapped), wraps."""
-    d = np.diff(counts)
-    span = float(np.ptp(counts)) if len(counts) else 0.0
-    for bits in WRAPS:
-        if span >= 2.0**bits:
-            continue
-        wrapped = np.abs(d) > 0.5 * 2.0**bits
-        if not wrapped.any():
-            continue
-        left = d - np.sign(d) * 2.0**bits
-        if np.abs(left[wrapped]).max() < 2.0 ** (bits - 4):  # what is left is a step as others are
-            d = np.where(wrapped, left, d)
-            return counts[0] + np.concatenate(([0.0], np.cumsum(d))), bits, int(wrapped.sum())
-    return counts.copy(), None, 0
-
-
-def unwrap_turns(angle: np.ndarray) -> np.ndarray:
-    """An angle (n,) in rad without its jumps of a turn; it is left alone where it has none."""
-    return np.unwrap(angle) if (np.abs(np.diff(angle)) > math.pi).any() else angle
 
 
 def _position(record: Record) -> np.ndarray | None:
@@ -384,10 +338,6 @@ def _supports(
             if k == 0:
                 raise NoAnswer(f"{path}: column '{name}' never changes; nothing moved, so it supports no verdict")
             warnings.append(f"{path}: column '{name}' never changes")
-
-
-def _is_counter(name: str) -> bool:
-    return name.endswith("_counts")
 
 
 def _disagrees(case: Case, agreement: Agreement | None) -> str:

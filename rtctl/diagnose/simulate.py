@@ -56,8 +56,7 @@ class Simulator:
         self.kernel = kernel.kernel(record.plant)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP[record.plant] - 1e-9)))
         self.channels = channels(record)
-        self.shows_speed = self.channels[0] == "speed"
-        usual = FOLLOW_SPEED if self.shows_speed else FOLLOW[record.plant]
+        usual = FOLLOW_SPEED if record.shows_speed else FOLLOW[record.plant]
         self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
         self.lead = round((LEAD[record.plant] if lead is None else lead) / record.dt)
         self.half = 0.5 if record.plant != "axis" else 0.0
@@ -166,7 +165,7 @@ class Simulator:
         j["current_limit"] = case.drive.current_limit or np.inf
         j["per_unit"] = per_unit(case)
         j["rectified"] = [0, 1, 1] if plant == "ivu" else 0
-        j["speed"] = self.shows_speed
+        j["speed"] = self.record.shows_speed
         j["share"] = SHARE[plant]
         rigid = rigid_gain(params, plant)
         j["P"], j["D"] = follow**2 / rigid, 1.4 * follow / rigid

@@ -52,7 +52,7 @@ def folded(speed: np.ndarray, u: np.ndarray) -> bool:
 
 def unsigned(record: "Record") -> bool:
     """Whether a recording shows a speed without its sign."""
-    return "speed" in record.y and folded(record.y["speed"], record.u[:, 0])
+    return record.shows_speed and folded(record.y["speed"], record.u[:, 0])
 
 
 def signed(speed: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from rtctl.diagnose.chain import diagnose_record, misread, tells, without_reels
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import Record, check, running, through_amplifier
+from rtctl.diagnose.record import Record, check
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
@@ -105,20 +105,6 @@ def test_a_second_recording_is_predicted_whole(spring):
 def test_no_verdict_from_too_little():
     with pytest.raises(NoAnswer, match="supports no verdict"):
         recording(SPRING, seconds=0.4)
-
-
-@pytest.mark.parametrize(
-    "state, rows",
-    [([0, 1, 2, 2, 3], (2, 4)), ([2, 2], (0, 2)), ([2, 0, 2, 2, 0], (2, 4)), ([0, 1, 1], (0, 0)), ([], (0, 0))],
-)
-def test_rows_in_which_our_own_loop_ran(state, rows):
-    found = running(np.array(state))
-    assert (found.start, found.stop) == rows
-
-
-def test_the_measured_amplifier_in_volts():
-    u = np.array([-2.8, -0.0, 0.0, 0.5, 0.8, 2.8])
-    assert 0.1 * through_amplifier(u) == pytest.approx([-0.242, -0.042, 0.042, 0.042, 0.042, 0.242])  # A, (12.3)
 
 
 @pytest.mark.parametrize(

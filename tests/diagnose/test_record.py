@@ -5,12 +5,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.record import check, law_agreement, load_record, recompute_law, split, unwrap
+from rtctl.diagnose.record import check, law_agreement, load_record, recompute_law, split
 from rtctl.trace.bundle import load_case, save_case
 
 SHARED = Path(__file__).parents[2].parent / "shared"
@@ -250,23 +248,6 @@ def test_one_drive_or_one_reel_may_rest(bundle_of, columns_of, case_of):
     columns = {**columns_of("ivu", 3000), "u2": np.full(3000, 0.4), "reel1_counts": np.zeros(3000)}
     record = load_record(bundle_of(columns, case_of("ivu")))
     assert any("reel1_counts" in text for text in record.case.warnings)
-
-
-@settings(deadline=None, max_examples=60)
-@given(st.sampled_from([16, 24, 32]), st.lists(st.integers(-900, 900), min_size=3, max_size=300), st.integers(0, 2**31))
-def test_a_counter_that_wraps_is_unwrapped(bits, steps, start):
-    true = start + np.concatenate(([0], np.cumsum(steps)))
-    wrapped = (true % 2**bits).astype(float)
-    counts, found, wraps = unwrap(wrapped)
-    assert np.array_equal(counts - counts[0], (true - true[0]).astype(float))
-    assert (found is None) == (wraps == 0)
-    if found is not None:
-        assert found == bits
-
-
-def test_a_wide_range_and_a_single_jump_are_no_wrap():
-    assert unwrap(np.array([0.0, 30000.0, 70000.0, 20.0]))[1] is None
-    assert unwrap(np.array([0.0, 1.0, 2.0, 40000.0, 40001.0]))[1] is None
 
 
 def test_y_holds_the_counters_unwrapped(bundle_of, columns_of, case_of):
