@@ -16,7 +16,7 @@ from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import HINTED
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, enrich, polish, whole_orders
-from rtctl.diagnose.scan import resonances, slack
+from rtctl.diagnose.scan import bumps, resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
 from rtctl.diagnose.stretches import loudness, usual
@@ -92,6 +92,11 @@ def search(
             candidates = [*candidates, *new_starts(propose(beam[0]), known)]
         parents = [*beam, away] if level == 0 and away is not None else beam
         full, scores = grow(problem, parents, candidates, QUICK if sure else ROUNDS[level], away, enough, progress)
+        if full and full[0].rms > decide.LOUD * problem.floor and level < MOST - 1 and not enough(full[0]):
+            progress("looking for bumps")
+            full = sorted(
+                [*full, *(f for model in beam for f in bumps(problem, model, propose(model)))], key=absurd_last
+            )
         if level == 0:
             first, candidates = tuple(scores), best_starts(scores)
             quiet = base.rms < QUIET * problem.floor

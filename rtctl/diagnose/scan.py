@@ -1,5 +1,5 @@
-"""A closer look for what a first look says nothing of: a resonance that is strong and whose frequency is not met, and
-a tape that goes slack.
+"""A closer look for what a first look says nothing of: a resonance that is strong and whose frequency is not met, a
+tape that goes slack, and a narrow bump.
 
 A heavy part on a spring turns the whole response round about its frequency: a small mass at a frequency nearby, all
 that the screening tries, explains nothing. So every frequency is tried with a mass that counts and with broad damping,
@@ -7,6 +7,9 @@ which lets a fit slide along.
 
 When a tape goes slack hangs on small differences between pull and friction: with the owner's values it does at other
 moments, or never, and no slope leads from there to where it did. So values all over their tolerance are tried.
+
+A bump is met or not met: a step off its place, or with another shape, a few rounds say nothing of what it comes to. So
+the likeliest places are fitted in full in each of its shapes.
 """
 
 from collections.abc import Sequence
@@ -17,7 +20,7 @@ import numpy as np
 from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import USUAL
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.screen import Score
+from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis
 
 TERM = "structure.resonance"
@@ -26,6 +29,7 @@ HEAVY, BROAD = 0.25, 0.05  # of a tenth of the machine's inertia; damping ratio
 FASTEST = 0.2  # of the rate of the record: above it a part on a spring only shows as more inertia
 ROUGH, FULL = 4, 2  # rounds of a rough fit, full fits
 SLACK, ELSEWHERE, DEEP = "tape.slack", 32, 3  # values tried all over their tolerance, and full fits
+BUMP, PLACES = "load.bump", 2  # places that are tried of each shape
 
 
 def resonances(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
@@ -69,3 +73,25 @@ def slack(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
         errors = parallel([partial(problem.residual, space.model(x), True) for x in xs])
         starts += [Fit(space, x, r, np.empty((0, 0)), 0.5 * float(r @ r)) for x, r in zip(xs, errors, strict=True)]
     return [fit(problem, f.space, f.x, rounds=12) for f in sorted(starts, key=lambda f: f.cost)[:DEEP]]
+
+
+def bumps(problem: Problem, model: Fit, proposed: Sequence[Hypothesis]) -> list[Fit]:
+    """Full fits with a bump on top of `model`, in each of its shapes at the places that do best at first sight, of
+    those that are `proposed` where the record is seen through that model."""
+    plant, there = problem.sim.record.plant, {h.name for h in model.space.hypotheses}
+    own = [h for h in proposed if h.term == BUMP and (plant, h.node) in USUAL and h.name not in there]
+    count: dict[tuple[str, str], int] = {}
+    starts: list[Score] = []
+    for score in screen(problem, model, own):
+        kind = score.hypothesis.node, str(score.hypothesis.fixed)
+        count[kind] = count.get(kind, 0) + 1
+        if count[kind] <= PLACES and score.gain > 0.0:
+            starts.append(score)
+    return parallel([partial(_met, problem, model, score) for score in starts])
+
+
+def _met(problem: Problem, base: Fit, score: Score) -> Fit:
+    """A full fit from where a first look has moved the bump to, the other parameters as they were."""
+    space, old = base.space.add(score.hypothesis), len(base.x)
+    start = np.concatenate([base.x, np.clip(score.x, *space.bounds())[old:]])
+    return fit(problem, space, start, rounds=16)

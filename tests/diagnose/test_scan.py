@@ -1,4 +1,4 @@
-"""Closer looks: a resonance that is heavy and lies between the frequencies of the first look, and a slack tape."""
+"""Closer looks: a resonance that is heavy and lies between the frequencies of the first look, a slack tape, a bump."""
 
 from types import SimpleNamespace
 
@@ -8,16 +8,18 @@ import pytest
 from rtctl.diagnose import scan
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
+from rtctl.diagnose.find import proposed
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.scan import SLACK, TERM, resonances, slack
+from rtctl.diagnose.scan import BUMP, PLACES, SLACK, TERM, bumps, resonances, slack
 from rtctl.diagnose.screen import screen
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
+NARROW = {"term": BUMP, "node": "carriage", "F": 20.0, "at": 0.047, "width": 1.5e-3, "form": "hill"}
 HEAVY = {"term": TERM, "node": "carriage", "mass": 40.0, "f_Hz": 14.5, "zeta": 0.04}
 
 
@@ -84,3 +86,32 @@ def test_a_slack_tape_is_met_from_values_all_over_their_tolerance(case_of):
     best = min(slack(problem, base, looked), key=lambda f: f.cost)
     assert {h.term for h in best.space.hypotheses} == {SLACK}
     assert best.rms < 0.3 * base.rms
+
+
+def test_a_narrow_bump_is_met_at_its_place_and_in_its_shape(make_axis, searched):
+    axis = make_axis(NARROW)
+    problem, base, _ = searched(axis)
+    tried = bumps(problem, base, proposed(axis.sim, base))
+    forms = [f.model.terms[0].form for f in tried]
+    assert {f.model.terms[0].term for f in tried} == {BUMP}
+    assert set(forms) == {"drag", "hill", "push"}
+    assert max(forms.count(form) for form in forms) <= PLACES
+    best = min(tried, key=lambda f: f.cost)
+    term = best.model.terms[0]
+    assert term.form == "hill"
+    assert term.at == pytest.approx(0.047, abs=2e-4)
+    assert term.F == pytest.approx(20.0, rel=0.1)
+    assert best.rms < 1.2 * problem.floor < 0.4 * base.rms
+
+
+def test_a_bump_that_a_model_has_is_not_looked_for_again(make_axis, searched):
+    axis = make_axis(NARROW)
+    problem, base, _ = searched(axis)
+    likely = proposed(axis.sim, base)
+    has = min(bumps(problem, base, likely), key=lambda f: f.cost)
+    assert bumps(problem, has, likely) == []
+
+
+def test_without_a_place_proposed_no_bump_is_fitted(plain, searched):
+    problem, base, _ = searched(plain)
+    assert bumps(problem, base, [h for h in proposed(plain.sim, base) if h.term != BUMP]) == []
