@@ -2,17 +2,20 @@
 
     T = c d(e) + k (damping + (1 - damping) d'(e)) e',   d = e beyond half the gap, less half the gap; 0 within
 
-Beyond the gap it is the linear spring and damper of the link, shifted. At the edge the slope d' goes from 0 to 1 over
-`edge` of half the gap to either side, so that neither force nor its derivative jumps. At rest the link stands in the
-middle of its gap. The difference to the linear spring is a pull held over the substep, such that free ends leave it at
-the speed that they had: second order, for h times the link's own angular frequency w = sqrt(c (a^2/J_i + b^2/J_j)) up
-to 1; what it errs is the way across the gap, by (w h)^2 / 12 of it. The axis has no spring between motor and carriage:
-there the play is between carriage and sensor, and the reading follows with the hysteresis of a gap.
+Beyond the gap it is the linear spring and damper of the link, shifted. What touches first is softer than the whole
+(grease, a tip, an edge out of true), so that neither force nor its derivative jumps: the corners are hyperbolas, which
+at the edge itself give half of `edge` of half the gap. Where little pulls, as at a tape's tension, they are most of
+what is seen. At rest the link stands in the middle of its gap. The difference to the linear spring is a pull held over
+the substep, such that free ends leave it at the speed that they had: second order, for h times the link's own angular
+frequency w = sqrt(c (a^2/J_i + b^2/J_j)) up to 1; what it errs is the way across the gap, by (w h)^2 / 12 of it. The
+axis has no spring between motor and carriage: there the play is between carriage and sensor, and the reading follows
+with the hysteresis of a gap.
 
 Source: Nordin & Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38 (2002); Lurie & Enright,
 Classical feedback control, for the play operator.
 """
 
+import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
@@ -27,7 +30,7 @@ class BacklashSettings(Settings):
     node: Node
     gap: float = quantity(unit="", ge=0, le=1.0, help="total play, rad of the link's first end (m at an axis)")
     damping: float = quantity(0.0, unit="", ge=0, le=1, help="share of the link's damping that also acts in the gap")
-    edge: float = quantity(0.05, unit="", ge=0, le=1, help="share of half the gap over which its edge is rounded")
+    edge: float = quantity(0.005, unit="", ge=0, le=1, help="share of half the gap by which its edges are rounded")
 
 
 class BacklashParams(NamedTuple):
@@ -86,15 +89,14 @@ def undone(m, j):
 
 @tick
 def dead_zone(e, half, edge):
-    """What sticks out of the dead zone -half .. half, and its slope; parabolas join the straight parts."""
-    out = abs(e) - half
-    soft = edge * half
-    if out >= soft:
-        return (out if e > 0.0 else -out), 1.0
-    if out <= -soft:
-        return 0.0, 0.0
-    d = (out + soft) ** 2 / (4.0 * soft)
-    return (d if e > 0.0 else -d), (out + soft) / (2.0 * soft)
+    """What sticks out of the dead zone -half .. half, and its slope; hyperbolas join the straight parts."""
+    w = edge * half
+    if w < 1e-12:
+        out = max(abs(e) - half, 0.0)
+        return (out if e > 0.0 else -out), (1.0 if abs(e) >= half else 0.0)
+    a, b = e - half, e + half
+    r, s = math.sqrt(a * a + w * w), math.sqrt(b * b + w * w)
+    return e + 0.5 * (r - s), 1.0 + 0.5 * (a / r - b / s)
 
 
 @tick

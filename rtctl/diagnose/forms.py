@@ -34,8 +34,9 @@ EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, t
     "drive.supply_sag": (Shape("tau", "seconds", (0.02,), 30.0),),
     "drive.thermal": (Size("ease", "one", 0.1, signed=True),),
     "structure.stiffening": (Size("c2", "square", 0.05, signed=True), Size("b2", "swell", 0.05)),
+    "transmission.backlash": (Shape("edge", "one", (0.05,), 20.0),),
 }  # fmt: skip
-RICH_AT = {"drive.thermal": "drive"}  # nodes at which alone there is more
+RICH_AT = {"drive.thermal": ("drive",), "transmission.backlash": ("motor", "wheel", "capstan")}  # how nodes begin
 FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in its other values once the term stands
     "friction.stribeck": ("form", ("gaussian", "exponential", "tustin")),
     "transmission.backlash": ("damping", (0.0, 1.0)),
@@ -53,7 +54,7 @@ OTHER_NAMES = {  # of a wave that a sliding axis misreads: what its length is ca
 def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis | None:
     """The same hypothesis with the further parameters of its richer form; None where it has none."""
     parts = EXTRAS.get(h.term)
-    if parts is None or not h.node.startswith(RICH_AT.get(h.term, "")):
+    if parts is None or not h.node.startswith(RICH_AT.get(h.term, ("",))):
         return None
     measures = Measures(record, base, node_scales(record, base), {})
     if is_rich(h):

@@ -26,6 +26,16 @@ def test_forms_and_richer_forms_keep_the_term_and_its_place(moved):
     assert richer(record, base, more) is None  # it has them already
 
 
+def test_the_edges_of_a_gap_are_round_where_a_link_has_one(moved):
+    """A sensor behind a gap is drawn along by its edges, and how round they are has no say."""
+    record, base = moved("ldu")
+    (gap, *_) = hypotheses(record, base, only=("transmission.backlash",))
+    assert [c.name for c in richer(record, base, gap).coordinates] == ["gap", "edge"]
+    record, base = moved("axis")
+    (gap, *_) = hypotheses(record, base, only=("transmission.backlash",))
+    assert richer(record, base, gap) is None
+
+
 def test_a_flank_of_a_hill_is_moved_aside(moved):
     """What pushes on is behind the middle of the hill that it belongs to, or the other way round before it."""
     record, base = moved("axis")

