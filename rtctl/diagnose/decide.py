@@ -189,7 +189,7 @@ def complete(problem: Problem, base: Fit, fitted: Fit) -> bool:
 
 def loud(problem: Problem, base: Fit) -> bool:
     """Whether the owner's model leaves so much that something is missing, named or not."""
-    return base.rms > LOUD * problem.floor and not complete(problem, base, base)
+    return problem.parted(base.r) or (base.rms > LOUD * problem.floor and not complete(problem, base, base))
 
 
 def quiet(problem: Problem, base: Fit, fitted: Fit) -> bool:

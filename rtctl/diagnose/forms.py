@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.diagnose.hypotheses import LENGTHS, Choice, Part, Shape, Size, Turn, starts_of
+from rtctl.diagnose.hypotheses import LENGTHS, SEARCH, Choice, Part, Shape, Size, Turn, Where, starts_of
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import Hypothesis
@@ -91,6 +91,18 @@ def forms(h: Hypothesis) -> list[Hypothesis]:
     name, values = FORMS.get(h.term, ("", ()))
     default = TERMS[h.term].settings.model_fields[name].default if name else None
     return [h._replace(fixed={**h.fixed, name: v}) for v in values if v != h.fixed.get(name, default)]
+
+
+def about_others(record: Record, base: dict[str, float], h: Hypothesis) -> list[Hypothesis]:
+    """The same hypothesis about each other place that it may be about: beside a push that has a name of its own, what
+    was taken for the middle of the travel may be the start."""
+    parts = tuple(part for part in SEARCH.get(h.term, ()) if isinstance(part, Where))
+    if not parts:
+        return []
+    rest = {name: value for name, value in h.fixed.items() if name not in {part.name for part in parts}}
+    measures = Measures(record, base, node_scales(record, base), {})
+    tried = (h._replace(fixed={**rest, **other.fixed}) for other in starts_of(h.term, h.node, parts, measures))
+    return [other for other in tried if other.fixed != h.fixed]
 
 
 def moved_into(form: Hypothesis, x: np.ndarray) -> list[np.ndarray]:

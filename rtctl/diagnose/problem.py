@@ -25,6 +25,7 @@ LOUDEST = 20.0  # times the floor, of what random forces leave
 ADDED = 2.0  # the same by what a white force adds up to, of a speed
 EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond which that has to have their very pattern
 SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
+PARTED = 2.5  # times the floor, by which one sensor may differ from what another shows of the same motion
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
 FORGOTTEN = 4.0  # the same, after which errors no longer go together
 FORGET = 8.0  # over the bandwidth of the correction
@@ -182,13 +183,24 @@ class Problem:
         u = means(self.sim.record.u[self.rows], self.mean)
         return commanded(self.by_sensor(r)[self.sim.channels[0]], np.column_stack((u, np.abs(u))), self.block)
 
+    def parted(self, r: np.ndarray) -> bool:
+        """Whether the errors r of sensors that know direction are not of one motion: what moves the machine, random
+        forces too, is seen by each of them."""
+        main, *others = list(self.by_sensor(r).values())[: len(self.channels)]
+        alone = (e - main * float(main @ e) / max(float(main @ main), 1e-300) for e in others)
+        return any(rms(e) > PARTED * self.main_floor for e in alone)
+
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave."""
         main, *others = self.by_sensor(r).values()
         moves = self.moves[self.source == 0]
         main = main[moves] if moves.any() else main
         loud = rms(main) / self.main_floor
-        if loud > self.loudest or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :]):
+        if (
+            loud > self.loudest
+            or self.parted(r)
+            or any(rms(e) > SHAKEN * EDGE for e in others[len(self.channels) - 1 :])
+        ):
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
         dt, speed = self.sim.record.dt * self.mean, self.sim.record.shows_speed

@@ -7,7 +7,7 @@ import numpy as np
 
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, fit, parallel
-from rtctl.diagnose.forms import as_harmonic, forms, moved_into, richer, rounded
+from rtctl.diagnose.forms import about_others, as_harmonic, forms, moved_into, richer, rounded
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import Hypothesis, Space
 
@@ -71,7 +71,7 @@ def drop(found: Fit, index: int) -> np.ndarray:
 def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:
     """Give each term another form of the same, or a richer one (harmonics, a second branch), where that is better."""
     for index, h in enumerate(found.space.hypotheses):
-        for form in forms(h):
+        for form in (*forms(h), *about_others(problem.sim.record, found.model.base, h)):
             for start in moved_into(form, found.space.parts(found.x)[index]):
                 other = with_other(problem, found, index, form, start, 10, found.J)
                 if other.merit < found.merit:

@@ -13,6 +13,7 @@ from rtctl.diagnose.decide import (
     complete,
     enough,
     explained,
+    loud,
     p_value,
     probabilities,
     same_law,
@@ -29,8 +30,9 @@ from rtctl.diagnose.stretches import loudness
 class Floor:
     """As much of a Problem as the judge looks at."""
 
-    def __init__(self, floor, hiss=False):
+    def __init__(self, floor, hiss=False, parted=False):
         self.floor, self.hiss, self.block, self.louder = floor, lambda r: hiss, 20, 1.0
+        self.parted = lambda r: parted
         self.loudness, self.measured = loudness, False
 
 
@@ -40,6 +42,15 @@ def made(r, terms=0, x=None):
     r = np.asarray(r, float)
     x = np.zeros(terms) if x is None else x
     return Fit(space, x, r, np.zeros((len(r), len(x))), 0.5 * float(r @ r))
+
+
+@pytest.mark.parametrize(
+    ("left", "hiss", "parted", "expected"),
+    [(9.0, False, False, True), (9.0, True, False, False), (3.0, False, False, False), (3.0, False, True, True)],
+)
+def test_something_is_missing_where_much_is_left_or_where_sensors_differ(left, hiss, parted, expected):
+    base = made(np.full(50, left))
+    assert loud(Floor(1.0, hiss, parted), base) == expected  # type: ignore[arg-type]
 
 
 rms = st.floats(0.1, 100.0)

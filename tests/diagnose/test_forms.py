@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.forms import EXTRAS, as_harmonic, forms, moved_into, renamed, richer
+from rtctl.diagnose.forms import EXTRAS, about_others, as_harmonic, forms, moved_into, renamed, richer
 from rtctl.diagnose.hypotheses import SEARCH, hypotheses
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.guide import thickness
@@ -34,6 +34,16 @@ def test_the_edges_of_a_gap_are_round_where_a_link_has_one(moved):
     record, base = moved("axis")
     (gap, *_) = hypotheses(record, base, only=("transmission.backlash",))
     assert richer(record, base, gap) is None
+
+
+def test_a_spring_pulls_to_where_the_machine_starts_or_to_the_middle(moved):
+    record, base = moved("axis")
+    start, middle = hypotheses(record, base, only=("load.spring",))
+    assert "x0" not in start.fixed and "x0" in middle.fixed
+    assert about_others(record, base, start) == [middle]
+    assert about_others(record, base, middle) == [start]
+    (h, *_) = hypotheses(record, base, only=("friction.viscous",))
+    assert about_others(record, base, h) == []
 
 
 def test_a_flank_of_a_hill_is_moved_aside(moved):

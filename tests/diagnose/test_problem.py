@@ -3,7 +3,8 @@
 import numpy as np
 
 from rtctl.diagnose.kernel import TRACK
-from rtctl.diagnose.problem import Problem, main_channels, settled
+from rtctl.diagnose.problem import PARTED, Problem, main_channels, settled
+from rtctl.diagnose.simulate import Simulator
 
 
 def test_weights_weigh_errors_and_multiply(plain):
@@ -45,3 +46,25 @@ def test_what_cannot_tell_direction_is_not_fitted():
     assert main_channels(Told()) == [0]  # type: ignore[arg-type]
     Told.channels = ("encoder_counts", "scale_counts")  # type: ignore[assignment]
     assert main_channels(Told()) == [0, 1]  # type: ignore[arg-type]
+
+
+def test_what_one_sensor_shows_alone_is_of_no_motion(blank):
+    """Random forces show in both sensors of a linear drive, an uneven strip in its scale alone."""
+    n = 20000
+    reading = np.round(4000 * np.sin(np.arange(n) * 1e-3))
+    problem = Problem(Simulator(blank("ldu", np.zeros((n, 1)), reading)))
+    rng, floor = np.random.default_rng(1), problem.main_floor
+    r = floor * rng.standard_normal(len(problem.order))
+    assert not problem.parted(r)
+    moves = 8.0 * floor * np.sin(np.arange(np.sum(problem.source == 0)) * 0.01)
+    r[problem.source == 0] += moves
+    r[problem.source == 1] += 1.6 * moves
+    assert not problem.parted(r)
+    r[problem.source == 1] += 1.5 * PARTED * floor * np.sqrt(2) * np.cos(np.arange(len(moves)) * 0.003)
+    assert problem.parted(r)
+    assert not problem.hiss(r)
+
+
+def test_one_sensor_has_nothing_to_differ_from(plain):
+    problem = Problem(plain.sim)
+    assert not problem.parted(100.0 * np.ones(len(problem.order)))
