@@ -113,7 +113,9 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "friction.presliding": (Size("z_s", "span", 1e-3, finest=1.0), Choice("form", ("dahl", "lugre"))),
     "friction.asymmetry": (Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
     "friction.load": (Size("mu", "one", 0.05, signed=True),),
-    "transmission.backlash": (Size("gap", "twist", (0.3, 5.0, 60.0)), Choice("damping", (0.0, 1.0))),
+    "transmission.backlash": (
+        Size("gap", "twist", (0.3, 5.0, 60.0)), Choice("damping", (0.0, 1.0)), Choice("edge", (0.005, 0.1)),
+    ),
     "transmission.slip": (Limit("F_max", "grip"),),
     "transmission.creep": (Size("kappa", "compliance", 1e-3),),
     "structure.resonance": (

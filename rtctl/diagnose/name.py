@@ -103,14 +103,14 @@ def search(
             if not quiet and not (full and not sure and enough(full[0]) and worth(base, full[0])):
                 progress("looking for resonances")
                 full = sorted([*full, *resonances(problem, base, scores)], key=absurd_last)
-            tape = problem.sim.record.plant == "ivu"
-            if tape and base.rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
-                progress("looking for a slack tape")
-                full = sorted([*full, *slack(problem, base, scores)], key=absurd_last)
         elif problem.sim.case.controller.kind == "none" and not (full and enough(full[0])):  # most ring freely then
             progress(f"looking for resonances beside {' + '.join(names(beam[0]))}")
             further = [score for score in scores if score.hypothesis.name not in names(beam[0])]
             full = sorted([*full, *resonances(problem, beam[0], further)], key=absurd_last)
+        tape = problem.sim.record.plant == "ivu" and level < MOST - 1
+        if tape and beam[0].rms > decide.LOUD * problem.floor and not (full and enough(full[0])):
+            progress("looking for a slack tape")
+            full = sorted([*full, *(f for model in beam for f in slack(problem, model, scores))], key=absurd_last)
         if full and sure and worth(beam[0], full[0]):
             full, _ = grow(problem, parents, candidates, ROUNDS[level], away, enough, progress)
         if not full:

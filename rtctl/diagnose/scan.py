@@ -6,7 +6,8 @@ that the screening tries, explains nothing. So every frequency is tried with a m
 which lets a fit slide along.
 
 When a tape goes slack hangs on small differences between pull and friction: with the owner's values it does at other
-moments, or never, and no slope leads from there to where it did. So values all over their tolerance are tried.
+moments, or never, and no slope leads from there to where it did. So values all over their tolerance are tried, and
+beside another effect sizes of that up to a few times what it seems to be without the slack.
 
 A bump is met or not met: a step off its place, or with another shape, a few rounds say nothing of what it comes to. So
 the likeliest places are fitted in full in each of its shapes.
@@ -21,7 +22,7 @@ from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import USUAL
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.screen import Score, screen
-from rtctl.diagnose.space import Hypothesis
+from rtctl.diagnose.space import SIZE, Hypothesis
 
 TERM = "structure.resonance"
 STEP = 1.2  # between frequencies: with this damping a fit finds the way from half of it
@@ -29,6 +30,7 @@ HEAVY, BROAD = 0.25, 0.05  # of a tenth of the machine's inertia; damping ratio
 FASTEST = 0.2  # of the rate of the record: above it a part on a spring only shows as more inertia
 ROUGH, FULL = 4, 2  # rounds of a rough fit, full fits
 SLACK, ELSEWHERE, DEEP = "tape.slack", 32, 3  # values tried all over their tolerance, and full fits
+LARGER = 3.0  # times the size of an effect beside it
 BUMP, PLACES = "load.bump", 2  # places that are tried of each shape
 
 
@@ -64,15 +66,28 @@ def _tried(problem: Problem, base: Fit, h: Hypothesis) -> list[Fit]:
 
 
 def slack(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:
-    """Full fits with a tape that goes slack, from the plant parameters at which it does best."""
+    """Full fits with a tape that goes slack on top of `base`, from the plant parameters at which it does best."""
+    if any(h.term == SLACK for h in base.space.hypotheses):
+        return []
     kinds = {(s.hypothesis.node, *s.hypothesis.fixed.items()): s.hypothesis for s in scores}
     starts: list[Fit] = []
     for h in (h for h in kinds.values() if h.term == SLACK):
         space = base.space.add(h)
-        xs = space.spread(ELSEWHERE)
+        xs = _all_over(base, h)
         errors = parallel([partial(problem.residual, space.model(x), True) for x in xs])
         starts += [Fit(space, x, r, np.empty((0, 0)), 0.5 * float(r @ r)) for x, r in zip(xs, errors, strict=True)]
     return [fit(problem, f.space, f.x, rounds=12) for f in sorted(starts, key=lambda f: f.cost)[:DEEP]]
+
+
+def _all_over(base: Fit, h: Hypothesis) -> list[np.ndarray]:
+    """Starts of `base` with `h`: the plant's parameters all over their tolerance, the sizes of what is there already
+    from nothing to several times what they were."""
+    plant, old = base.space._replace(hypotheses=()), base.x[base.space.nb :]
+    xs = plant.spread(ELSEWHERE)
+    shares = np.random.default_rng(0).uniform(0.0, LARGER, ELSEWHERE)
+    sizes = np.array([c.kind == SIZE for own in base.space.hypotheses for c in own.coordinates], bool)
+    beside = (np.where(sizes, share * old, old) for share in shares)
+    return [np.concatenate([x, own, h.start()]) for x, own in zip(xs, beside, strict=True)]
 
 
 def bumps(problem: Problem, model: Fit, proposed: Sequence[Hypothesis]) -> list[Fit]:

@@ -149,7 +149,8 @@ def rate(m, x, q0, z0, xs, current, heat, push, spot, ring, det, dx, F, net):
 @compiled
 def _slide(m, x, F, net, dx, contact, k_sum, ns):
     """Tape that slides on its roller (node 4) so that the contact carries no more than the limit, or creeps."""
-    rate_ = m.cap_creep * contact * abs(x[QV + 4])
+    grip = m.cap_creep * abs(x[QV + 4])
+    rate_ = grip * contact / (1.0 + grip * k_sum)  # what the contact carries, damping and all
     if abs(contact) > m.cap_limit:
         rate_ += (contact - np.sign(contact) * m.cap_limit) / k_sum
     dx[SLIP] = rate_

@@ -88,6 +88,25 @@ def test_a_slack_tape_is_met_from_values_all_over_their_tolerance(case_of):
     assert best.rms < 0.3 * base.rms
 
 
+def test_beside_an_effect_its_size_is_tried_too(plain, searched):
+    """What an offset seems to be while the tape is thought to pull all the time is not what it is."""
+    _, base, _ = searched(plain)
+    offset, other = hypotheses(plain.record, base.model.base, only=("drive.offset", "timing.delay"))
+    space = base.space.add(offset)
+    model = base._replace(space=space, x=np.append(base.x, 2.0))
+    xs = np.array(scan._all_over(model, other))
+    assert xs.shape == (scan.ELSEWHERE, len(base.x) + 1 + len(other.coordinates))
+    own = xs[:, len(base.x)]
+    assert own.min() >= 0.0 and 4.0 < own.max() <= 2.0 * scan.LARGER
+    assert len(np.unique(xs[:, 0])) == scan.ELSEWHERE
+    np.testing.assert_array_equal(xs[0, len(base.x) + 1 :], other.start())
+
+
+def test_a_tape_that_goes_slack_already_is_not_looked_for_again():
+    slackened = SimpleNamespace(space=SimpleNamespace(hypotheses=[SimpleNamespace(term=SLACK)]))
+    assert slack(None, slackened, []) == []
+
+
 def test_a_narrow_bump_is_met_at_its_place_and_in_its_shape(make_axis, searched):
     axis = make_axis(NARROW)
     problem, base, _ = searched(axis)
