@@ -22,13 +22,14 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 from rtctl.config.units import to_si
+from rtctl.step_cache import StepCache
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False}
 INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def tick(function: Callable[..., Any]) -> Any:
-    """Compile a step. Not cached by itself: the generated module that calls it is, under a name made of all sources.
+    """Compile a step. It is kept, as the generated module that calls it is, under a name made of all sources.
 
     IEEE arithmetic in program order (no fastmath, no contraction), so that the same step gives the same bits in
     whatever module it is compiled; division by zero gives inf instead of raising, since nobody could catch it.
@@ -67,6 +68,7 @@ class Step:
         self.py_func = function
         self._inner = njit(**OPTIONS, **INNER)(function)
         self._outer = njit(**OPTIONS)(function)
+        self._inner._cache, self._outer._cache = StepCache(function, "inner"), StepCache(function, "outer")
         self._numba_type_ = typeof(self._inner)  # what a name stands for in compiled code
 
     def __call__(self, *arguments: Any) -> Any:

@@ -18,7 +18,7 @@ from rtctl.config.errors import UserError
 from rtctl.config.fields import written
 from rtctl.config.load import load_settings, set_paths
 from rtctl.config.yaml_file import find, load_yaml
-from rtctl.loop import generate
+from rtctl.sources import sources_hash
 from rtctl.trace import metrics as step
 
 MOST_RUNS = 1_000_000
@@ -199,7 +199,7 @@ def load_plan(name: str, load: Load, seconds: float | None = None) -> Plan:
 
 def sources() -> str:
     """Hash of all that a row comes from: the tick's sources, and what measures a run."""
-    digest = hashlib.sha256(generate.sources_hash().encode())
+    digest = hashlib.sha256(sources_hash().encode())
     for path in (Path(step.__file__ or ""), *(Path(__file__).with_name(name) for name in ("metrics.py", "cell.py"))):
         digest.update(path.read_bytes())
     return digest.hexdigest()

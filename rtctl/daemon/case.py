@@ -18,6 +18,7 @@ from rtctl.machines import CONFIGS, Machine
 from rtctl.own.files import is_own
 from rtctl.own.plant import own_plants
 from rtctl.plants import axis, ivu, ldu
+from rtctl.sources import sources_hash
 
 TENSION_NOTE = (
     "Law: recompute it from `config` with the rtctl of `versions`; `ref`, `w` and the counts are its only inputs. "
@@ -43,7 +44,7 @@ def describe(machine: Machine, made: generate.Generated) -> dict[str, Any]:
             "python": sys.version.split()[0],
             "machine": platform.machine(),
             "tick": made.path.stem,
-            "sources": generate.sources_hash(),
+            "sources": sources_hash(),
         },
     }
     own = own_plants.get(type(config.plant))

@@ -21,6 +21,7 @@ from rtctl.loop import generate
 from rtctl.plants.physics import TERMS, place
 from rtctl.plants.physics.place import PLANTS
 from rtctl.plants.physics.term import SITES, Term
+from rtctl.sources import versions
 
 OPEN, TRACK, CLOSED = range(3)
 SLOTS = 32  # terms at once
@@ -286,7 +287,7 @@ def sources_hash(kind: str) -> str:
     files = [root / "idiom.py", root / "diagnose" / "law.py", plants / "linear.py", plants / f"{kind}.py"]
     for path in [*files, *sorted((plants / "physics").glob("*.py"))]:
         digest.update(path.name.encode() + path.read_bytes())
-    digest.update(generate.versions().encode())
+    digest.update(versions().encode())
     return digest.hexdigest()
 
 

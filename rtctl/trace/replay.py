@@ -18,6 +18,7 @@ from rtctl.config.load import set_paths
 from rtctl.loop import generate
 from rtctl.loop.replay import Replay, read_columns, written_columns
 from rtctl.own.files import OwnError
+from rtctl.sources import sources_hash
 from rtctl.trace.bundle import Bundle, load_bundle
 from rtctl.trace.orders import orders, restore
 
@@ -79,7 +80,7 @@ def replay(folder: Path | str, changed: Mapping[str, Any] | None = None) -> Repl
     written = written_columns(machine)
     found = [_difference(name, recorded, rows) for name in compared]
     different = sorted((d for d in found if d is not None), key=lambda d: d.tick)
-    same = bundle.case.get("versions", {}).get("sources") == generate.sources_hash()
+    same = bundle.case.get("versions", {}).get("sources") == sources_hash()
     return Replayed(bundle, recorded, rows, compared, written, tuple(different), stopped, changed, same)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtctl import machines
+from rtctl import machines, sources
 from rtctl.config.errors import UserError
 from rtctl.loop import generate
 
@@ -97,9 +97,9 @@ def test_row_has_every_column_and_the_tick_is_a_whole_number(config: Callable[..
 
 @pytest.fixture
 def fresh_hash() -> Any:
-    generate.sources_hash.cache_clear()
-    yield generate.sources_hash
-    generate.sources_hash.cache_clear()
+    sources.sources_hash.cache_clear()
+    yield sources.sources_hash
+    sources.sources_hash.cache_clear()
 
 
 def test_a_changed_source_or_version_is_another_hash(fresh_hash: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,7 +113,7 @@ def test_a_changed_source_or_version_is_another_hash(fresh_hash: Any, monkeypatc
             patch.setattr(Path, "read_bytes", lambda p, changed=changed: read(p) + b"#" * (p.name == changed))
             assert fresh_hash() != before, changed
     fresh_hash.cache_clear()
-    monkeypatch.setattr(generate.numba, "__version__", "0.0")
+    monkeypatch.setattr(sources.numba, "__version__", "0.0")
     assert fresh_hash() != before
 
 

@@ -1,0 +1,89 @@
+"""Keeps compiled steps on disk, so that another machine compiles only what it does not share with those before it.
+
+A tick is a hundred steps, and nearly all of them stand in the tick of the next config too. numba's own cache will not
+do for them: it looks at the file of a function and not at those that it calls, and two processes that save at the same
+moment may each number their file as the other does. Here a file is named by all that goes into it: every source that
+compiled code can come from, the versions, the step and its types.
+"""
+
+import hashlib
+import inspect
+import os
+import pickle
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from rtctl.config.cache import cache_folder
+from rtctl.sources import files, sources_hash
+
+
+class StepCache(_Cache):
+    """What numba asks before it compiles a step, and tells after it."""
+
+    def __init__(self, function: Callable[..., Any], use: str):
+        self.function, self.use = function, use
+
+    @property
+    def cache_path(self) -> str:
+        """The folder of the steps of these sources."""
+        return str(cache_folder() / f"steps_{sources_hash()[:16]}")
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The step compiled for these types, or None where it is not there."""
+        if not is_kept(self.function):
+            return None
+        target_context.refresh()
+        try:
+            kept, compiled = pickle.loads(self._path(sig, target_context).read_bytes())
+        except Exception:  # not there, cut short, or of classes that are gone: then it is compiled
+            return None
+        if kept != sig:  # types may differ and be written alike
+            return None
+        return CompileResult._rebuild(target_context, *compiled)
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled step, unless it has an address in it that another process does not."""
+        if not is_kept(self.function) or data.library.has_dynamic_globals:
+            return
+        path = self._path(sig, data.target_context)
+        draft = path.with_suffix(f".{os.getpid()}.tmp")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            draft.write_bytes(dumps((sig, data._reduce())))
+            draft.replace(path)
+        except Exception:  # a full disk, a folder of somebody else, types of a function: it runs all the same
+            with suppress(OSError):
+                draft.unlink()
+
+    def _path(self, sig: Any, target_context: Any) -> Path:
+        key = repr((self.function.__module__, self.use, str(sig), target_context.codegen().magic_tuple()))
+        name = f"{self.function.__name__}_{hashlib.sha256(key.encode()).hexdigest()[:24]}"
+        return Path(self.cache_path) / name
+
+    def enable(self) -> None:
+        """Always."""
+
+    def disable(self) -> None:
+        """Never."""
+
+    def flush(self) -> None:
+        """Nothing is ever out of date."""
+
+
+@cache
+def is_kept(function: Callable[..., Any]) -> bool:
+    """Whether a step is rtctl's own and stands at the top of its file: what is defined within a function depends on
+    that function's arguments, and a person's own file on others of theirs."""
+    return function.__qualname__ == function.__name__ and inspect.getfile(function) in _names()
+
+
+@cache
+def _names() -> frozenset[str]:
+    return frozenset(map(str, files()))

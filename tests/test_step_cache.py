@@ -1,0 +1,105 @@
+"""Compiled steps on disk: found again by another process's step, and only by one that is the same."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rtctl import sources, step_cache
+from rtctl.idiom import Step, tick
+from rtctl.laws import pd
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def params() -> Any:
+    return pd.build(pd.PdSettings(gain=6.2, tau_d=0.16), 0.002)
+
+
+def call(step: Step, p: Any) -> tuple[list[float], np.ndarray]:
+    s = np.zeros(1, pd.PD_STATE)
+    return [step(p, s[0], error) for error in (0.1, 0.3, 0.2)], s
+
+
+def hits(step: Step) -> int:
+    return sum(step._outer._cache_hits.values())
+
+
+def test_a_step_that_was_compiled_is_found_again_and_gives_the_same_bits(folder: Path, params: Any) -> None:
+    first, again = Step(pd.step.py_func), Step(pd.step.py_func)  # as two processes would have it
+    here = call(first, params)
+    assert hits(first) == 0 and any(folder.rglob("step_*"))
+    there = call(again, params)
+    assert hits(again) == 1
+    assert there[0] == here[0] and there[1] == here[1]
+
+
+def test_other_types_are_another_file(folder: Path, params: Any) -> None:
+    call(Step(pd.step.py_func), params)
+    kept = set(folder.rglob("step_*"))
+    other = Step(pd.step.py_func)
+    s = np.zeros(1, pd.PD_STATE)
+    other(params, s[0], np.float32(0.1))
+    assert hits(other) == 0 and set(folder.rglob("step_*")) > kept
+
+
+def test_types_that_are_only_written_alike_are_told_apart(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(step_cache.StepCache, "_path", lambda *_: folder / "steps" / "one")
+    params = pd.build(pd.PdSettings(gain=6.2, tau_d=0.16), 0.002)
+    call(Step(pd.step.py_func), params)
+    other = Step(pd.step.py_func)
+    other(params, np.zeros(1, pd.PD_STATE)[0], np.float32(0.1))
+    assert hits(other) == 0
+
+
+def test_a_changed_source_is_another_folder(folder: Path, params: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    call(Step(pd.step.py_func), params)
+    monkeypatch.setattr(step_cache, "sources_hash", lambda: "f" * 64)
+    other = Step(pd.step.py_func)
+    call(other, params)
+    assert hits(other) == 0 and len(list(folder.glob("steps_*"))) == 2
+
+
+@pytest.mark.parametrize("damage", [b"", b"\x80\x04damaged", None])
+def test_a_file_that_was_cut_short_is_compiled_anew(folder: Path, params: Any, damage: bytes | None) -> None:
+    expected = call(Step(pd.step.py_func), params)
+    for path in folder.rglob("step_*"):
+        path.write_bytes(path.read_bytes()[:-100] if damage is None else damage)
+    other = Step(pd.step.py_func)
+    assert call(other, params)[0] == expected[0] and hits(other) == 0
+    again = Step(pd.step.py_func)
+    assert call(again, params)[0] == expected[0] and hits(again) == 1
+
+
+def test_a_folder_that_cannot_be_written_is_no_obstacle(
+    tmp_path: Path, params: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path / "file" / "cache"))
+    assert len(call(Step(pd.step.py_func), params)[0]) == 3
+
+
+def test_what_is_not_rtctls_own_or_depends_on_more_is_not_kept(folder: Path) -> None:
+    def made(factor: float) -> Step:
+        @tick
+        def scaled(x: float) -> float:
+            return factor * x
+
+        return scaled
+
+    assert made(2.0)(3.0) == 6.0 and made(3.0)(3.0) == 9.0
+    assert not any(folder.rglob("scaled_*"))
+    assert step_cache.is_kept(pd.step.py_func)
+    assert not step_cache.is_kept(test_a_changed_source_is_another_folder)
+
+
+def test_every_step_of_the_library_is_in_the_hash() -> None:
+    names = {path.name for path in sources.files()}
+    assert {"pd.py", "l292.py", "friction.py", "runner.py", "idiom.py", "step_cache.py"} <= names
+    assert not {"chain.py", "main.py", "generate_cases.py"} & names
