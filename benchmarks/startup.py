@@ -6,7 +6,7 @@ The clock is read before the process is started. The loop writes the time of its
 segment (`first_ns` of its status), from the same clock, CLOCK_MONOTONIC, and this program reads it there.
 So the time has all in it: Python's imports, the config, compiled code from the cache, plant and loop as processes of
 their own, and the hello of the link. `--cold` starts once more with an empty RTCTL_CACHE_DIR, so that the tick and the
-plant are compiled first.
+plant are compiled first, and over the other link twice: with an empty one too, and with the steps that the first has left.
 """
 
 import argparse
@@ -79,12 +79,18 @@ def main() -> int:
         result["warm_s"] = round(statistics.median(warm), 3)
         result["warm_range_s"] = [round(min(warm), 3), round(max(warm), 3)]
         if given.cold:
-            result["cold_s"] = round(start(given.machine, given.link, Path(folder), Path(folder) / "cache"), 2)
+            cache, empty = Path(folder) / "cache", Path(folder) / "empty"
+            result["cold_s"] = round(start(given.machine, given.link, Path(folder), cache), 2)
+            other = "shm" if given.link == "zmq" else "zmq"  # another tick, of nearly the same steps
+            alone, after = (start(given.machine, other, Path(folder), each) for each in (empty, cache))
+            result["another_cold_s"], result["another_after_first_s"] = round(alone, 2), round(after, 2)
+            result["another_ratio"] = round(after / alone, 2)
     if given.json:
         print(json.dumps(result))
     else:
         print(f"{given.machine} over {given.link}: {result['warm_s']:.2f} s from the command to the first tick"
-              + (f", {result['cold_s']:.1f} s with everything to compile" if given.cold else ""))  # fmt: skip
+              + (f", {result['cold_s']:.1f} s with everything to compile; another link {result['another_cold_s']:.1f} s,"
+                 f" {result['another_after_first_s']:.1f} s after that" if given.cold else ""))  # fmt: skip
     return 0
 
 
