@@ -90,10 +90,9 @@ def main() -> int:
     else:
         print(f"{given.machine} over {given.link}: {result['warm_s']:.2f} s from the command to the first tick")
         if given.cold:
-            print(f"with everything to compile {result['cold_s']:.1f} s; over another link")
-            print(
-                f"{result['another_cold_s']:.1f} s, {result['another_after_first_s']:.1f} s with the steps of the first"
-            )
+            print(f"with everything to compile {result['cold_s']:.1f} s")
+            alone, after = result["another_cold_s"], result["another_after_first_s"]
+            print(f"over the other link {alone:.1f} s, with the steps of the first {after:.1f} s")
     return 0
 
 
