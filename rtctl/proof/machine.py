@@ -41,7 +41,7 @@ MACHINE = np.dtype(
     + [("ecc_j", "f8", (NS, NH)), ("ecc_pj", "f8", (NS, NH))]
     + [(f"d_{n}", "f8", (NU,)) for n in DRIVE]
     + [(f"y_{n}", "f8", (NY,)) for n in SENSOR]
-    + [("rip_a", "f8", (NY, NH)), ("rip_n", "f8", (NY, NH)), ("rip_ph", "f8", (NY, NH))]
+    + [("rip_a", "f8", (NY, 2 * NH)), ("rip_n", "f8", (NY, 2 * NH)), ("rip_ph", "f8", (NY, 2 * NH))]
     + [(n, "f8") for n in LOOP]
 )
 

@@ -22,6 +22,12 @@ def _harmonics(rng: np.random.Generator, rich: float = 0.6) -> np.ndarray:
     return np.array([1.0, rng.uniform(0.1, 0.35) * more, rng.uniform(0.05, 0.2) * more])
 
 
+def _misread(s: Setup, y: int, bank: int, a: np.ndarray, n: float, phase: np.ndarray) -> None:
+    """A wave and its harmonics (3,) in the reading of sensor y; a wheel's and a guide's have a bank of their own."""
+    at = slice(bank, bank + machine.NH)
+    s.m["rip_a"][y, at], s.m["rip_n"][y, at], s.m["rip_ph"][y, at] = a, n * np.arange(1, 4), phase
+
+
 @effect("ripple.cogging", {"ivu": MOTORS, "ldu": ("motor",), "axis": ("drive",)}, ("angle", "position"),
         {"ldu": ("motor", "drive"), "axis": ("drive", "carriage")}, rich=True)  # fmt: skip
 def cogging(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
@@ -56,9 +62,7 @@ def reel(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 def encoder(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     a = about(rng, {"ivu": 0.012, "ldu": 0.0055, "axis": 4e-5}[s.plant]) * size
     n = 1.0 if s.plant != "axis" else 2.0 * math.pi / float(rng.choice([0.01, 0.02, 0.04]))
-    s.m["rip_a"][0] = a * _harmonics(rng, 0.4)
-    s.m["rip_n"][0] = n * np.arange(1, 4)
-    s.m["rip_ph"][0] = rng.uniform(0, 2 * math.pi, 3)
+    _misread(s, 0, 0, a * _harmonics(rng, 0.4), n, rng.uniform(0, 2 * math.pi, 3))
     return {"amplitude_rad": a} if s.plant != "axis" else {"amplitude_m": a, "wavelength_m": 2.0 * math.pi / n}
 
 
@@ -72,7 +76,7 @@ def capstan(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
             s.m["ecc_j"][j], s.m["ecc_pj"][j] = side * e * shape, phase
         return {"eccentricity_m": e}
     e = about(rng, 1.2e-5) * size
-    s.m["rip_a"][1], s.m["rip_n"][1], s.m["rip_ph"][1] = e / s.truth["R_c"] * shape, np.arange(1, 4), phase
+    _misread(s, 1, 0, e / s.truth["R_c"] * shape, 1.0, phase)
     return {"eccentricity_m": e}
 
 
@@ -84,8 +88,7 @@ def thickness(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
     a = about(rng, 2e-5 if s.plant == "ldu" else 3e-4) * size
     span = float(np.ptp(s.ref))
     wave = float(min([0.01875, 0.0375, 0.075, 0.15], key=lambda v: abs(v - span / rng.uniform(1.5, 5.0))))
-    s.m["rip_a"][y] = a / f * _harmonics(rng, 0.4)
-    s.m["rip_n"][y], s.m["rip_ph"][y] = 2 * math.pi / wave * f * np.arange(1, 4), rng.uniform(0, 2 * math.pi, 3)
+    _misread(s, y, machine.NH, a / f * _harmonics(rng, 0.4), 2 * math.pi / wave * f, rng.uniform(0, 2 * math.pi, 3))
     return {"amplitude_m": a, "wavelength_m": wave}
 
 

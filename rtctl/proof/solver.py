@@ -147,7 +147,7 @@ def _reading(m, s, x, offset):
     """Sensor `s` in counts before they are whole."""
     q = x[int(m.y_node[s])]
     ripple = 0.0
-    for n in range(NH):
+    for n in range(2 * NH):
         if m.rip_a[s, n] != 0.0:
             ripple += m.rip_a[s, n] * (np.sin(m.rip_n[s, n] * q + m.rip_ph[s, n]) - np.sin(m.rip_ph[s, n]))
     return m.y_phase[s] + m.y_gain[s] * m.y_relative[s] * (q + ripple + offset)

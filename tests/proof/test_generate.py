@@ -1,5 +1,6 @@
 """The generator: determinism, the bundle's format, kinds in their shares, effects that show."""
 
+import itertools
 import json
 from collections import Counter
 
@@ -74,6 +75,24 @@ def test_an_effect_leaves_the_sound_machine_alone(machines):
     g.put(base, (draw.Part("friction.stribeck", "carriage", 1.0),), [7])
     assert base.m == before
     assert np.array_equal(g.simulate(base, [1])["x"], a["x"])
+
+
+@pytest.mark.parametrize("plant", g.PLANTS)
+def test_no_effect_takes_the_place_of_another(machines, plant):
+    """What may be drawn together is in the machine together, at numbers of their own."""
+    s, _, _ = machines[plant]
+    changed = {}
+    for name in draw.names_on(plant):
+        for node in TABLE[name].nodes[plant]:
+            m = g.put(s, (draw.Part(name, node, 1.0),), [7])[0].m
+            changed[name, node] = {
+                (field, at)
+                for field in m.dtype.names
+                for at in zip(*np.nonzero(np.atleast_1d(m[field] != s.m[field])), strict=True)
+            }
+    for (one, own), (other, others) in itertools.combinations(changed.items(), 2):
+        if one[0].split(".")[0] != other[0].split(".")[0]:  # those of one family are not drawn together
+            assert not own & others, (one, other)
 
 
 def test_kinds_come_in_their_shares():
