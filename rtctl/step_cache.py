@@ -16,16 +16,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import _Cache
-from numba.core.compiler import CompileResult
-from numba.core.serialize import dumps
-
 from rtctl.config.cache import cache_folder
 from rtctl.sources import files, sources_hash
 
 
-class StepCache(_Cache):
-    """What numba asks before it compiles a step, and tells after it."""
+class StepCache:
+    """What numba asks before it compiles a step, and tells after it (numba.core.caching._Cache, which is not public: a
+    version that does it otherwise compiles every step anew)."""
 
     def __init__(self, function: Callable[..., Any], use: str):
         self.function, self.use = function, use
@@ -39,14 +36,15 @@ class StepCache(_Cache):
         """The step compiled for these types, or None where it is not there."""
         if not is_kept(self.function):
             return None
-        target_context.refresh()
         try:
+            from numba.core.compiler import CompileResult
+
+            target_context.refresh()
             kept, compiled = pickle.loads(self._path(sig, target_context).read_bytes())
+            same = kept == sig  # types may differ and be written alike
+            return CompileResult._rebuild(target_context, *compiled) if same else None
         except Exception:  # not there, cut short, or of classes that are gone: then it is compiled
             return None
-        if kept != sig:  # types may differ and be written alike
-            return None
-        return CompileResult._rebuild(target_context, *compiled)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled step, unless it has an address in it that another process does not."""
@@ -55,6 +53,8 @@ class StepCache(_Cache):
         path = self._path(sig, data.target_context)
         draft = path.with_suffix(f".{os.getpid()}.tmp")
         try:
+            from numba.core.serialize import dumps
+
             path.parent.mkdir(parents=True, exist_ok=True)
             draft.write_bytes(dumps((sig, data._reduce())))
             draft.replace(path)
