@@ -119,28 +119,41 @@ class SaturationSettings(Settings):
     limit: float = quantity(unit="V", gt=0, le=1e3, help="the output gets no further than this")
     knee: float = quantity(0.0, unit="", ge=0, le=0.9, help="share of the limit at which it starts to bend; 0 is sharp")
     rise: float = quantity(0.0, unit="s/V", ge=0, le=10, help="time that a change of one volt takes; 0 is at once")
+    form: Literal["parabola", "rapp"] = Field(
+        default="parabola", description="how it bends: over the knee alone, or ever more, u/(1 + (u/limit)^p)^(1/p)"
+    )
 
 
 class SaturationParams(NamedTuple):
     limit: float
     knee: float
     step: float  # V in one substep; 0 where there is no limit to it
+    power: float  # of Rapp's form; 0 in the other
 
 
 SATURATION_STATE = state(u=float)
 
 
 def build_saturation(settings: SaturationSettings, h: float) -> SaturationParams:
-    """Largest change in a substep of `h` s."""
-    return SaturationParams(settings.limit, settings.knee, h / settings.rise if settings.rise > 0.0 else 0.0)
+    """Largest change in a substep of `h` s, and the power at which Rapp's form lacks a quarter of the knee at the
+    limit, as the parabola does."""
+    step = h / settings.rise if settings.rise > 0.0 else 0.0
+    rapp = settings.form == "rapp" and settings.knee > 0.0
+    return SaturationParams(settings.limit, settings.knee, step, 4.0 * math.log(2.0) / settings.knee if rapp else 0.0)
 
 
 @tick
 def saturation(p, s, u):
-    """Mean volts at the driver over a substep at a command of `u` volts."""
+    """Mean volts at the driver over a substep at a command of `u` volts.
+
+    A knee of its own, or the amplifier of C. Rapp, 2nd European Conference on Satellite Communications, 1991.
+    """
     a = abs(u)
     low, high = p.limit * (1.0 - p.knee), p.limit * (1.0 + p.knee)
-    if a >= high:
+    if p.power > 0.0:
+        small, large = min(a, p.limit), max(a, p.limit)
+        a = small / (1.0 + (small / large) ** p.power) ** (1.0 / p.power)
+    elif a >= high:
         a = p.limit
     elif a > low:
         a -= 0.5 * (a - low) ** 2 / (high - low)

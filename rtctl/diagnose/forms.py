@@ -42,6 +42,7 @@ FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in 
     "transmission.backlash": ("damping", (0.0, 1.0)),
     "drive.supply_sag": ("form", ("current", "power", "drawn")),
     "drive.deadband": ("form", ("shift", "cut", "floor")),
+    "drive.saturation": ("form", ("parabola", "rapp")),
     "load.bump": ("form", ("drag", "hill", "push")),
     "drive.thermal": ("form", ("exponential", "linear", "hyperbolic")),
 }
@@ -69,16 +70,20 @@ def is_rich(h: Hypothesis) -> bool:
     return any(c.name.partition("|")[0] in more for c in h.coordinates)
 
 
-def as_harmonic(h: Hypothesis, x: np.ndarray) -> Iterator[tuple[Hypothesis, np.ndarray]]:
+def as_harmonic(h: Hypothesis, x: np.ndarray, span: float) -> Iterator[tuple[Hypothesis, np.ndarray]]:
     """The wave of a richer form as the second and the third of a longer one, which errors that are judged on track
-    show less of than of its harmonics."""
+    show less of than of its harmonics; no longer than the `span` of its node in m, so that it comes once at least."""
     names = [c.name for c in h.coordinates]
     long = next((names.index(name) for name in LENGTHS if name in names), None)
     if long is None or not is_rich(h):
         return
     for k in (2, 3):
         coordinates, y = list(h.coordinates), h.start()
-        coordinates[long] = coordinates[long]._replace(scale=k * coordinates[long].scale)
+        scale = k * coordinates[long].scale
+        longest = min(coordinates[long].high, float(np.log(span / scale)))
+        if x[long] >= longest:
+            return
+        coordinates[long] = coordinates[long]._replace(scale=scale, high=longest)
         y[long] = x[long]
         first, other = names.index("A|phi"), names.index(f"A{k}|phi{k}")
         for i in (0, 1):  # cosine and sine

@@ -269,13 +269,14 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             else:
                 turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
                 step, longest = min(1e-2, TURN / turns), part.reach
-                if part.name == "turn":  # less than a whole one is a spring and a push
+                if part.kind == "wavelength":  # less than a whole one is a spring and a push, or any curve
                     longest = min(longest, float(np.log(turns / (2 * np.pi))))
                 if longest > 0.0:
                     yield (Coordinate(part.name, SHAPE, value, -part.reach, longest, step=step),), {}
     elif isinstance(part, Where):
         yield (), {}
-        yield (), {part.name: m.scale(node).at(0.5)}
+        if not (m.record.plant == "axis" and m.base.get("k", 0.0)):  # whose own spring would take up all but a push
+            yield (), {part.name: m.scale(node).at(0.5)}
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
         if jumps:

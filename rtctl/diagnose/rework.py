@@ -9,6 +9,7 @@ from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.forms import about_others, as_harmonic, forms, moved_into, richer, rounded
 from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import Hypothesis, Space
 
 LITTLE = 0.05  # of what a name takes off: a richer form that takes all but this does as well
@@ -80,11 +81,17 @@ def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> F
         if more is None:
             continue
         own = np.concatenate([found.space.parts(found.x)[index], more.start()[len(h.coordinates) :]])
-        starts = ((more, own), *as_harmonic(more, own))
+        scales = node_scales(problem.sim.record, found.model.base)
+        span = (scales.get(h.node) or next(iter(scales.values()))).span
+        starts = ((more, own), *as_harmonic(more, own, span))
         tried = parallel([partial(with_other, problem, found, index, f, x, 12) for f, x in starts])
         fitted = min(tried, key=lambda f: f.merit)
         if worth(found, fitted):
             found = fitted
+            for form in forms(found.space.hypotheses[index]):  # of which the plain one may know no difference
+                other = with_other(problem, found, index, form, found.space.parts(found.x)[index], 10, found.J)
+                if other.merit < found.merit:
+                    found = other
     return found
 
 

@@ -127,7 +127,7 @@ def patched(best: Fit) -> bool:
     Less of one kind and more of another is no machine's doing.
     """
     found = {h.term: h.values(x) for h, x in zip(best.space.hypotheses, best.space.parts(best.x), strict=True)}
-    others = {"friction.viscous", "friction.stribeck"} & set(found)
+    others = {"friction.viscous", "friction.stribeck", "friction.load"} & set(found)
     return bool(others) and found.get("friction.coulomb", {}).get("F_C", 0.0) < 0.0
 
 

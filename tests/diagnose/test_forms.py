@@ -65,7 +65,7 @@ def test_a_flank_of_a_hill_is_moved_aside(moved):
 def test_a_wave_may_be_the_second_or_the_third_of_a_longer_one(moved):
     record, base = moved("axis")
     (h, *_) = hypotheses(record, base, {"wavelength": [0.05]}, only=("guide.thickness",))
-    assert list(as_harmonic(h, h.start())) == []  # in its plain form it is one wave
+    assert list(as_harmonic(h, h.start(), 1.0)) == []  # in its plain form it is one wave
     more = richer(record, base, h)
     x = more.start()
     x[[c.name for c in more.coordinates].index("A|phi") + 1] = 2.0
@@ -78,10 +78,13 @@ def test_a_wave_may_be_the_second_or_the_third_of_a_longer_one(moved):
 
     own = wave(more.settings(x))
     assert np.ptp(own) > 0.0
-    longer = [form.settings(y) for form, y in as_harmonic(more, x)]
+    longer = [form.settings(y) for form, y in as_harmonic(more, x, 1.0)]
     assert [s.wavelength / more.settings(x).wavelength for s in longer] == pytest.approx([2.0, 3.0])
     for settings in longer:
         assert settings.A == 0.0 and wave(settings) == pytest.approx(own, rel=1e-9, abs=1e-15)
+    ((twice, y),) = as_harmonic(more, x, 0.15)  # three times as long it would not come once in the travel
+    y[[c.name for c in twice.coordinates].index("wavelength")] = twice.coordinates[2].high
+    assert twice.values(y)["wavelength"] == pytest.approx(0.15)
 
 
 def test_a_wave_of_a_reading_has_two_names_where_its_length_may_be_either(moved):

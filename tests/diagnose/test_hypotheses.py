@@ -13,7 +13,7 @@ from rtctl.plants.physics.sensor import READINGS, missed_counts
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
 HINTS = {
-    "order": [2.0, 7.0], "wavelength": [0.01, 0.1], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
+    "order": [2.0, 7.0], "wavelength": [0.01, 0.08], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
     "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
 }  # fmt: skip
 
@@ -179,14 +179,14 @@ def test_less_friction_than_the_base_has_is_no_push(moved, kind, node, term, mos
 
 
 def test_a_wave_of_a_linear_axis_is_its_screws_or_its_guides_by_its_length(moved):
-    """And of forces one that is longer than the travel is none: it would be a spring and a push."""
+    """And one that is longer than the travel is none: it would be a spring and a push, or any curve of a reading."""
     record, base = moved("axis")
-    waves = {"wavelength": [0.01, 0.02, 0.15]}  # in between it may be either
+    waves = {"wavelength": [0.01, 0.02, 0.08, 0.15]}  # 0.02 may be either
     found = hypotheses(record, base, waves, only=("ripple.encoder", "guide.thickness", "ripple.cogging"))
     by = {}
     for h in found:
         by.setdefault(h.term, []).append(h.coordinates[-1].scale)
-    assert by == {"ripple.encoder": [0.01, 0.02], "guide.thickness": [0.02, 0.15], "ripple.cogging": [0.01, 0.02]}
+    assert by == {"ripple.encoder": [0.01, 0.02], "guide.thickness": [0.02, 0.08], "ripple.cogging": [0.01, 0.02, 0.08]}
     assert {h.coordinates[-1].name for h in found} == {"turn", "wavelength"}
 
 
@@ -196,3 +196,27 @@ def test_the_step_of_a_wave_moves_its_far_end_by_little(moved):
     for h in hypotheses(record, base, {"wavelength": [0.001, 0.3]}, only=("ripple.cogging",)):
         c = h.coordinates[-1]
         assert c.step * 2 * np.pi / c.scale * span <= 0.1 * 1.2
+
+
+@pytest.mark.parametrize(("kind", "term", "name"), [
+    ("axis", "guide.thickness", "wavelength"), ("axis", "ripple.cogging", "turn"),
+    ("ldu", "guide.thickness", "wavelength"),
+])  # fmt: skip
+def test_a_wave_comes_once_in_the_travel_at_least(moved, kind, term, name):
+    """Of a longer one nothing says that it is a wave: with its harmonics it follows any curve."""
+    record, base = moved(kind)
+    scales = node_scales(record, base)
+    span = scales["carriage"].span
+    hints = {"wavelength": [0.3 * span, 0.9 * span, 1.1 * span, 3.0 * span]}
+    found = [h for h in hypotheses(record, base, hints, only=(term,)) if h.term == term]
+    lengths = [(c.scale, c.scale * np.exp(c.high)) for h in found for c in h.coordinates if c.name == name]
+    assert {round(start / span, 2) for start, _ in lengths} == {0.3, 0.9}
+    assert max(longest for _, longest in lengths) == pytest.approx(span)
+
+
+@pytest.mark.parametrize(("k", "places"), [(0.0, 2), (900.0, 1)])
+def test_beside_the_owners_spring_another_about_the_middle_would_be_a_push(blank, k, places):
+    t = np.arange(2000) / 1000
+    record = blank("axis", np.sin(t), 0.05 * (1 - np.cos(t)), parameters={"M": 95.0, "F_v": 200.0, "F_c": 20.0, "k": k})
+    found = hypotheses(record, owner_model(record.case).base, only=("load.spring",))
+    assert len(found) == places and "x0" not in found[0].fixed

@@ -12,7 +12,7 @@ from rtctl.diagnose.verdict import Verdict, listed, of_jitter, patched, proven, 
 
 
 def fitted(**sizes):
-    names = {"F_C": "friction.coulomb", "B": "friction.viscous", "offset": "drive.offset"}
+    names = {"F_C": "friction.coulomb", "B": "friction.viscous", "mu": "friction.load", "offset": "drive.offset"}
     hypotheses = tuple(Hypothesis(names[k], "carriage", (Coordinate(k, SIZE, 1.0),)) for k in sizes)
     space = Space(Model("axis", {"M": 1.0}), (), lambda name: 0.1, hypotheses)
     return Fit(space, np.array(list(sizes.values())), np.ones(10), np.zeros((10, len(sizes))), 5.0)
@@ -20,9 +20,9 @@ def fitted(**sizes):
 
 @pytest.mark.parametrize(("sizes", "expected"), [
     ({"F_C": -1.0, "B": 5.0}, True), ({"F_C": 1.0, "B": 5.0}, False), ({"F_C": -1.0}, False),
-    ({"F_C": -1.0, "offset": 0.1}, False),
+    ({"F_C": -1.0, "mu": 0.3}, True), ({"F_C": -1.0, "offset": 0.1}, False),
 ])  # fmt: skip
-def test_less_dry_and_more_viscous_friction_is_another_curve(sizes, expected):
+def test_less_dry_and_more_of_another_friction_is_another_curve(sizes, expected):
     assert patched(fitted(**sizes)) == expected
 
 

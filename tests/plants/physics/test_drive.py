@@ -18,8 +18,10 @@ def deadband(band: float, form: str = "shift", edge: float = 0.1) -> drive.Deadb
     return drive.build_deadband(drive.DeadbandSettings(node="drive", band=band, form=form, edge=edge), H)
 
 
-def saturation(limit: float, knee: float = 0.0, rise: float = 0.0) -> drive.SaturationParams:
-    return drive.build_saturation(drive.SaturationSettings(node="drive", limit=limit, knee=knee, rise=rise), H)
+def saturation(limit: float, knee: float = 0.0, rise: float = 0.0, form: str = "parabola") -> drive.SaturationParams:
+    return drive.build_saturation(
+        drive.SaturationSettings(node="drive", limit=limit, knee=knee, rise=rise, form=form), H
+    )
 
 
 def memory() -> np.record:
@@ -65,16 +67,28 @@ def test_the_edge_of_a_cut_is_even():
 
 
 @settings(deadline=None)
-@given(volts, volts, st.floats(0.1, 20), st.floats(0, 0.9))
-def test_saturation_is_a_limit_that_never_falls(u, w, limit, knee):
-    p, s = saturation(limit, knee), memory()
+@given(volts, volts, st.floats(0.1, 20), st.floats(0, 0.9), st.sampled_from(["parabola", "rapp"]))
+def test_saturation_is_a_limit_that_never_falls(u, w, limit, knee, form):
+    p, s = saturation(limit, knee, form=form), memory()
     one, two = sorted((u, w))
     low, high = drive.saturation(p, s, one), drive.saturation(p, s, two)
     assert low <= high + 1e-12
     assert abs(high) <= limit
     assert drive.saturation(p, s, -u) == -drive.saturation(p, s, u)
-    if abs(u) <= limit * (1 - knee):
+    if abs(u) <= limit * (1 - knee) and form == "parabola":
         assert drive.saturation(p, s, u) == u
+
+
+@pytest.mark.parametrize("knee", [0.02, 0.15, 0.6])
+def test_both_forms_lack_a_quarter_of_the_knee_at_the_limit(knee):
+    s = memory()
+    forms = [saturation(2.0, knee, form=form) for form in ("parabola", "rapp")]
+    assert [drive.saturation(p, s, 2.0) / 2.0 for p in forms] == pytest.approx([1 - knee / 4] * 2, abs=0.04 * knee)
+    below, beyond = (1 - 1.05 * knee) * 2.0, (1 + 1.05 * knee) * 2.0
+    assert drive.saturation(forms[0], s, below) == below and drive.saturation(forms[0], s, beyond) == 2.0
+    assert drive.saturation(forms[1], s, below) < below and drive.saturation(forms[1], s, beyond) < 2.0
+    assert drive.saturation(forms[1], s, 1e6) == 2.0 and drive.saturation(forms[1], s, 1e-3) == pytest.approx(1e-3)
+    assert drive.saturation(saturation(2.0, 0.0, form="rapp"), s, 3.0) == 2.0  # without a knee it is sharp
 
 
 def test_a_slow_rise_takes_its_time_and_its_mean():
