@@ -272,8 +272,8 @@ GAIN_ASYMMETRY = Term(
 SATURATION = Term(
     name="drive.saturation",
     words="it runs out of push: beyond some command there is no more, or it cannot follow fast",
-    equation="|u_out| <= limit, |u_out'| <= 1/rise",
-    source="Slotine & Li 1991, 5.2",
+    equation="|u_out| <= limit, |u_out'| <= 1/rise; or u/(1 + (u/limit)^p)^(1/p)",
+    source="Slotine & Li 1991, 5.2; Rapp 1991",
     settings=SaturationSettings,
     build=build_saturation,
     act={"command": "{m}.volts[{c}] = drive.saturation({p}, {s}, {m}.volts[{c}])"},

@@ -84,7 +84,8 @@ def find(
             best = level[0]
     if len(best.space.hypotheses) > 1:
         best = polish(problem, eliminate(problem, best, worth))
-    near = replacements(problem, best, looked, propose(base), progress)
+    candidates = propose(base)
+    near = replacements(problem, best, looked, candidates, progress)
     others = [place.fit for places in near for place in places]
     if best.rms > decide.COMPLETE * problem.floor and best.space.hypotheses:
         close = [best, *(f for f in others if f.cost < CLOSE * best.cost)]
@@ -93,13 +94,20 @@ def find(
     looked = looked._replace(rounds=(*looked.rounds, (best, *others)))  # what came out second is a rival of the first
     if absurd_last(ahead) < absurd_last(best):  # a rival came out ahead once it was fitted to the bottom
         best = polish(problem, eliminate(problem, ahead, worth))  # beside it another may be needed no more
-        near = replacements(problem, best, looked, (), progress)
+        near = replacements(problem, best, looked, resembling(candidates, best), progress)
     likelier = most_likely(problem, best, near)
     if likelier is not best:
         best, near = likelier, replacements(problem, likelier, looked, (), progress)
     best, near = without_doubtful(problem, best, looked, near, progress)
     best, near = usual_nodes(sim.record.plant, best, near)
     return Found(problem, off, base, best, looked, near, beyond.nameless(problem, base, best, progress))
+
+
+def resembling(candidates: Sequence[Hypothesis], best: Fit) -> list[Hypothesis]:
+    """Those of the candidates that look like a term of the best model: the search need not have met them beside the
+    others of a model that it did not end with."""
+    alike = {name for h in best.space.hypotheses for name in TERMS[h.term].look_alikes}
+    return [h for h in candidates if h.term in alike]
 
 
 def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:

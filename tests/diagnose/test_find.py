@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rtctl.diagnose.find import most_likely, usual_nodes
+from rtctl.diagnose.find import most_likely, resembling, usual_nodes
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
@@ -46,3 +46,11 @@ def test_of_equal_models_the_usual_size_goes_first():
     push = fitted(("drive.offset", "drive", "offset"))
     assert most_likely(PROBLEM, tilt, ((Alternative(push, 0),),)) is push  # type: ignore[arg-type]
     assert most_likely(PROBLEM, push, ((Alternative(tilt, 0),),)) is push  # type: ignore[arg-type]
+
+
+def test_what_looks_like_a_term_of_the_model_is_tried_in_its_place_again():
+    wave = fitted(("ripple.capstan", "capstan", "a"), SPRING)
+    names = ("ripple.encoder", "drive.offset", "friction.stribeck", "timing.delay")
+    candidates = [Hypothesis(name, "capstan", (Coordinate("A", SIZE, 1.0),)) for name in names]
+    assert [h.term for h in resembling(candidates, wave)] == ["ripple.encoder", "drive.offset"]
+    assert resembling(candidates, fitted()) == []
