@@ -1,6 +1,6 @@
 """Takes a model that was found in hand: to the bottom of its fit, in richer forms, without what it does not need."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -72,11 +72,7 @@ def drop(found: Fit, index: int) -> np.ndarray:
 def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> Fit:
     """Give each term another form of the same, or a richer one (harmonics, a second branch), where that is better."""
     for index, h in enumerate(found.space.hypotheses):
-        for form in (*forms(h), *about_others(problem.sim.record, found.model.base, h)):
-            for start in moved_into(form, found.space.parts(found.x)[index]):
-                other = with_other(problem, found, index, form, start, 10, found.J)
-                if other.merit < found.merit:
-                    found = other
+        found = reformed(problem, found, index, (*forms(h), *about_others(problem.sim.record, found.model.base, h)))
         more = richer(problem.sim.record, found.model.base, found.space.hypotheses[index])
         if more is None:
             continue
@@ -87,11 +83,18 @@ def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> F
         tried = parallel([partial(with_other, problem, found, index, f, x, 12) for f, x in starts])
         fitted = min(tried, key=lambda f: f.merit)
         if worth(found, fitted):
-            found = fitted
-            for form in forms(found.space.hypotheses[index]):  # of which the plain one may know no difference
-                other = with_other(problem, found, index, form, found.space.parts(found.x)[index], 10, found.J)
-                if other.merit < found.merit:
-                    found = other
+            # forms between which the plain one may know no difference
+            found = reformed(problem, fitted, index, forms(fitted.space.hypotheses[index]))
+    return found
+
+
+def reformed(problem: Problem, found: Fit, index: int, others: Sequence[Hypothesis]) -> Fit:
+    """The model with the best of the `others`, forms of hypothesis `index`, in its place where one is better."""
+    for form in others:
+        for start in moved_into(form, found.space.parts(found.x)[index]):
+            other = with_other(problem, found, index, form, start, 10, found.J)
+            if other.merit < found.merit:
+                found = other
     return found
 
 
