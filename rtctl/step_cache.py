@@ -48,19 +48,21 @@ class StepCache:
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled step, unless it has an address in it that another process does not."""
-        if not is_kept(self.function) or data.library.has_dynamic_globals:
+        if not is_kept(self.function):
             return
-        path = self._path(sig, data.target_context)
-        draft = path.with_suffix(f".{os.getpid()}.tmp")
-        try:
+        with suppress(Exception):  # a full disk, a folder of somebody else, types of a function: it runs all the same
             from numba.core.serialize import dumps
 
+            if data.library.has_dynamic_globals:
+                return
+            path = self._path(sig, data.target_context)
+            draft = path.with_suffix(f".{os.getpid()}.tmp")
             path.parent.mkdir(parents=True, exist_ok=True)
-            draft.write_bytes(dumps((sig, data._reduce())))
-            draft.replace(path)
-        except Exception:  # a full disk, a folder of somebody else, types of a function: it runs all the same
-            with suppress(OSError):
-                draft.unlink()
+            try:
+                draft.write_bytes(dumps((sig, data._reduce())))
+                draft.replace(path)
+            finally:
+                draft.unlink(missing_ok=True)
 
     def _path(self, sig: Any, target_context: Any) -> Path:
         key = repr((self.function.__module__, self.use, str(sig), target_context.codegen().magic_tuple()))

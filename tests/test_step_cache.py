@@ -49,9 +49,10 @@ def test_other_types_are_another_file(folder: Path, params: Any) -> None:
     assert hits(other) == 0 and set(folder.rglob("step_*")) > kept
 
 
-def test_types_that_are_only_written_alike_are_told_apart(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_types_that_are_only_written_alike_are_told_apart(
+    folder: Path, params: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(step_cache.StepCache, "_path", lambda *_: folder / "steps" / "one")
-    params = pd.build(pd.PdSettings(gain=6.2, tau_d=0.16), 0.002)
     call(Step(pd.step.py_func), params)
     other = Step(pd.step.py_func)
     other(params, np.zeros(1, pd.PD_STATE)[0], np.float32(0.1))
