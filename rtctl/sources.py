@@ -3,7 +3,7 @@
 import hashlib
 import platform
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -35,8 +35,13 @@ def files() -> Iterator[Path]:
 @lru_cache(maxsize=1)
 def sources_hash() -> str:
     """Hash over every source file that compiled code can come from, and the versions that compile it."""
+    return hash_of(files())
+
+
+def hash_of(paths: Iterable[Path]) -> str:
+    """Hash over some source files, in their order, and the versions that compile them."""
     digest = hashlib.sha256()
-    for path in files():
+    for path in paths:
         digest.update(path.name.encode() + path.read_bytes())
     digest.update(versions().encode())
     return digest.hexdigest()

@@ -18,13 +18,13 @@ from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.name import names
-from rtctl.diagnose.predict import Shown, cut_of, predicted
+from rtctl.diagnose.predict import Shown, cut_of, predicted, slips
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import awake
 from rtctl.diagnose.rework import drop
-from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.simulate import SLIPS, Simulator
 from rtctl.diagnose.stretches import rms
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
 from rtctl.diagnose.verdict import of_jitter
@@ -83,12 +83,15 @@ def searched(record: Record, progress: Progress) -> Found:
         return held_or_smooth(record, progress)
     problem, base = base_of(Simulator(record))
     sim = problem.sim
-    found = find(sim, problem, progress, base, unless_misread=True)
+    found = find(sim, problem, progress, base, sound)
     if not found.problem.agrees(found.best.model):
         progress("reading the reels anew, through the model that was found")
         found = read_through(sim, found, progress)
     if misread(found):
         found = without_reels(sim, found, progress)
+    if slip_is_imagined(found.problem, found.best):
+        progress("correcting every model as one that slips")
+        found = find_pushed_behind(found.problem, progress)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or faster <= sim.follow:
         return found
@@ -157,6 +160,28 @@ def misread(found: Found) -> bool:
     best, problem = found.best, found.problem
     reels = list(problem.by_sensor(best.r).values())[len(problem.channels) :]
     return any(rms(e) > ASTRAY for e in reels) and not decide.enough(problem, found.base, best)
+
+
+def sound(problem: Problem, best: Fit) -> bool:
+    """Whether a model agrees with how the reels were read, and its contact, where it slips, does what no push does."""
+    return problem.agrees(best.model) and not slip_is_imagined(problem, best)
+
+
+def slip_is_imagined(problem: Problem, best: Fit) -> bool:
+    """Whether that the model is corrected as one that slips brings what the slip seems to."""
+    if not slips(best):
+        return False
+    alike = problem.of(problem.sim.pushed_behind())
+    index = next(i for i, h in enumerate(best.space.hypotheses) if h.term == SLIPS)
+    less = fit(alike, best.space.without(index), drop(best, index), rounds=12)
+    base = base_fit(alike.sim, alike, best.x[: best.space.nb])
+    return not decide.worth(alike, base, less, best)
+
+
+def find_pushed_behind(problem: Problem, progress: Progress) -> Found:
+    """What is found where every model is corrected as one that slips."""
+    alike = problem.of(problem.sim.pushed_behind())
+    return find(alike.sim, alike, progress)
 
 
 def base_of(sim: Simulator) -> tuple[Problem, Fit]:

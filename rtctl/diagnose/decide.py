@@ -55,7 +55,7 @@ def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     Below the floor there is nothing to take, and where what is left may be noise a term must take more: a lucky one may
     follow that for a while. Less is enough of what no form of the laws beside it could do.
     """
-    if before.space.hypotheses and at_end(before, after):
+    if slight(after) or (before.space.hypotheses and at_end(before, after)):
         return False
     return earns(problem, base, before, after) or no_form(problem, before, after)
 
@@ -266,6 +266,21 @@ def absurd(fitted: Fit) -> bool:
             if known and abs(values[name]) > ABSURD * term.typical[name][1]:
                 return True
     return False
+
+
+def slight(fitted: Fit) -> bool:
+    """Whether a size is so small that nobody would miss it: long records show what the form of the owner's own law
+    leaves, as dry friction of a hundredth of the force that drives."""
+    return any(
+        abs(value) < c.slight
+        for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True)
+        for c, value in zip(h.coordinates, x, strict=True)
+    )
+
+
+def unlikely(fitted: Fit) -> bool:
+    """Whether a model has a size that is `absurd` or `slight`."""
+    return absurd(fitted) or slight(fitted)
 
 
 def unusual(fitted: Fit) -> float:

@@ -28,6 +28,7 @@ SPARED = 1.5  # times the best cost: what a model may come to when it loses a te
 DOUBTFUL = 0.7  # weight among its rivals, of a name that the model may have to do without
 MOST = 4  # rivals of one hypothesis
 Progress = Callable[[str], None]
+Sound = Callable[[Problem, Fit], bool]
 Places = tuple[tuple[Alternative, ...], ...]
 
 
@@ -47,12 +48,17 @@ def quiet(text: str) -> None:
     """Say nothing."""
 
 
+def any_model(problem: Problem, first: Fit) -> bool:
+    """Trust it."""
+    return True
+
+
 def find(
-    sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit | None = None, unless_misread: bool = False
+    sim: Simulator, problem: Problem, progress: Progress = quiet, base: Fit | None = None, sound: Sound = any_model
 ) -> Found:
     """Base fit, unless it is given, search, and the rivals of what it found.
 
-    `unless_misread`: ends after the first round where the best model does not agree with how the reels were read.
+    It ends after the first round where the best model is not `sound`: then the record is to be looked at otherwise.
     """
     if base is None:
         progress("fitting the owner's parameters")
@@ -71,12 +77,12 @@ def find(
     worth = partial(decide.worth, problem, base)
     propose = partial(proposed, sim)
 
-    def sound(first: Fit) -> bool:
-        return not unless_misread or not worth(base, first) or problem.agrees(first.model)
+    def trusted(first: Fit) -> bool:
+        return not worth(base, first) or sound(problem, first)
 
     enough, spent = partial(decide.complete, problem, base), partial(decide.spent, problem, base)
-    looked = search(problem, base, propose, enough, worth, progress, sound, spent)
-    if len(looked.rounds) == 1 and not sound(looked.rounds[0][0]):
+    looked = search(problem, base, propose, enough, worth, progress, trusted, spent)
+    if len(looked.rounds) == 1 and not trusted(looked.rounds[0][0]):
         return Found(problem, off, base, looked.rounds[0][0], looked, ())
     best = base
     for level in looked.rounds:

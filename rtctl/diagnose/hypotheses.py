@@ -31,6 +31,7 @@ class Size(NamedTuple):
     offset: str = ""  # "dry": on top of the base's dry friction
     undoes: str = ""  # what of the base's a negative one takes away, and no more: friction never pushes
     finest: float = 0.0  # in steps of the sensor: less is no effect that this sensor could show
+    slight: float = 0.0  # in units of share times measure: less is missed by nobody, however clearly it shows
 
 
 class Shape(NamedTuple):
@@ -105,12 +106,12 @@ SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else 
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
 Part = Size | Limit | Shape | Turn | At | Hint | Where | Jumps | Choice
 SEARCH: dict[str, tuple[Part, ...]] = {
-    "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry"),),
+    "friction.coulomb": (Size("F_C", "force", 0.1, signed=True, undoes="dry", slight=0.1),),
     "friction.viscous": (Size("B", "drag", 0.1, signed=True, undoes="thick"),),
     "friction.stribeck": (
         Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.012, 0.035, 0.1, 0.3, 0.9), 4.0),
     ),
-    "friction.presliding": (Size("z_s", "span", 1e-3, finest=1.0), Choice("form", ("dahl", "lugre"))),
+    "friction.presliding": (Size("z_s", "span", 1e-3, finest=2.0), Choice("form", ("dahl", "lugre"))),
     "friction.asymmetry": (Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
     "friction.load": (Size("mu", "one", 0.05, signed=True),),
     "transmission.backlash": (
@@ -131,7 +132,7 @@ SEARCH: dict[str, tuple[Part, ...]] = {
         Size("F", "force", 0.2, signed=True), At("at", "width", 8, 0.05, 0.012),
         Choice("form", ("drag", "hill", "push")),
     ),
-    "drive.offset": (Size("offset", "volts", 0.05, signed=True),),
+    "drive.offset": (Size("offset", "volts", 0.05, signed=True, slight=0.05),),
     "drive.deadband": (Size("band", "volts", 0.1), Choice("form", ("shift", "cut", "floor"))),
     "drive.gain_asymmetry": (Size("a", "one", 0.1, signed=True),),
     "drive.saturation": (Limit("limit", "peak", (0.5, 0.8)),),
@@ -239,7 +240,7 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             if part.undoes:
                 least = -(m.dry(node) if part.undoes == "dry" else m.thick(node)) / scale - 1e-3
             most = part.most / scale if part.measure == "one" else part.most
-            yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset),), {}
+            yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset, slight=part.slight),), {}
     elif isinstance(part, Shape):
         measure = m.of(part.measure, node)
         low, high = min(part.starts) * measure / part.reach, max(part.starts) * measure * part.reach

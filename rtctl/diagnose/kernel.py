@@ -5,8 +5,6 @@ params, so that a guess at another effect is another record and not another comp
 plants/ and plants/physics/, as in the emulator.
 """
 
-import hashlib
-import os
 import re
 from functools import cache
 from pathlib import Path
@@ -15,13 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.config.cache import cache_folder
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
 from rtctl.plants.physics import TERMS, place
 from rtctl.plants.physics.place import PLANTS
 from rtctl.plants.physics.term import SITES, Term
-from rtctl.sources import versions
+from rtctl.sources import hash_of
 
 OPEN, TRACK, CLOSED = range(3)
 SLOTS = 32  # terms at once
@@ -281,28 +278,17 @@ def sources_hash(kind: str) -> str:
     import rtctl
     import rtctl.plants
 
-    digest = hashlib.sha256()
     root = Path(rtctl.__file__).parent
     plants = Path(next(iter(rtctl.plants.__path__)))
-    files = [root / "idiom.py", root / "diagnose" / "law.py", plants / "linear.py", plants / f"{kind}.py"]
-    for path in [*files, *sorted((plants / "physics").glob("*.py"))]:
-        digest.update(path.name.encode() + path.read_bytes())
-    digest.update(versions().encode())
-    return digest.hexdigest()
+    shared = [root / "idiom.py", root / "diagnose" / "law.py", plants / "linear.py", plants / f"{kind}.py"]
+    return hash_of([*shared, *sorted((plants / "physics").glob("*.py"))])
 
 
 @cache
 def kernel(kind: str) -> Kernel:
     """The kernel of a plant, compiled or taken from the cache."""
     terms = terms_of(kind)
-    text = source(kind)
-    name = hashlib.sha256((text + sources_hash(kind)).encode()).hexdigest()[:16]
-    path = cache_folder() / f"fit_{kind}_{name}.py"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = path.with_suffix(f".{os.getpid()}.tmp")
-        draft.write_text(text)
-        draft.replace(path)
+    path = generate.write_text(f"fit_{kind}", source(kind), sources_hash(kind))
     plant = PLANTS[kind]
     params = [(field(t.name), record_dtype(sample(t))) for t in terms]
     states = [(field(t.name), t.state) for t in terms if t.state is not None]

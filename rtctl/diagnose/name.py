@@ -206,13 +206,13 @@ def various(ranked: Sequence[Fit], count: int) -> list[Fit]:
 
 
 def absurd_last(fitted: Fit) -> tuple[bool, float]:
-    """What models are ordered by: a size that no machine has may follow what several real terms do."""
-    return decide.absurd(fitted), fitted.merit
+    """What models are ordered by: a size that no machine has, or nobody misses, may follow what real terms do."""
+    return decide.unlikely(fitted), fitted.merit
 
 
 def held(before: Fit, after: Fit) -> tuple[bool, bool]:
-    """What models of a round come after the others by: a size that no machine has, then a shape at its end."""
-    return decide.absurd(after), decide.at_end(before, after)
+    """What models of a round come after the others by: a size that is not one to find, then a shape at its end."""
+    return decide.unlikely(after), decide.at_end(before, after)
 
 
 def elsewhere(problem: Problem, base: Fit) -> Fit:

@@ -52,6 +52,7 @@ class Simulator:
         held: bool = True,
     ):
         self.record = record
+        self.behind = False  # whether the correction pushes behind a contact that may slip, whatever the model
         self.case: Case = record.case
         self.kernel = kernel.kernel(record.plant)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP[record.plant] - 1e-9)))
@@ -71,6 +72,12 @@ class Simulator:
         """The same with steps that are so many `times` shorter."""
         other = copy(self)
         other.substeps *= times
+        return other
+
+    def pushed_behind(self) -> "Simulator":
+        """The same with every model corrected as one whose contact slips is: models compare under one correction."""
+        other = copy(self)
+        other.behind = True
         return other
 
     def commanded(self, volts: np.ndarray) -> "Simulator":
@@ -133,9 +140,10 @@ class Simulator:
         job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
         if directed:
             job["rectified"] = 0
-        if slips and not at:  # through the contact no drive could correct
+        past = slips or self.behind  # through the contact no drive could correct
+        if past and not at:
             at = BEHIND.get(self.record.plant, "")
-        if at or slips:
+        if at or past:
             job["share"] = 0.0
             for node, torque in pushes(self.record, model.base, at).items():
                 job["push"][0, PLANTS[self.record.plant].NODES[node]] = torque

@@ -32,6 +32,7 @@ class Coordinate(NamedTuple):
     start: float = 0.0
     offset: float = 0.0  # SI, of a place, or of a size that is not 0 where the effect is none
     step: float = 1e-2  # of the difference quotient
+    slight: float = 0.0  # size below which it is missed by nobody
 
 
 class Hypothesis(NamedTuple):

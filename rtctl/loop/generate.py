@@ -155,9 +155,10 @@ def write(machine: Machine, link: str) -> Path:
     return write_text(machine.kind, source(machine, link))
 
 
-def write_text(kind: str, text: str) -> Path:
-    """Write a module under the hash of its text and of all that it is compiled from; returns its path."""
-    name = hashlib.sha256((text + sources_hash()).encode()).hexdigest()[:16]
+def write_text(kind: str, text: str, made_of: str | None = None) -> Path:
+    """Write a module under the hash of its text and of all that it is compiled from (`made_of`, the hash of the
+    sources; without it of every source that a tick can come from); returns its path."""
+    name = hashlib.sha256((text + (made_of or sources_hash())).encode()).hexdigest()[:16]
     path = cache_folder() / f"{kind}_{name}.py"
     if not path.exists():
         try:

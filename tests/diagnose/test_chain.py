@@ -8,12 +8,15 @@ import pytest
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import chain
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.chain import diagnose_record, misread, tells, without_reels
+from rtctl.diagnose.chain import diagnose_record, misread, slip_is_imagined, sound, tells, without_reels
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
+from rtctl.diagnose.fit import fit
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, check
 from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.space import INVERSE, Coordinate, Hypothesis, Space
 from rtctl.plants.physics import TERMS
 
 STEP = 1e-6  # m, of the encoder
@@ -116,6 +119,19 @@ def test_reels_that_no_model_follows_are_misread(monkeypatch, reel, explained, e
     found = SimpleNamespace(problem=problem, base=None, best=SimpleNamespace(r=None))
     monkeypatch.setattr(chain.decide, "enough", lambda problem, before, after: explained)
     assert misread(found) == expected
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.6, False), (None, True)])
+def test_a_slip_that_does_no_more_than_its_correction_is_imagined(contact, share, expected):
+    machine = contact.plain.change(M=1.02 * contact.plain.base["M"])
+    limit = 1e3 if share is None else contact.carried(share)  # nothing slips below a kNm
+    problem = Problem(contact.seen(machine if share is None else contact.slipping(machine, limit)))
+    plain = Space(contact.plain, ("M",), lambda name: 0.15)
+    slip = Hypothesis("transmission.slip", "wheel", (Coordinate("F_max", INVERSE, limit, 0.0),))
+    found = fit(problem, plain.add(slip), np.array([np.log(1.02), 1.0]), rounds=0)
+    assert slip_is_imagined(problem, found) == expected
+    assert sound(problem, found) != expected
+    assert sound(problem, fit(problem, plain, rounds=0))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,9 @@ from rtctl.diagnose.decide import (
     p_value,
     probabilities,
     same_law,
+    slight,
     spent,
+    unlikely,
     unusual,
     worth,
 )
@@ -300,6 +302,16 @@ def test_a_size_beyond_all_that_is_typical_is_no_machines():
     wave = ("drive.offset", "drive1")
     assert not absurd(with_terms(wave, sizes=(0.5,))) and not absurd(with_terms(wave, sizes=(1e-6,)))
     assert absurd(with_terms(wave, sizes=(-7.0,)))
+
+
+def test_a_size_that_nobody_misses_is_not_worth_a_name_however_clearly_it_shows():
+    dry = Hypothesis("friction.coulomb", "carriage", (Coordinate("F_C", SIZE, 2.0, slight=0.1),))
+    before, after = made(np.full(200, 9.0)), made(np.full(200, 1.0))
+    space = before.space.add(dry)
+    for size, expected in ((0.09, True), (-0.09, True), (0.11, False), (-0.5, False)):
+        found = after._replace(space=space, x=np.array([size]))
+        assert slight(found) == unlikely(found) == expected
+        assert worth(Floor(1.0), before, before, found) != expected  # type: ignore[arg-type]
 
 
 def test_what_explains_little_of_a_little_needs_more_than_luck():

@@ -15,7 +15,16 @@ from rtctl.diagnose.kernel import CLOSED, OPEN, SLOTS, TRACK
 from rtctl.diagnose.model import owner_model, plant_params
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import Simulator, channels, gear, lever, per_unit, pushes, resolution, rigid_gain
+from rtctl.diagnose.simulate import (
+    Simulator,
+    channels,
+    gear,
+    lever,
+    per_unit,
+    pushes,
+    resolution,
+    rigid_gain,
+)
 from rtctl.idiom import tick
 from rtctl.plants import axis, linear
 from rtctl.plants.physics import TERMS
@@ -243,19 +252,20 @@ def test_resolution_is_what_the_owner_says_or_the_smallest_step_that_occurs(blan
     assert resolution(blank("ivu", np.zeros((10, 2)))) == pytest.approx(2 * np.pi / 10000)
 
 
+def test_pushed_behind_every_model_is_corrected_as_one_that_slips(contact):
+    sim = contact.seen(contact.plain)
+    nearly = contact.plain.change(M=1.1 * contact.plain.base["M"])
+    endless = contact.slipping(nearly, 1e3)
+    own, alike, slips = sim.run(nearly), sim.pushed_behind().run(nearly), sim.run(endless)
+    assert np.std(own - slips) > 10 * np.std(alike - slips)
+    np.testing.assert_array_equal(sim.run(nearly), own)  # the simulator itself is as it was
+
+
 @pytest.mark.parametrize("share", [0.6, 0.8])  # of what the wheel would carry of the time
-def test_a_model_that_slips_is_kept_on_the_track_of_a_machine_that_slips(case_of, share):
-    case, n = read_case(case_of("ldu"), "."), 20000
-    t, zero = 1e-4 * np.arange(n), np.zeros(n)
-    u = 1.2 * np.sin(2 * np.pi * 3.0 * t) + 0.8 * np.sin(2 * np.pi * 11.0 * t)
-    names = ("encoder_counts", "scale_counts")
-    empty = Record("ldu", case, t, 1e-4, zero, zero, u[:, None], dict.fromkeys(names, zero), {})
-    plain = owner_model(case)
-    carried = grips(empty, plain.base, Simulator(empty).run(plain, OPEN)[:, 0], (share,))["grip:wheel"][0]
-    slips = plain.add(TERMS["transmission.slip"].settings(node="wheel", F_max=carried))
-    out = Simulator(empty).run(slips, OPEN)
-    sim = Simulator(empty._replace(y={name: np.floor(out[:, c]) for c, name in enumerate(names)}))
-    well, badly = (Problem(sim).residual(model).std() for model in (slips, plain))
+def test_a_model_that_slips_is_kept_on_the_track_of_a_machine_that_slips(contact, share):
+    slips = contact.slipping(contact.plain, contact.carried(share))
+    sim = contact.seen(slips)
+    well, badly = (Problem(sim).residual(model).std() for model in (slips, contact.plain))
     assert well < 1.0 and badly > 10.0
 
 
