@@ -58,6 +58,7 @@ def machine_state(nq: int, nx: int, nu: int, ny: int, nl: int) -> np.dtype:
         link_k=(float, nl),
         link_T=(float, nl),  # what terms pull with on top of it, this substep
         link_e=(float, nl),  # elongation that the linear model does not know, as of tape wound at another radius
+        link_v=(float, nl),  # its rate
     )
 
 
@@ -176,6 +177,7 @@ def midpoint(m):
     for j in range(m.link_T.shape[0]):
         m.link_T[j] = 0.0
         m.link_e[j] = 0.0
+        m.link_v[j] = 0.0
 
 
 @tick
@@ -194,7 +196,14 @@ def stretch(m, j):
 @tick
 def stretch_rate(m, j):
     """Its rate, m/s or rad/s."""
-    return m.link_a[j] * m.vm[m.link_i[j]] + m.link_b[j] * m.vm[m.link_j[j]]
+    return m.link_a[j] * m.vm[m.link_i[j]] + m.link_b[j] * m.vm[m.link_j[j]] + m.link_v[j]
+
+
+@tick
+def known(m, j):
+    """What the linear model itself pulls with in link `j` at the middle of the substep, N or Nm."""
+    e, v = stretch(m, j) - m.link_e[j], stretch_rate(m, j) - m.link_v[j]
+    return m.link_c[j] * e + m.link_k[j] * v
 
 
 @tick
@@ -209,6 +218,17 @@ def pull(m, j, T):
     m.f[m.link_i[j]] -= m.link_a[j] * T
     m.f[m.link_j[j]] -= m.link_b[j] * T
     m.link_T[j] += T
+
+
+@tick
+def extend(m, j, e, v):
+    """Stretch link `j` by `e` m or rad, growing at the rate `v`: its spring and damper feel it, and so does every law
+    that asks for the stretch."""
+    T = m.link_c[j] * e + m.link_k[j] * v
+    m.f[m.link_i[j]] -= m.link_a[j] * T
+    m.f[m.link_j[j]] -= m.link_b[j] * T
+    m.link_e[j] += e
+    m.link_v[j] += v
 
 
 @tick

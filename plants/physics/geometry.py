@@ -58,7 +58,7 @@ def wound(p, m, i, grow):
     j = tape_of(m, i)
     R_0, q = m.link_a[j], m.qm[i]
     way = ivu.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
-    linear.pull(m, j, m.link_c[j] * way + m.link_k[j] * (radius(p, m, i, grow) - R_0) * m.vm[i])
+    linear.extend(m, j, way, (radius(p, m, i, grow) - R_0) * m.vm[i])
 
 
 @tick
@@ -71,7 +71,7 @@ def turned(p, m, i, grow):
     # All that turns the reel turns another inertia: what the matrices divide by the old one is put right as a force.
     torque, c, k = m.f[i], 0.0, 0.0
     for n in range(m.link_i.shape[0]):
-        T = m.link_c[n] * linear.stretch(m, n) + m.link_k[n] * linear.stretch_rate(m, n)
+        T = linear.known(m, n)
         if m.link_i[n] == i:
             torque -= m.link_a[n] * T
             c += m.link_a[n] ** 2 * m.link_c[n]

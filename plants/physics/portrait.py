@@ -58,7 +58,7 @@ def run(acts, P, S, p, s, i, r, l, c, q, v, volts, read, pull, dry, force):
         for n in range(nq):
             m.x[n], m.x[nq + n] = q[k, n] - 0.5 * m.h * v[k, n], v[k, n]
             m.qm[n], m.vm[n], m.f[n], m.dry[n] = q[k, n], v[k, n], 0.0, m.dry_base[n]
-        m.link_T[:] = 0.0
+        m.link_T[:], m.link_e[:], m.link_v[:] = 0.0, 0.0, 0.0
         m.volts[:] = volts[k]
         if acts:
             {command}

@@ -98,7 +98,7 @@ def reel(p, m, i):
     """Stretch the tape of reel `i` by what the reel has wound too much, and let it pull at the arm that it has."""
     j = tape_of(m, i)
     extra = arm(p, m.qm[i])
-    linear.pull(m, j, m.link_c[j] * way(p, m.qm[i]) + m.link_k[j] * extra * m.vm[i])
+    linear.extend(m, j, way(p, m.qm[i]), extra * m.vm[i])
     m.f[i] -= extra * linear.tension(m, j)
 
 
@@ -107,8 +107,8 @@ def capstan(p, m, i):
     """Move both tapes by what the capstan `i` has passed too much: tape 1 gets shorter by it and tape 2 longer."""
     extra = arm(p, m.qm[i])
     moved, speed = way(p, m.qm[i]), extra * m.vm[i]
-    linear.pull(m, 0, -(m.link_c[0] * moved + m.link_k[0] * speed))
-    linear.pull(m, 1, m.link_c[1] * moved + m.link_k[1] * speed)
+    linear.extend(m, 0, -moved, -speed)
+    linear.extend(m, 1, moved, speed)
     m.f[i] += extra * (linear.tension(m, 0) - linear.tension(m, 1))
 
 

@@ -47,6 +47,7 @@ FORM = 0.04  # of what a term does: what the form of its law may miss
 HALF = 0.5  # of the excess explained, and not by luck: something is there; less may be what any number takes off
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
+LEFT = 20.0  # times the floor, that it may leave there: of what is a thousand times louder any law takes a share
 
 
 def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
@@ -201,7 +202,7 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     """Whether the terms of `after` explain so much that they may be named."""
     share = explained(problem, before, after)
     if not complete(problem, before, after):
-        return share > ENOUGH
+        return share > ENOUGH and after.rms < LEFT * problem.floor
     restless = before.rms < LOUD * problem.floor or not quiet(problem, before, after)
     lucky = restless and after.cost > MOST * before.cost and by_noise(before, after) > NOWHERE
     if lucky and p_value(after, before, blocks(problem, after)) > UNLIKELY:

@@ -30,6 +30,7 @@ class Edges(NamedTuple):
     at: np.ndarray  # (n,) position of the edge, counts from where it stood at first
     sigma: np.ndarray  # (n,) noise, counts
     group: np.ndarray  # (n,) of edges whose constant is the same
+    share: np.ndarray  # (n,) of the tick's way that was gone when it came: the middle, where it came alone
 
     def between(self, start: int, stop: int) -> "Edges":
         """Those of these rows."""
@@ -39,11 +40,11 @@ class Edges(NamedTuple):
     def way(self, out: np.ndarray) -> np.ndarray:
         """Simulated position (n,) at the edges, counts, of readings out (rows, sensors) that keep their direction."""
         y = out[:, self.channel]
-        return 0.5 * (y[self.rows - 1] + y[self.rows])
+        return y[self.rows - 1] + self.share * (y[self.rows] - y[self.rows - 1])
 
     def error(self, out: np.ndarray) -> np.ndarray:
         """Edges less simulation, by their noise, (n,); the constants are those that fit best."""
-        e, weight = self.at - self.way(out), self.sigma**-2
+        e, weight = self.at - self.way(out), 1.0 / (self.sigma * self.sigma)
         mean = np.bincount(self.group, weight * e) / np.maximum(np.bincount(self.group, weight), 1e-12)
         found: np.ndarray = (e - mean[self.group]) / self.sigma
         return found
@@ -58,8 +59,10 @@ def edges(counts: np.ndarray, way: np.ndarray, channel: int) -> Edges | None:
     if not np.isfinite(way).all() or steps.sum() < FEWEST or (steps < 0).any():
         return None
     rows = np.repeat(np.arange(1, len(counts)), steps)
-    predicted = 0.5 * (way[rows - 1] + way[rows])
-    moved = np.abs(np.diff(way))[rows - 1]
+    count = steps[rows - 1]  # that came in its tick, and share the way
+    share = (np.arange(len(rows)) - np.searchsorted(rows, rows) + 0.5) / count
+    predicted = way[rows - 1] + share * (way[rows] - way[rows - 1])
+    moved = np.abs(np.diff(way))[rows - 1] / count
     turns = EVERY
     forward, at, off = followed(predicted, turns)
     turned = forward[1:] != forward[:-1]
@@ -69,7 +72,17 @@ def edges(counts: np.ndarray, way: np.ndarray, channel: int) -> Edges | None:
     if np.mean(off**2) > SURE**2 + np.mean(moved**2) / 6.0:
         return None
     group = forward.astype(int) if turns == RISING else np.zeros(len(at), int)
-    return Edges(channel, rows, at, np.hypot(OWN, moved / np.sqrt(12.0)), group)
+    found = Edges(channel, rows, at, np.hypot(OWN, moved / np.sqrt(12.0)), group, share)
+    return found if len(rows) <= len(counts) else one_a_tick(found)
+
+
+def one_a_tick(found: Edges) -> Edges:
+    """The same with one edge in the middle of all that came in a tick, as where a reel spins freely: they are one
+    reading, of which both ends are known to a count."""
+    first = np.flatnonzero(np.diff(found.rows, prepend=-1))
+    last = np.append(first[1:], len(found.rows)) - 1
+    at, middle = 0.5 * (found.at[first] + found.at[last]), np.full(len(first), 0.5)
+    return Edges(found.channel, found.rows[first], at, found.sigma[first], found.group[first], middle)
 
 
 def alike(some: Sequence[Edges], others: Sequence[Edges]) -> bool:

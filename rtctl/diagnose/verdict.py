@@ -29,6 +29,10 @@ KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
 BESIDE = 2  # rivals told besides
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
+IMITATES, IMITATED = (
+    {"drive.lag": "timing.delay"},
+    1e-4,
+)  # a law that bends to what another is; chance, to be told apart
 
 
 class Alternative(NamedTuple):
@@ -68,8 +72,7 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
     doubt = False
     for index in by_weight(problem, best):
         places = [Alternative(best, index), *rivals[index]]
-        weights = decide.probabilities([p.fit for p in places], problem.floor)
-        names = weigh(places, weights)
+        names = shared(problem, places)
         term = places[0].hypothesis.term
         own.append(_effect(places[0], names[term] * trust, best, rivals[index], block))
         if names[term] < SURE:
@@ -149,7 +152,21 @@ def of_jitter(found: Jitter) -> Effect:
 def standing(problem: Problem, best: Fit, index: int, rivals: Sequence[Alternative]) -> float:
     """Weight of the name of one hypothesis of the best model among those that could stand in its place."""
     places = [Alternative(best, index), *rivals]
-    return weigh(places, decide.probabilities([p.fit for p in places], problem.floor))[places[0].hypothesis.term]
+    return shared(problem, places)[places[0].hypothesis.term]
+
+
+def shared(problem: Problem, places: Sequence[Alternative]) -> dict[str, float]:
+    """Weight of each name among `places`, that of the best model first.
+
+    A lag that is as good as the delay that it could imitate shares with it: the lag has more to bend, and what little a
+    delay leaves, of a driver's own lag or a fraction of a tick, it follows.
+    """
+    names = weigh(places, decide.probabilities([p.fit for p in places], problem.floor))
+    best, term = places[0].fit, places[0].hypothesis.term
+    other = next((p for p in places if p.hypothesis.term == IMITATES.get(term)), None)
+    if other is not None and decide.p_value(best, other.fit, problem.block) > IMITATED:
+        names[term] = names[other.hypothesis.term] = 0.5 * (names[term] + names[other.hypothesis.term])
+    return names
 
 
 def weigh(places: Sequence[Alternative], weights: np.ndarray) -> dict[str, float]:

@@ -341,6 +341,12 @@ def test_what_may_be_a_machine_that_is_not_quiet_needs_a_miracle_or_to_be_most_o
     assert enough(Floor(1.0), made(hiss + push), made(hiss, 1))  # type: ignore[arg-type]
 
 
+def test_what_leaves_much_is_not_enough_however_small_a_share_that_is():
+    floor, before = Floor(1.0), made(np.full(200, 900.0))
+    assert enough(floor, before, made(np.full(200, 15.0), 1))  # type: ignore[arg-type]
+    assert not enough(floor, before, made(np.full(200, 90.0), 1))  # type: ignore[arg-type]
+
+
 def test_a_further_term_at_the_end_of_its_times_is_none():
     tape = Hypothesis(
         "tape.viscoelastic", "tape2", (Coordinate("c", SIZE, 1.0), Coordinate("tau", SHAPE, 1.2, -4.0, 3.0))

@@ -41,6 +41,15 @@ def test_a_reading_between_two_edges_is_as_good_as_they_are():
     assert some.rows.min() >= 1000 and some.rows.max() < 3000
 
 
+def test_of_a_reel_that_spins_freely_one_edge_a_tick_is_kept():
+    way = 800 * np.sin(2 * np.pi * 0.5 * T)
+    found = edges(counter(way), way, 0)
+    assert counter(way)[-1] > len(T) > len(found.rows) > 0.9 * len(T)
+    assert (np.diff(found.rows) > 0).all()
+    e = found.error(way[:, None])
+    assert np.std(e * found.sigma) < 0.3 and np.std(e) < 1.2  # counts, and by their noise
+
+
 def rising(way, phase=0.37):
     """What a sensor shows of it that counts where dark turns to light, a quarter of a period on or three back."""
     light = np.mod(way + phase, 1.0) - 0.5

@@ -1,5 +1,7 @@
 """What becomes of a best model: a name, and no name for what only imitates."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
-from rtctl.diagnose.verdict import Verdict, listed, of_jitter, patched, proven, with_known
+from rtctl.diagnose.verdict import Alternative, Verdict, listed, of_jitter, patched, proven, shared, with_known
 
 
 def fitted(**sizes):
@@ -24,6 +26,25 @@ def fitted(**sizes):
 ])  # fmt: skip
 def test_less_dry_and_more_of_another_friction_is_another_curve(sizes, expected):
     assert patched(fitted(**sizes)) == expected
+
+
+def test_a_lag_shares_with_a_delay_that_it_is_not_surely_better_than():
+    noise = np.random.default_rng(2).normal(size=4000)
+    problem = SimpleNamespace(floor=0.1, block=40)
+
+    def place(name, r):
+        space = fitted(offset=1.0).space._replace(
+            hypotheses=(Hypothesis(name, "drive", (Coordinate("x", SIZE, 1.0),)),)
+        )
+        return Alternative(Fit(space, np.ones(1), r, np.zeros((len(r), 1)), 0.5 * float(r @ r)), 0)
+
+    loud = np.where(np.arange(4000) < 120, 3.0, 1.0)  # three blocks of a hundred
+    lag, delay, other = place("drive.lag", noise), place("timing.delay", 3.0 * noise), place("drive.lag", noise)
+    few = place("timing.delay", loud * noise)
+    assert shared(problem, [lag, delay])["drive.lag"] == pytest.approx(1.0)  # everywhere worse
+    assert shared(problem, [lag, few])["drive.lag"] == pytest.approx(0.5)
+    assert shared(problem, [few, lag])["timing.delay"] < 0.5  # a delay does not bend
+    assert shared(problem, [lag, other]) == {"drive.lag": pytest.approx(1.0)}
 
 
 def test_what_shows_elsewhere_stands_beside_a_verdict():

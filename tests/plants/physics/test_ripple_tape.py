@@ -89,6 +89,36 @@ def test_forces_come_from_one_potential(node):
 
 
 @pytest.mark.parametrize("node", CASES)
+def test_other_laws_of_the_tape_feel_what_a_wheel_stretches_it_by(node):
+    """Springs that stiffen beside it: the forces still come from one potential, with a fourth power in it."""
+    at, p, function = CASES[node]
+    c3, d = 3e7, 1e-5
+
+    def stretched(q: np.ndarray) -> tuple[np.ndarray, list[float]]:
+        def both(m, i):
+            function(p, m, i)
+            e.extend(linear.stretch(m, j) for j in (0, 1))
+            for j in (0, 1):
+                linear.pull(m, j, c3 * e[j] ** 3)
+
+        e: list[float] = []
+        force, _ = forces(both, at, q, np.zeros(5))
+        return force, e
+
+    def energy(q: np.ndarray) -> float:
+        return sum(0.5 * 450.0 * e**2 + 0.25 * c3 * e**4 for e in stretched(q)[1])
+
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        q = rng.normal(size=5) * 0.3
+        q[at] += 1.0
+        slope = np.array([(energy(q + step) - energy(q - step)) / (2 * d) for step in d * np.eye(5)])
+        direct = -slope
+        missing = stretched(q)[0] - direct  # the arm of the wheel itself feels what was added before it alone
+        assert np.allclose(np.delete(missing, at), 0.0, atol=1e-5 * np.abs(direct).max())
+
+
+@pytest.mark.parametrize("node", CASES)
 def test_the_damper_only_takes_energy(node):
     at, p, function = CASES[node]
     rng = np.random.default_rng(4)
