@@ -91,7 +91,7 @@ def searched(record: Record, progress: Progress) -> Found:
         found = without_reels(sim, found, progress)
     if slip_is_imagined(found.problem, found.best):
         progress("correcting every model as one that slips")
-        found = find_pushed_behind(found.problem, progress)
+        found = without_slip(found, progress)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or faster <= sim.follow:
         return found
@@ -178,10 +178,11 @@ def slip_is_imagined(problem: Problem, best: Fit) -> bool:
     return not decide.worth(alike, base, less, best)
 
 
-def find_pushed_behind(problem: Problem, progress: Progress) -> Found:
-    """What is found where every model is corrected as one that slips."""
-    alike = problem.of(problem.sim.pushed_behind())
-    return find(alike.sim, alike, progress)
+def without_slip(found: Found, progress: Progress) -> Found:
+    """What is found where every model is corrected as one that slips; no name, where the push takes up all there is."""
+    alike = found.problem.of(found.problem.sim.pushed_behind())
+    apart = find(alike.sim, alike, progress)
+    return apart if apart.best.space.hypotheses else found._replace(best=found.base, rivals=(), beyond=None)
 
 
 def base_of(sim: Simulator) -> tuple[Problem, Fit]:
