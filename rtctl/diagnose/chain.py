@@ -24,7 +24,7 @@ from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import awake
 from rtctl.diagnose.rework import drop
-from rtctl.diagnose.simulate import SLIPS, Simulator
+from rtctl.diagnose.simulate import BEHIND, SLIPS, Simulator
 from rtctl.diagnose.stretches import rms
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
 from rtctl.diagnose.verdict import of_jitter
@@ -37,6 +37,7 @@ OTHERWISE, AS_WELL = 0.9, 1.05  # of the cost
 LATE = ("drive.lag", "timing.delay")
 ASTRAY = 5.0  # times the noise of a reel's edges, where no model explains them
 SHOWS = 2.5  # times the noise floor
+HELD = 0.3  # of the share of the cost that a term takes off, which it must take off however the model is kept on track
 
 
 def diagnose(folder: Path | str, other: Path | str | None = None, progress: Progress = quiet) -> Diagnosis:
@@ -92,6 +93,8 @@ def searched(record: Record, progress: Progress) -> Found:
     if slip_is_imagined(found.problem, found.best):
         progress("correcting every model as one that slips")
         found = without_slip(found, progress)
+    if record.plant in BEHIND:
+        found = borne_out(found)
     faster = min(QUICK * sim.follow, FASTEST / record.dt)
     if record.plant != "axis" or faster <= sim.follow:
         return found
@@ -183,6 +186,22 @@ def without_slip(found: Found, progress: Progress) -> Found:
     alike = found.problem.of(found.problem.sim.pushed_behind())
     apart = find(alike.sim, alike, progress)
     return apart if apart.best.space.hypotheses else found._replace(best=found.base, rivals=(), beyond=None)
+
+
+def borne_out(found: Found) -> Found:
+    """`found` without what does far less where every model is kept on track by a push behind the contact: what a
+    machine does is there however its model is led, what a correction misses is not."""
+    problem, best = found.problem, found.best
+    alike = problem.of(problem.sim.pushed_behind())
+    slips = any(h.term == SLIPS for h in best.space.hypotheses)  # of which `sound` has the say
+    if problem.sim.behind or slips or not best.space.hypotheses:
+        return found
+    gains = []
+    for which, start in ((problem, best), (alike, fit(alike, best.space, best.x, rounds=10))):
+        rest = [fit(which, best.space.without(i), drop(start, i), rounds=10) for i in range(len(best.space.hypotheses))]
+        gains.append([1.0 - start.cost / less.cost for less in rest])
+    missing = [i for i, (own, other) in enumerate(zip(*gains, strict=True)) if other < HELD * own]
+    return borne_out(with_fewer(found, missing[0])) if missing else found
 
 
 def base_of(sim: Simulator) -> tuple[Problem, Fit]:

@@ -168,11 +168,13 @@ def without_doubtful(
     return best, near
 
 
-def with_fewer(found: Found) -> Found:
-    """The same without the term that is missed least."""
-    problem = found.problem
-    count = range(len(found.best.space.hypotheses))
-    best = polish(problem, min((dropped(problem, found.best, i, 10) for i in count), key=lambda f: f.cost))
+def with_fewer(found: Found, index: int | None = None) -> Found:
+    """The same without the term `index`, or without that which is missed least."""
+    problem, count = found.problem, len(found.best.space.hypotheses)
+    if count == 1:
+        return found._replace(best=found.base, rivals=(), beyond=None)
+    indices = range(count) if index is None else [index]
+    best = polish(problem, min((dropped(problem, found.best, i, 10) for i in indices), key=lambda f: f.cost))
     best = enrich(problem, best, decide.better)
     return found._replace(best=best, rivals=replacements(problem, best, found.search, (), quiet))
 

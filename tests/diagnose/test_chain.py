@@ -8,7 +8,7 @@ import pytest
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import chain
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.chain import diagnose_record, misread, slip_is_imagined, sound, tells, without_reels
+from rtctl.diagnose.chain import borne_out, diagnose_record, misread, slip_is_imagined, sound, tells, without_reels
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
 from rtctl.diagnose.fit import fit
 from rtctl.diagnose.kernel import CLOSED
@@ -132,6 +132,49 @@ def test_a_slip_that_does_no_more_than_its_correction_is_imagined(contact, share
     assert slip_is_imagined(problem, found) == expected
     assert sound(problem, found) != expected
     assert sound(problem, fit(problem, plain, rounds=0))
+
+
+class Told:
+    """A model of some terms, as far as it is asked for them."""
+
+    def __init__(self, *names):
+        self.hypotheses = tuple(SimpleNamespace(term=name) for name in names)
+
+    def without(self, index):
+        return Told(*(h.term for i, h in enumerate(self.hypotheses) if i != index))
+
+
+@pytest.mark.parametrize(
+    ("drive", "push", "expected"),
+    [
+        ((0.5, 0.9), (0.55, 0.9), ["load.spring", "drive.offset"]),  # a cost of 0.4, and what is left without each
+        ((0.5, 0.9), (0.41, 0.9), ["drive.offset"]),
+    ],
+)
+def test_what_shows_only_because_of_how_the_model_is_led_is_left_out(monkeypatch, drive, push, expected):
+    def sim(behind):
+        return SimpleNamespace(behind=behind, pushed_behind=lambda: sim(True))
+
+    def problem(behind):
+        return SimpleNamespace(sim=sim(behind), of=lambda other: problem(other.behind))
+
+    def fake(problem, space, x, rounds):
+        without = dict(zip(("load.spring", "drive.offset"), push if problem.sim.behind else drive, strict=True))
+        gone = set(without) - {h.term for h in space.hypotheses}
+        return SimpleNamespace(space=space, x=None, cost=max([0.4, *(without[name] for name in gone)]))
+
+    def fewer(found, index):
+        left = found.best.space.without(index)
+        return SimpleNamespace(problem=found.problem, best=fake(found.problem, left, None, 10))
+
+    monkeypatch.setattr(chain, "fit", fake)
+    monkeypatch.setattr(chain, "drop", lambda start, index: None)
+    monkeypatch.setattr(chain, "with_fewer", fewer)
+    both = Told("load.spring", "drive.offset")
+    found = SimpleNamespace(problem=problem(False), best=fake(problem(False), both, None, 10))
+    assert [h.term for h in borne_out(found).best.space.hypotheses] == expected
+    led = SimpleNamespace(problem=problem(True), best=found.best)
+    assert borne_out(led) is led
 
 
 @pytest.mark.parametrize(
