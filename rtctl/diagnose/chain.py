@@ -174,7 +174,7 @@ def slip_is_imagined(problem: Problem, best: Fit) -> bool:
     """Whether that the model is corrected as one that slips brings what the slip seems to."""
     if not slips(best):
         return False
-    alike = problem.of(problem.sim.pushed_behind())
+    alike = problem.pushed_behind()
     index = next(i for i, h in enumerate(best.space.hypotheses) if h.term == SLIPS)
     less = fit(alike, best.space.without(index), drop(best, index), rounds=12)
     base = base_fit(alike.sim, alike, best.x[: best.space.nb])
@@ -183,19 +183,18 @@ def slip_is_imagined(problem: Problem, best: Fit) -> bool:
 
 def without_slip(found: Found, progress: Progress) -> Found:
     """What is found where every model is corrected as one that slips; no name, where the push takes up all there is."""
-    alike = found.problem.of(found.problem.sim.pushed_behind())
+    alike = found.problem.pushed_behind()
     apart = find(alike.sim, alike, progress)
-    return apart if apart.best.space.hypotheses else found._replace(best=found.base, rivals=(), beyond=None)
+    return apart if apart.best.space.hypotheses else found.bare()
 
 
 def borne_out(found: Found) -> Found:
     """`found` without what does far less where every model is kept on track by a push behind the contact: what a
     machine does is there however its model is led, what a correction misses is not."""
     problem, best = found.problem, found.best
-    alike = problem.of(problem.sim.pushed_behind())
-    slips = any(h.term == SLIPS for h in best.space.hypotheses)  # of which `sound` has the say
-    if problem.sim.behind or slips or not best.space.hypotheses:
+    if problem.sim.behind or slips(best) or not best.space.hypotheses:  # of a slip `sound` has the say
         return found
+    alike = problem.pushed_behind()
     gains = []
     for which, start in ((problem, best), (alike, fit(alike, best.space, best.x, rounds=10))):
         rest = [fit(which, best.space.without(i), drop(start, i), rounds=10) for i in range(len(best.space.hypotheses))]

@@ -43,6 +43,10 @@ class Found(NamedTuple):
     rivals: tuple[tuple[Alternative, ...], ...]  # for each hypothesis of the best, fits with another in its place
     beyond: Fit | None = None  # in which a law without a name does better than names that it resembles
 
+    def bare(self) -> "Found":
+        """The same without any term."""
+        return self._replace(best=self.base, rivals=(), beyond=None)
+
 
 def quiet(text: str) -> None:
     """Say nothing."""
@@ -82,7 +86,7 @@ def find(
 
     enough, spent = partial(decide.complete, problem, base), partial(decide.spent, problem, base)
     looked = search(problem, base, propose, enough, worth, progress, trusted, spent)
-    if len(looked.rounds) == 1 and not trusted(looked.rounds[0][0]):
+    if not looked.sound:
         return Found(problem, off, base, looked.rounds[0][0], looked, ())
     best = base
     for level in looked.rounds:
@@ -172,7 +176,7 @@ def with_fewer(found: Found, index: int | None = None) -> Found:
     """The same without the term `index`, or without that which is missed least."""
     problem, count = found.problem, len(found.best.space.hypotheses)
     if count == 1:
-        return found._replace(best=found.base, rivals=(), beyond=None)
+        return found.bare()
     indices = range(count) if index is None else [index]
     best = polish(problem, min((dropped(problem, found.best, i, 10) for i in indices), key=lambda f: f.cost))
     best = enrich(problem, best, decide.better)

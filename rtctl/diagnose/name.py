@@ -52,6 +52,7 @@ class Search(NamedTuple):
     base: Fit
     rounds: tuple[tuple[Fit, ...], ...]  # one term, two terms, three terms
     scores: tuple[Score, ...]  # of the first screening
+    sound: bool = True  # or the best of the first round is not, and nothing was built on it
 
     @property
     def fits(self) -> list[Fit]:
@@ -119,7 +120,7 @@ def search(
             full = sorted(full, key=partial(held, beam[0]))
         rounds.append(tuple(full))
         if level == 0 and not sound(full[0]):
-            break
+            return Search(base, tuple(rounds), first, sound=False)
         if not worth(beam[0], full[0]) or (level == 1 and full[0].cost > FAR * base.cost):
             break
         if spent(full[0]):

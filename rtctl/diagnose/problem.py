@@ -99,6 +99,10 @@ class Problem:
         other.sim = sim
         return other
 
+    def pushed_behind(self) -> "Problem":
+        """The same with every model corrected as one whose contact slips is."""
+        return self.of(self.sim.pushed_behind())
+
     def weighed(self, weights: np.ndarray) -> "Problem":
         """The same with a further weight for each error."""
         other = copy(self)

@@ -29,10 +29,8 @@ KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
 BESIDE = 2  # rivals told besides
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
-IMITATES, IMITATED = (
-    {"drive.lag": "timing.delay"},
-    1e-4,
-)  # a law that bends to what another is; chance, to be told apart
+IMITATES = {"drive.lag": "timing.delay"}  # a law that bends to what another is
+IMITATED = 1e-4  # chance that it does no more than that
 
 
 class Alternative(NamedTuple):

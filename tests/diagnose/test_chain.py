@@ -152,11 +152,8 @@ class Told:
     ],
 )
 def test_what_shows_only_because_of_how_the_model_is_led_is_left_out(monkeypatch, drive, push, expected):
-    def sim(behind):
-        return SimpleNamespace(behind=behind, pushed_behind=lambda: sim(True))
-
     def problem(behind):
-        return SimpleNamespace(sim=sim(behind), of=lambda other: problem(other.behind))
+        return SimpleNamespace(sim=SimpleNamespace(behind=behind), pushed_behind=lambda: problem(True))
 
     def fake(problem, space, x, rounds):
         without = dict(zip(("load.spring", "drive.offset"), push if problem.sim.behind else drive, strict=True))

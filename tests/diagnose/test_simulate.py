@@ -15,16 +15,7 @@ from rtctl.diagnose.kernel import CLOSED, OPEN, SLOTS, TRACK
 from rtctl.diagnose.model import owner_model, plant_params
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import (
-    Simulator,
-    channels,
-    gear,
-    lever,
-    per_unit,
-    pushes,
-    resolution,
-    rigid_gain,
-)
+from rtctl.diagnose.simulate import Simulator, channels, gear, lever, per_unit, pushes, resolution, rigid_gain
 from rtctl.idiom import tick
 from rtctl.plants import axis, linear
 from rtctl.plants.physics import TERMS
