@@ -7,6 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,8 @@ from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
 from rtctl.trace.replay import replay
 
-sys.path.insert(0, str(Path(__file__).parent))  # for served.py and compiled.py, under importlib mode
+TESTS = Path(__file__).parent
+sys.path.insert(0, str(TESTS))  # for served.py and compiled.py, under importlib mode
 CONFIGS = Path(__file__).parents[1] / "configs"
 number = itertools.count(1)
 settings.register_profile("any machine", deadline=None)  # no test is wrong because it was slow
@@ -35,7 +37,7 @@ settings.load_profile("any machine")
 @pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
     """Which tests go to one worker: those on the wall clock, since two FIFO loops on one CPU would judge each other;
-    and those of a file that share a fixture, since it is dear and once is enough."""
+    and those that share a fixture of their file or what a module keeps (`functools.cache`): dear, once is enough."""
     groups = {item: name for item in items if (name := group(item))}
     for item, name in groups.items():
         item.add_marker(pytest.mark.xdist_group(name))
@@ -50,8 +52,25 @@ def group(item: pytest.Item) -> str:
     fixtures = getattr(item, "_fixtureinfo").name2fixturedefs.values()  # noqa: B009
     if item.get_closest_marker("realtime"):
         return "realtime"
-    shared = any(found[-1].scope == "module" for found in fixtures)
-    return f"{item.path.parent.name}-{item.path.stem}" if shared else ""
+    here = f"{item.path.parent.name}-{item.path.stem}"
+    if any(found[-1].scope == "module" for found in fixtures):
+        return here
+    seen = vars(getattr(item, "module"))  # noqa: B009
+    if any(keeps(value) and value.__module__ == seen["__name__"] for value in seen.values()):
+        return here
+    helpers = [value for value in seen.values() if isinstance(value, ModuleType) and is_helper(value)]
+    return helpers[0].__name__ if helpers else ""
+
+
+def is_helper(module: ModuleType) -> bool:
+    """Whether it is one of the tests' own modules that keep what they made."""
+    path = getattr(module, "__file__", None)
+    return path is not None and TESTS in Path(path).parents and any(keeps(value) for value in vars(module).values())
+
+
+def keeps(value: Any) -> bool:
+    """Whether it is a function that keeps what it once made."""
+    return hasattr(value, "cache_info")
 
 
 @pytest.fixture(scope="session", autouse=True)
