@@ -9,7 +9,7 @@ Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Ec
 """
 
 import numpy as np
-from scipy.stats import chi2, t
+from scipy.stats import chi2, t, wilcoxon
 
 from rtctl.diagnose.anylaw import freed, static
 from rtctl.diagnose.fit import Fit
@@ -39,6 +39,7 @@ SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where th
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
 UNLIKELY = 1e-5  # chance of that, and of a name that explains less than most of what random forces may have done
+FEW = 4  # blocks, fewer of which prove nothing
 NOWHERE = 1e-100  # chance of the same by noise at a few places: at rest, where friction creeps, 1e-72 was seen
 CLEAR = 0.15  # share of the cost that it must take off
 LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
@@ -47,7 +48,8 @@ FORM = 0.04  # of what a term does: what the form of its law may miss
 HALF = 0.5  # of the excess explained, and not by luck: something is there; less may be what any number takes off
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
-LEFT = 20.0  # times the floor, that it may leave there: of what is a thousand times louder any law takes a share
+LEFT = 20.0  # times the floor, or part of what there was, that it may leave there: of what is a thousand times louder
+# any law takes a share, but not nineteen parts of twenty
 
 
 def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
@@ -70,14 +72,16 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     weights = discount(problem, base, before)
     if rms(weights * before.r) < problem.floor:
         return False
+    if problem.louder == 1.0 and not alike and releases(before, after) and nearly_everywhere(problem, before, after):
+        return True
     share = MATERIAL
     if complete(problem, base, before):
         if problem.louder > 1.0:
             return False  # of a machine that is known to be louder nobody knows what is noise
         block = blocks(problem, after)
         luck = p_value(after, before, block)
-        if before.bound() and not after.bound() and luck < RELEASED and after.cost < (1.0 - FREE) * before.cost:
-            return True  # the owner's values need not be stretched any more
+        if releases(before, after) and luck < RELEASED:
+            return True
         noise = rms(before.r) < COMPLETE * problem.floor and not alike
         clear = after.cost < (1.0 - CLEAR) * before.cost
         some = after.cost < (1.0 - NEARLY) * before.cost
@@ -96,6 +100,20 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
     ):
         return False
     return merit(after, weights) < (1.0 - share) * merit(before, weights)
+
+
+def releases(before: Fit, after: Fit) -> bool:
+    """Whether the owner's values need not be stretched any more to the ends of their tolerance."""
+    return bool(before.bound()) and not after.bound() and after.cost < (1.0 - FREE) * before.cost
+
+
+def nearly_everywhere(problem: Problem, before: Fit, after: Fit) -> bool:
+    """Whether a further term does better in nearly all of a record: most of that may be in a few blocks, which says
+    little of their sum. Source: Wilcoxon, Biometrics Bulletin 1 (1945)."""
+    if not before.space.hypotheses:
+        return False
+    gains = in_blocks(after.r, before.r, blocks(problem, after))
+    return len(gains) >= FEW and float(wilcoxon(gains, alternative="greater").pvalue) < NEVER
 
 
 def no_form(problem: Problem, before: Fit, after: Fit) -> bool:
@@ -128,9 +146,11 @@ def at_end(before: Fit, after: Fit) -> bool:
 
 
 def same_law(before: Fit, after: Fit) -> bool:
-    """Whether what `after` has more looks like a law that `before` has at that very node: it may be its form."""
+    """Whether what `after` has more looks like a law that `before` has at that very node, or anywhere on an axis, which
+    is one body: it may be its form."""
     return any(
-        old.node == h.node and (h.term in TERMS[old.term].look_alikes or old.term in TERMS[h.term].look_alikes)
+        (old.node == h.node or after.model.kind == "axis")
+        and (h.term in TERMS[old.term].look_alikes or old.term in TERMS[h.term].look_alikes)
         for h in more(before, after)
         for old in before.space.hypotheses
     )
@@ -202,7 +222,7 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     """Whether the terms of `after` explain so much that they may be named."""
     share = explained(problem, before, after)
     if not complete(problem, before, after):
-        return share > ENOUGH and after.rms < LEFT * problem.floor
+        return share > ENOUGH and after.rms < max(LEFT * problem.floor, before.rms / LEFT)
     restless = before.rms < LOUD * problem.floor or not quiet(problem, before, after)
     lucky = restless and after.cost > MOST * before.cost and by_noise(before, after) > NOWHERE
     if lucky and p_value(after, before, blocks(problem, after)) > UNLIKELY:
@@ -233,12 +253,17 @@ def p_value(best: Fit, rival: Fit, block: int) -> float:
 
 def chance(best: np.ndarray, rival: np.ndarray, block: int) -> float:
     """As `p_value`, of the errors (errors,) themselves; by Student's t, since few blocks do not tell their spread."""
-    d = 0.5 * (rival**2 - best**2)
-    sums = d[: len(d) // block * block].reshape(-1, block).sum(axis=1)
-    if len(sums) < 4:
+    sums = in_blocks(best, rival, block)
+    if len(sums) < FEW:
         return 1.0
     spread = float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
     return float(t.sf(sums.sum() / max(spread, 1e-12), len(sums) - 1))
+
+
+def in_blocks(best: np.ndarray, rival: np.ndarray, block: int) -> np.ndarray:
+    """What the cost of the errors `best` (errors,) is below that of `rival` in each block."""
+    d = 0.5 * (rival**2 - best**2)
+    return np.asarray(d[: len(d) // block * block].reshape(-1, block).sum(axis=1))
 
 
 def probabilities(fits: list[Fit], floor: float = 0.0) -> np.ndarray:

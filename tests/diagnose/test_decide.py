@@ -77,6 +77,16 @@ def test_down_to_the_floor_all_is_explained_and_with_nothing_gained_nothing(befo
     assert explained(Floor(1.0), full, full) == 0.0  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("there", "left", "expected"), [(100.0, 16.0, True), (1000.0, 160.0, False), (1000.0, 40.0, True)]
+)
+def test_a_name_may_leave_no_more_than_it_could_miss_by_its_form(there, left, expected):
+    here = np.where(np.arange(4000) < 2000, np.sqrt(2.0), 0.0)
+    elsewhere = left * (np.sqrt(2.0) - here)
+    before, after = made(there * here + elsewhere), made(elsewhere, 1)
+    assert enough(Floor(1.0), before, after) == expected  # type: ignore[arg-type]
+
+
 def test_a_term_is_worth_it_where_it_takes_a_material_share_off():
     noise, before = Floor(0.5), made(np.full(1000, 2.0))
     assert worth(noise, before, before, made(np.full(1000, 1.0), 1))  # type: ignore[arg-type]
@@ -113,6 +123,31 @@ def test_what_is_spent():
     assert spent(Floor(1.0), quiet, quiet)  # type: ignore[arg-type]
     assert not spent(Floor(1.0), loud, loud)  # type: ignore[arg-type]
     assert spent(Floor(1.0), base, loud)  # as much as the form of its law may miss  # type: ignore[arg-type]
+
+
+def stretched(r, terms, mass):
+    """A fit whose owner's mass is off by this share, of the tenth that it may be."""
+    fitted = made(r, terms)
+    space = fitted.space._replace(names=("M",))
+    x = np.append(np.log1p(mass), fitted.x)
+    return fitted._replace(space=space, x=x, J=np.zeros((len(fitted.r), len(x))))
+
+
+def test_what_frees_an_owners_value_all_along_is_there_though_most_of_it_is_in_a_few_places():
+    rng = np.random.default_rng(7)
+    noise = rng.standard_normal(8000)
+    small, big = 1.8 * noise, np.zeros(8000)
+    big[700:740] = big[5100:5140] = 18.0
+    base = stretched(2.0 * noise + big + 300.0 * (np.arange(8000) < 400), 0, 0.1)
+    held, freed = stretched(2.0 * noise + big, 1, 0.1), stretched(small, 2, 0.03)
+    assert explained(Floor(0.5), base, held) > 0.97  # type: ignore[arg-type]
+    assert p_value(freed, held, 100) > 2e-3
+    assert worth(Floor(0.5), base, held, freed)  # type: ignore[arg-type]
+    assert not worth(Floor(0.5), base, held, stretched(small, 2, 0.1))  # type: ignore[arg-type]
+    here_and_there = np.where(rng.random(8000) < 0.5, 1.1, 0.9)
+    few = stretched(here_and_there * (2.0 * noise), 2, 0.03)  # better in the two places and nowhere else
+    assert few.cost < 0.8 * held.cost
+    assert not worth(Floor(0.5), base, held, few)  # type: ignore[arg-type]
 
 
 def test_near_the_noise_a_term_must_take_more():
@@ -285,6 +320,9 @@ def test_a_law_that_looks_like_one_at_the_same_node_may_be_its_form():
     assert same_law(with_terms(play), with_terms(play, twist))
     assert not same_law(with_terms(play), with_terms(play, ("structure.stiffening", "motor1")))
     assert not same_law(with_terms(play), with_terms(play, ("drive.offset", "motor2")))
+    bristles, play = ("friction.presliding", "carriage"), ("transmission.backlash", "sensor")
+    assert same_law(with_terms(bristles, kind="axis"), with_terms(bristles, play, kind="axis"))  # which is one body
+    assert not same_law(with_terms(bristles, kind="ldu"), with_terms(bristles, play, kind="ldu"))
 
 
 def test_typical_angles_say_nothing_of_ways():
