@@ -93,7 +93,7 @@ def allowed_for(problem: Problem, model: Model, found: Jitter) -> Problem:
     out = problem.sim.run(model)[:, problem.channels]
     v = np.gradient(out, problem.sim.record.dt, axis=0)[problem.rows]
     spread = means((v * found.sigma / problem.sigma) ** 2, problem.mean) / problem.mean
-    allowing = problem.weighed(1.0 / np.sqrt(1.0 + problem.beside(spread.T.ravel())))
+    allowing = problem.allowing(1.0 / np.sqrt(1.0 + problem.beside(spread.T.ravel())))
     allowing.louder = LOUDER if found.told else 1.0
     return allowing
 

@@ -70,6 +70,7 @@ class Problem:
         share = shares(gone[: self.n], grain, memory)[self.time_rows]
         self.moves = share == 1.0  # (errors,): the machine does
         self.weights = np.sqrt(share / share.mean())
+        self.clock = np.ones(len(rows))  # (errors,): share of the weights, for what ticks off their times make
         self.louder = 1.0  # than a quiet machine, as far as is known
         self.measured = sim.record.shows_speed  # the floor is the noise of this very record
 
@@ -107,6 +108,12 @@ class Problem:
         """The same with a further weight for each error."""
         other = copy(self)
         other.weights = self.weights * weights
+        return other
+
+    def allowing(self, weights: np.ndarray) -> "Problem":
+        """As `weighed`, for the noise of ticks off their times."""
+        other = self.weighed(weights)
+        other.clock = self.clock * weights
         return other
 
     @property
@@ -195,11 +202,14 @@ class Problem:
         return any(rms(e) > PARTED * self.main_floor for e in alone)
 
     def hiss(self, r: np.ndarray) -> bool:
-        """Whether the errors r of a fit are what random forces leave."""
+        """Whether the errors r of a fit are what random forces leave: these know nothing of what a clock makes worth
+        less where it moves fast, and have their spectrum without such weights."""
         main, *others = self.by_sensor(r).values()
-        moves = self.moves[self.source == 0]
-        main = main[moves] if moves.any() else main
-        loud = rms(main) / self.main_floor
+        moves, clock = self.moves[self.source == 0], self.clock[self.source == 0]
+        loud = rms(main[moves] if moves.any() else main) / self.main_floor
+        main, floor = main / clock, self.main_floor / clock
+        if moves.any():
+            main, floor = main[moves], floor[moves]
         if (
             loud > self.loudest
             or self.parted(r)
@@ -208,7 +218,7 @@ class Problem:
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
         dt, speed = self.sim.record.dt * self.mean, self.sim.record.shows_speed
-        return is_hiss(main, dt, self.sim.follow, self.main_floor, exact, speed) and not self.commanded(r)
+        return is_hiss(main, dt, self.sim.follow, rms(floor), exact, speed) and not self.commanded(r)
 
 
 def means(x: np.ndarray, count: int) -> np.ndarray:

@@ -54,7 +54,7 @@ def test_what_any_clock_does_is_allowed_for_and_not_told():
         return SimpleNamespace(louder=1.0)
 
     problem = SimpleNamespace(
-        sim=stand(0.0), channels=[0], rows=slice(0, None), sigma=0.35, mean=1, weighed=again, beside=lambda s: s
+        sim=stand(0.0), channels=[0], rows=slice(0, None), sigma=0.35, mean=1, allowing=again, beside=lambda s: s
     )
     assert allowed_for(problem, None, seen).louder == 1.0  # type: ignore[arg-type]
     speed = np.abs(np.gradient(WAY, DT))

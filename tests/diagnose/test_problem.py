@@ -1,6 +1,7 @@
 """The errors that a fit sees: which rows and sensors count, and what they weigh."""
 
 import numpy as np
+from scipy.signal import lfilter
 
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.problem import PARTED, Problem, main_channels, settled
@@ -63,6 +64,22 @@ def test_what_one_sensor_shows_alone_is_of_no_motion(blank):
     r[problem.source == 1] += 1.5 * PARTED * floor * np.sqrt(2) * np.cos(np.arange(len(moves)) * 0.003)
     assert problem.parted(r)
     assert not problem.hiss(r)
+
+
+def test_random_forces_are_hiss_also_where_a_clock_makes_fast_readings_worth_less(blank):
+    n = 40000
+    problem = Problem(Simulator(blank("axis", np.zeros((n, 1)), 0.1 * np.sin(np.arange(n) * 1e-3))))
+    rng, count = np.random.default_rng(3), len(problem.order)
+    dt, w = problem.sim.record.dt * problem.mean, problem.sim.follow
+    a = np.array([1.0, -2.0, 1.0]) / dt**2 + 1.4 * w * np.array([1.0, -1.0, 0.0]) / dt + np.array([w**2, 0.0, 0.0])
+    e = lfilter([w**2], a, rng.standard_normal(count))
+    e = problem.main_floor * (7.0 * e / np.std(e) + rng.standard_normal(count))
+    worth = 1.0 / np.sqrt(1.0 + (6.0 * np.sin(np.arange(count) * 4e-3)) ** 2)
+    assert problem.hiss(e)
+    assert problem.allowing(worth).hiss(worth * e)
+    assert not problem.weighed(worth).hiss(worth * e)
+    late = 6.0 * np.sin(np.arange(count) * 4e-3) * rng.standard_normal(count)  # what makes them worth less
+    assert problem.allowing(worth).hiss(worth * (e + problem.main_floor * late))
 
 
 def test_one_sensor_has_nothing_to_differ_from(plain):
