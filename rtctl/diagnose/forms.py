@@ -46,6 +46,7 @@ FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in 
     "load.bump": ("form", ("drag", "hill", "push")),
     "drive.thermal": ("form", ("exponential", "linear", "hyperbolic")),
 }
+NO_SWING = 3.0  # damping of a second-order lag, whose faster half is 34 times faster by then
 OTHER_NAMES = {  # of a wave that a sliding axis misreads: what its length is called, the other name, its length there
     "ripple.encoder": ("turn", "guide.thickness", "wavelength"),
     "guide.thickness": ("wavelength", "ripple.encoder", "turn"),
@@ -135,6 +136,18 @@ def rounded(h: Hypothesis, x: np.ndarray) -> tuple[int, Hypothesis] | None:
             rest = (*h.coordinates[:i], *h.coordinates[i + 1 :])
             return i, h._replace(coordinates=rest, fixed={**h.fixed, c.name: float(round(order))})
     return None
+
+
+def of_first_order(h: Hypothesis, x: np.ndarray) -> tuple[Hypothesis, np.ndarray] | None:
+    """The first-order lag that a second-order one comes to at x where it is damped far beyond any swing, and its x;
+    None for anything else."""
+    names = [c.name for c in h.coordinates]
+    if h.fixed.get("order") != 2 or "zeta" not in names or h.values(x)["zeta"] < NO_SWING:
+        return None
+    zeta, y = names.index("zeta"), np.array(x)
+    y[names.index("tau")] *= 2.0 * h.values(x)["zeta"]  # (s tau)^2 + 2 zeta s tau + 1, where s is small
+    rest = tuple(c for i, c in enumerate(h.coordinates) if i != zeta)
+    return h._replace(coordinates=rest, fixed={**h.fixed, "order": 1}), np.delete(y, zeta)
 
 
 def renamed(h: Hypothesis, x: np.ndarray) -> Hypothesis | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, fit, parallel
-from rtctl.diagnose.forms import about_others, as_harmonic, forms, moved_into, richer, rounded
+from rtctl.diagnose.forms import about_others, as_harmonic, forms, moved_into, of_first_order, richer, rounded
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import Hypothesis, Space
@@ -42,6 +42,7 @@ def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -
     A richer form that does as well as a further name is the smaller claim, whatever its numbers.
     """
     while len(found.space.hypotheses) > 1:
+        found = plainer(problem, found)
         indices = range(len(found.space.hypotheses))
         trials = parallel([partial(dropped, problem, found, i, 10) for i in indices])
         less = min(trials, key=lambda f: f.merit)
@@ -85,6 +86,15 @@ def enrich(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -> F
         if worth(found, fitted):
             # forms between which the plain one may know no difference
             found = reformed(problem, fitted, index, forms(fitted.space.hypotheses[index]))
+    return found
+
+
+def plainer(problem: Problem, found: Fit) -> Fit:
+    """The model with a plain form again of what a fit has led to the end of its richer one, where that is better."""
+    for index, (h, x) in enumerate(zip(found.space.hypotheses, found.space.parts(found.x), strict=True)):
+        less = of_first_order(h, x)
+        if less is not None:
+            found = min(found, with_other(problem, found, index, *less, 12), key=lambda f: f.merit)
     return found
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.forms import EXTRAS, about_others, as_harmonic, forms, moved_into, renamed, richer
+from rtctl.diagnose.forms import EXTRAS, about_others, as_harmonic, forms, moved_into, of_first_order, renamed, richer
 from rtctl.diagnose.hypotheses import SEARCH, hypotheses
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.guide import thickness
@@ -60,6 +60,20 @@ def test_a_flank_of_a_hill_is_moved_aside(moved):
     for v in found[1:]:
         assert v["F"] * (push["at"] - v["at"]) > 0.0  # there it pushes as before
     assert all(len(moved_into(f, x)) == 1 for f in forms(h) if f.fixed["form"] != "hill")
+
+
+def test_a_second_order_lag_that_never_swings_is_one_of_first_order(plain):
+    record, model = plain.record, plain.model
+    slow = next(h for h in hypotheses(record, model.base, only=("drive.lag",)) if h.fixed["order"] == 2)
+    more = richer(record, model.base, slow)
+    x = np.array([1e-3 / more.coordinates[0].scale, np.log(5.0 / more.coordinates[1].scale)])
+    assert more.values(x) == pytest.approx({"tau": 1e-3, "zeta": 5.0})
+    other, y = of_first_order(more, x)
+    assert (other.values(y), other.fixed["order"]) == (pytest.approx({"tau": 0.01}), 1)
+    none, two, one = (plain.sim.run(m) for m in (model, model.add(more.settings(x)), model.add(other.settings(y))))
+    assert np.std(two - one) < 0.03 * np.std(two - none)
+    assert of_first_order(more, more.start()) is None
+    assert of_first_order(other, y) is None
 
 
 def test_a_wave_may_be_the_second_or_the_third_of_a_longer_one(moved):

@@ -8,10 +8,11 @@ import pytest
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.decide import worth
 from rtctl.diagnose.fit import Fit, fit
+from rtctl.diagnose.forms import richer
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.name import names
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.rework import drop, eliminate, enrich, polish
+from rtctl.diagnose.rework import drop, eliminate, enrich, plainer, polish
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
 
 
@@ -64,3 +65,20 @@ def test_a_richer_form_that_does_as_well_as_a_second_name_takes_its_place(make_a
     assert left.model.terms[0].A2 == pytest.approx(1.2, rel=0.2)
     assert left.cost < both.cost
     assert enrich(problem, plain, lambda before, after: False) is plain
+
+
+def test_a_lag_that_never_swings_is_told_as_one_of_first_order(make_axis):
+    made = make_axis({"term": "drive.lag", "node": "drive", "tau": 8e-3})
+    problem = Problem(made.sim)
+    base = base_fit(made.sim, problem)
+    lags = {h.fixed["order"]: h for h in hypotheses(made.record, base.model.base, only=("drive.lag",))}
+    rich = richer(made.record, base.model.base, lags[2])
+    zeta = rich.coordinates[1]
+    x = np.array([8e-3 / (2 * zeta.scale * np.exp(zeta.high)) / rich.coordinates[0].scale, zeta.high])
+    held = fit(problem, base.space.add(rich), np.append(base.x, x), rounds=0)
+    assert "drive.lag:drive.zeta" in held.bound()
+    found = plainer(problem, held)
+    (h,) = found.space.hypotheses
+    assert h.fixed["order"] == 1 and found.merit < held.merit
+    assert h.values(found.space.parts(found.x)[0])["tau"] == pytest.approx(8e-3, rel=0.05)
+    assert plainer(problem, found) is found
