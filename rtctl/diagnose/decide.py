@@ -15,7 +15,7 @@ from rtctl.diagnose.anylaw import freed, static
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.space import COSINE, SHAPE, SIZE, Hypothesis
-from rtctl.diagnose.stretches import memory, rms
+from rtctl.diagnose.stretches import in_blocks, memory, rms
 from rtctl.plants.physics import TERMS
 
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
@@ -39,7 +39,6 @@ SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where th
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
 UNLIKELY = 1e-5  # chance of that, and of a name that explains less than most of what random forces may have done
-FEW = 4  # blocks, fewer of which prove nothing
 NOWHERE = 1e-100  # chance of the same by noise at a few places: at rest, where friction creeps, 1e-72 was seen
 CLEAR = 0.15  # share of the cost that it must take off
 LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
@@ -48,8 +47,10 @@ FORM = 0.04  # of what a term does: what the form of its law may miss
 HALF = 0.5  # of the excess explained, and not by luck: something is there; less may be what any number takes off
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
-LEFT = 20.0  # times the floor, or part of what there was, that it may leave there: of what is a thousand times louder
-# any law takes a share, but not nineteen parts of twenty
+LEFT = (
+    20.0  # times the floor, or part of what there was, that it may leave there: any law takes a share of what is loud
+)
+FEW = 4  # blocks, fewer of which prove nothing
 
 
 def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
@@ -112,7 +113,7 @@ def nearly_everywhere(problem: Problem, before: Fit, after: Fit) -> bool:
     little of their sum. Source: Wilcoxon, Biometrics Bulletin 1 (1945)."""
     if not before.space.hypotheses:
         return False
-    gains = in_blocks(after.r, before.r, blocks(problem, after))
+    gains = ahead(after.r, before.r, blocks(problem, after))
     return len(gains) >= FEW and float(wilcoxon(gains, alternative="greater").pvalue) < NEVER
 
 
@@ -180,8 +181,7 @@ def by_accident(before: Fit, after: Fit, block: int) -> float:
     Biometrics Bulletin 2 (1946), for the count.
     """
     does = before.r - after.r
-    whole = len(does) // block * block
-    power, agrees = (np.sum((does * e)[:whole].reshape(-1, block), axis=1) for e in (does, after.r))
+    power, agrees = (in_blocks(does * e, block) for e in (does, after.r))
     count = float(power.sum() ** 2 / max(float(power @ power), 1e-300))
     return float(t.sf(power.sum() / max(float(np.sqrt(agrees @ agrees)), 1e-300), max(count - 1.0, 1.0)))
 
@@ -253,17 +253,16 @@ def p_value(best: Fit, rival: Fit, block: int) -> float:
 
 def chance(best: np.ndarray, rival: np.ndarray, block: int) -> float:
     """As `p_value`, of the errors (errors,) themselves; by Student's t, since few blocks do not tell their spread."""
-    sums = in_blocks(best, rival, block)
+    sums = ahead(best, rival, block)
     if len(sums) < FEW:
         return 1.0
     spread = float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
     return float(t.sf(sums.sum() / max(spread, 1e-12), len(sums) - 1))
 
 
-def in_blocks(best: np.ndarray, rival: np.ndarray, block: int) -> np.ndarray:
+def ahead(best: np.ndarray, rival: np.ndarray, block: int) -> np.ndarray:
     """What the cost of the errors `best` (errors,) is below that of `rival` in each block."""
-    d = 0.5 * (rival**2 - best**2)
-    return np.asarray(d[: len(d) // block * block].reshape(-1, block).sum(axis=1))
+    return in_blocks(0.5 * (rival**2 - best**2), block)
 
 
 def probabilities(fits: list[Fit], floor: float = 0.0) -> np.ndarray:

@@ -205,11 +205,10 @@ class Problem:
         """Whether the errors r of a fit are what random forces leave: these know nothing of what a clock makes worth
         less where it moves fast, and have their spectrum without such weights."""
         main, *others = self.by_sensor(r).values()
-        moves, clock = self.moves[self.source == 0], self.clock[self.source == 0]
-        loud = rms(main[moves] if moves.any() else main) / self.main_floor
-        main, floor = main / clock, self.main_floor / clock
-        if moves.any():
-            main, floor = main[moves], floor[moves]
+        moves = self.moves[self.source == 0]
+        counts = moves if moves.any() else slice(None)
+        main, clock = main[counts], self.clock[self.source == 0][counts]
+        loud = rms(main) / self.main_floor
         if (
             loud > self.loudest
             or self.parted(r)
@@ -218,7 +217,8 @@ class Problem:
             return False
         exact = loud > EXACTLY[self.sim.record.plant]
         dt, speed = self.sim.record.dt * self.mean, self.sim.record.shows_speed
-        return is_hiss(main, dt, self.sim.follow, rms(floor), exact, speed) and not self.commanded(r)
+        e, floor = main / clock, self.main_floor * rms(1.0 / clock)
+        return is_hiss(e, dt, self.sim.follow, floor, exact, speed) and not self.commanded(r)
 
 
 def means(x: np.ndarray, count: int) -> np.ndarray:

@@ -17,6 +17,11 @@ def loudness(r: np.ndarray) -> np.ndarray:
     return np.sqrt(np.bincount(index, r**2) / np.bincount(index))[index]
 
 
+def in_blocks(x: np.ndarray, block: int) -> np.ndarray:
+    """Sums of x (n, ...) over `block` rows each (n // block, ...), the rest left out."""
+    return np.asarray(x[: len(x) // block * block].reshape(-1, block, *x.shape[1:]).sum(axis=1))
+
+
 def usual(r: np.ndarray) -> float:
     """Median of the rms of stretches: a few loud ones do not count."""
     return float(np.median(loudness(r))) + 1e-9

@@ -19,6 +19,7 @@ from rtctl.diagnose.fit import Fit, trust
 from rtctl.diagnose.forms import COUNTED
 from rtctl.diagnose.model import DRY, dry_friction
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, SINE, Hypothesis
+from rtctl.diagnose.stretches import in_blocks
 from rtctl.diagnose.words import unit_at
 
 Z90 = 1.645
@@ -34,10 +35,7 @@ def covariance(fitted: Fit, block: int) -> np.ndarray:
     """Covariance of x (n, n)."""
     weight = trust(fitted.r)
     prior = fitted.space.prior() * weight
-    n = len(fitted.r) // block * block
-    if n < 2 * block:
-        n, block = len(fitted.r), 1
-    scores = (fitted.J[:n] * fitted.r[:n, None]).reshape(-1, block, fitted.J.shape[1]).sum(axis=1)
+    scores = in_blocks(fitted.J * fitted.r[:, None], block if len(fitted.r) >= 2 * block else 1)
     A = fitted.J.T @ fitted.J + np.diag(prior)
     d = np.sqrt(np.maximum(np.diag(A), 1e-12))
     inverse = np.linalg.pinv(A / np.outer(d, d), rcond=1e-12) / np.outer(d, d)

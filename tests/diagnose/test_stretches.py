@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.stretches import loudness, usual
+from rtctl.diagnose.stretches import in_blocks, loudness, usual
 
 
 def test_each_error_is_told_the_rms_of_its_own_stretch():
@@ -20,3 +20,9 @@ def test_a_few_loud_stretches_are_not_usual():
 @pytest.mark.parametrize("n", [1, 99, 101, 250])
 def test_any_length_will_do(n):
     assert loudness(np.ones(n)) == pytest.approx(np.ones(n))
+
+
+def test_what_fills_no_block_is_left_out():
+    np.testing.assert_array_equal(in_blocks(np.arange(7.0), 3), [3.0, 12.0])
+    np.testing.assert_array_equal(in_blocks(np.arange(10.0).reshape(5, 2), 2), [[2.0, 4.0], [10.0, 12.0]])
+    assert in_blocks(np.ones(2), 3).shape == (0,)
