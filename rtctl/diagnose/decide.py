@@ -47,9 +47,7 @@ FORM = 0.04  # of what a term does: what the form of its law may miss
 HALF = 0.5  # of the excess explained, and not by luck: something is there; less may be what any number takes off
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
-LEFT = (
-    20.0  # times the floor, or part of what there was, that it may leave there: any law takes a share of what is loud
-)
+LEFT = 20.0  # times the floor, or part of what was there, that it may leave: any law takes a share of what is loud
 FEW = 4  # blocks, fewer of which prove nothing
 
 
