@@ -173,7 +173,9 @@ def write_text(kind: str, text: str, made_of: str | None = None) -> Path:
 
 def is_warm(path: Path, entry: str) -> bool:
     """Whether machine code for an entry point is in the cache, so that it starts in seconds instead of a minute."""
-    return any((path.parent / "__pycache__").glob(f"{path.stem}.{entry}-*.nbc"))
+    elsewhere = os.environ.get("NUMBA_CACHE_DIR")  # which holds a folder for each of the sources'
+    code = f"{path.stem}.{entry}-*.nbc"
+    return any(Path(elsewhere).glob(f"*/{code}") if elsewhere else (path.parent / "__pycache__").glob(code))
 
 
 def load(path: Path) -> ModuleType:

@@ -132,3 +132,20 @@ def test_a_cache_that_cannot_be_written_is_told(
     monkeypatch.setenv("RTCTL_CACHE_DIR", str(tmp_path / "file" / "cache"))
     with pytest.raises(UserError, match=r"cannot write the generated tick .*; set RTCTL_CACHE_DIR"):
         generate.write(machines.build(config()), "shm")
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_machine_code_is_found_where_numba_puts_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elsewhere: bool
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", folder := str(tmp_path / "numba") if elsewhere else "")
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", folder)  # it reads the environment once
+    text = "import numba\n\n\n@numba.njit(cache=True)\ndef entry(x):\n    return x\n"
+    path = tmp_path / f"small_{elsewhere}.py"
+    path.write_text(text)
+    module = generate.load(path)
+    assert not generate.is_warm(path, "entry")
+    module.entry(1)
+    assert generate.is_warm(path, "entry")
+    assert not generate.is_warm(path, "other")
+    assert (tmp_path / "numba").exists() == elsewhere
