@@ -13,9 +13,10 @@ from rtctl.diagnose.hypotheses import USUAL, hypotheses
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
 from rtctl.diagnose.name import Search, absurd_last, look_alikes, names, rivals, search
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.rework import dropped, eliminate, enrich, exchanged, polish
+from rtctl.diagnose.rework import dropped, eliminate, enrich, exchanged, placed, polish, with_other
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
+from rtctl.diagnose.stretches import rms
 from rtctl.diagnose.verdict import Alternative, standing
 from rtctl.plants.physics import TERMS
 
@@ -216,17 +217,24 @@ def replacements(
         for f in sorted(tried, key=lambda f: f.merit):
             if names(f) != names(best):
                 nearest.setdefault(names(f), f)
-        fits = parallel([partial(deepened, problem, f, best.cost, is_rich(h)) for f in list(nearest.values())[:MOST]])
+        fits = parallel([partial(deepened, problem, f, best, index) for f in list(nearest.values())[:MOST]])
         places = [Alternative(f, _other(f, rest)) for f in sorted(fits, key=lambda f: f.merit)]
         out.append(tuple(places))
     return tuple(out)
 
 
-def deepened(problem: Problem, rival: Fit, cost: float, rich: bool) -> Fit:
-    """To the bottom where it is near the `cost` of the best, and in a richer form where the best is `rich`."""
-    if rich and rival.cost < RICH * cost:
+def deepened(problem: Problem, rival: Fit, best: Fit, index: int) -> Fit:
+    """To the bottom where it is near the best, in whose place `index` it has another term, and in a richer form where
+    the best has one there. It is as well tried with all else as in the best: its own fit may have ended in a trough."""
+    own = best.space.hypotheses[index]
+    if is_rich(own) and rival.cost < RICH * best.cost:
         rival = enrich(problem, rival, decide.better)
-    return polish(problem, rival) if rival.cost < NEAR * cost else rival
+    if best.cost < rival.cost < RICH * best.cost:
+        other = _other(rival, set(names(best)) - {own.name})
+        h, x = rival.space.hypotheses[other], rival.space.parts(rival.x)[other]
+        if rms(placed(problem, best, index, h, x)) < rival.rms:
+            rival = min(rival, with_other(problem, best, index, h, x, 10), key=lambda f: f.cost)
+    return polish(problem, rival) if rival.cost < NEAR * best.cost else rival
 
 
 def _other(fitted: Fit, rest: set[str]) -> int:

@@ -112,9 +112,19 @@ def with_other(
     problem: Problem, found: Fit, index: int, h: Hypothesis, start: np.ndarray, rounds: int, J: np.ndarray | None = None
 ) -> Fit:
     """The model fitted with `h`, from `start`, in the place of hypothesis `index`."""
+    return fit(problem, exchanged(found, index, h), swapped(found, index, start), rounds, J=J)
+
+
+def placed(problem: Problem, found: Fit, index: int, h: Hypothesis, x: np.ndarray) -> np.ndarray:
+    """Residual of the model with `h` at `x` in the place of hypothesis `index`, and nothing else moved."""
+    return problem.residual(exchanged(found, index, h).model(swapped(found, index, x)))
+
+
+def swapped(found: Fit, index: int, x: np.ndarray) -> np.ndarray:
+    """x of the model with the coordinates of hypothesis `index` replaced."""
     parts = found.space.parts(found.x)
-    parts[index] = start
-    return fit(problem, exchanged(found, index, h), np.concatenate([found.x[: found.space.nb], *parts]), rounds, J=J)
+    parts[index] = x
+    return np.concatenate([found.x[: found.space.nb], *parts])
 
 
 def exchanged(found: Fit, index: int, h: Hypothesis) -> Space:

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rtctl.diagnose.find import most_likely, resembling, usual_nodes
+from rtctl.diagnose.find import NEAR, RICH, deepened, most_likely, resembling, usual_nodes
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
@@ -54,3 +54,16 @@ def test_what_looks_like_a_term_of_the_model_is_tried_in_its_place_again():
     candidates = [Hypothesis(name, "capstan", (Coordinate("A", SIZE, 1.0),)) for name in names]
     assert [h.term for h in resembling(candidates, wave)] == ["ripple.encoder", "drive.offset"]
     assert resembling(candidates, fitted()) == []
+
+
+def test_a_rival_whose_fit_ended_in_a_trough_is_tried_with_all_else_as_in_the_best(tilted, searched):
+    problem, _, looked = searched(tilted)
+    best, rival, *_ = looked.rounds[0]
+    x = rival.x.copy()
+    x[best.space.names.index("F_c")] -= 0.005
+    r = problem.residual(rival.space.model(x))
+    stuck = rival._replace(x=x, r=r, cost=0.5 * float(r @ r))
+    assert NEAR * best.cost < stuck.cost < RICH * best.cost  # too far to be fitted to the bottom
+    assert deepened(problem, stuck, best, 0).cost < 1.01 * rival.cost
+    far = stuck._replace(cost=2.0 * RICH * best.cost)
+    assert deepened(problem, far, best, 0) is far
