@@ -6,7 +6,7 @@ some sticking. A name that gives way to such a law is not to be told.
 
 from collections.abc import Callable
 
-from rtctl.diagnose import decide
+from rtctl.diagnose import chances, decide
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.name import look_alikes
@@ -43,7 +43,7 @@ def nameless(problem: Problem, base: Fit, best: Fit, progress: Callable[[str], N
             trials += look_alikes(problem, base, screen(problem, base, there), {term}, best.cost)
         for fitted in trials:
             trial = polish(problem, fitted) if fitted.cost < 2 * best.cost else fitted
-            surely = decide.p_value(trial, best, problem.block) < SURELY
+            surely = chances.p_value(trial, best, problem.block) < SURELY
             several = len(trial.space.hypotheses) < len(best.space.hypotheses)
             if (several and trial.merit < AS_GOOD * best.merit) or (surely and decide.better(best, trial)):
                 return trial

@@ -9,13 +9,15 @@ Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Ec
 """
 
 import numpy as np
-from scipy.stats import chi2, t, wilcoxon
+from scipy.stats import wilcoxon
 
 from rtctl.diagnose.anylaw import freed, static
+from rtctl.diagnose.chances import FEW, ahead, blocks, by_accident, by_noise, chance, p_value
 from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.plausible import slight, unusual
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.space import COSINE, SHAPE, SIZE, Hypothesis
-from rtctl.diagnose.stretches import in_blocks, memory, rms
+from rtctl.diagnose.space import SHAPE, Hypothesis
+from rtctl.diagnose.stretches import memory, rms
 from rtctl.plants.physics import TERMS
 
 MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
@@ -23,32 +25,23 @@ LOUD = 4.5  # times the noise floor: below it what no hypothesis explains may be
 NEARLY = 0.1  # the same where the model is already near the noise
 BESIDE = 0.5  # the same where more is left than noise, which the form of a law may account for
 QUIET = 0.85  # of the noise floor, below which models are equally good
-OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
-ABSURD = 30.0  # times the largest typical size
-ELSEWHERE = (  # whose typical sizes are those of another machine: angles, or contacts of tape
-    ("ripple.encoder", "axis"),
-    ("transmission.backlash", "axis"),
-    ("transmission.creep", "ldu"),
-)
 MOST = 0.3  # of the cost: a term that leaves less is more than the form of another, and nothing that chance does
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
 SELDOM = 1e-8  # chance that a further term does by accident what it does, wherever that is
+PLAIN = 0.75  # of the cost: of 71 machines in which nothing was missing none came to that and to SELDOM besides
 MEASURED = 1e-6  # the same of a first term, where the floor is the noise of this very record
-SPANS, LONGEST = 2.0, 4000  # times the memory of what is left: blocks, where that is no noise; and the most, in ticks
 NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
 BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
 UNLIKELY = 1e-5  # chance of that, and of a name that explains less than most of what random forces may have done
 NOWHERE = 1e-100  # chance of the same by noise at a few places: at rest, where friction creeps, 1e-72 was seen
 CLEAR = 0.15  # share of the cost that it must take off
-LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
 COMPLETE = 1.75  # times the noise floor of a quiet machine: what is left may well be noise
 FORM = 0.04  # of what a term does: what the form of its law may miss
 HALF = 0.5  # of the excess explained, and not by luck: something is there; less may be what any number takes off
 MOSTLY = 0.75  # share of the excess that a name must explain besides
 ENOUGH = 0.97  # share of the excess that a name must explain where the floor is not reached
 LEFT = 20.0  # times the floor, or part of what was there, that it may leave: any law takes a share of what is loud
-FEW = 4  # blocks, fewer of which prove nothing
 
 
 def worth(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
@@ -86,6 +79,8 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         some = after.cost < (1.0 - NEARLY) * before.cost
         seldom = SELDOM if before.space.hypotheses else MEASURED * problem.measured
         if noise and some and by_accident(before, after, block) < seldom:
+            return True
+        if not alike and sure(before, after, block):
             return True
         if luck > LUCK:
             return False
@@ -161,27 +156,10 @@ def more(before: Fit, after: Fit) -> list[Hypothesis]:
     return [h for h in after.space.hypotheses if h.name not in there]
 
 
-def by_noise(before: Fit, after: Fit) -> float:
-    """Chance that noise alone takes so much off, however few the places where it does.
-
-    Source: Wilks, Annals of Mathematical Statistics 9 (1938), with as many errors as are independent.
-    """
-    level = 2.0 * after.cost / len(after.r) * memory(after.r, LONGEST)
-    return float(chi2.sf(2.0 * (before.cost - after.cost) / level, len(after.x) - len(before.x)))
-
-
-def by_accident(before: Fit, after: Fit, block: int) -> float:
-    """Chance that what `after` does otherwise than `before` has nothing to do with the machine.
-
-    Its size is as sure as what is left lets it be, block by block: a term that acts at a few places is judged by the
-    errors there, and one that acts everywhere but fits in one place is not borne out by the others. Counts as many
-    blocks as share in what it does. Source: Liang & Zeger, Biometrika 73 (1986), for the spread; Satterthwaite,
-    Biometrics Bulletin 2 (1946), for the count.
-    """
-    does = before.r - after.r
-    power, agrees = (in_blocks(does * e, block) for e in (does, after.r))
-    count = float(power.sum() ** 2 / max(float(power @ power), 1e-300))
-    return float(t.sf(power.sum() / max(float(np.sqrt(agrees @ agrees)), 1e-300), max(count - 1.0, 1.0)))
+def sure(before: Fit, after: Fit, block: int) -> bool:
+    """Whether what is better by much is so by no accident: chance does one of the two to a machine that lacks nothing,
+    and not both."""
+    return after.cost < PLAIN * before.cost and by_accident(before, after, block) < SELDOM
 
 
 def better(before: Fit, after: Fit) -> bool:
@@ -221,9 +199,12 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH and after.rms < max(LEFT * problem.floor, before.rms / LEFT)
+    longer = blocks(problem, after)
+    if sure(before, after, longer):
+        return True
     restless = before.rms < LOUD * problem.floor or not quiet(problem, before, after)
     lucky = restless and after.cost > MOST * before.cost and by_noise(before, after) > NOWHERE
-    if lucky and p_value(after, before, blocks(problem, after)) > UNLIKELY:
+    if lucky and p_value(after, before, longer) > UNLIKELY:
         return False
     if share > MOSTLY:
         return True
@@ -237,30 +218,6 @@ def explained(problem: Problem, before: Fit, after: Fit) -> float:
     """Share of the error's excess over the noise floor that the terms of `after` explain."""
     floor = min(problem.floor, after.rms) ** 2
     return float(np.clip((before.rms**2 - after.rms**2) / max(before.rms**2 - floor, 1e-12), 0.0, 1.0))
-
-
-def blocks(problem: Problem, fitted: Fit) -> int:
-    """Errors in a block of a test where what is left need be no noise: longer than the memory of that."""
-    return max(problem.block, round(SPANS * memory(fitted.r, LONGEST)))
-
-
-def p_value(best: Fit, rival: Fit, block: int) -> float:
-    """Chance that the rival explains the record as well as the best does (one-sided Vuong test on blocks)."""
-    return chance(best.r, rival.r, block)
-
-
-def chance(best: np.ndarray, rival: np.ndarray, block: int) -> float:
-    """As `p_value`, of the errors (errors,) themselves; by Student's t, since few blocks do not tell their spread."""
-    sums = ahead(best, rival, block)
-    if len(sums) < FEW:
-        return 1.0
-    spread = float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
-    return float(t.sf(sums.sum() / max(spread, 1e-12), len(sums) - 1))
-
-
-def ahead(best: np.ndarray, rival: np.ndarray, block: int) -> np.ndarray:
-    """What the cost of the errors `best` (errors,) is below that of `rival` in each block."""
-    return in_blocks(0.5 * (rival**2 - best**2), block)
 
 
 def probabilities(fits: list[Fit], floor: float = 0.0) -> np.ndarray:
@@ -277,49 +234,3 @@ def probabilities(fits: list[Fit], floor: float = 0.0) -> np.ndarray:
     log -= np.array([unusual(f) for f in fits])
     w = np.exp(-np.clip(log - log.min(), 0.0, 700.0))
     return w / w.sum()
-
-
-def absurd(fitted: Fit) -> bool:
-    """Whether a size is far beyond all that is typical: then it is a number that fits, and no machine's."""
-    for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True):
-        term, values = TERMS[h.term], h.values(x)
-        for c in h.coordinates:
-            name = c.name.partition("|")[0]
-            known = c.kind in (SIZE, COSINE) and name in term.typical and name not in term.scale
-            if known and abs(values[name]) > ABSURD * term.typical[name][1]:
-                return True
-    return False
-
-
-def slight(fitted: Fit) -> bool:
-    """Whether a size is so small that nobody would miss it: long records show what the form of the owner's own law
-    leaves, as dry friction of a hundredth of the force that drives."""
-    return any(
-        abs(value) < c.slight
-        for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True)
-        for c, value in zip(h.coordinates, x, strict=True)
-    )
-
-
-def unlikely(fitted: Fit) -> bool:
-    """Whether a model has a size that is `absurd` or `slight`."""
-    return absurd(fitted) or slight(fitted)
-
-
-def unusual(fitted: Fit) -> float:
-    """Minus the logarithm of how likely sizes like these are: only what tells two equal laws apart.
-
-    Within the term's typical range all are alike; beyond it a factor of OFTEN counts as one standard deviation.
-    Friction that takes away counts as two: what a model lacks rubs, and an owner's value is right to its tolerance.
-    """
-    total = 0.0
-    for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True):
-        term, values = TERMS[h.term], h.values(x)
-        if values.get(LESS.get(h.term, ""), 0.0) < 0.0:
-            total -= 2.0
-        for name, (low, high) in term.typical.items():
-            size = abs(values.get(name, 0.0))
-            known = name not in term.scale and (h.term, fitted.model.kind) not in ELSEWHERE
-            if known and size > 0.0:
-                total -= 0.5 * min(max(np.log(low / size), np.log(size / high), 0.0) / np.log(OFTEN), 3.0) ** 2
-    return float(total)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose import decide
+from rtctl.diagnose import decide, plausible
 from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import HINTED
 from rtctl.diagnose.problem import Problem
@@ -208,12 +208,12 @@ def various(ranked: Sequence[Fit], count: int) -> list[Fit]:
 
 def absurd_last(fitted: Fit) -> tuple[bool, float]:
     """What models are ordered by: a size that no machine has, or nobody misses, may follow what real terms do."""
-    return decide.unlikely(fitted), fitted.merit
+    return plausible.unlikely(fitted), fitted.merit
 
 
 def held(before: Fit, after: Fit) -> tuple[bool, bool]:
     """What models of a round come after the others by: a size that is not one to find, then a shape at its end."""
-    return decide.unlikely(after), decide.at_end(before, after)
+    return plausible.unlikely(after), decide.at_end(before, after)
 
 
 def elsewhere(problem: Problem, base: Fit) -> Fit:

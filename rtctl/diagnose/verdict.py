@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose import decide
+from rtctl.diagnose import chances, decide, plausible
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.jitter import Jitter, interval
@@ -58,11 +58,11 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
         return Verdict(UNNAMED if loud else NOTHING, (), 0.0)
     share = decide.explained(problem, base, best)
     whole = decide.complete(problem, base, best)
-    if patched(best) or decide.absurd(best):
+    if patched(best) or plausible.absurd(best):
         return Verdict(UNNAMED, (), share)
     if not decide.enough(problem, base, best):
-        longer = decide.blocks(problem, best)
-        loud = loud or (share > decide.HALF and decide.p_value(best, base, longer) < decide.UNLIKELY)
+        longer = chances.blocks(problem, best)
+        loud = loud or (share > decide.HALF and chances.p_value(best, base, longer) < decide.UNLIKELY)
         return Verdict(UNNAMED if loud else NOTHING, (), share)
     right = RIGHT[min(len(best.space.hypotheses), MOST) - 1]
     trust = right if whole else min(right, 0.6 + 0.35 * share)
@@ -162,7 +162,7 @@ def shared(problem: Problem, places: Sequence[Alternative]) -> dict[str, float]:
     names = weigh(places, decide.probabilities([p.fit for p in places], problem.floor))
     best, term = places[0].fit, places[0].hypothesis.term
     other = next((p for p in places if p.hypothesis.term == IMITATES.get(term)), None)
-    if other is not None and decide.p_value(best, other.fit, problem.block) > IMITATED:
+    if other is not None and chances.p_value(best, other.fit, problem.block) > IMITATED:
         names[term] = names[other.hypothesis.term] = 0.5 * (names[term] + names[other.hypothesis.term])
     return names
 
@@ -178,7 +178,7 @@ def weigh(places: Sequence[Alternative], weights: np.ndarray) -> dict[str, float
 def _effect(place: Alternative, weight: float, best: Fit, rivals: Sequence[Alternative], block: int) -> Effect:
     h = place.hypothesis
     looks = tuple(
-        Rival(r.hypothesis.term, r.hypothesis.node, decide.p_value(best, r.fit, block), r.fit.rms)
+        Rival(r.hypothesis.term, r.hypothesis.node, chances.p_value(best, r.fit, block), r.fit.rms)
         for r in rivals
         if r.hypothesis.term != h.term
     )
