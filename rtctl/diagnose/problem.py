@@ -26,6 +26,7 @@ ADDED = 2.0  # the same by what a white force adds up to, of a speed
 EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond which that has to have their very pattern
 SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
 PARTED = 2.5  # times the floor, by which one sensor may differ from what another shows of the same motion
+GIVES = 0.2  # share of that motion by which it may differ besides: what gives between the two lies differently each time
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
 FORGOTTEN = 4.0  # the same, after which errors no longer go together
 FORGET = 8.0  # over the bandwidth of the correction
@@ -198,8 +199,8 @@ class Problem:
         """Whether the errors r of sensors that know direction are not of one motion: what moves the machine, random
         forces too, is seen by each of them."""
         main, *others = list(self.by_sensor(r).values())[: len(self.channels)]
-        alone = (e - main * float(main @ e) / max(float(main @ main), 1e-300) for e in others)
-        return any(rms(e) > PARTED * self.main_floor for e in alone)
+        alone = ((e, e - main * float(main @ e) / max(float(main @ main), 1e-300)) for e in others)
+        return any(rms(apart) > np.hypot(PARTED * self.main_floor, GIVES * rms(e)) for e, apart in alone)
 
     def hiss(self, r: np.ndarray) -> bool:
         """Whether the errors r of a fit are what random forces leave: these know nothing of what a clock makes worth

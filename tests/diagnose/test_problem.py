@@ -57,13 +57,18 @@ def test_what_one_sensor_shows_alone_is_of_no_motion(blank):
     rng, floor = np.random.default_rng(1), problem.main_floor
     r = floor * rng.standard_normal(len(problem.order))
     assert not problem.parted(r)
-    moves = 8.0 * floor * np.sin(np.arange(np.sum(problem.source == 0)) * 0.01)
+    moves = 20.0 * floor * np.sin(np.arange(np.sum(problem.source == 0)) * 0.01)
     r[problem.source == 0] += moves
     r[problem.source == 1] += 1.6 * moves
     assert not problem.parted(r)
-    r[problem.source == 1] += 1.5 * PARTED * floor * np.sqrt(2) * np.cos(np.arange(len(moves)) * 0.003)
+    gives = 1.4 * PARTED * floor * np.sqrt(2) * np.cos(np.arange(len(moves)) * 0.003)  # the springs between the two
+    assert not problem.parted(r + np.where(problem.source == 1, np.resize(gives, len(r)), 0.0))
+    r[problem.source == 1] += 2.5 * PARTED * floor * np.sqrt(2) * np.cos(np.arange(len(moves)) * 0.003)
     assert problem.parted(r)
     assert not problem.hiss(r)
+    small = floor * rng.standard_normal(len(problem.order))
+    small[problem.source == 1] += gives
+    assert problem.parted(small)  # of what hardly moves no spring gives that much
 
 
 def test_random_forces_are_hiss_also_where_a_clock_makes_fast_readings_worth_less(blank):
