@@ -12,8 +12,9 @@ BIN := $(VENV)/bin
 run: $(VENV)/installed
 	$(BIN)/rtctl run configs/ivu.yaml --reference configs/references/steps.yaml --for 12s
 
+# one thread of linear algebra for each of the two workers: more would wait for one another
 test: $(VENV)/installed-dev
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadgroup
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -110,9 +110,10 @@ def plant_response(model: Model, f: np.ndarray) -> np.ndarray:
     T, Q = schur(model.A, output="complex")
     b, c = Q.conj().T @ model.b, model.c @ Q
     x = np.zeros((len(b), len(s)), complex)
+    # einsum, not @: for so few rows BLAS wakes threads that cost far more than the sum
     for i in range(len(b) - 1, -1, -1):
-        x[i] = (b[i] + T[i, i + 1 :] @ x[i + 1 :]) / (s - T[i, i])
-    return np.asarray(c @ x)
+        x[i] = (b[i] + np.einsum("k,kn->n", T[i, i + 1 :], x[i + 1 :])) / (s - T[i, i])
+    return np.einsum("k,kn->n", c, x)
 
 
 def hold(parts: Loop, f: np.ndarray) -> np.ndarray:
