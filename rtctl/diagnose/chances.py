@@ -2,6 +2,8 @@
 
 Errors of neighbouring ticks are not independent: what is counted are blocks of them, longer than the memory of the
 machine, or of what is left.
+
+Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Econometrica 59 (1991).
 """
 
 import numpy as np

@@ -2,10 +2,7 @@
 
 A term earns its place when it takes a material share off the error, beyond what the luckiest of all hypotheses takes
 off a record with nothing in it. It earns its name when the model with it explains what there was to explain, down to
-the noise, when no bound holds it, and when it beats each rival by more than chance, judged on blocks longer than the
-machine's memory, since errors of neighbouring ticks are not independent.
-
-Source: Vuong, Econometrica 57 (1989), with the long-run variance of Andrews, Econometrica 59 (1991).
+the noise, when no bound holds it, and when it beats each rival by more than chance (see `chances`).
 """
 
 import numpy as np
@@ -20,8 +17,8 @@ from rtctl.diagnose.space import SHAPE, Hypothesis
 from rtctl.diagnose.stretches import memory, rms
 from rtctl.plants.physics import TERMS
 
-MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
 LOUD = 4.5  # times the noise floor: below it what no hypothesis explains may be a machine that is not quiet
+MATERIAL = 0.03  # share of the cost that a term must take off, beside its toll
 NEARLY = 0.1  # the same where the model is already near the noise
 BESIDE = 0.5  # the same where more is left than noise, which the form of a law may account for
 QUIET = 0.85  # of the noise floor, below which models are equally good
@@ -29,9 +26,9 @@ MOST = 0.3  # of the cost: a term that leaves less is more than the form of anot
 LUCK = 1e-4  # chance that a term does so well there by luck
 RELEASED, FREE = 2e-3, 0.2  # chance and share where a term frees plant parameters from the ends of their tolerance
 SELDOM = 1e-8  # chance that a further term does by accident what it does, wherever that is
-PLAIN = 0.75  # of the cost: of 71 machines in which nothing was missing none came to that and to SELDOM besides
 MEASURED = 1e-6  # the same of a first term, where the floor is the noise of this very record
-NEVER = 1e-6  # the same of a term that no luck brings, whatever the number of its numbers
+PLAIN = 0.75  # of the cost: of 71 machines in which nothing was missing none came to that and to SELDOM besides
+NEVER = 1e-6  # chance of a term that no luck brings, whatever the number of its numbers
 BEYOND = 0.75  # of the cost, once the laws beside a term may have any form
 UNLIKELY = 1e-5  # chance of that, and of a name that explains less than most of what random forces may have done
 NOWHERE = 1e-100  # chance of the same by noise at a few places: at rest, where friction creeps, 1e-72 was seen
