@@ -77,7 +77,7 @@ def earns(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
         seldom = SELDOM if before.space.hypotheses else MEASURED * problem.measured
         if noise and some and by_accident(before, after, block) < seldom:
             return True
-        if not alike and sure(before, after, block):
+        if not alike and sure(problem, before, after):
             return True
         if luck > LUCK:
             return False
@@ -153,10 +153,10 @@ def more(before: Fit, after: Fit) -> list[Hypothesis]:
     return [h for h in after.space.hypotheses if h.name not in there]
 
 
-def sure(before: Fit, after: Fit, block: int) -> bool:
+def sure(problem: Problem, before: Fit, after: Fit) -> bool:
     """Whether what is better by much is so by no accident: chance does one of the two to a machine that lacks nothing,
     and not both."""
-    return after.cost < PLAIN * before.cost and by_accident(before, after, block) < SELDOM
+    return after.cost < PLAIN * before.cost and by_accident(before, after, blocks(problem, after)) < SELDOM
 
 
 def better(before: Fit, after: Fit) -> bool:
@@ -196,12 +196,11 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH and after.rms < max(LEFT * problem.floor, before.rms / LEFT)
-    longer = blocks(problem, after)
-    if sure(before, after, longer):
+    if sure(problem, before, after):
         return True
     restless = before.rms < LOUD * problem.floor or not quiet(problem, before, after)
     lucky = restless and after.cost > MOST * before.cost and by_noise(before, after) > NOWHERE
-    if lucky and p_value(after, before, longer) > UNLIKELY:
+    if lucky and p_value(after, before, blocks(problem, after)) > UNLIKELY:
         return False
     if share > MOSTLY:
         return True
