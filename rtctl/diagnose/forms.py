@@ -29,7 +29,7 @@ EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, t
         Size("rise", "one", 0.1, most=3.0), Shape("v_s", "speed", (0.1,), 50.0),
         Shape("tau_s", "seconds", (3e-3,), 300.0), Choice("form", ("lugre",)),
     ),
-    "drive.lag": (Shape("zeta", "one", (0.7,), 20.0),),
+    "drive.lag": (Shape("zeta", "one", (0.7,), 5.0),),
     "drive.saturation": (Shape("knee", "one", (0.15,), 6.0),),
     "drive.supply_sag": (Shape("tau", "seconds", (0.02,), 30.0),),
     "drive.thermal": (Size("ease", "one", 0.1, signed=True),),

@@ -5,9 +5,12 @@ import pytest
 
 from rtctl.diagnose.forms import EXTRAS, about_others, as_harmonic, forms, moved_into, of_first_order, renamed, richer
 from rtctl.diagnose.hypotheses import SEARCH, hypotheses
+from rtctl.diagnose.space import SHAPE
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.guide import thickness
 from rtctl.plants.physics.ripple import encoder
+
+HINTS = {"order": [7.0], "wavelength": [0.02]}
 
 
 def test_extras_belong_to_a_form_that_is_searched_for():
@@ -34,6 +37,22 @@ def test_the_edges_of_a_gap_are_round_where_a_link_has_one(moved):
     record, base = moved("axis")
     (gap, *_) = hypotheses(record, base, only=("transmission.backlash",))
     assert richer(record, base, gap) is None
+
+
+@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
+def test_no_shape_of_a_richer_form_leaves_what_a_config_may_hold(moved, kind):
+    """A model that was found is run as it is."""
+    record, base = moved(kind)
+    plain = (*hypotheses(record, base, only=EXTRAS), *hypotheses(record, base, HINTS, only=EXTRAS))
+    seen = set()
+    for h in filter(None, (richer(record, base, h) for h in plain)):
+        fields = TERMS[h.term].settings.model_fields
+        for c in (c for c in h.coordinates if c.kind == SHAPE):
+            seen.add((h.term, c.name))
+            for bound in fields[c.name].metadata:
+                assert c.scale * np.exp(c.low) >= getattr(bound, "ge", -np.inf), f"{h.term} {c.name}"
+                assert c.scale * np.exp(c.high) <= getattr(bound, "le", np.inf), f"{h.term} {c.name}"
+    assert ("drive.lag", "zeta") in seen
 
 
 def test_a_spring_pulls_to_where_the_machine_starts_or_to_the_middle(moved):
