@@ -18,7 +18,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm
 
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.problem import Problem, means
+from rtctl.diagnose.problem import RECTIFIED, Problem, means
 from rtctl.diagnose.simulate import Simulator, resolution
 
 FAST = 0.7  # counts a tick: slower, the cut into counts is no white noise
@@ -29,6 +29,7 @@ CERTAIN = 8.0  # standard errors
 LOUDER = 1.5  # times the noise that is left: a late tick also holds the last command for longer
 SMOOTH, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which the force is averaged
 TINY = 1e-30  # beside a power that may be 0
+AGREES = 0.25  # of sigma squared: what another sensor must bear out
 MIXED = (-0.82, -0.5)  # correlation of neighbouring second differences: -2/3 where the ticks are independent
 
 
@@ -47,27 +48,54 @@ class Jitter(NamedTuple):
 
 
 def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
-    """Of the main sensor's error under `model`; None where there is no sign of it."""
-    out = sim.run(model)[:, 0]
-    e = (sim.seen - out)[rows]
-    v = np.gradient(out, sim.record.dt)[rows][1:-1]
-    d = e[1:-1] - 0.5 * (e[:-2] + e[2:])
-    count = 1.0 if sim.record.plant != "axis" else resolution(sim.record)
-    fast = np.abs(v) * sim.record.dt > FAST * count
-    if not np.isfinite(e).all() or fast.sum() < ENOUGH:
+    """Of the main sensor's error under `model`; None where there is no sign of it, or another sensor that is read at
+    the same ticks shows none: near one count a tick the cut into counts alone may look like it."""
+    out = sim.run(model)
+    main, *others = (sim.channels.index(c) for c in sim.channels if c not in RECTIFIED)
+    found = of_sensor(sim, out, main, rows)
+    if found is None:
         return None
-    d, v = d[fast], v[fast]
-    beyond = np.abs(d) > 8 * np.median(np.abs(d)) + count  # lost counts
-    d, v = d[~beyond], v[~beyond]
-    slope, error, floor = growth(d**2 / 1.5, v**2)
-    sigma = float(np.sqrt(max(slope, 0.0)))
+    for c in others:
+        grown = grows(sim, out, c, rows)
+        if grown is not None and grown[0] < AGREES * found.sigma**2:
+            return None
+    return found
+
+
+def of_sensor(sim: Simulator, out: np.ndarray, channel: int, rows: slice) -> Jitter | None:
+    """Of the error of one sensor, beside what is simulated of all, `out` (n, sensors)."""
+    found = grows(sim, out, channel, rows)
+    if found is None:
+        return None
+    slope, error, floor, d, v = found
     if slope < CERTAIN * error or slope * np.mean(v**2) < LOUD * floor:
         return None
     z = d / np.sqrt(floor + slope * v**2)
     mixed = float(z[1:] @ z[:-1]) / float(z @ z)
     if not MIXED[0] < mixed < MIXED[1]:
         return None
+    sigma = float(np.sqrt(slope))
     return Jitter(sigma, 0.5 * error / sigma, float(np.sqrt(floor)), sim.record.dt)
+
+
+def grows(
+    sim: Simulator, out: np.ndarray, channel: int, rows: slice
+) -> tuple[float, float, float, np.ndarray, np.ndarray] | None:
+    """How the power of a sensor's second differences grows with the square of speed, as in `growth`, and both (ticks,)
+    themselves; None where it moves too slowly to tell."""
+    record = sim.record
+    seen = sim.seen if channel == 0 else record.y[sim.channels[channel]]
+    e = (seen - out[:, channel])[rows]
+    v = np.gradient(out[:, channel], record.dt)[rows][1:-1]
+    d = e[1:-1] - 0.5 * (e[:-2] + e[2:])
+    count = 1.0 if record.plant != "axis" else resolution(record)
+    fast = np.abs(v) * record.dt > FAST * count
+    if not np.isfinite(e).all() or fast.sum() < ENOUGH:
+        return None
+    d, v = d[fast], v[fast]
+    beyond = np.abs(d) > 8 * np.median(np.abs(d)) + count  # lost counts
+    d, v = d[~beyond], v[~beyond]
+    return (*growth(d**2 / 1.5, v**2), d, v)
 
 
 def growth(power: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:

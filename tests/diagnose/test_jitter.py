@@ -17,7 +17,20 @@ WAY = 3000.0 * (1 - np.cos(2 * np.pi * 0.5 * T))  # counts
 def stand(error, way=WAY):
     """As much of a simulator as is looked at: the model's way, and a reading that is off by `error` (n,)."""
     record = SimpleNamespace(dt=DT, plant="ivu")
-    return SimpleNamespace(record=record, seen=way + error, run=lambda model: way[:, None])
+    return SimpleNamespace(
+        record=record, seen=way + error, run=lambda model: way[:, None], channels=("capstan_counts",)
+    )
+
+
+def two(late, other):
+    """The same of a drive with two sensors, read `late` s (n,) and `other` s (n,), beside their noise."""
+    noise = 0.3 * np.random.default_rng(7).standard_normal((2, N))
+    ways = np.stack([WAY, 1.9 * WAY])
+    main, second = ways + np.gradient(ways, DT, axis=1) * np.stack([late, other]) + noise
+    return SimpleNamespace(
+        record=SimpleNamespace(dt=DT, plant="ldu", y={"scale_counts": second}), seen=main, run=lambda model: ways.T,
+        channels=("encoder_counts", "scale_counts"),
+    )  # fmt: skip
 
 
 def found(error):
@@ -82,6 +95,13 @@ def test_a_machine_that_hardly_moves_shows_none():
     still = 0.01 * WAY
     error = off(0.0)
     assert jitter(stand(error, still), None, slice(10, None)) is None  # type: ignore[arg-type]
+
+
+def test_sensors_that_are_read_at_the_same_ticks_are_late_together():
+    late = 2e-4 * np.random.default_rng(3).standard_normal(N)
+    both, one = (jitter(two(late, other), None, slice(10, None)) for other in (late, 0.0 * late))  # type: ignore[arg-type]
+    assert both.sigma == pytest.approx(2e-4, rel=0.1)
+    assert one is None
 
 
 def test_growth_is_the_slope_of_noise_power():
