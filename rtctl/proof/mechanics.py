@@ -87,7 +87,8 @@ def thickness(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
     y, f = (1, s.truth["R_c"]) if s.plant == "ldu" else (0, 1.0)
     a = about(rng, 2e-5 if s.plant == "ldu" else 3e-4) * size
     span = float(np.ptp(s.ref))
-    wave = float(min([0.01875, 0.0375, 0.075, 0.15], key=lambda v: abs(v - span / rng.uniform(1.5, 5.0))))
+    wanted = span / rng.uniform(1.5, 5.0)  # it comes at least once, and is not as long as the capstan's turn of 19 mm
+    wave = min((0.003125, 0.00625, 0.0125, 0.025, 0.0375, 0.075, 0.15), key=lambda v: abs(math.log(v / wanted)))
     _misread(s, y, machine.NH, a / f * _harmonics(rng, 0.4), 2 * math.pi / wave * f, rng.uniform(0, 2 * math.pi, 3))
     return {"amplitude_m": a, "wavelength_m": wave}
 
