@@ -166,6 +166,7 @@ ALL = SEARCH | BEYOND
 
 
 ALONE = ("sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt")  # asks for a second sensor
+TWICE = {("guide.thickness", "scale"), ("guide.dirt", "scale")}  # where a term does what it does at its other node
 TURNING = {"axis": ("load.imbalance",)}  # ask for an axis that turns
 SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
     "ripple.encoder": (Turn("A", "phi", "one", 1e-5), Hint("turn", "wavelength", 0.4)),
@@ -200,7 +201,8 @@ def hypotheses(
             for node in term.nodes.get(record.plant, ()):
                 slides = record.plant == "axis" and record.case.sensors.unit != "rad"
                 if (
-                    (node == "sensor" and name in alone and not (slides and name == "guide.thickness"))
+                    (name, node) in TWICE
+                    or (node == "sensor" and name in alone and not (slides and name == "guide.thickness"))
                     or (record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ()))
                     or (name == "friction.stribeck" and measures.dry(node) <= SLIGHT * measures.of("force", node))
                 ):  # falls to what the base has
