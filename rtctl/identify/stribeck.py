@@ -2,7 +2,7 @@
 
     F(v) = F_C + (F_S - F_C) exp(-(v / v_s)^2) + F_v v                                                        (8.3)
 
-For a given v_s it is linear in the rest, so v_s is searched on a grid and the rest solved.
+For a given v_s it is linear in the rest, so v_s is searched on a grid, then between its points, and the rest solved.
 
 Source: thesis (8.3); Armstrong-Helouvry 1994.
 """
@@ -37,6 +37,8 @@ def stribeck(v: Sequence[float], F: Sequence[float], resolution: float = 0.02, f
     interval, or no better a fit than a straight line. v_s alone is None where the fall lies between standstill and the
     slowest speed. Without `fall` neither is looked for. Raises NoAnswer where there are fewer than 3 different speeds.
     """
+    from scipy.optimize import minimize_scalar
+
     x, y = np.asarray(v, float), np.asarray(F, float)
     moves = x > 0.0
     if len(np.unique(np.round(x[moves], 6))) < 3:
@@ -46,12 +48,18 @@ def stribeck(v: Sequence[float], F: Sequence[float], resolution: float = 0.02, f
         costs = np.array([_linear(x, y, s)[2] for s in grid])
         best = int(np.argmin(costs))
         step = float(grid[min(best + 1, len(grid) - 1)] - grid[best])
-        a, half, rss = _linear(x, y, float(grid[best]))
+        around = (float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)]))
+        finer = minimize_scalar(
+            lambda s: _linear(x, y, s)[2], bounds=around, method="bounded", options={"xatol": 1e-3 * step}
+        )
+        at = float(finer.x) if finer.fun < costs[best] else float(grid[best])
+        a, half, rss = _linear(x, y, at)
         near = costs <= rss * (1.0 + 4.0 / max(len(x) - 4, 1)) + 1e-30 * float(y @ y)  # 95 %: an F ratio of about 4
+        near[best] = True  # where between the points nothing is left, none is near
         # the chance that noise makes two more parameters worth as much: that of F with 2 and n - 4 degrees of freedom
         chance = (rss / max(_linear(x, y, None)[2], 1e-300)) ** (0.5 * (len(x) - 4))
         if a[1] > max(resolution * a[0], half[1]) and chance < CHANCE and not near[-1]:
-            v_s, width = (None, None) if near[0] else (float(grid[best]), max(0.5 * float(np.ptp(grid[near])), step))
+            v_s, width = (None, None) if near[0] else (at, max(0.5 * float(np.ptp(grid[near])), step))
             return Stribeck(a[0], a[0] + a[1], v_s, a[2], half[0], half[0] + half[1], width, half[2])
     a, half, _ = _linear(x[moves], y[moves], None)
     rest = float(y[~moves].mean()) if fall and (~moves).any() else a[0]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rtctl.config.errors import NoAnswer
@@ -16,6 +16,7 @@ from rtctl.identify.stribeck import stribeck
     v_s=st.floats(0.3, 2.0),
     F_v=st.floats(0.0, 0.1),
 )
+@example(F_C=1.0, rise=2.0, v_s=1.9375, F_v=0.0)  # between two points of the grid
 def test_fit_finds_the_curve(F_C, rise, v_s, F_v):
     v = np.array([0.0, 0.1, 0.2, 0.4, 0.8, 1.2, 1.6, 2.5, 4.0, 6.0])
     fit = stribeck(v, F_C * (1 + rise * np.exp(-((v / v_s) ** 2)) + F_v * v))
