@@ -18,7 +18,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.stats import norm
 
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.problem import RECTIFIED, Problem, means
+from rtctl.diagnose.problem import Problem, main_channels, means
 from rtctl.diagnose.simulate import Simulator, resolution
 
 FAST = 0.7  # counts a tick: slower, the cut into counts is no white noise
@@ -51,7 +51,7 @@ def jitter(sim: Simulator, model: Model, rows: slice) -> Jitter | None:
     """Of the main sensor's error under `model`; None where there is no sign of it, or another sensor that is read at
     the same ticks shows none: near one count a tick the cut into counts alone may look like it."""
     out = sim.run(model)
-    main, *others = (sim.channels.index(c) for c in sim.channels if c not in RECTIFIED)
+    main, *others = main_channels(sim)
     found = of_sensor(sim, out, main, rows)
     if found is None:
         return None
