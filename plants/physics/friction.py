@@ -105,7 +105,9 @@ class StribeckSettings(Settings):
 
     term: Literal["friction.stribeck"] = "friction.stribeck"
     node: Node
-    F_s: float = quantity(unit="", ge=0, le=1e4, help="dry friction at standstill, Nm or N by node")
+    F_s: float = quantity(
+        unit="", ge=0, le=1e4, help="dry friction at standstill, but for what other terms add, Nm or N by node"
+    )
     v_s: float = quantity(unit="", gt=0, le=1e3, help="Stribeck speed, rad/s or m/s by node")
     form: Literal["gaussian", "exponential", "tustin"] = Field(
         default="gaussian", description="how it falls with speed: exp(-(v/v_s)^2), exp(-|v|/v_s), 1/(1 + |v|/v_s)"

@@ -187,7 +187,7 @@ def with_fewer(found: Found, index: int | None = None) -> Found:
 def proposed(sim: Simulator, seen_by: Fit) -> list[Hypothesis]:
     """All hypotheses, with the starts that the record suggests once it is seen through a model."""
     model = seen_by.model
-    return hypotheses(sim.record, model.base, hints(sim, model))
+    return hypotheses(sim.record, model.base, hints(sim, model), beside=model.terms)
 
 
 def replacements(

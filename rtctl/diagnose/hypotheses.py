@@ -5,16 +5,18 @@ which shapes (speeds, times, frequencies) it starts. Starts are shares of what t
 its rms speed, its span, the rms force of its drive.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.model import Model, dry_with_terms
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis
 from rtctl.diagnose.yardstick import Measures
+from rtctl.idiom import Settings
 from rtctl.own.term import sizes
 from rtctl.plants.physics import TERMS
 
@@ -166,6 +168,7 @@ ALL = SEARCH | BEYOND
 
 
 ALONE = ("sensor.scale", "sensor.rectified", "guide.thickness", "guide.dirt")  # asks for a second sensor
+FALLING = "friction.stribeck"  # to what dry friction there is
 TWICE = {("guide.thickness", "scale"), ("guide.dirt", "scale")}  # where a term does what it does at its other node
 TURNING = {"axis": ("load.imbalance",)}  # ask for an axis that turns
 SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
@@ -182,12 +185,18 @@ LENGTHS = {  # m, between which a wave that a linear axis misreads is of its scr
 
 
 def hypotheses(
-    record: Record, base: dict[str, float], hints: dict[str, list] | None = None, only: Iterable[str] = ()
+    record: Record,
+    base: dict[str, float],
+    hints: dict[str, list] | None = None,
+    only: Iterable[str] = (),
+    beside: Sequence[Settings] = (),
 ) -> list[Hypothesis]:
     """All of them for this plant, one for each start; `only` restricts to terms by name.
 
-    `hints` gives, as "kind" or "kind:node", what the record suggests for a Hint (see `hints.py`).
+    `hints` gives, as "kind" or "kind:node", what the record suggests for a Hint (see `hints.py`). `beside` are the
+    terms that the model has already: friction that falls with speed asks for dry friction that it falls to.
     """
+    model = Model(record.plant, base, tuple(beside))
     scales = node_scales(record, base)
     measures = Measures(record, base, scales, hints or {})
     alone = set(ALONE) - ({"sensor.rectified"} if record.shows_speed else set())  # which never falls below zero
@@ -204,8 +213,8 @@ def hypotheses(
                     (name, node) in TWICE
                     or (node == "sensor" and name in alone and not (slides and name == "guide.thickness"))
                     or (record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ()))
-                    or (name == "friction.stribeck" and measures.dry(node) <= SLIGHT * measures.of("force", node))
-                ):  # falls to what the base has
+                    or (name == FALLING and dry_with_terms(model, node) <= SLIGHT * measures.of("force", node))
+                ):
                     continue
                 out += starts_of(name, node, (slides and SLIDING.get(name)) or parts_of(name), measures)
     return out

@@ -16,6 +16,7 @@ from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import HINTED
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, enrich, polish, whole_orders
+from rtctl.diagnose.rubbing import rubbing
 from rtctl.diagnose.scan import bumps, resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
@@ -88,8 +89,12 @@ def search(
     candidates = list(propose(base))
     known = {key(h) for h in candidates}
     first: tuple[Score, ...] = ()
+    rubs = None if sure else rubbing(problem, base, candidates)
+    if rubs is not None and worth(base, rubs):
+        first, beam, away = tuple(screen(problem, base, candidates)), [rubs], None
+        rounds, sure = [(rubs,)], enough(rubs)
     for level in range(MOST):
-        if level > 0:
+        if level > 0 or rounds:
             candidates = [*candidates, *new_starts(propose(beam[0]), known)]
         parents = [*beam, away] if level == 0 and away is not None else beam
         full, scores = grow(problem, parents, candidates, QUICK if sure else ROUNDS[level], away, enough, progress)
@@ -99,11 +104,11 @@ def search(
                 [*full, *(f for model in beam for f in bumps(problem, model, propose(model)))], key=absurd_last
             )
         if level == 0:
-            first, candidates = tuple(scores), best_starts(scores)
-            quiet = base.rms < QUIET * problem.floor
-            if not quiet and not (full and not sure and enough(full[0]) and worth(base, full[0])):
+            first, candidates = first or tuple(scores), best_starts(scores)
+            quiet = beam[0].rms < QUIET * problem.floor
+            if not quiet and not (full and not sure and enough(full[0]) and worth(beam[0], full[0])):
                 progress("looking for resonances")
-                full = sorted([*full, *resonances(problem, base, scores)], key=absurd_last)
+                full = sorted([*full, *resonances(problem, beam[0], scores)], key=absurd_last)
         elif problem.sim.case.controller.kind == "none" and not (full and enough(full[0])):  # most ring freely then
             progress(f"looking for resonances beside {' + '.join(names(beam[0]))}")
             further = [score for score in scores if score.hypothesis.name not in names(beam[0])]
@@ -282,8 +287,10 @@ def best_starts(scores: Sequence[Score]) -> list[Hypothesis]:
 
 
 def new_starts(proposed: Sequence[Hypothesis], known: set[tuple]) -> list[Hypothesis]:
-    """Those of the proposed that were not proposed before, by what the record suggested; `known` is kept up to date."""
-    new = [h for h in proposed if h.term in HINTED and key(h) not in known]
+    """Those of the proposed that were not proposed before: by what the record suggests through the model so far, or
+    because they ask for what it has by now. `known` is kept up to date."""
+    before = {name for name, *_ in known}
+    new = [h for h in proposed if (h.term in HINTED or h.name not in before) and key(h) not in known]
     known.update(key(h) for h in proposed)
     return new
 

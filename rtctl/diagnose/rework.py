@@ -8,6 +8,8 @@ import numpy as np
 from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.forms import about_others, as_harmonic, forms, moved_into, of_first_order, richer, rounded
+from rtctl.diagnose.hypotheses import FALLING
+from rtctl.diagnose.model import dry_friction
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import Hypothesis, Space
@@ -43,7 +45,7 @@ def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -
     """
     while len(found.space.hypotheses) > 1:
         found = plainer(problem, found)
-        indices = range(len(found.space.hypotheses))
+        indices = [i for i in range(len(found.space.hypotheses)) if not bears(found, i)]
         trials = parallel([partial(dropped, problem, found, i, 10) for i in indices])
         less = min(trials, key=lambda f: f.merit)
         if less.cost < IN_REACH * found.cost:
@@ -57,6 +59,13 @@ def eliminate(problem: Problem, found: Fit, worth: Callable[[Fit, Fit], bool]) -
             return found
         found = less
     return found
+
+
+def bears(found: Fit, index: int) -> bool:
+    """Whether another term stands on one: friction that falls with speed falls to dry friction, the owner's or this."""
+    h = found.space.hypotheses[index]
+    falls = any((other.term, other.node) == (FALLING, h.node) for other in found.space.hypotheses)
+    return h.term == "friction.coulomb" and falls and not dry_friction(found.model.kind, found.model.base, h.node)
 
 
 def dropped(problem: Problem, found: Fit, index: int, rounds: int) -> Fit:

@@ -104,7 +104,22 @@ def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Inte
             v, w = values[c.name], abs(c.scale) * half
             out[c.name] = Interval(v, v - w, v + w, parameter_unit(kind, h, c.name))
     out |= {n: Interval(v, v, v, parameter_unit(kind, h, n)) for n, v in h.fixed.items() if n in COUNTED}
-    return with_total(out, fitted, h, cov, columns[0]) if h.term == "friction.coulomb" else out
+    if h.term == "friction.coulomb":
+        return with_total(out, fitted, h, cov, columns[0])
+    return at_standstill(out, fitted, index, cov) if h.term == "friction.stribeck" else out
+
+
+def at_standstill(own: dict[str, Interval], fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Interval]:
+    """F_s with the dry friction that another term adds at the node, which the law itself does not count."""
+    h = fitted.space.hypotheses[index]
+    for other, found in enumerate(fitted.space.hypotheses):
+        if (found.term, found.node) == ("friction.coulomb", h.node):
+            columns = [fitted.space.columns(index)[0], fitted.space.columns(other)[0]]
+            slope = np.array([h.coordinates[0].scale, found.coordinates[0].scale])
+            half = Z90 * float(np.sqrt(max(slope @ cov[np.ix_(columns, columns)] @ slope, 0.0)))
+            total = own["F_s"].value + found.values(fitted.space.parts(fitted.x)[other])["F_C"]
+            return {**own, "F_s": Interval(total, total - half, total + half, own["F_s"].unit)}
+    return own
 
 
 def with_total(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, UNNAMED, Diagnosis, Effect, Interval, Located
-from rtctl.diagnose.model import Model, dry_with_terms
+from rtctl.diagnose.model import Model, dry_friction, dry_with_terms
 from rtctl.diagnose.numbers import PREFIXES as PREFIXES  # for those who draw with words
 from rtctl.diagnose.numbers import both, nice, percent
 from rtctl.diagnose.numbers import figures as figures
@@ -141,7 +141,9 @@ class _Slots(dict):
 
 def _sticking(s: Sizes) -> str:
     dry = dry_with_terms(s.model, s.node)
-    start, keep = both(s.value("F_s"), dry, s.unit("F_s"))
+    told = "F_s" in s.parameters  # else it is the term's, which falls to the plant's own friction and counts no other
+    added = 0.0 if told else dry - dry_friction(s.model.kind, s.model.base, s.node)
+    start, keep = both(s.value("F_s") + added, dry, s.unit("F_s"))
     return f"it needs {start} to start but {keep} to keep moving"
 
 

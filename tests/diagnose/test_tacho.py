@@ -151,7 +151,7 @@ def test_a_sensor_without_direction_is_asked_for_where_a_speed_is_shown_and_can_
 def test_it_is_named(terms, monkeypatch):
     """Two effects at once, of machines like the coupled drives of Wigren & Schoukens (2013), or none."""
     names = ("sensor.rectified", "structure.resonance", "friction.coulomb", "drive.deadband", "drive.lag")
-    monkeypatch.setattr(find, "hypotheses", lambda *given: hypotheses(*given, only=names))
+    monkeypatch.setattr(find, "hypotheses", lambda *given, beside: hypotheses(*given, only=names, beside=beside))
     record, _ = recorded(*terms, M=1.1, F_v=1.7)
     told = chain.diagnose_record(record)
     assert told.verdict == ("named" if terms else "nothing")
