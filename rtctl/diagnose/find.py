@@ -14,6 +14,7 @@ from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
 from rtctl.diagnose.name import Search, absurd_last, look_alikes, names, rivals, search
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, eliminate, enrich, exchanged, placed, polish, with_other
+from rtctl.diagnose.rubbing import bare
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.stretches import rms
@@ -93,8 +94,9 @@ def find(
     for level in looked.rounds:
         if worth(best, level[0]):
             best = level[0]
+    needed = partial(missed, problem, base) if bare(base) else worth
     if len(best.space.hypotheses) > 1:
-        best = polish(problem, eliminate(problem, best, worth))
+        best = polish(problem, eliminate(problem, best, needed))
     candidates = propose(base)
     near = replacements(problem, best, looked, candidates, progress)
     others = [place.fit for places in near for place in places]
@@ -104,7 +106,7 @@ def find(
     ahead = min(others, key=absurd_last, default=best)
     looked = looked._replace(rounds=(*looked.rounds, (best, *others)))  # what came out second is a rival of the first
     if absurd_last(ahead) < absurd_last(best):  # a rival came out ahead once it was fitted to the bottom
-        best = polish(problem, eliminate(problem, ahead, worth))  # beside it another may be needed no more
+        best = polish(problem, eliminate(problem, ahead, needed))  # beside it another may be needed no more
         near = replacements(problem, best, looked, resembling(candidates, best), progress)
     likelier = most_likely(problem, best, near)
     if likelier is not best:
@@ -112,6 +114,13 @@ def find(
     best, near = without_doubtful(problem, best, looked, near, progress)
     best, near = usual_nodes(sim.record.plant, best, near)
     return Found(problem, off, base, best, looked, near, beyond.nameless(problem, base, best, progress))
+
+
+def missed(problem: Problem, base: Fit, before: Fit, after: Fit) -> bool:
+    """Whether `after` is worth its further term, or may be told and `before` not: the frictions that an owner wrote
+    nothing of are several, and what the form of one misses may well be another."""
+    told = partial(decide.enough, problem, base)
+    return decide.worth(problem, base, before, after) or (told(after) and not told(before))
 
 
 def resembling(candidates: Sequence[Hypothesis], best: Fit) -> list[Hypothesis]:

@@ -16,9 +16,14 @@ PLAIN = ("friction.coulomb", "friction.viscous")
 OWN = ("F_c", "F_v")  # the owner's names of them
 
 
+def bare(base: Fit) -> bool:
+    """Whether it is an axis of whose friction the owner says nothing."""
+    return base.model.kind == "axis" and not any(base.model.base.get(name, 0.0) for name in OWN)
+
+
 def rubbing(problem: Problem, base: Fit, candidates: Sequence[Hypothesis]) -> Fit | None:
     """The base with both plain frictions; None where the owner has one of them, or the machine is no axis."""
-    if problem.sim.record.plant != "axis" or any(base.model.base.get(name, 0.0) for name in OWN):
+    if not bare(base):
         return None
     first = {h.term: h for h in reversed(candidates) if h.term in PLAIN}
     if len(first) < len(PLAIN):

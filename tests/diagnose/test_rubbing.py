@@ -4,13 +4,13 @@ import pytest
 
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.decide import complete, worth
-from rtctl.diagnose.find import find
+from rtctl.diagnose.find import find, missed
 from rtctl.diagnose.hypotheses import FALLING, hypotheses
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.name import key, new_starts
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.rework import bears
-from rtctl.diagnose.rubbing import PLAIN, rubbing
+from rtctl.diagnose.rework import bears, dropped
+from rtctl.diagnose.rubbing import PLAIN, bare, rubbing
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.uncertainty import covariance, effect_intervals
 
@@ -75,3 +75,15 @@ def test_what_sticking_falls_to_is_not_taken_from_under_it(found):
     falls = next(i for i, h in enumerate(best.space.hypotheses) if h.term == FALLING)
     alone = best._replace(space=best.space.without(falls))
     assert not any(bears(alone, i) for i in range(len(alone.space.hypotheses)))
+
+
+def test_a_friction_without_which_nothing_could_be_told_is_missed(problem, found):
+    viscous = next(i for i, h in enumerate(found.best.space.hypotheses) if h.term == "friction.viscous")
+    less = dropped(problem, found.best, viscous, 10)
+    assert missed(problem, found.base, less, found.best)
+    assert not missed(problem, found.base, found.best, found.best)
+
+
+def test_bare_is_an_axis_without_any_friction_of_the_owners(problem, plain, searched):
+    assert bare(base_fit(problem.sim, problem))
+    assert not bare(searched(plain)[1])

@@ -1,0 +1,47 @@
+"""The axes that nobody wrote friction down for rub as their equations say, the same every time, and are judged so."""
+
+import importlib
+import json
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.record import load_record
+
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def axes() -> ModuleType:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        return importlib.import_module("bare_axes")
+
+
+def test_at_one_speed_the_drive_pays_for_both_frictions(axes):
+    carriage = axes.Carriage(2.0, 5.0, 3.0, 3.0, 0.01, 3e5, 50.0, 0.0, 0.0)
+    ref = 0.1 * axes.DT * np.arange(4000)  # m, at 0.1 m/s
+    _, u = axes.moved(carriage, axes.Loop(15.0, 40.0, 3.0, 1e-7), ref, np.zeros(4000))
+    assert 3.0 * np.mean(u[2000:]) == pytest.approx(3.0 + 5.0 * 0.1, rel=0.01)
+
+
+def test_a_case_is_a_bundle_and_the_same_every_time(axes, tmp_path):
+    assert axes.conceal(tmp_path / "a", 7, 1) == ("friction.stribeck",)
+    axes.conceal(tmp_path / "b", 7, 1)
+    one, two = (load_record(tmp_path / name) for name in "ab")
+    np.testing.assert_array_equal(one.y["x"], two.y["x"])
+    assert set(one.case.parameters) == {"M"}
+
+
+def test_what_is_told_is_counted(axes, tmp_path):
+    hidden = {"a": (), "b": ("friction.stribeck",), "c": ("drive.offset",), "d": ("friction.stribeck",)}
+    told = {"a": ("named", [*axes.PLAIN, axes.BRISTLES]), "b": ("named", [*axes.PLAIN]),
+            "c": ("ambiguous", [*axes.PLAIN, "friction.asymmetry", "drive.offset"]), "d": ("unnamed", [])}  # fmt: skip
+    for case, (verdict, names) in told.items():
+        (tmp_path / case).mkdir()
+        entry = {"verdict": verdict, "effects": [{"name": name} for name in names]}
+        (tmp_path / case / "diagnosis.json").write_text(json.dumps(entry))
+    found = axes.judged(hidden, tmp_path)
+    assert (found["right"], found["ambiguous_with_it"], set(found["others"])) == (1, 1, {"b", "d"})
