@@ -12,17 +12,14 @@ Source: Canudas de Wit, Olsson, Astrom & Lischinsky, A new model for control of 
 (1995); Janot, Gautier & Brunot, Data set and reference models of EMPS (2019) for the kind.
 """
 
-import argparse
 import json
-import subprocess
-import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from lateness import rtctl_command
+from concealed import run
 from numba import njit
 
 DT, FINE, SECONDS = 1e-3, 40, 20.0  # s, steps of the integration a sample, s
@@ -148,27 +145,10 @@ def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
     return {"cases": len(hidden), "right": right, "ambiguous_with_it": among, "others": others}
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=100)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="keep cases and diagnoses here")
-    parser.add_argument("--json", action="store_true")
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:
-        out = given.out or Path(name)
-        cases = {f"case-{k:04d}": conceal(out / "cases" / f"case-{k:04d}", given.seed, k) for k in range(given.count)}
-        command = (*rtctl_command(), "diagnose", str(out / "cases"), "--out", str(out / "told"))
-        subprocess.run((*command, "--jobs", str(given.jobs)), check=True, capture_output=True)
-        found = judged(cases, out / "told")
-    if given.json:
-        print(json.dumps(found))
-        return
-    print(f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with all of it")
-    for case, entry in found["others"].items():
-        print(f"{case}: {entry}")
+def told(found: dict[str, Any]) -> list[str]:
+    """Lines of what was found."""
+    return [f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with all of it"]
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, conceal, judged, told, count=8, seed=100)

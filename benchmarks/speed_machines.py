@@ -12,17 +12,14 @@ Source for the kind: Wigren & Schoukens, Three free data sets for development an
 identification, ECC 2013 (coupled electric drives, whose sensor does not know direction).
 """
 
-import argparse
 import json
-import subprocess
-import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from lateness import rtctl_command
+from concealed import run
 from numba import njit
 from scipy.optimize import least_squares
 
@@ -172,31 +169,14 @@ def judged(hidden: dict[str, tuple[str, ...]], out: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=48)
-    parser.add_argument("--seed", type=int, default=60)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="keep cases and diagnoses here")
-    parser.add_argument("--json", action="store_true")
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:
-        out = given.out or Path(name)
-        cases = {f"case-{k:04d}": conceal(out / "cases" / f"case-{k:04d}", given.seed, k) for k in range(given.count)}
-        command = (*rtctl_command(), "diagnose", str(out / "cases"), "--out", str(out / "told"))
-        subprocess.run((*command, "--jobs", str(given.jobs)), check=True, capture_output=True)
-        found = judged(cases, out / "told")
-    if given.json:
-        print(json.dumps(found))
-        return
-    print(
-        f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with the right names"
-    )
-    print(f"false alarms {found['false_alarms']} of {found['nothing_missing']}")
-    print(f"names right {found['names_right']} of {found['names_given']}, gap closed {found['gap_closed_median']}")
-    for case, entry in found["others"].items():
-        print(f"{case}: {entry}")
+def told(found: dict[str, Any]) -> list[str]:
+    """Lines of what was found."""
+    return [
+        f"{found['right']} of {found['cases']} right, {found['ambiguous_with_it']} more ambiguous with the right names",
+        f"false alarms {found['false_alarms']} of {found['nothing_missing']}",
+        f"names right {found['names_right']} of {found['names_given']}, gap closed {found['gap_closed_median']}",
+    ]
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, conceal, judged, told, count=48, seed=60)

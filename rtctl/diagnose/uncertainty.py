@@ -116,7 +116,7 @@ def at_standstill(own: dict[str, Interval], fitted: Fit, index: int, cov: np.nda
         if (found.term, found.node) == ("friction.coulomb", h.node):
             columns = [fitted.space.columns(index)[0], fitted.space.columns(other)[0]]
             slope = np.array([h.coordinates[0].scale, found.coordinates[0].scale])
-            half = Z90 * float(np.sqrt(max(slope @ cov[np.ix_(columns, columns)] @ slope, 0.0)))
+            half = _half(slope, columns, cov)
             total = own["F_s"].value + found.values(fitted.space.parts(fitted.x)[other])["F_C"]
             return {**own, "F_s": Interval(total, total - half, total + half, own["F_s"].unit)}
     return own
@@ -133,9 +133,14 @@ def with_total(
         return {"F_added": added, **own}
     i, dry = fitted.space.names.index(name), dry_friction(fitted.model.kind, fitted.model.base, h.node)
     slope = np.array([dry, h.coordinates[0].scale])
-    half = Z90 * float(np.sqrt(max(slope @ cov[np.ix_([i, column], [i, column])] @ slope, 0.0)))
+    half = _half(slope, [i, column], cov)
     total = dry + added.value
     return {"F_C": Interval(total, total - half, total + half, added.unit), "F_added": added}
+
+
+def _half(slope: np.ndarray, columns: list[int], cov: np.ndarray) -> float:
+    """Half the width of the interval of a sum of coordinates, each times its slope."""
+    return Z90 * float(np.sqrt(max(slope @ cov[np.ix_(columns, columns)] @ slope, 0.0)))
 
 
 def _turn(

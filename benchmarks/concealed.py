@@ -1,0 +1,42 @@
+"""What benchmarks of the diagnosis share: cases made, diagnosed by the command, judged, printed."""
+
+import argparse
+import json
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from lateness import rtctl_command
+
+Hidden = dict[str, tuple[str, ...]]  # case: what is in it
+
+
+def run(
+    text: str | None,
+    conceal: Callable[[Path, int, int], tuple[str, ...]],
+    judged: Callable[[Hidden, Path], dict[str, Any]],
+    told: Callable[[dict[str, Any]], list[str]],
+    count: int,
+    seed: int,
+) -> None:
+    """The command line of a benchmark with this help `text` and usual `count` and `seed`: `conceal(folder, seed, k)`
+    writes case k, `judged(hidden, folder)` counts what the diagnoses say, `told(found)` are lines of that."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=count)
+    parser.add_argument("--seed", type=int, default=seed)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, help="keep cases and diagnoses here")
+    parser.add_argument("--json", action="store_true")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:
+        out = given.out or Path(name)
+        cases = {f"case-{k:04d}": conceal(out / "cases" / f"case-{k:04d}", given.seed, k) for k in range(given.count)}
+        command = (*rtctl_command(), "diagnose", str(out / "cases"), "--out", str(out / "told"))
+        subprocess.run((*command, "--jobs", str(given.jobs)), check=True, capture_output=True)
+        found = judged(cases, out / "told")
+    if given.json:
+        print(json.dumps(found))
+        return
+    print(*told(found), *(f"{case}: {entry}" for case, entry in found["others"].items()), sep="\n")
