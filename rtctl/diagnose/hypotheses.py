@@ -282,12 +282,13 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
                 turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
                 step, longest = min(1e-2, TURN / turns), part.reach
                 if part.kind == "wavelength":  # less than a whole one is a spring and a push, or any curve
-                    longest = min(longest, float(np.log(turns / (2 * np.pi))))
+                    least = 2 if _sprung(m) else 1  # where a spring has to bend a single one may be its own law's
+                    longest = min(longest, float(np.log(turns / (2 * np.pi * least))))
                 if longest > 0.0:
                     yield (Coordinate(part.name, SHAPE, value, -part.reach, longest, step=step),), {}
     elif isinstance(part, Where):
         yield (), {}
-        if not (m.record.plant == "axis" and m.base.get("k", 0.0)):  # whose own spring would take up all but a push
+        if not _sprung(m):  # whose own spring would take up all but a push
             yield (), {part.name: m.scale(node).at(0.5)}
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
@@ -307,3 +308,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
     else:
         for value in part.values:
             yield (), {part.name: value * m.of(part.measure, node) if part.measure else value}
+
+
+def _sprung(m: Measures) -> bool:
+    """Whether it is an axis on a spring."""
+    return m.record.plant == "axis" and m.base.get("k", 0.0) > 0.0

@@ -16,7 +16,7 @@ from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import HINTED
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, enrich, polish, whole_orders
-from rtctl.diagnose.rubbing import rubbing
+from rtctl.diagnose.rubbing import rubbing, soft
 from rtctl.diagnose.scan import bumps, resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
@@ -109,6 +109,8 @@ def search(
             if not quiet and not (full and not sure and enough(full[0]) and worth(beam[0], full[0])):
                 progress("looking for resonances")
                 full = sorted([*full, *resonances(problem, beam[0], scores)], key=absurd_last)
+            if not quiet and not (full and full[0].rms < decide.COMPLETE * problem.floor):
+                full = sorted([*full, *soft(problem, beam[0], candidates)], key=absurd_last)
         elif problem.sim.case.controller.kind == "none" and not (full and enough(full[0])):  # most ring freely then
             progress(f"looking for resonances beside {' + '.join(names(beam[0]))}")
             further = [score for score in scores if score.hypothesis.name not in names(beam[0])]

@@ -3,17 +3,23 @@
 Dry and viscous friction are then one first step: each alone is a poor model, beside which a weak supply or a limit of
 the drive looks better than the other one does, and the laws that only alter friction (sticking, give, another for each
 direction) have nothing to alter.
+
+Bristles are dry friction too, and where they bend through most of the travel, as in a spring with hysteresis, plain dry
+friction is as poor a model of them as none, and bristles without a limit do nothing: the two come together.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
-from rtctl.diagnose.fit import Fit, fit
+from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import polish
 from rtctl.diagnose.space import Hypothesis
 
 PLAIN = ("friction.coulomb", "friction.viscous")
 OWN = ("F_c", "F_v")  # the owner's names of them
+DRY, BRISTLES = "friction.coulomb", "friction.presliding"
+SOFT = (1.0, 30.0, 300.0)  # times the least that bristles are tried with, up to a third of the travel
 
 
 def bare(base: Fit) -> bool:
@@ -34,3 +40,22 @@ def rubbing(problem: Problem, base: Fit, candidates: Sequence[Hypothesis]) -> Fi
     for i, h in enumerate(space.hypotheses):  # both brake: from there it is one trough
         x[space.columns(i)[h.sizes]] = 1.0
     return polish(problem, fit(problem, space, x, rounds=16))
+
+
+def soft(problem: Problem, model: Fit, candidates: Sequence[Hypothesis]) -> list[Fit]:
+    """The model with dry friction on bristles, from stiff and from soft ones; nothing where the owner has dry friction,
+    or the machine is no axis."""
+    there = {h.term for h in model.space.hypotheses}
+    kinds = {h.term: h for h in (*reversed(candidates), *model.space.hypotheses) if h.term in (DRY, BRISTLES)}
+    if model.model.kind != "axis" or model.model.base.get(OWN[0], 0.0) or len(kinds) < 2:
+        return []
+    space = model.space.add(*(h for term, h in kinds.items() if term not in there))
+    starts = []
+    for share in SOFT if BRISTLES not in there else ():
+        x = space.start()
+        x[: len(model.x)] = model.x
+        for i, h in enumerate(space.hypotheses):
+            if h.term not in there:
+                x[space.columns(i)[h.sizes]] = share if h.term == BRISTLES else 1.0
+        starts.append(x)
+    return parallel([partial(fit, problem, space, x, rounds=16) for x in starts])

@@ -214,6 +214,16 @@ def test_a_wave_comes_once_in_the_travel_at_least(moved, kind, term, name):
     assert max(longest for _, longest in lengths) == pytest.approx(span)
 
 
+@pytest.mark.parametrize(("k", "least"), [(0.0, 1), (900.0, 2)])
+def test_where_a_spring_bends_a_wave_comes_twice(moved, k, least):
+    """One would follow what the spring's own law is not."""
+    record, base = moved("axis")
+    span = node_scales(record, base)["carriage"].span
+    found = hypotheses(record, {**base, "k": k}, {"wavelength": [0.3 * span]}, only=("ripple.cogging",))
+    lengths = [c.scale * np.exp(c.high) for h in found for c in h.coordinates if c.name == "turn"]
+    assert max(lengths) == pytest.approx(span / least)
+
+
 @pytest.mark.parametrize(("k", "places"), [(0.0, 2), (900.0, 1)])
 def test_beside_the_owners_spring_another_about_the_middle_would_be_a_push(blank, k, places):
     t = np.arange(2000) / 1000
