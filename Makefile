@@ -6,7 +6,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# bytecode is written of what is imported, when it is: most files of the libraries never are
+# bytecode is written of what is imported, when it is: most files of the libraries never are. Where it may not be
+# written, every process compiles some 400 files anew, which takes longer than most that the tests start
+unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 .PHONY: run test check format docs bench clean
