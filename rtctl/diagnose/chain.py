@@ -102,7 +102,10 @@ def searched(record: Record, progress: Progress) -> Found:
     if base.rms < decide.LOUD * problem.floor or decide.quiet(problem, base, found.best):
         return found
     quick, fitted = base_of(Simulator(record, follow=faster))
-    return find(quick.sim, quick, progress, fitted) if tells(found, quick, fitted) else found
+    if not tells(found, quick, fitted):
+        return found
+    again = find(quick.sim, quick, progress, fitted)
+    return found if stays(found, again) else again
 
 
 def held_or_smooth(record: Record, progress: Progress) -> Found:
@@ -134,6 +137,18 @@ def tells(found: Found, quick: Problem, fitted: Fit) -> bool:
     if fitted.rms >= SHOWS * quick.floor:  # what is missing still shows
         return True
     return not found.best.space.hypotheses and quick.hiss(fitted.r)  # all the rest was wandering
+
+
+def stays(found: Found, again: Found) -> bool:
+    """Whether what was `found` has the say, and not what was found `again` under another correction: where that may not
+    be told, and this may and follows the record better, seen under that one, or all there was is hiss."""
+    if decide.enough(again.problem, again.base, again.best):
+        return False
+    if not found.best.space.hypotheses:
+        return found.problem.hiss(found.base.r)
+    if not decide.enough(found.problem, found.base, found.best):
+        return False
+    return fit(again.problem, found.best.space, found.best.x, rounds=10).merit < again.best.merit
 
 
 def read_through(sim: Simulator, found: Found, progress: Progress) -> Found:

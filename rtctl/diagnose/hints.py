@@ -29,7 +29,7 @@ ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)]
 WHOLE = tuple(map(float, range(2, 49)))  # of slots and poles: where it turns fast none stands out, and each is tried
 SEEN = 2.0  # times the observer's bandwidth: a quicker ripple is not in what it shows
 SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
-FINEST = 400.0  # waves along the way of an axis: 2 mm of a screw on 0.8 m
+FINEST = 1000.0  # waves along the way of an axis: 1 mm of a screw on a metre
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 
 

@@ -28,7 +28,9 @@ ROBUST = 3  # rounds of weights
 STARTS = 3  # of one hypothesis that later rounds try
 ORDERS = {"ripple.cogging": 6}  # more of them: of orders that pass slowly at a few places only, a look shows little
 MOST = 3  # terms at once
+WAVES = ("turn", "wavelength", "per_turn")  # what a wave is as long as, or how often it comes
 ROUGH = 4  # rounds of a rough fit
+LESS, SHORTER = 3, 0.3  # steps back from a start that does worse than nothing, and how far each goes
 RICHER, LIKELY = 3.0, 4  # times the best cost, up to which models are tried in richer forms, and how many of them
 
 
@@ -42,7 +44,7 @@ class Breadth(NamedTuple):
 
 
 ROUNDS = (Breadth(14, 5, 2, 3), Breadth(9, 4, 0, 2), Breadth(7, 3, 0, 2))
-ALIKE = 1.01  # times the cost: the same terms at other nodes do the same
+ALIKE, NEAR = 1.01, 1.1  # times the cost: the same terms at other nodes do the same; one beside equal laws does
 QUIET = 1.2  # times the noise floor: a heavy resonance leaves more
 QUICK = Breadth(8, 2, 0, 2)  # where the model is already down to the noise
 
@@ -175,19 +177,35 @@ def grow(
     progress("fitting " + ", ".join(" + ".join(names(f)) for f in ranked[:3]))
     ranked += [trial for trial in likely if not any(trial is f for f in ranked)]
     best, limit = min(f.cost for f in ranked), np.inf
-    fits: dict[tuple[str, ...], Fit] = {}
+    fits: dict[tuple, Fit] = {}
     for trial in ranked:
         fitted = from_both(problem, trial, best, None if away is None else away.x, limit * best)
         best = min(best, fitted.cost)
         limit = RICHER if enough(fitted) else limit
-        if names(fitted) not in fits or fitted.cost < fits[names(fitted)].cost:
-            fits[names(fitted)] = fitted
+        kind = names(fitted), lengths(fitted)
+        if kind not in fits or fitted.cost < fits[kind].cost:
+            fits[kind] = fitted
     full = sorted(fits.values(), key=absurd_last)
     near = [f for i, f in enumerate(full) if i < breadth.keep or f.cost < RICHER * full[0].cost]
-    near = various(near, max(breadth.keep, LIKELY))
+    near = various(near, max(breadth.keep, LIKELY) + len(near) - len({names(f) for f in near}))
     rest = [f for f in full if not any(f is n for n in near)]
     near = parallel([partial(finish, problem, f, f.cost < 6 * near[0].cost) for f in near])
-    return sorted([*near, *rest], key=absurd_last), first
+    each: dict[tuple[str, ...], Fit] = {}
+    for fitted in sorted([*near, *rest], key=absurd_last):
+        each.setdefault(names(fitted), fitted)
+    return list(each.values()), first
+
+
+def lengths(fitted: Fit) -> tuple[int, ...]:
+    """What tells the waves of a model from others of the same terms, to a tenth: a plain wave that is not there may do
+    better than the plain form of one that is, whose harmonics are its own."""
+    found = [
+        h.values(x)[c.name]
+        for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True)
+        for c in h.coordinates
+        if c.name in WAVES
+    ]
+    return tuple(round(10 * float(np.log(value))) for value in found)
 
 
 def finish(problem: Problem, fitted: Fit, close: bool) -> Fit:
@@ -198,16 +216,22 @@ def finish(problem: Problem, fitted: Fit, close: bool) -> Fit:
 
 
 def various(ranked: Sequence[Fit], count: int) -> list[Fit]:
-    """The first `count` that are not the same terms doing the same at other nodes; those only of the very first."""
-    kinds: list[tuple[list[str], float]] = []
+    """The first `count` that are not the same terms doing the same at other nodes, nor the same further term doing the
+    same beside another of equal laws; those only of the very first."""
+    kinds: list[tuple[list[str], str, float]] = []
     out = []
     for trial in ranked:
         terms = sorted(h.term for h in trial.space.hypotheses)
-        same = [i for i, (other, cost) in enumerate(kinds) if other == terms and trial.cost < ALIKE * cost]
+        last = trial.space.hypotheses[-1].name if len(terms) > 1 else ""
+        same = [
+            i
+            for i, (other, more, cost) in enumerate(kinds)
+            if (other == terms and trial.cost < ALIKE * cost) or (more == last != "" and trial.cost < NEAR * cost)
+        ]
         if not same:
             if len(kinds) == count:
                 break
-            kinds.append((terms, trial.cost))
+            kinds.append((terms, last, trial.cost))
         if not same or same[0] == 0:
             out.append(trial)
     return out
@@ -338,13 +362,21 @@ def shortlist(scores: Sequence[Score], count: int) -> list[Score]:
 def roughly(problem: Problem, parent: Fit, score: Score) -> Fit:
     """A few cheap rounds: the parent's Jacobian for what it has, new columns for the hypothesis.
 
-    They begin where the score has moved the parent's parameters to or where they were, whichever is better.
+    They begin where the score has moved the parent's parameters to or where they were, whichever is better; where both
+    are worse than the parent, which has none of it, with less of it.
     """
     space: Space = parent.space.add(score.hypothesis)
     old = parent.J.shape[1]
     starts = [np.clip(score.x, *space.bounds())]
     starts.append(np.concatenate([parent.x, starts[0][old:]]))
     costs = [float(np.sum(problem.residual(space.model(x), coarse=True) ** 2)) for x in starts]
+    for _ in range(LESS):
+        if min(costs) <= 2.0 * parent.cost:
+            break
+        x = starts[-1].copy()
+        x[old:][score.hypothesis.sizes] *= SHORTER
+        starts.append(x)
+        costs.append(float(np.sum(problem.residual(space.model(x), coarse=True) ** 2)))
     x = starts[int(np.argmin(costs))]
     J = np.concatenate([parent.J, jacobian(problem, space, x, range(old, len(x)))], axis=1)
     return fit(problem, space, x, rounds=ROUGH, J=J, rough=True)

@@ -21,7 +21,7 @@ EDGES = 0.5  # share of the main sensor's rows that all edges count for: they ar
 FLOOR = {"capstan_counts": 0.86, "encoder_counts": 0.9, "scale_counts": 0.9}  # of SIGMA, on quiet machines
 RECTIFIED = ("reel1_counts", "reel2_counts")
 FINEST = 1.8  # floor of a position in m or rad, whose SIGMA is half its resolution: stops are never quite hard
-LOUDEST = 20.0  # times the floor, of what random forces leave
+LOUDEST = {"ivu": 20.0, "ldu": 20.0, "axis": 80.0}  # times the floor, of what random forces leave
 ADDED = 2.0  # the same by what a white force adds up to, of a speed
 EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond which that has to have their very pattern
 SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
@@ -185,7 +185,7 @@ class Problem:
         """Times the floor, of what random forces leave. Where the floor is the record's own they are in it, and what
         they do from one row to the next adds up for as long as the correction remembers."""
         if not self.measured:
-            return LOUDEST
+            return LOUDEST[self.sim.record.plant]
         return ADDED / float(np.sqrt(2.8 * self.sim.follow * self.sim.record.dt * self.mean))
 
     def commanded(self, r: np.ndarray) -> bool:

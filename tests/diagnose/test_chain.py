@@ -8,7 +8,16 @@ import pytest
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import chain
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.chain import borne_out, diagnose_record, misread, slip_is_imagined, sound, tells, without_reels
+from rtctl.diagnose.chain import (
+    borne_out,
+    diagnose_record,
+    misread,
+    slip_is_imagined,
+    sound,
+    stays,
+    tells,
+    without_reels,
+)
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, as_json
 from rtctl.diagnose.fit import fit
 from rtctl.diagnose.kernel import CLOSED
@@ -221,3 +230,27 @@ def test_a_quicker_correction_is_asked_where_something_shows_or_where_all_was_wa
     found = SimpleNamespace(best=SimpleNamespace(space=SimpleNamespace(hypotheses=names)))
     quick = SimpleNamespace(floor=1.0, hiss=lambda r: hiss)
     assert tells(found, quick, SimpleNamespace(rms=left, r=None)) == expected
+
+
+@pytest.mark.parametrize(
+    ("told", "names", "again", "merit", "hiss", "expected"),
+    [
+        (True, ("ripple.cogging",), False, 1.0, False, True),
+        (True, ("ripple.cogging",), False, 3.0, False, False),
+        (True, ("ripple.cogging",), True, 1.0, False, False),
+        (False, ("ripple.cogging",), False, 1.0, True, False),
+        (False, (), False, 1.0, False, False),
+        (False, (), False, 1.0, True, True),
+        (False, (), True, 1.0, True, False),
+    ],
+)
+def test_a_quicker_correction_has_the_say_unless_it_shows_less(monkeypatch, told, names, again, merit, hiss, expected):
+    """What may be told stays, and so does that there is nothing but random forces."""
+
+    def found(enough, merit):
+        best = SimpleNamespace(space=SimpleNamespace(hypotheses=names), x=None, merit=merit, enough=enough)
+        return SimpleNamespace(problem=SimpleNamespace(hiss=lambda r: hiss), base=SimpleNamespace(r=None), best=best)
+
+    monkeypatch.setattr(chain.decide, "enough", lambda problem, base, best: best.enough)
+    monkeypatch.setattr(chain, "fit", lambda problem, space, x, rounds: SimpleNamespace(merit=merit))
+    assert stays(found(told, 0.5), found(again, 2.0)) == expected

@@ -18,8 +18,10 @@ from rtctl.diagnose.name import (
     from_both,
     grow,
     held,
+    lengths,
     names,
     rivals,
+    roughly,
     shortlist,
     various,
 )
@@ -168,6 +170,20 @@ def test_where_one_model_is_enough_the_next_start_is_not_screened(tilted, search
         assert full[0].cost == pytest.approx(looked.rounds[0][0].cost, rel=0.02)
 
 
+def test_waves_of_other_lengths_are_all_taken_to_their_richer_forms(tilted, searched, monkeypatch):
+    """A plain wave that is not there may do better than the plain form of one that is."""
+    problem, base, _ = searched(tilted)
+    found = {"wavelength": [0.01, 0.011, 0.02]}  # of which the first two are the same
+    waves = hypotheses(tilted.record, base.model.base, found, only=("ripple.cogging",))
+    finished = []
+    monkeypatch.setattr(name, "RICHER", 100.0)
+    monkeypatch.setattr(name, "from_both", lambda problem, trial, *others: trial)
+    monkeypatch.setattr(name, "finish", lambda problem, fitted, close: finished.append(lengths(fitted)) or fitted)
+    full, _ = grow(problem, [base], waves, ROUNDS[0], None, lambda f: False, lambda text: None)
+    assert len(finished) == len(set(finished)) == 2
+    assert [names(f) for f in full] == [("ripple.cogging:carriage",)]
+
+
 def test_a_shortlist_has_two_starts_of_one_and_three_nodes_of_one_at_most():
     told = [("a", "m1", 9.0)] * 3 + [("a", n, 8.0) for n in ("m2", "m3", "m4")] + [("b", "m1", 1.0), ("c", "m1", 0.0)]
     chosen = [(s.hypothesis.term, s.hypothesis.node) for s in shortlist(scores(*told), 20)]
@@ -208,3 +224,23 @@ def test_full_fits_go_to_various_terms():
     assert various(ranked, 4) == [ranked[i] for i in (0, 1, 2, 4, 5)]  # nodes of the best stay open
     assert various(ranked, 1) == ranked[:2]
     assert various([], 3) == []
+
+
+def test_one_term_beside_equal_laws_fills_one_place():
+    ranked = [
+        doing(1.0, "drive.offset:drive1", "friction.stribeck:capstan"),
+        doing(1.02, "friction.asymmetry:motor1", "friction.stribeck:capstan"),
+        doing(1.5, "drive.offset:drive1", "friction.stribeck:motor2"),
+        doing(1.55, "friction.asymmetry:motor1", "friction.stribeck:motor2"),
+        doing(1.7, "drive.offset:drive1", "friction.stribeck:motor1"),
+    ]
+    assert various(ranked, 3) == [ranked[i] for i in (0, 1, 2, 4)]
+
+
+def test_from_where_a_term_does_worse_than_nothing_less_of_it_is_tried(tilted, searched):
+    problem, base, _ = searched(tilted)
+    (band,) = hypotheses(tilted.record, base.model.base, only=("drive.offset",))
+    far = Score(band, 1.0, np.append(base.x, 40.0), 0.0, 1.0)
+    start = problem.residual(base.space.add(band).model(far.x))
+    assert 0.5 * float(start @ start) > 10 * base.cost
+    assert roughly(problem, base, far).cost < base.cost
