@@ -21,6 +21,7 @@ MOST = 4  # hints of a kind
 JUMPS = 47
 AROUND = 8  # ticks that a jump is compared with
 SURE, UNSURE = 6.0, 4.0  # times the noise from tick to tick: a jump, and one if there are others like it
+TWIN = 1.4  # times another jump nearby, which is as large
 ALIKE = 2.5  # times the same: jumps that differ by less may be of one size
 SENSORS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)}
 CALM = {"ivu": 0.02, "ldu": 2e-3}  # s, over which an acceleration is taken
@@ -172,8 +173,8 @@ def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 80) -> lis
 def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:
     """Rows and sizes of sudden steps of the error (n,) that do not come back at once, the largest first.
 
-    `count` is the sensor's step in the error's unit. A jump takes one tick: it stands out of the ticks around it, which
-    a vibration or a reversal that the model misses does not. Where one is sure, others as large may be less so; and
+    `count` is the sensor's step in the error's unit. A jump takes one tick: it stands out of the ticks around it, but for
+    one more jump at most, which a vibration or a reversal that the model misses does not. Where one is sure, others as large may be less so; and
     where noise makes what they differ by, they are alike.
     """
     step = np.diff(error)
@@ -183,7 +184,9 @@ def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:
     for k in np.flatnonzero(np.abs(step) > max(UNSURE * quiet, 2.5 * count)):
         if not AROUND < k < len(step) - AROUND:
             continue
-        near = np.abs(np.delete(step[k - AROUND : k + AROUND + 1], AROUND))
+        near = np.sort(np.abs(np.delete(step[k - AROUND : k + AROUND + 1], AROUND)))
+        if near[-1] < TWIN * abs(step[k]) < TWIN**2 * near[-1]:  # another as large, which stands out as well
+            near = near[:-1]
         size = float(np.median(error[k + 1 : k + 4]) - np.median(error[k - 2 : k + 1]))
         if abs(step[k]) > 4 * np.median(near) and abs(step[k]) > 2 * near.max() and abs(size) > 0.6 * abs(step[k]):
             (found if abs(step[k]) > SURE * quiet else unsure).append((int(k) + 1, size))

@@ -92,6 +92,15 @@ def test_a_reversal_that_the_model_misses_is_no_jump():
     assert jumps(error, 1.0) == []
 
 
+def test_two_jumps_within_a_few_ticks_are_two():
+    error = np.random.default_rng(3).normal(0.0, 0.3, 1000)
+    error[500:] += 33.0
+    error[502:] += 33.0
+    assert sorted(k for k, _ in jumps(error, 1.0)) == [500, 502]
+    error[504:] += 33.0  # three are a motion
+    assert jumps(error, 1.0) == []
+
+
 def test_in_noise_nothing_jumps():
     error = 0.5 * np.random.default_rng(1).standard_normal(4000)
     assert jumps(error, 1.0) == []
