@@ -52,7 +52,7 @@ def screen(problem: Problem, fitted: Fit, candidates: list[Hypothesis]) -> list[
         end = at + max(len(h.sizes), 1)
         C, step = np.stack(changes[at:end], axis=1), np.array(steps[at:end])
         at = end
-        if np.isfinite(C).all() and np.abs(C).max() < RUNAWAY:
+        if np.isfinite(C).all() and (not h.sizes or np.abs(C).max() < RUNAWAY):  # what is there or not may do any much
             score = _line(ground, h, C / step) if h.sizes else Score(h, -np.inf, fitted.x, 0.0, 0.0)
             if len(step) == 1:
                 there = _there(ground, score, C[:, 0], step[0])

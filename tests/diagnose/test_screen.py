@@ -95,3 +95,13 @@ def test_one_that_runs_away_is_left_out_and_a_limit_is_tried_from_far(plain, sea
     scores = screen(Problem(plain.sim), base, [away, limit])
     assert limit in [s.hypothesis for s in scores]
     assert all(np.isfinite(s.gain) for s in scores)
+
+
+def test_what_is_there_or_not_may_do_any_much(make_axis, searched, monkeypatch):
+    """A sensor without direction adds up all the way that a machine has gone, however long."""
+    problem, base, _ = searched(make_axis({"term": "sensor.rectified", "node": "sensor", "share": 1.0}))
+    blind = Hypothesis("sensor.rectified", "sensor", (), {"share": 1.0})
+    candidates = [blind, *hypotheses(problem.sim.record, base.model.base, only=("load.spring",))]
+    monkeypatch.setattr("rtctl.diagnose.screen.RUNAWAY", 0.0)
+    scores = screen(problem, base, candidates)
+    assert [s.hypothesis.term for s in scores] == ["sensor.rectified"]
