@@ -173,9 +173,9 @@ def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 80) -> lis
 def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:
     """Rows and sizes of sudden steps of the error (n,) that do not come back at once, the largest first.
 
-    `count` is the sensor's step in the error's unit. A jump takes one tick: it stands out of the ticks around it, but for
-    one more jump at most, which a vibration or a reversal that the model misses does not. Where one is sure, others as large may be less so; and
-    where noise makes what they differ by, they are alike.
+    `count` is the sensor's step in the error's unit. A jump takes one tick: it stands out of the ticks around it, but
+    for one more jump at most, which a vibration or a reversal that the model misses does not. Where one is sure, others
+    as large may be less so; and where noise makes what they differ by, they are alike.
     """
     step = np.diff(error)
     quiet = 1.4826 * float(np.median(np.abs(step - np.median(step)))) + 0.3 * count
