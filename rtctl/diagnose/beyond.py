@@ -9,9 +9,9 @@ from collections.abc import Callable
 from rtctl.diagnose import chances, decide
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.hypotheses import hypotheses
-from rtctl.diagnose.name import look_alikes
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, polish
+from rtctl.diagnose.rivals import look_alikes
 from rtctl.diagnose.screen import screen
 
 IMITATED = {  # by which names of the table

@@ -11,9 +11,10 @@ from rtctl.diagnose.forms import is_rich, renamed
 from rtctl.diagnose.hints import hints
 from rtctl.diagnose.hypotheses import USUAL, hypotheses
 from rtctl.diagnose.jitter import Jitter, allowed_for, jitter, pushed
-from rtctl.diagnose.name import Search, absurd_last, look_alikes, names, rivals, search
+from rtctl.diagnose.name import Search, absurd_last, names, search
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, eliminate, enrich, exchanged, placed, polish, with_other
+from rtctl.diagnose.rivals import look_alikes, rivals
 from rtctl.diagnose.rubbing import bare
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis

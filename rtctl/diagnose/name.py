@@ -5,7 +5,7 @@ the likely ones roughly, the best of those in full, and keeps the best few, so t
 something else is still found. Then what is no longer needed is taken out.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from rtctl.diagnose import decide, plausible
 from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
 from rtctl.diagnose.hypotheses import HINTED
 from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.rework import dropped, enrich, polish, whole_orders
+from rtctl.diagnose.rework import enrich, polish, whole_orders
 from rtctl.diagnose.rubbing import rubbing, soft
 from rtctl.diagnose.scan import bumps, resonances, slack
 from rtctl.diagnose.screen import Score, screen
@@ -380,27 +380,3 @@ def roughly(problem: Problem, parent: Fit, score: Score) -> Fit:
     x = starts[int(np.argmin(costs))]
     J = np.concatenate([parent.J, jacobian(problem, space, x, range(old, len(x)))], axis=1)
     return fit(problem, space, x, rounds=ROUGH, J=J, rough=True)
-
-
-def rivals(
-    problem: Problem, found: Fit, index: int, candidates: Sequence[Hypothesis], alike: Collection[str], most: int = 3
-) -> list[Fit]:
-    """Full fits in which term `index` is replaced by each of the most likely others, and by those that look `alike`."""
-    rest = dropped(problem, found, index, 4)
-    taken = {h.name for h in found.space.hypotheses}
-    scores = screen(problem, rest, [h for h in candidates if h.name not in taken])
-    rough = parallel([partial(roughly, problem, rest, score) for score in shortlist(scores, 8)])
-    rough = sorted(rough, key=lambda f: f.merit)[:most]
-    best = parallel([partial(well, problem, f, f.x, found.cost) for f in rough])
-    seen = {f.space.hypotheses[-1].term for f in best}
-    return sorted([*best, *look_alikes(problem, rest, scores, set(alike) - seen, found.cost)], key=lambda f: f.merit)
-
-
-def look_alikes(problem: Problem, rest: Fit, scores: Sequence[Score], terms: Collection[str], cost: float) -> list[Fit]:
-    """Full fits of these terms on top of `rest`, each at the node and start that does best at first sight."""
-    first: dict[str, Score] = {}
-    for score in scores:
-        if score.hypothesis.term in terms and np.isfinite(score.gain):
-            first.setdefault(score.hypothesis.term, score)
-    rough = parallel([partial(roughly, problem, rest, score) for score in first.values()])
-    return parallel([partial(well, problem, f, f.x, cost) for f in rough])
