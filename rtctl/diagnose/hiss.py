@@ -1,11 +1,12 @@
 """Whether what is left is hiss: forces without any pattern, which a machine makes and no hypothesis explains.
 
 The correction that keeps a model on track lets a force d (per unit of inertia) through to the error e by
-e'' + 1.4 w e' + w^2 e = d. Where d is white, or white noise through a lag that is shorter than the correction's own,
-and the sensor's noise is white beside it, the spectrum of e has that shape, with a level and a lag that are unknown.
-Friction, drifts and ripples have another: a peak, a rise to low frequencies, or more error than that level accounts
-for, are no hiss. Nor are errors that come in bursts, where it turns or where it moves: the sum of many small forces is
-normal, with a kurtosis of 3. Nor is what the command of a machine without a controller foretells.
+e'' + (1.4 w + b) e' + (w^2 + k) e = d, where b and k are the machine's own damper and spring. Where d is white, or white
+noise through a lag that is shorter than the correction's own, and the sensor's noise is white beside it, the spectrum of
+e has that shape, with a level and a lag that are unknown. Friction, drifts and ripples have another: a peak, a rise to
+low frequencies, or more error than that level accounts for, are no hiss. Nor are errors that come in bursts, where it
+turns or where it moves: the sum of many small forces is normal, with a kurtosis of 3. Nor is what the command of a
+machine without a controller foretells.
 
 Source: Bartlett, An introduction to stochastic processes (1955), for the cumulative periodogram and its bound; Whittle,
 Arkiv for Matematik 2 (1953), for the likelihood of a spectrum.
@@ -29,15 +30,25 @@ FORETOLD = 0.2  # share of what chance leaves
 LAGS = (0.1, 0.2, 0.4, 0.7, 1.0)  # of the correction's own time
 
 
-def is_hiss(e: np.ndarray, dt: float, follow: float, floor: float, exact: bool = False, speed: bool = False) -> bool:
+def is_hiss(
+    e: np.ndarray,
+    dt: float,
+    follow: float,
+    floor: float,
+    exact: bool = False,
+    speed: bool = False,
+    own: tuple[float, float] = (0.0, 0.0),
+) -> bool:
     """Of the error e (n,), `dt` s apart, of a model that follows at `follow` rad/s and whose sensor leaves `floor`.
 
-    `exact`: with no more deviation than chance makes in one of a hundred. `speed`: what the sensor shows is one.
+    `exact`: with no more deviation than chance makes in one of a hundred. `speed`: what the sensor shows is one. `own`:
+    damper (1/s) and spring (1/s^2) of the machine, per unit of inertia.
     """
     n = len(e)
     taper = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.05 * n))
     w = 2 * np.pi * np.fft.rfftfreq(n, dt)
-    through = 1.0 / np.abs(1j * w + 1.4 * follow if speed else (follow**2 - w**2) + 1.4j * follow * w) ** 2
+    b, k = own
+    through = 1.0 / np.abs(1j * w + 1.4 * follow if speed else follow**2 + k - w**2 + (1.4 * follow + b) * 1j * w) ** 2
     power = np.abs(np.fft.rfft((e - e.mean()) * taper)) ** 2 / float(np.sum(taper**2))
     band = (w > 2 * np.pi * FROM / (n * dt)) & (w < UPTO * follow)
     count = int(band.sum())

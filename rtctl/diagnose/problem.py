@@ -8,6 +8,7 @@ from copy import copy
 
 import numpy as np
 
+from rtctl.diagnose.case import Case, believed
 from rtctl.diagnose.edges import Edges, alike, edges
 from rtctl.diagnose.hiss import commanded, is_hiss
 from rtctl.diagnose.kernel import TRACK
@@ -219,7 +220,14 @@ class Problem:
         exact = loud > EXACTLY[self.sim.record.plant]
         dt, speed = self.sim.record.dt * self.mean, self.sim.record.shows_speed
         e, floor = main / clock, self.main_floor * rms(1.0 / clock)
-        return is_hiss(e, dt, self.sim.follow, floor, exact, speed) and not self.commanded(r)
+        return is_hiss(e, dt, self.sim.follow, floor, exact, speed, own_of(self.sim.case)) and not self.commanded(r)
+
+
+def own_of(case: Case) -> tuple[float, float]:
+    """Damper (1/s) and spring (1/s^2) of an axis per unit of its inertia, as its owner has them; 0 of other machines,
+    which move freely next to how fast they are corrected."""
+    known = believed(case) if case.plant == "axis" else {}
+    return (known["F_v"] / known["M"], known["k"] / known["M"]) if known.get("M") else (0.0, 0.0)
 
 
 def means(x: np.ndarray, count: int) -> np.ndarray:

@@ -9,9 +9,10 @@ from rtctl.diagnose.hiss import is_hiss
 DT, N, W = 1e-3, 20000, 30.0
 
 
-def error(force: np.ndarray) -> np.ndarray:
-    """e'' + 1.4 W e' + W^2 e = W^2 force, backward differences."""
-    a = np.array([1.0, -2.0, 1.0]) / DT**2 + 1.4 * W * np.array([1.0, -1.0, 0.0]) / DT + np.array([W**2, 0.0, 0.0])
+def error(force: np.ndarray, b: float = 0.0, k: float = 0.0) -> np.ndarray:
+    """e'' + (1.4 W + b) e' + (W^2 + k) e = W^2 force, backward differences."""
+    damper, spring = (1.4 * W + b) * np.array([1.0, -1.0, 0.0]) / DT, np.array([W**2 + k, 0.0, 0.0])
+    a = np.array([1.0, -2.0, 1.0]) / DT**2 + damper + spring
     return lfilter([W**2], a, force)
 
 
@@ -36,6 +37,12 @@ def test_so_are_forces_behind_a_short_lag(seed, size, lag):
     pole = np.exp(-DT / lag)
     force = lfilter([1.0], [1.0, -pole], noise(seed)) * np.sqrt(1.0 - pole**2)
     assert is_hiss(error(size * force) + 0.3 * noise(seed + 1), DT, W, 0.3)
+
+
+def test_a_machine_on_a_spring_lets_less_of_the_slow_ones_through():
+    e = error(30.0 * noise(2), b=6.0, k=2 * W**2) + 0.3 * noise(3)
+    assert is_hiss(e, DT, W, 0.3, exact=True, own=(6.0, 2 * W**2))
+    assert not is_hiss(e, DT, W, 0.3, exact=True)
 
 
 def test_a_reading_that_wanders_is_not():

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from rtctl.diagnose.kernel import TRACK
-from rtctl.diagnose.problem import PARTED, Problem, main_channels, settled
+from rtctl.diagnose.problem import PARTED, Problem, main_channels, own_of, settled
 from rtctl.diagnose.simulate import Simulator
 
 
@@ -90,3 +90,10 @@ def test_random_forces_are_hiss_also_where_a_clock_makes_fast_readings_worth_les
 def test_one_sensor_has_nothing_to_differ_from(plain):
     problem = Problem(plain.sim)
     assert not problem.parted(100.0 * np.ones(len(problem.order)))
+
+
+def test_an_axis_has_a_damper_and_a_spring_of_its_own(blank):
+    u = np.zeros(100)
+    axis = blank("axis", u, parameters={"M": 2.0, "F_v": 6.0, "k": 900.0}).case
+    assert own_of(axis) == (3.0, 450.0)
+    assert own_of(blank("ldu", u).case) == (0.0, 0.0)
