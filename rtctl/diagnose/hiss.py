@@ -1,9 +1,9 @@
 """Whether what is left is hiss: forces without any pattern, which a machine makes and no hypothesis explains.
 
-The correction that keeps a model on track lets a force d (per unit of inertia) through to the error e by
-e'' + (1.4 w + b) e' + (w^2 + k) e = d, where b and k are the machine's own damper and spring. Where d is white, or white
-noise through a lag that is shorter than the correction's own, and the sensor's noise is white beside it, the spectrum of
-e has that shape, with a level and a lag that are unknown. Friction, drifts and ripples have another: a peak, a rise to
+The correction that keeps a model on track lets a force d (per unit of inertia) through to the error e by e'' + (1.4 w
++ b) e' + (w^2 + k) e = d, where b and k are the machine's own damper and spring. Where d is white, or white noise
+through a lag that is shorter than the correction's own, and the sensor's noise is white beside it, the spectrum of e
+has that shape, with a level and a lag that are unknown. Friction, drifts and ripples have another: a peak, a rise to
 low frequencies, or more error than that level accounts for, are no hiss. Nor are errors that come in bursts, where it
 turns or where it moves: the sum of many small forces is normal, with a kurtosis of 3. Nor is what the command of a
 machine without a controller foretells.
