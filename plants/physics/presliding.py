@@ -25,7 +25,7 @@ from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.physics.friction import DRY
 from rtctl.plants.physics.term import Node, Term
 
-NEWTON = 12  # steps at most; each is from below and the last one doubles the digits
+NEWTON = 40  # steps at most, from below: far from the root each is one unit of the exponent, near it digits double
 CLOSE = 1e-13  # of the speed: the root is found
 
 

@@ -3,7 +3,7 @@
 import bench
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rtctl.plants.physics import presliding
@@ -37,6 +37,7 @@ def test_bristles_bend_exactly_and_no_further_than_one(w, one, two, z):
     st.floats(-10, 10),
     st.floats(-6, 3).map(lambda x: 10**x),
 )
+@example(0.0, 0.0, 1.0, 1e-9, 0.0, 1.0, 0.0, 1.0)  # eleven units of the exponent away
 def test_the_force_is_solved_with_the_speed_that_it_makes(w, last, F_C, z, tau, v, vm, gain):
     h = 5e-4
     F = presliding.bristles(w, last * F_C, F_C, z, tau, v, vm, gain, h)
