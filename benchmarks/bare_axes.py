@@ -17,9 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from concealed import run
+from concealed import run, write
 from numba import njit
 
 DT, FINE, SECONDS = 1e-3, 40, 20.0  # s, steps of the integration a sample, s
@@ -118,16 +116,12 @@ def conceal(folder: Path, seed: int, k: int) -> tuple[str, ...]:
     )  # fmt: skip
     loop = Loop(15.0, 60.0 * M / gain, gain, 2e-6 * span)
     x, u = moved(carriage, loop, ref, rng.standard_normal(len(ref)))
-    folder.mkdir(parents=True)
-    t, zero = DT * np.arange(len(ref)), np.zeros(len(ref))
-    pq.write_table(pa.table({"t": t, "ref": ref, "w": zero, "u": u, "x": x}), folder / "recording.parquet")
     case = {
-        "format": 1, "plant": "axis", "sample_rate": 1 / DT, "parameters": {"M": M * rng.uniform(0.9, 1.1)},
+        "sample_rate": 1 / DT, "parameters": {"M": M * rng.uniform(0.9, 1.1)},
         "sensors": {"x_resolution_m": loop.step}, "drive": {"newton_per_volt": gain, "limit_volt": LIMIT},
-        "delay_samples": 0.0, "controller": {"kind": "cascade_p_v", "kp": loop.kp, "kv": loop.kv},
-        "controller_known": True, "reaches": {"parameter_tolerance": 0.15},
+        "controller": {"kind": "cascade_p_v", "kp": loop.kp, "kv": loop.kv}, "controller_known": True,
     }  # fmt: skip
-    (folder / "case.json").write_text(json.dumps(case))
+    write(folder, {"t": DT * np.arange(len(ref)), "ref": ref, "u": u, "x": x}, case)
     return what
 
 

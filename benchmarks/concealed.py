@@ -6,17 +6,29 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 from lateness import rtctl_command
 
-Hidden = dict[str, tuple[str, ...]]  # case: what is in it
+Hidden = TypeVar("Hidden")  # what is in a case
+USUAL = {"format": 1, "plant": "axis", "delay_samples": 0.0, "reaches": {"parameter_tolerance": 0.15}}
+
+
+def write(folder: Path, columns: dict[str, np.ndarray], case: dict[str, Any]) -> None:
+    """A bundle of these columns (n,) in a new folder, ref 0 where there is none, of a `case` that is else as USUAL."""
+    folder.mkdir(parents=True)
+    zero = np.zeros(len(columns["t"]))
+    pq.write_table(pa.table({"t": zero, "ref": zero, "w": zero, **columns}), folder / "recording.parquet")
+    (folder / "case.json").write_text(json.dumps({**USUAL, **case}))
 
 
 def run(
     text: str | None,
-    conceal: Callable[[Path, int, int], tuple[str, ...]],
-    judged: Callable[[Hidden, Path], dict[str, Any]],
+    conceal: Callable[[Path, int, int], Hidden],
+    judged: Callable[[dict[str, Hidden], Path], dict[str, Any]],
     told: Callable[[dict[str, Any]], list[str]],
     count: int,
     seed: int,

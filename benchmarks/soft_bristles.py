@@ -17,9 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from concealed import run
+from concealed import run, write
 from numba import njit
 
 RATE, FINE, SECONDS, LINES = 750.0, 40, 12.0, 25  # Hz, steps of the integration a sample, s, of the multisine
@@ -81,16 +79,12 @@ def conceal(folder: Path, seed: int, number: int) -> Kind:
     F = kind.force * k * np.std(linear)
     x = moved(m, c, k, F, kind.z * np.ptp(linear), kind, force(fine))
     x += 1e-3 * x.std() * rng.standard_normal(count)
-    folder.mkdir(parents=True)
-    zero = np.zeros(count)
-    pq.write_table(pa.table({"t": t, "ref": zero, "w": zero, "u": force(t), "x": x}), folder / "recording.parquet")
     owner = {name: value * rng.uniform(0.95, 1.05) for name, value in (("M", m), ("F_v", c), ("k", k))}
     case = {
-        "format": 1, "plant": "axis", "sample_rate": RATE, "parameters": owner, "sensors": {"x_resolution_m": 0.0},
-        "drive": {"newton_per_volt": 1.0, "limit_volt": 1e4}, "delay_samples": 0.0, "controller": {"kind": "none"},
-        "controller_known": False, "reaches": {"parameter_tolerance": 0.15},
+        "sample_rate": RATE, "parameters": owner, "sensors": {"x_resolution_m": 0.0},
+        "drive": {"newton_per_volt": 1.0, "limit_volt": 1e4}, "controller": {"kind": "none"}, "controller_known": False,
     }  # fmt: skip
-    (folder / "case.json").write_text(json.dumps(case))
+    write(folder, {"t": t, "u": force(t), "x": x}, case)
     return kind
 
 

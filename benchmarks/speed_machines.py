@@ -17,9 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-from concealed import run
+from concealed import run, write
 from numba import njit
 from scipy.optimize import least_squares
 
@@ -135,15 +133,11 @@ def conceal(folder: Path, seed: int, k: int) -> tuple[str, ...]:
             break
     shown = v + noise * rng.standard_normal(len(v))
     M, F, K = (value * (1.0 + rng.uniform(-OFF, OFF)) for value in (d.M, d.F, d.K))
-    folder.mkdir(parents=True)
-    zero = np.zeros(len(t))
-    pq.write_table(pa.table({"t": t, "ref": zero, "w": zero, "u": u, "speed": shown}), folder / "recording.parquet")
     case = {
-        "format": 1, "plant": "axis", "sample_rate": rate, "parameters": {"M": M, "F_v": F}, "sensors": {},
-        "drive": {"newton_per_volt": K, "limit_volt": 10.0}, "delay_samples": 0.0, "controller": {"kind": "none"},
-        "controller_known": False, "reaches": {"parameter_tolerance": 0.15},
+        "sample_rate": rate, "parameters": {"M": M, "F_v": F}, "sensors": {},
+        "drive": {"newton_per_volt": K, "limit_volt": 10.0}, "controller": {"kind": "none"}, "controller_known": False,
     }  # fmt: skip
-    (folder / "case.json").write_text(json.dumps(case))
+    write(folder, {"t": t, "u": u, "speed": shown}, case)
     return tuple(sorted(NAMES[name] for name in what))
 
 

@@ -369,14 +369,18 @@ def roughly(problem: Problem, parent: Fit, score: Score) -> Fit:
     old = parent.J.shape[1]
     starts = [np.clip(score.x, *space.bounds())]
     starts.append(np.concatenate([parent.x, starts[0][old:]]))
-    costs = [float(np.sum(problem.residual(space.model(x), coarse=True) ** 2)) for x in starts]
+
+    def cost(x: np.ndarray) -> float:
+        return float(np.sum(problem.residual(space.model(x), coarse=True) ** 2))
+
+    costs = [cost(x) for x in starts]
     for _ in range(LESS):
         if min(costs) <= 2.0 * parent.cost:
             break
         x = starts[-1].copy()
         x[old:][score.hypothesis.sizes] *= SHORTER
         starts.append(x)
-        costs.append(float(np.sum(problem.residual(space.model(x), coarse=True) ** 2)))
+        costs.append(cost(x))
     x = starts[int(np.argmin(costs))]
     J = np.concatenate([parent.J, jacobian(problem, space, x, range(old, len(x)))], axis=1)
     return fit(problem, space, x, rounds=ROUGH, J=J, rough=True)

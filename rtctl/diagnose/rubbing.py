@@ -11,10 +11,12 @@ friction is as poor a model of them as none, and bristles without a limit do not
 from collections.abc import Sequence
 from functools import partial
 
+import numpy as np
+
 from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import polish
-from rtctl.diagnose.space import Hypothesis
+from rtctl.diagnose.space import Hypothesis, Space
 
 PLAIN = ("friction.coulomb", "friction.viscous")
 OWN = ("F_c", "F_v")  # the owner's names of them
@@ -35,10 +37,7 @@ def rubbing(problem: Problem, base: Fit, candidates: Sequence[Hypothesis]) -> Fi
     if len(first) < len(PLAIN):
         return None
     space = base.space.add(*(first[name] for name in PLAIN))
-    x = space.start()
-    x[: space.nb] = base.x
-    for i, h in enumerate(space.hypotheses):  # both brake: from there it is one trough
-        x[space.columns(i)[h.sizes]] = 1.0
+    x = begun(space, base, dict.fromkeys(PLAIN, 1.0))  # both brake: from there it is one trough
     return polish(problem, fit(problem, space, x, rounds=16))
 
 
@@ -47,15 +46,19 @@ def soft(problem: Problem, model: Fit, candidates: Sequence[Hypothesis]) -> list
     or the machine is no axis."""
     there = {h.term for h in model.space.hypotheses}
     kinds = {h.term: h for h in (*reversed(candidates), *model.space.hypotheses) if h.term in (DRY, BRISTLES)}
-    if model.model.kind != "axis" or model.model.base.get(OWN[0], 0.0) or len(kinds) < 2:
+    known = model.model.kind != "axis" or model.model.base.get(OWN[0], 0.0) or BRISTLES in there
+    if known or len(kinds) < 2:
         return []
     space = model.space.add(*(h for term, h in kinds.items() if term not in there))
-    starts = []
-    for share in SOFT if BRISTLES not in there else ():
-        x = space.start()
-        x[: len(model.x)] = model.x
-        for i, h in enumerate(space.hypotheses):
-            if h.term not in there:
-                x[space.columns(i)[h.sizes]] = share if h.term == BRISTLES else 1.0
-        starts.append(x)
+    starts = [begun(space, model, {DRY: 1.0, BRISTLES: share}) for share in SOFT]
     return parallel([partial(fit, problem, space, x, rounds=16) for x in starts])
+
+
+def begun(space: Space, model: Fit, sizes: dict[str, float]) -> np.ndarray:
+    """A start of `space`, in which `model` stands as it is and what it has more has these `sizes` by term."""
+    x = space.start()
+    x[: len(model.x)] = model.x
+    for i in range(len(model.space.hypotheses), len(space.hypotheses)):
+        h = space.hypotheses[i]
+        x[space.columns(i)[h.sizes]] = sizes[h.term]
+    return x
