@@ -1,8 +1,7 @@
 """The axes that nobody wrote friction down for rub as their equations say, the same every time, and are judged so."""
 
-import importlib
 import json
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -10,14 +9,10 @@ import pytest
 
 from rtctl.diagnose.record import load_record
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-
 
 @pytest.fixture(scope="module")
-def axes() -> ModuleType:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        return importlib.import_module("bare_axes")
+def axes(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark_module("bare_axes")
 
 
 def test_at_one_speed_the_drive_pays_for_both_frictions(axes):

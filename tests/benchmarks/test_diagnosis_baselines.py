@@ -1,8 +1,6 @@
 """Baselines find what is plain, write the exchange form and are scored as the tool itself is."""
 
-import importlib
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,19 +8,9 @@ import pytest
 from rtctl.proof.generate import generate
 from rtctl.trace.bundle import load_bundle
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-
 
 @pytest.fixture(scope="module")
-def module():
-    """`module(name)`: a module of benchmarks/."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        yield importlib.import_module
-
-
-@pytest.fixture(scope="module")
-def moving(module):
+def moving(benchmark_module):
     """States of an axis of 10 kg that moves smoothly, with this friction (N by speed) and noise."""
 
     def make(friction, owner_has_dry=False, n=1500):
@@ -31,7 +19,7 @@ def moving(module):
         v, a = np.gradient(x, t), np.gradient(np.gradient(x, t), t)
         noise = 0.01 * np.random.default_rng(1).standard_normal(n)
         effort = 10.0 * a + friction(v, x)
-        states = module("baselines.states")
+        states = benchmark_module("baselines.states")
         return states.moving(
             states.States(
                 t=t, x=x, v=v, a=a + noise, effort=effort, pull=np.abs(effort), u=effort / 35.0,
@@ -44,8 +32,8 @@ def moving(module):
     return make
 
 
-def test_bic_counts_parameters_and_errors(module):
-    bic = module("baselines.inverse_dynamics").bic
+def test_bic_counts_parameters_and_errors(benchmark_module):
+    bic = benchmark_module("baselines.inverse_dynamics").bic
     assert bic(100.0, 100, 3) == pytest.approx(3 * np.log(100))
     assert bic(100.0, 100, 4) - bic(100.0, 100, 3) == pytest.approx(np.log(100))
     assert bic(50.0, 100, 3) - bic(100.0, 100, 3) == pytest.approx(-100 * np.log(2))
@@ -61,22 +49,22 @@ def test_bic_counts_parameters_and_errors(module):
         (lambda v, x: 0.0 * v, []),
     ],
 )
-def test_inverse_dynamics_names_what_is_plain(module, moving, friction, names):
-    inverse = module("baselines.inverse_dynamics")
+def test_inverse_dynamics_names_what_is_plain(benchmark_module, moving, friction, names):
+    inverse = benchmark_module("baselines.inverse_dynamics")
     s = moving(friction)
     chosen = inverse.forward(s.a, inverse.base_columns(s), inverse.regressors(s))
     assert [r.name for r in chosen] == names
 
 
-def test_what_the_owners_model_has_is_not_named(module, moving):
-    inverse = module("baselines.inverse_dynamics")
+def test_what_the_owners_model_has_is_not_named(benchmark_module, moving):
+    inverse = benchmark_module("baselines.inverse_dynamics")
     s = moving(lambda v, x: 3.0 * np.sign(v), owner_has_dry=True)
     assert "friction.coulomb" not in {r.name for r in inverse.regressors(s)}
     assert inverse.forward(s.a, inverse.base_columns(s), inverse.regressors(s)) == []
 
 
-def test_every_regressor_has_rows_and_a_name_of_the_exchange_format(module, moving):
-    inverse, form = module("baselines.inverse_dynamics"), module("baselines.form")
+def test_every_regressor_has_rows_and_a_name_of_the_exchange_format(benchmark_module, moving):
+    inverse, form = benchmark_module("baselines.inverse_dynamics"), benchmark_module("baselines.form")
     s = moving(lambda v, x: 0.0 * v)
     for r in inverse.regressors(s):
         assert r.X.shape[0] == len(s.t) and r.X.ndim == 2
@@ -84,13 +72,13 @@ def test_every_regressor_has_rows_and_a_name_of_the_exchange_format(module, movi
         assert r.name in form.AXES or r.name == ""
 
 
-def test_play_follows_at_a_distance(module):
-    out = module("baselines.inverse_dynamics").play(np.array([0.0, 1.0, 2.0, 1.8, 0.0]), 1.0)
+def test_play_follows_at_a_distance(benchmark_module):
+    out = benchmark_module("baselines.inverse_dynamics").play(np.array([0.0, 1.0, 2.0, 1.8, 0.0]), 1.0)
     assert out.tolist() == [0.0, 0.5, 1.5, 1.5, 0.5]
 
 
-def test_white_is_white_and_coloured_is_not(module):
-    ljung_box = module("baselines.whiteness").ljung_box
+def test_white_is_white_and_coloured_is_not(benchmark_module):
+    ljung_box = benchmark_module("baselines.whiteness").ljung_box
     e = np.random.default_rng(2).standard_normal(4000)
     assert ljung_box(e) > 0.01
     assert ljung_box(np.convolve(e, [1.0, 0.3], "valid")) < 1e-6
@@ -99,8 +87,8 @@ def test_white_is_white_and_coloured_is_not(module):
     assert 0.35 < np.mean(p) < 0.65
 
 
-def test_sparse_functions_are_finite_and_known_ones_are_among_them(module, moving):
-    sparse = module("baselines.sparse")
+def test_sparse_functions_are_finite_and_known_ones_are_among_them(benchmark_module, moving):
+    sparse = benchmark_module("baselines.sparse")
     s = moving(lambda v, x: 3.0 * np.sign(v), owner_has_dry=True)
     functions = sparse.library(s)
     assert all(np.isfinite(f).all() and f.shape == s.t.shape for f in functions.values())
@@ -113,8 +101,8 @@ def cases(tmp_path_factory):
     return generate(tmp_path_factory.mktemp("proof") / "cases", 2, 3, plants=("axis",))
 
 
-def test_a_folder_is_diagnosed_and_scored(module, cases, tmp_path, capsys):
-    main = module("diagnosis_baselines").main
+def test_a_folder_is_diagnosed_and_scored(benchmark_module, cases, tmp_path, capsys):
+    main = benchmark_module("diagnosis_baselines").main
     assert main([str(cases), "--json", "--only", "inverse", "coulomb", "--out", str(tmp_path)]) == 0
     rows = json.loads(capsys.readouterr().out)
     assert set(rows) == {"inverse", "coulomb"}
@@ -128,14 +116,14 @@ def test_a_folder_is_diagnosed_and_scored(module, cases, tmp_path, capsys):
     assert load_bundle(cases / "case-0001").case["plant"] == "axis"
 
 
-def test_the_table_has_a_row_for_each_method(module, cases, capsys):
-    assert module("diagnosis_baselines").main([str(cases), "--only", "coulomb", "inverse"]) == 0
+def test_the_table_has_a_row_for_each_method(benchmark_module, cases, capsys):
+    assert benchmark_module("diagnosis_baselines").main([str(cases), "--only", "coulomb", "inverse"]) == 0
     out = capsys.readouterr().out
     assert "| always Coulomb |" in out and "| inverse dynamics" in out
     rows = [line for line in out.splitlines() if line.startswith("|")]
     assert len({line.count("|") for line in rows}) == 1
 
 
-def test_without_answers_it_says_so(module, tmp_path, capsys):
-    assert module("diagnosis_baselines").main([str(tmp_path)]) == 2
+def test_without_answers_it_says_so(benchmark_module, tmp_path, capsys):
+    assert benchmark_module("diagnosis_baselines").main([str(tmp_path)]) == 2
     assert "answers.json" in capsys.readouterr().err

@@ -1,10 +1,10 @@
 """The C twins of the benchmark compute what the generated ticks compute, to the bit; the printed JSON is whole."""
 
-import importlib
 import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -16,10 +16,8 @@ pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compile
 
 
 @pytest.fixture(scope="module")
-def twins() -> ModuleType:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        return importlib.import_module("twins")
+def twins(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark_module("twins")
 
 
 @pytest.mark.parametrize(("kind", "ticks"), [("ivu", 2_000), ("ldu", 12_000)])
@@ -51,10 +49,8 @@ def test_the_json_has_both_figures() -> None:
     assert told["ratio_to_c"] > 0
 
 
-def test_percentiles_of_cyclictest_lie_inside_their_bucket() -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        lateness = importlib.import_module("lateness")
+def test_percentiles_of_cyclictest_lie_inside_their_bucket(benchmark_module: Callable[[str], ModuleType]) -> None:
+    lateness = benchmark_module("lateness")
     told = lateness.percentiles({"1000": 50, "2000": 49}, 100)  # the hundredth was later than all buckets
     assert told["p50"] == pytest.approx(1.001)
     assert told["p99"] == pytest.approx(2.001)

@@ -1,11 +1,10 @@
 """What the comparison with cyclictest and LinuxCNC counts, computes, and says where neither is there."""
 
-import importlib
 import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,21 +16,13 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture(scope="module")
-def module() -> Iterator[Callable[[str], ModuleType]]:
-    """`module(name)`: a module of benchmarks/."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        yield importlib.import_module
+def peers(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark_module("peers")
 
 
 @pytest.fixture(scope="module")
-def peers(module: Callable[[str], ModuleType]) -> ModuleType:
-    return module("peers")
-
-
-@pytest.fixture(scope="module")
-def session(module: Callable[[str], ModuleType]) -> ModuleType:
-    return module("hal.session")
+def session(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark_module("hal.session")
 
 
 def late(p50: float) -> dict[str, float]:
@@ -98,8 +89,8 @@ def test_with_neither_it_says_so_and_ends_with_3(tmp_path: Path, json_: bool) ->
     assert any(word in said for word in ("cyclictest is not installed", "SCHED_FIFO", "one CPU"))
 
 
-def test_the_law_runs_at_every_tick(module: Callable[[str], ModuleType]) -> None:
-    took, per_ns = module("hal.law").run(2_000.0, 0.05, 1)
+def test_the_law_runs_at_every_tick(benchmark_module: Callable[[str], ModuleType]) -> None:
+    took, per_ns = benchmark_module("hal.law").run(2_000.0, 0.05, 1)
     assert len(took) == 100 and (took > 0).all()
     assert per_ns > 0
 

@@ -1,8 +1,7 @@
 """The springs of the benchmark lose what their loops say, are the same every time, and are judged as they are told."""
 
-import importlib
 import json
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -10,14 +9,10 @@ import pytest
 
 from rtctl.diagnose.record import load_record
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-
 
 @pytest.fixture(scope="module")
-def springs() -> ModuleType:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        return importlib.import_module("soft_bristles")
+def springs(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark_module("soft_bristles")
 
 
 def test_pushed_slowly_the_bristles_hold_their_limit_both_ways(springs):

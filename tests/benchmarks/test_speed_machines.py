@@ -1,8 +1,7 @@
 """The drives that show a speed are what their equations say, the same every time, and judged as they are told."""
 
-import importlib
 import json
-from pathlib import Path
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -10,14 +9,10 @@ import pytest
 
 from rtctl.diagnose.record import load_record
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
-
 
 @pytest.fixture(scope="module")
-def machines() -> ModuleType:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        return importlib.import_module("speed_machines")
+def machines(benchmark_module: Callable[[str], ModuleType]) -> ModuleType:
+    return benchmark_module("speed_machines")
 
 
 def test_a_plain_drive_rises_to_its_speed(machines):
