@@ -251,6 +251,7 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         fit_rows=(problem.rows.start or 0, cut_of(record)),
         seconds=0.0,
         on_track=shown.on_track,
+        random_forces=not decide.quiet(problem, base, taken) and problem.hiss(taken.r),
         resembles=resembled(found) if verdict.verdict == UNNAMED else None,
     )
 

@@ -198,8 +198,8 @@ class Problem:
 
     def parted(self, r: np.ndarray) -> bool:
         """Whether the errors r of sensors that know direction are not of one motion: what moves the machine, random
-        forces too, is seen by each of them."""
-        main, *others = list(self.by_sensor(r).values())[: len(self.channels)]
+        forces too, is seen by each of them. Where each began to count says nothing."""
+        main, *others = (e - e.mean() for e in list(self.by_sensor(r).values())[: len(self.channels)])
         alone = ((e, e - main * float(main @ e) / max(float(main @ main), 1e-300)) for e in others)
         return any(rms(apart) > np.hypot(PARTED * self.main_floor, GIVES * rms(e)) for e, apart in alone)
 

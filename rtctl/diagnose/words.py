@@ -327,6 +327,11 @@ def _nothing(d: Diagnosis) -> tuple[str, str]:
     unit = main_unit(d)
     left, noise = (nice(heldout_error(d, x), unit) for x in (d.heldout_after, d.noise_floor))
     first = f"Nothing is missing: the part that was not fitted is predicted to {left}, and noise alone makes {noise}."
+    if d.random_forces:
+        first = (
+            f"Nothing is missing that has a pattern: random forces move the part that was not fitted by {left}, and noise "
+            f"makes {noise} beside that."
+        )
     if not d.hides:
         return first, "How large an effect could be and still hide was not worked out."
     words: list[str] = []

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from rtctl.config.errors import NoAnswer
 from rtctl.diagnose import chain
@@ -44,8 +45,9 @@ CASE = {
 SPRING = {"term": "load.spring", "node": "carriage", "k": 600.0}
 
 
-def recording(*physics, seconds=10.0, true=None) -> Record:
-    """What the axis with `physics` in it does on a sum of two slow sines; `true` parameters differ from the owner's."""
+def recording(*physics, seconds=10.0, true=None, shaken=0.0) -> Record:
+    """What the axis with `physics` in it does on a sum of two slow sines; `true` parameters differ from the owner's.
+    `shaken`: rms of random forces, N."""
     case, n = read_case(CASE, "."), round(1000 * seconds)
     t, zero = np.arange(n) * 1e-3, np.zeros(n)
     ref = 0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t)
@@ -53,10 +55,21 @@ def recording(*physics, seconds=10.0, true=None) -> Record:
     model = owner_model(case).change(**(true or {}))
     model = model.add(*(TERMS[entry["term"]].settings(**entry) for entry in physics))
     out, volts, _ = Simulator(empty).everything(model, CLOSED)
-    x = np.round(out[:, 0] / STEP) * STEP
+    off, answered = thrown(n, shaken)
+    volts = volts + answered[:, None]
+    x = np.round((out[:, 0] + off) / STEP) * STEP
     # the law saw the reading before it was cut: the recorded command is the input
     case = case._replace(controller_known=False)
     return check({"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": x}, case)
+
+
+def thrown(n: int, force: float) -> tuple[np.ndarray, np.ndarray]:
+    """How far white forces of `force` N rms throw the axis off (n,) under its law, and the volts with which that
+    answers: to both the machine is a mass with a damper, so that they add to any motion that keeps its direction."""
+    per_volt, stiff, damp = CASE["drive"]["newton_per_volt"], 160.0 * 243.0, 243.0
+    loop = signal.cont2discrete(([1.0], [95.0, 200.0 + per_volt * damp, per_volt * stiff]), 1e-3)
+    off = signal.lfilter(loop[0].ravel(), loop[1], force * np.random.default_rng(5).standard_normal(n))
+    return off, -stiff * off - damp * np.gradient(off, 1e-3)
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +119,14 @@ def test_wrong_values_are_not_missing_physics():
     assert d.after == d.before
     assert d.parameters["M"].value == pytest.approx(88.0, rel=0.02)
     assert d.hides  # how large each effect could be and still hide
+    assert not d.random_forces
+
+
+def test_random_forces_are_said_and_nothing_else():
+    d = diagnose_record(recording(shaken=15.0))
+    assert d.verdict == NOTHING
+    assert d.random_forces and as_json(d)["random_forces"]
+    assert d.heldout_before > 3.0 * d.noise_floor
 
 
 def test_a_second_recording_is_predicted_whole(spring):

@@ -69,6 +69,8 @@ def test_what_one_sensor_shows_alone_is_of_no_motion(blank):
     small = floor * rng.standard_normal(len(problem.order))
     small[problem.source == 1] += gives
     assert problem.parted(small)  # of what hardly moves no spring gives that much
+    begun = floor * rng.standard_normal(len(problem.order)) + 40.0 * floor * (problem.source == 1)
+    assert not problem.parted(begun)  # where the scale began to count is of no motion either, and of no physics
 
 
 def test_random_forces_are_hiss_also_where_a_clock_makes_fast_readings_worth_less(blank):

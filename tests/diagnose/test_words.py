@@ -184,6 +184,12 @@ def test_nothing_says_what_would_have_shown():
     assert "motor 2" not in text  # one node of each effect is enough for a sentence
 
 
+def test_random_forces_are_told_apart_from_the_noise_of_the_sensor():
+    text = verdict_sentences(diagnosis(NOTHING, heldout_after=0.012, random_forces=True))
+    assert text.startswith("Nothing is missing that has a pattern: random forces move")
+    assert "by 12 counts, and noise makes 0.30 counts beside that" in text
+
+
 def test_nothing_without_sizes():
     assert "was not worked out" in verdict_sentences(diagnosis(NOTHING))
 
