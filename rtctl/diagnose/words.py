@@ -329,8 +329,8 @@ def _nothing(d: Diagnosis) -> tuple[str, str]:
     first = f"Nothing is missing: the part that was not fitted is predicted to {left}, and noise alone makes {noise}."
     if d.random_forces:
         first = (
-            f"Nothing is missing that has a pattern: random forces move the part that was not fitted by {left}, and noise "
-            f"makes {noise} beside that."
+            f"Nothing is missing that has a pattern: random forces move the part that was not fitted by {left}, and "
+            f"noise makes {noise} beside that."
         )
     if not d.hides:
         return first, "How large an effect could be and still hide was not worked out."
