@@ -22,7 +22,7 @@ from rtctl.diagnose.predict import Shown, cut_of, predicted, slips
 from rtctl.diagnose.preflight import Preflight, preflight
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, load_record
-from rtctl.diagnose.rest import awake
+from rtctl.diagnose.rest import telling
 from rtctl.diagnose.rework import drop
 from rtctl.diagnose.simulate import BEHIND, SLIPS, Simulator
 from rtctl.diagnose.stretches import rms
@@ -54,14 +54,12 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
     began = time.monotonic()
     with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
         progress("preflight")
-        whole, record = len(record.t), awake(record)
+        record, left_out = telling(record)
         checked = preflight(record)
         found = searched(record, progress)
         problem, sim = found.problem, found.problem.sim
-        more = [solver.finding(problem, found.best.model)]
-        if len(record.t) < whole:
-            more.append(f"The last {(whole - len(record.t)) * record.dt:.0f} s, in which it rests, are left out.")
-        checked = replace(checked, findings=(*checked.findings, *more))
+        solved = solver.finding(problem, found.best.model)
+        checked = replace(checked, findings=(*checked.findings, solved, *left_out))
         progress("predicting rows that were not fitted")
         known = [of_jitter(found.jitter)] if found.jitter is not None else []
         shown = predicted(sim, other, found, known)

@@ -13,7 +13,7 @@ from rtctl.diagnose.edges import Edges, alike, edges
 from rtctl.diagnose.hiss import commanded, is_hiss
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.rest import shares
+from rtctl.diagnose.rest import averaged, shares
 from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.stretches import loudness, rms
 
@@ -28,7 +28,6 @@ EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond whic
 SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
 PARTED = 2.5  # times the floor, by which one sensor may differ from what another shows of the same motion
 GIVES = 0.2  # share of that motion by which it may differ besides: springs lie between the two
-MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
 FORGOTTEN = 4.0  # the same, after which errors no longer go together
 FORGET = 8.0  # over the bandwidth of the correction
 SIGMA = {"encoder": 0.4, "scale": 0.5}  # counts: what quantisation and a quiet machine leave
@@ -51,7 +50,7 @@ class Problem:
     ):
         self.sim = sim
         self.rows = slice(settled(sim), stop)
-        self.mean = max(1, round(MEAN / sim.record.dt)) if mean is None else mean  # ticks averaged into one error
+        self.mean = averaged(sim.record.dt) if mean is None else mean  # ticks averaged into one error
         self.channels = list(channels if channels is not None else main_channels(sim))
         seen = np.stack([sim.record.y[sim.channels[c]] + sim.half for c in self.channels], axis=1)
         self.target = means(seen[self.rows], self.mean)

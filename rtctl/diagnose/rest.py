@@ -1,6 +1,7 @@
-"""A machine at rest tells no more: rows that follow its last motion only dilute the error before it, and where dry
-friction holds it between two motions the error stays what it happened to be when it stopped, one number and not as many
-as there are rows."""
+"""The rows that tell something. A machine at rest tells no more: rows that follow its last motion only dilute the error
+before it, and where dry friction holds it between two motions the error stays what it happened to be when it stopped,
+one number and not as many as there are rows. Nor do hours tell more than minutes, which take all the memory there is.
+"""
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
@@ -11,6 +12,20 @@ REST = 3.0  # s, that are kept behind the last motion
 STILL = 0.01  # of the travel
 HELD = 3.5  # steps of the sensor: a noisy one shows as much of a machine that stands
 CALM = 0.05  # of the command's range: below it nothing is asked of the machine either
+MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
+LONGEST = {"ivu": 100_000, "ldu": 100_000, "axis": 200_000}  # errors of a sensor; the search holds some 10 kB for each
+
+
+def telling(record: Record) -> tuple[Record, list[str]]:
+    """The rows of the recording that tell something, and what is left out, in words."""
+    waking = awake(record)
+    kept = bounded(waking)
+    seconds = len(record.t) * record.dt
+    if len(kept.t) < len(waking.t):
+        looked_at = f"{kept.t[0]:.0f} to {kept.t[-1]:.0f} s are looked at"
+        return kept, [f"Of {seconds:.0f} s, {looked_at}; rtctl simulate tells how the model predicts all of them."]
+    rests = seconds - len(kept.t) * kept.dt
+    return kept, [f"The last {rests:.0f} s, in which it rests, are left out."] if kept is not record else []
 
 
 def awake(record: Record) -> Record:
@@ -24,13 +39,33 @@ def awake(record: Record) -> Record:
     return upto(record, end)
 
 
+def bounded(record: Record) -> Record:
+    """As much of the recording, from its first motion on, as the search can hold; itself where that is all."""
+    x, longest = next(iter(record.y.values())), LONGEST[record.plant] * averaged(record.dt)
+    if len(x) <= longest:
+        return record
+    first = int(np.argmax(np.abs(x - x[0]) > STILL * np.ptp(x)))
+    begin = max(0, first - round(REST / record.dt))
+    return part(record, begin, begin + longest)
+
+
+def averaged(dt: float) -> int:
+    """Ticks of dt s that are averaged into one error."""
+    return max(1, round(MEAN / dt))
+
+
 def upto(record: Record, end: int) -> Record:
     """The first `end` rows of a recording."""
-    n = len(record.t)
+    return part(record, 0, end)
+
+
+def part(record: Record, begin: int, end: int) -> Record:
+    """The rows of a recording from `begin` up to `end`."""
+    n, kept = len(record.t), slice(begin, end)
     return record._replace(
-        t=record.t[:end], ref=record.ref[:end], w=record.w[:end], u=record.u[:end],
-        y={name: values[:end] for name, values in record.y.items()},
-        columns={name: values[:end] if len(values) == n else values for name, values in record.columns.items()},
+        t=record.t[kept], ref=record.ref[kept], w=record.w[kept], u=record.u[kept],
+        y={name: values[kept] for name, values in record.y.items()},
+        columns={name: values[kept] if len(values) == n else values for name, values in record.columns.items()},
     )  # fmt: skip
 
 

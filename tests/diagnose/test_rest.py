@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.rest import REST, awake, shares
+from rtctl.diagnose import rest
+from rtctl.diagnose.rest import REST, awake, bounded, shares, telling
 
 MOVE, RATE = 5.0, 1000
 
@@ -32,6 +33,30 @@ def test_what_follows_the_last_motion_is_left_out(resting):
 def test_a_short_rest_and_a_machine_that_is_pushed_at_rest_stay(resting, rest, works):
     record = resting(rest, works)
     assert awake(record) is record
+
+
+@pytest.fixture
+def long(blank, monkeypatch):
+    """A minute of motion behind a minute of rest, where half a minute is all that is held."""
+    monkeypatch.setitem(rest.LONGEST, "axis", 30 * RATE)
+    t = np.arange(120 * RATE) / RATE
+    x = np.where(t < 60.0, 0.0, np.sin(t - 60.0))
+    return blank("axis", np.where(t < 60.0, 0.0, np.cos(t)), x)
+
+
+def test_of_a_long_recording_as_much_is_taken_as_can_be_held_from_its_first_motion_on(long):
+    record = bounded(long)
+    assert len(record.t) == 30 * RATE == len(record.y["x"]) == len(record.u)
+    assert record.t[0] == pytest.approx(60.0 - REST, abs=0.1)
+    assert bounded(record) is record
+
+
+def test_what_is_left_out_is_said(long, resting):
+    assert telling(long)[1] == [
+        "Of 120 s, 57 to 87 s are looked at; rtctl simulate tells how the model predicts all of them."
+    ]
+    assert telling(resting(20.0))[1] == ["The last 17 s, in which it rests, are left out."]
+    assert telling(resting(0.0))[1] == []
 
 
 def test_all_of_a_stop_counts_for_as_much_as_a_moment_in_motion():
