@@ -32,12 +32,12 @@ def located(
     errors = problem.by_sensor(base.r)
     channel = max(errors, key=lambda name: float(np.mean(errors[name] ** 2)))
     error = problem.at_rows(channel, errors[channel])
-    step = sim.record.dt * problem.mean
-    first = sim.record.dt * (problem.rows.start or 0)
+    first = problem.rows.start or 0
     loud = np.flatnonzero(np.abs(error) > 4 * problem.floor)
-    since = float(first + step * loud[0]) if len(loud) else 0.0
+    since = float(sim.record.t[first + problem.mean * loud[0]]) if len(loud) else 0.0  # by the recording's own clock
     if ticks and not best.space.hypotheses:
-        return Located(channel, "loop", "time", "at every tick, the more the faster it moves", first, 1.0)
+        begun = float(sim.record.t[first])
+        return Located(channel, "loop", "time", "at every tick, the more the faster it moves", begun, 1.0)
     share, axis, node = 0.0, "time", ""
     top = next((f for f in (best, *looked.fits) if f.space.hypotheses), None)
     if top is not None:
