@@ -3,18 +3,24 @@
 A tick that comes d late shows a reading v d further on. The d are independent, so that the error's second difference,
 which what is smooth hardly touches, has the variance 3/2 (s^2 + (v sigma)^2) and forgets after two ticks.
 
+Cutting into counts makes noise that depends on speed as well: at one count a tick every reading is cut alike and the
+differences show nothing, at one and a half each other one is cut the other way. `cut` is what that amounts to, of which
+a reading with noise of its own shows a part; what is left of the growth with speed is the ticks'.
+
 They move the machine, too: a command acts until the next one is written, and a law with a derivative answers a late
 reading, which is v d ahead, with a command against the motion that is then cut short. On average that is a force along
 the motion, by the square of sigma. `pushed` reads each d back from the error and gives the model that force.
 
 Source: Cervin et al., How does control timing affect performance, IEEE Control Systems 23(3) (2003); Box, Jenkins &
-Reinsel, Time series analysis (2008), ch. 3 for the correlation of a differenced white series.
+Reinsel, Time series analysis (2008), ch. 3 for the correlation of a differenced white series; Widrow & Kollar,
+Quantization noise (2008), for that of readings that are cut.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
+from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
 from rtctl.diagnose.model import Model
@@ -95,25 +101,38 @@ def grows(
     d, v = d[fast], v[fast]
     beyond = np.abs(d) > 8 * np.median(np.abs(d)) + count  # lost counts
     d, v = d[~beyond], v[~beyond]
-    return (*growth(d**2 / 1.5, v**2), d, v)
+    return (*growth(d**2 / 1.5, v**2, count**2 * cut(v * record.dt / count)), d, v)
 
 
-def growth(power: np.ndarray, x: np.ndarray) -> tuple[float, float, float]:
-    """Slope of `power` (n,) over x (n,), its standard error and what is left at x = 0, the latter not below zero.
+def cut(v: np.ndarray) -> np.ndarray:
+    """Power (n,) of the noise that cutting into counts makes in second differences at v (n,) counts a tick, as that of
+    independent readings would be told by them, count^2."""
+
+    def alike(step: np.ndarray) -> np.ndarray:  # covariance of what two readings so far apart are cut by
+        off = np.mod(step, 1.0)
+        return 1.0 / 12.0 - 0.5 * off * (1.0 - off)
+
+    return (1.5 / 12.0 + 0.5 * alike(2.0 * v) - 2.0 * alike(v)) / 1.5
+
+
+def growth(power: np.ndarray, x: np.ndarray, cut: np.ndarray) -> tuple[float, float, float]:
+    """Slope of `power` (n,) over x (n,), its standard error and what is left besides on average, of which a share of
+    `cut` (n,) may be.
 
     A power of noise scatters by its own mean, so that rows are weighed by the fit of the round before.
     """
-    A = np.stack([np.ones_like(x), x], axis=1)
+    A = np.stack([np.ones_like(x), x, cut], axis=1)
     mean = np.full(len(x), power.mean())
     for _ in range(4):
-        w = 1.0 / mean
-        H = (A * w[:, None]).T @ (A * w[:, None])
-        a, b = np.linalg.solve(H, (A * w[:, None]).T @ (power * w))
-        if a < 0.0:
-            a, b = 0.0, float(np.sum(w**2 * x * power) / np.sum(w**2 * x * x))
-        mean = np.maximum(a + b * x, 0.05 * power.mean())
+        weighed = A / mean[:, None]
+        scale = np.linalg.norm(weighed, axis=0) + TINY
+        found = lsq_linear(weighed / scale, power / mean, ([0.0, -np.inf, 0.0], [np.inf, np.inf, scale[2]]))
+        each = found.x / scale
+        mean = np.maximum(A @ each, 0.05 * power.mean())
     scatter = float(np.mean(((power - mean) / mean) ** 2))  # 2 for independent ones; neighbours share ticks
-    return float(b), float(np.sqrt(2.0 * scatter * np.linalg.inv(H)[1, 1])), float(a)
+    H = weighed.T @ weighed + np.diag(TINY + 1e-12 * scale**2)
+    error = float(np.sqrt(2.0 * scatter * np.linalg.inv(H)[1, 1]))
+    return float(each[1]), error, float(each[0] + each[2] * cut.mean())
 
 
 def allowed_for(problem: Problem, model: Model, found: Jitter) -> Problem:

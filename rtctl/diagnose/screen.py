@@ -44,35 +44,32 @@ def screen(problem: Problem, fitted: Fit, candidates: list[Hypothesis]) -> list[
     weight = fitted.space.prior() * trust(fitted.r)
     ground = Ground(fitted, weight, fitted.J.T @ fitted.J + np.diag(weight), *fitted.space.bounds())
     start = problem.residual(fitted.model, coarse=True)
-    tries = [(h, i) for h in candidates for i in h.sizes or [0]]
-    steps: list[float] = [1.0] * len(tries)
-    changes = parallel([partial(_change, problem, fitted, start, h, i, steps, k) for k, (h, i) in enumerate(tries)])
-    scores, at = [], 0
-    for h in candidates:
-        end = at + max(len(h.sizes), 1)
-        C, step = np.stack(changes[at:end], axis=1), np.array(steps[at:end])
-        at = end
-        if np.isfinite(C).all() and (not h.sizes or np.abs(C).max() < RUNAWAY):  # what is there or not may do any much
-            score = _line(ground, h, C / step) if h.sizes else Score(h, -np.inf, fitted.x, 0.0, 0.0)
-            if len(step) == 1:
-                there = _there(ground, score, C[:, 0], step[0])
-                limit = bool(h.sizes) and h.coordinates[h.sizes[0]].kind == INVERSE
-                if limit and there.gain > 0.0:  # below a limit nothing happens: no line leads on from there
-                    score = there
-                else:
-                    score = max(score, there, key=_gain)
-            scores.append(score)
-    return sorted(scores, key=_gain, reverse=True)
+    scores = parallel([partial(_score, problem, ground, start, h) for h in candidates])
+    return sorted((score for score in scores if score is not None), key=_gain, reverse=True)
 
 
 def _gain(score: Score) -> float:
     return score.gain
 
 
-def _change(
-    problem: Problem, fitted: Fit, r: np.ndarray, h: Hypothesis, i: int, steps: list[float], k: int
-) -> np.ndarray:
-    """Change of the residual by a step of size `i` that moves the residual by about its own size; steps[k] tells it.
+def _score(problem: Problem, ground: Ground, r: np.ndarray, h: Hypothesis) -> Score | None:
+    """Of one hypothesis beside the residual r; None where the model runs away with it."""
+    tries = [_change(problem, ground.fitted, r, h, i) for i in h.sizes or [0]]
+    C, steps = np.stack([change for change, _ in tries], axis=1), np.array([step for _, step in tries])
+    if not np.isfinite(C).all() or (h.sizes and np.abs(C).max() >= RUNAWAY):  # what is there or not may do any much
+        return None
+    score = _line(ground, h, C / steps) if h.sizes else Score(h, -np.inf, ground.fitted.x, 0.0, 0.0)
+    if len(tries) > 1:
+        return score
+    there = _there(ground, score, *tries[0])
+    limit = bool(h.sizes) and h.coordinates[h.sizes[0]].kind == INVERSE
+    if limit and there.gain > 0.0:  # below a limit nothing happens: no line leads on from there
+        return there
+    return max(score, there, key=_gain)
+
+
+def _change(problem: Problem, fitted: Fit, r: np.ndarray, h: Hypothesis, i: int) -> tuple[np.ndarray, float]:
+    """Change of the residual by a step of size `i` that moves the residual by about its own size, and that step.
 
     A hypothesis without a size is there or is not: its step is to be there.
     """
@@ -87,8 +84,7 @@ def _change(
         if size <= TOO_FAR * own or not h.sizes or h.coordinates[i].kind == INVERSE:
             break
         step *= max(0.5 * own / size, 1e-3)
-    steps[k] = step
-    return change
+    return change, step
 
 
 def _line(ground: Ground, h: Hypothesis, C: np.ndarray) -> Score:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.diagnose.jitter import Jitter, allowed_for, growth, interval, jitter, pushed
+from rtctl.diagnose.jitter import Jitter, allowed_for, cut, growth, interval, jitter, pushed
 
 DT, N = 2e-3, 8000
 T = DT * np.arange(N)
@@ -107,7 +107,7 @@ def test_sensors_that_are_read_at_the_same_ticks_are_late_together():
 def test_growth_is_the_slope_of_noise_power():
     rng = np.random.default_rng(0)
     x = rng.uniform(0, 4, 20000)
-    slope, error, rest = growth((1.0 + 0.5 * x) * rng.standard_normal(20000) ** 2, x)
+    slope, error, rest = growth((1.0 + 0.5 * x) * rng.standard_normal(20000) ** 2, x, np.zeros(20000))
     assert slope == pytest.approx(0.5, abs=4 * error)
     assert rest == pytest.approx(1.0, rel=0.1)
     assert 0.0 < error < 0.05
@@ -129,3 +129,28 @@ def test_a_late_tick_under_a_derivative_pushes_along_the_motion():
     force = D * v * sigma**2 / DT
     assert float(more @ force / (force @ force)) == pytest.approx(1.0, abs=0.1)
     assert pushed(sim, None, Jitter(1e-9, 0.0, 1.0))[:, 0] == pytest.approx(volts[:, 0], abs=1e-6)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("fastest", [0.9, 1.2, 1.8, 3.0])
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
+def test_what_cutting_into_counts_makes_near_one_count_a_tick_is_none(fastest, noise):
+    way = WAY * fastest / (np.abs(np.gradient(WAY, DT)).max() * DT)
+    rng = np.random.default_rng(3)
+    error = np.floor(way + noise * rng.standard_normal(N)) + 0.5 - way
+    assert jitter(stand(error, way), None, slice(10, None)) is None  # type: ignore[arg-type]
+
+
+def test_beside_what_cutting_makes_late_ticks_are_seen():
+    way = WAY * 3.0 / (np.abs(np.gradient(WAY, DT)).max() * DT)
+    late = 0.3 * DT * np.random.default_rng(4).standard_normal(N)
+    error = np.floor(way + np.gradient(way, DT) * late) + 0.5 - way
+    seen = jitter(stand(error, way), None, slice(10, None))  # type: ignore[arg-type]
+    assert seen.sigma == pytest.approx(0.3 * DT, rel=0.1)
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.75, 1.0, 1.5, 2.2])
+def test_the_power_of_cutting_is_that_of_cut_readings(speed):
+    way = (speed + 1.7e-4) * np.arange(200_000)  # so that it is cut at any place
+    e = np.floor(way) - way
+    d = e[1:-1] - 0.5 * (e[:-2] + e[2:])
+    assert np.mean(d**2) / 1.5 == pytest.approx(float(cut(np.array([speed]))[0]), abs=0.006)
