@@ -13,7 +13,7 @@ STILL = 0.01  # of the travel
 HELD = 3.5  # steps of the sensor: a noisy one shows as much of a machine that stands
 CALM = 0.05  # of the command's range: below it nothing is asked of the machine either
 MEAN = 0.4e-3  # s, over which errors are averaged: no machine here does more in that time
-LONGEST = {"ivu": 100_000, "ldu": 100_000, "axis": 200_000}  # errors of a sensor; the search holds some 10 kB for each
+LONGEST = {"ivu": 100_000, "ldu": 50_000, "axis": 200_000}  # errors of a sensor; the search holds 5 to 25 kB for each
 
 
 def telling(record: Record) -> tuple[Record, list[str]]:

@@ -5,12 +5,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Rival
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.jitter import Jitter
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
-from rtctl.diagnose.verdict import Alternative, Verdict, listed, of_jitter, patched, proven, shared, with_known
+from rtctl.diagnose.verdict import (
+    BY_SIZE,
+    Alternative,
+    Verdict,
+    confidence,
+    listed,
+    of_jitter,
+    patched,
+    proven,
+    shared,
+    with_known,
+)
 
 
 def fitted(**sizes):
@@ -84,6 +95,13 @@ def test_a_name_must_predict_and_several_must_predict_better(several, closed, ex
     assert told.verdict == expected
     assert all(0.88 < e.confidence < 0.96 for e in told.effects)
     assert proven(named, float("nan"), several) is named  # where there was nothing to predict
+
+
+def test_usual_sizes_alone_make_no_name_sure():
+    even, worse = Rival("friction.asymmetry", "carriage", 0.5, 1.0), Rival("load.spring", "carriage", 1e-6, 1.2)
+    assert confidence(0.96, (worse,)) == 0.96
+    assert confidence(0.96, (worse, even)) == BY_SIZE
+    assert confidence(0.4, (even,)) == 0.4
 
 
 def test_where_the_model_without_it_is_right_to_the_noise_a_name_that_does_not_predict_leaves_nothing():
