@@ -115,13 +115,13 @@ def cut(v: np.ndarray) -> np.ndarray:
     return (1.5 / 12.0 + 0.5 * alike(2.0 * v) - 2.0 * alike(v)) / 1.5
 
 
-def growth(power: np.ndarray, x: np.ndarray, cut: np.ndarray) -> tuple[float, float, float]:
+def growth(power: np.ndarray, x: np.ndarray, other: np.ndarray) -> tuple[float, float, float]:
     """Slope of `power` (n,) over x (n,), its standard error and what is left besides on average, of which a share of
-    `cut` (n,) may be.
+    `other` (n,) may be.
 
     A power of noise scatters by its own mean, so that rows are weighed by the fit of the round before.
     """
-    A = np.stack([np.ones_like(x), x, cut], axis=1)
+    A = np.stack([np.ones_like(x), x, other], axis=1)
     mean = np.full(len(x), power.mean())
     for _ in range(4):
         weighed = A / mean[:, None]
@@ -132,7 +132,7 @@ def growth(power: np.ndarray, x: np.ndarray, cut: np.ndarray) -> tuple[float, fl
     scatter = float(np.mean(((power - mean) / mean) ** 2))  # 2 for independent ones; neighbours share ticks
     H = weighed.T @ weighed + np.diag(TINY + 1e-12 * scale**2)
     error = float(np.sqrt(2.0 * scatter * np.linalg.inv(H)[1, 1]))
-    return float(each[1]), error, float(each[0] + each[2] * cut.mean())
+    return float(each[1]), error, float(each[0] + each[2] * other.mean())
 
 
 def allowed_for(problem: Problem, model: Model, found: Jitter) -> Problem:

@@ -28,8 +28,8 @@ EXACTLY = {"ivu": 2.5, "ldu": 2.5, "axis": 12.0}  # times the floor, beyond whic
 SHAKEN = 2.5  # times EDGE: what random forces do to the reels at most, which follow the capstan however that is shaken
 PARTED = 2.5  # times the floor, by which one sensor may differ from what another shows of the same motion
 GIVES = 0.2  # share of that motion by which it may differ besides: springs lie between the two
-FORGOTTEN = 4.0  # the same, after which errors no longer go together
-FORGET = 8.0  # over the bandwidth of the correction
+FORGOTTEN = 4.0  # over the bandwidth of the correction: the time after which errors no longer go together
+FORGET = 8.0  # the same, after which it does not show how the machine stood before the recording
 SIGMA = {"encoder": 0.4, "scale": 0.5}  # counts: what quantisation and a quiet machine leave
 
 

@@ -326,11 +326,14 @@ def goes(located: Located) -> str:
 def _nothing(d: Diagnosis) -> tuple[str, str]:
     unit = main_unit(d)
     left, noise = (nice(heldout_error(d, x), unit) for x in (d.heldout_after, d.noise_floor))
-    first = f"Nothing is missing: the part that was not fitted is predicted to {left}, and noise alone makes {noise}."
     if d.random_forces:
         first = (
             f"Nothing is missing that has a pattern: random forces move the part that was not fitted by {left}, and "
             f"noise makes {noise} beside that."
+        )
+    else:
+        first = (
+            f"Nothing is missing: the part that was not fitted is predicted to {left}, and noise alone makes {noise}."
         )
     if not d.hides:
         return first, "How large an effect could be and still hide was not worked out."
