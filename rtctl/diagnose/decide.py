@@ -196,7 +196,7 @@ def enough(problem: Problem, before: Fit, after: Fit) -> bool:
     share = explained(problem, before, after)
     if not complete(problem, before, after):
         return share > ENOUGH and after.rms < max(LEFT * problem.floor, before.rms / LEFT)
-    if sure(problem, before, after):
+    if problem.white is not None or sure(problem, before, after):
         return True
     restless = before.rms < LOUD * problem.floor or not quiet(problem, before, after)
     lucky = restless and after.cost > MOST * before.cost and by_noise(before, after) > NOWHERE

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from rtctl.diagnose import beyond, decide
 from rtctl.diagnose.base import base_fit
+from rtctl.diagnose.faint import faint
 from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.forms import is_rich, renamed
 from rtctl.diagnose.hints import hints
@@ -19,7 +20,7 @@ from rtctl.diagnose.rubbing import bare
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.stretches import rms
-from rtctl.diagnose.verdict import Alternative, standing
+from rtctl.diagnose.verdict import Alternative, standing, weights
 from rtctl.plants.physics import TERMS
 
 CLOSE = 1.3  # times the best cost: a rival this near may be ahead in its richer form
@@ -99,6 +100,12 @@ def find(
     if len(best.space.hypotheses) > 1:
         best = polish(problem, eliminate(problem, best, needed))
     candidates = propose(base)
+    hidden = None if best.space.hypotheses else faint(problem, base, candidates, progress)
+    if hidden is not None:
+        looked = looked._replace(rounds=(*looked.rounds, hidden.fits))
+        best = hidden.fits[0]
+        near = replacements(hidden.problem, best, looked, candidates, progress)
+        return Found(hidden.problem, off, base, best, looked, near)
     near = replacements(problem, best, looked, candidates, progress)
     others = [place.fit for places in near for place in places]
     if best.rms > decide.COMPLETE * problem.floor and best.space.hypotheses:
@@ -133,11 +140,11 @@ def resembling(candidates: Sequence[Hypothesis], best: Fit) -> list[Hypothesis]:
 
 def most_likely(problem: Problem, best: Fit, near: Places) -> Fit:
     """Of models that explain the record equally well, the one with fewer numbers and the more usual sizes."""
-    for places in near:
-        fits = [best, *(place.fit for place in places)]
-        weights = decide.probabilities(fits, problem.floor)
-        if weights.argmax() > 0:
-            return fits[int(weights.argmax())]
+    for index, places in enumerate(near):
+        all_of_them = [Alternative(best, index), *places]
+        likeliest = int(weights(problem, all_of_them).argmax())
+        if likeliest > 0:
+            return all_of_them[likeliest].fit
     return best
 
 

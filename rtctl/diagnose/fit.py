@@ -16,14 +16,13 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.problem import TOGETHER, Problem
 from rtctl.diagnose.space import Space
 from rtctl.diagnose.stretches import rms
 
 TOLL = 0.08  # share of the cost that a further number of a term must take off
 THREADS = 2
 IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
-TOGETHER = 100.0  # errors that count as one
 
 Result = TypeVar("Result")
 
@@ -115,7 +114,7 @@ def fit(
     low, high = space.bounds()
     x = np.clip(space.start() if x is None else np.array(x, float), low, high)
     r = problem.residual(space.model(x), rough)
-    weight = space.prior() * trust(r)
+    weight = space.prior() * trust(r, problem.together)
 
     def total(r: np.ndarray, x: np.ndarray) -> float:
         return 0.5 * float(r @ r) + 0.5 * float(weight @ x**2)
@@ -148,7 +147,7 @@ def fit(
         if honest:
             J = J + np.outer(trial - r - J @ dx, dx) / float(dx @ dx)
         x, r, damping = x + dx, trial, max(damping / 10, 1e-8)
-        weight = space.prior() * trust(r)
+        weight = space.prior() * trust(r, problem.together)
         cost = total(r, x)
         if give_up is not None and give_up(cost):
             break
@@ -160,18 +159,18 @@ def fit(
             fresh = False
     if rough:
         r = problem.residual(space.model(x))
-        weight = space.prior() * trust(r)
+        weight = space.prior() * trust(r, problem.together)
         cost = total(r, x)
     return Fit(space, x, r, J, cost)
 
 
-def trust(r: np.ndarray) -> float:
+def trust(r: np.ndarray, together: float = TOGETHER) -> float:
     """By how much the owner's values outweigh the errors' count.
 
     Errors of neighbouring ticks go together, and where the model lacks something they are no noise at all. Without this
     weight, parameters that hardly matter run into their bounds to serve what is missing, and the way back is barred.
     """
-    return TOGETHER * max(1.0, float(np.mean(r**2)))
+    return together * max(1.0, float(np.mean(r**2)))
 
 
 def bounded_step(

@@ -79,6 +79,13 @@ def closed_on_track(problem: Problem, before: Fit, after: Fit, cut: int) -> floa
     return (rms(old[late]) ** 2 - rms(new[late]) ** 2) / gap
 
 
+def holds_in_white(white: Problem, before: Fit, after: Fit, cut: int) -> bool:
+    """Whether `after`, fitted on rows before `cut`, does better than `before` beyond them, in white errors."""
+    late = white.time_rows >= cut
+    old, new = (white.residual(f.model)[late] for f in (before, after))
+    return float(new @ new) < float(old @ old)
+
+
 def faint(problem: Problem, before: Fit, after: Fit, cut: int) -> bool:
     """Whether what tells `after` from `before` acts before row `cut`, and beyond it is less than what `after` leaves.
 

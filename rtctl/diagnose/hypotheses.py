@@ -178,6 +178,7 @@ SLIDING: dict[str, tuple[Part, ...]] = {  # what a linear axis has instead
 HINTED = tuple(  # whose starts the record suggests
     name for name, parts in (SEARCH | SLIDING).items() if any(isinstance(part, Hint | Jumps | At) for part in parts)
 )
+ONCE = 1.5  # times a turn: what comes less often is no cogging of a shaft that may be out of balance, which has teeth
 LENGTHS = {  # m, between which a wave that a linear axis misreads is of its screw or encoder, and of its guide
     "turn": (0.0, 0.045),
     "wavelength": (0.012, np.inf),
@@ -275,6 +276,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
         if node == "sensor" and part.kind == "wavelength":
             low, high = LENGTHS[part.name]
             found = [value for value in found if low < value < high]
+        if part.kind == "order" and node in TERMS["load.imbalance"].nodes.get(m.record.plant, ()):
+            found = [value for value in found if value > ONCE]
         for value in found:
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}

@@ -30,6 +30,7 @@ PARTED = 2.5  # times the floor, by which one sensor may differ from what anothe
 GIVES = 0.2  # share of that motion by which it may differ besides: springs lie between the two
 FORGOTTEN = 4.0  # over the bandwidth of the correction: the time after which errors no longer go together
 FORGET = 8.0  # the same, after which it does not show how the machine stood before the recording
+TOGETHER = 100.0  # errors that count as one
 SIGMA = {"encoder": 0.4, "scale": 0.5}  # counts: what quantisation and a quiet machine leave
 
 
@@ -39,6 +40,8 @@ class Problem:
     Errors are those of the sensors that know direction, averaged over `mean` ticks, sensor by sensor, and between them,
     in the order of time, those of the edges that reels were seen at.
     """
+
+    together = TOGETHER
 
     def __init__(
         self,
@@ -74,6 +77,7 @@ class Problem:
         self.clock = np.ones(len(rows))  # (errors,): share of the weights, for what ticks off their times make
         self.louder = 1.0  # than a quiet machine, as far as is known
         self.measured = sim.record.shows_speed  # the floor is the noise of this very record
+        self.white: Problem | None = None  # the same with white errors, in which names are weighed
 
     def seen_by(self, model: Model) -> "Problem":
         """The same with the edges of counters that cannot tell direction, which the model tells; there must be no
@@ -104,6 +108,12 @@ class Problem:
     def pushed_behind(self) -> "Problem":
         """The same with every model corrected as one whose contact slips is."""
         return self.of(self.sim.pushed_behind())
+
+    def weighed_in(self, white: "Problem") -> "Problem":
+        """The same, in which names are weighed by the errors of `white`."""
+        other = copy(self)
+        other.white = white
+        return other
 
     def weighed(self, weights: np.ndarray) -> "Problem":
         """The same with a further weight for each error."""

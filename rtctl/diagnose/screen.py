@@ -41,7 +41,7 @@ class Ground(NamedTuple):
 
 def screen(problem: Problem, fitted: Fit, candidates: list[Hypothesis]) -> list[Score]:
     """Scores of all candidates, best first; several seeds of one term and node are candidates of their own."""
-    weight = fitted.space.prior() * trust(fitted.r)
+    weight = fitted.space.prior() * trust(fitted.r, problem.together)
     ground = Ground(fitted, weight, fitted.J.T @ fitted.J + np.diag(weight), *fitted.space.bounds())
     start = problem.residual(fitted.model, coarse=True)
     scores = parallel([partial(_score, problem, ground, start, h) for h in candidates])

@@ -11,12 +11,13 @@ import numpy as np
 
 from rtctl.diagnose import chances, decide, plausible
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
-from rtctl.diagnose.fit import Fit
+from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.jitter import Jitter, interval
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals, with_form
+from rtctl.diagnose.white import White
 
 SURE = 0.9  # weight of a name among its rivals: of generated names below it, five in six were the rival's
 POSSIBLE = 0.05  # weight from which a rival is mentioned
@@ -29,9 +30,10 @@ EVEN, BY_SIZE = 0.1, 0.8  # chance of a rival that does as well; confidence wher
 KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
 BESIDE = 2  # rivals told besides
+IN_WHITE = 8  # rounds of a fit to white errors
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
-IMITATES = {"drive.lag": "timing.delay"}  # a law that bends to what another is
-IMITATED = 1e-4  # chance that it does no more than that
+LATE = "drive.lag", "timing.delay"  # laws that bend to what the other is
+IMITATED = 1e-4  # chance that one does no more than that
 
 
 class Alternative(NamedTuple):
@@ -155,17 +157,41 @@ def standing(problem: Problem, best: Fit, index: int, rivals: Sequence[Alternati
 
 
 def shared(problem: Problem, places: Sequence[Alternative]) -> dict[str, float]:
-    """Weight of each name among `places`, that of the best model first.
+    """Weight of each name among `places`, that of the best model first."""
+    return weigh(places, weights(problem, places))
 
-    A lag that is as good as the delay that it could imitate shares with it: the lag has more to bend, and what little a
-    delay leaves, of a driver's own lag or a fraction of a tick, it follows.
+
+def weights(problem: Problem, places: Sequence[Alternative]) -> np.ndarray:
+    """Weight of each of the places. A lag and a delay share theirs by what they do to white errors.
+
+    Where more than noise is left, a lag that is as good as the delay that it could imitate has as much as that: the lag
+    has more to bend, and what little a delay leaves, of a driver's own lag or a fraction of a tick, it follows.
     """
-    names = weigh(places, decide.probabilities([p.fit for p in places], problem.floor))
-    best, term = places[0].fit, places[0].hypothesis.term
-    other = next((p for p in places if p.hypothesis.term == IMITATES.get(term)), None)
-    if other is not None and chances.p_value(best, other.fit, problem.block) > IMITATED:
-        names[term] = names[other.hypothesis.term] = 0.5 * (names[term] + names[other.hypothesis.term])
-    return names
+    fits = [p.fit for p in places]
+    if problem.white is not None:
+        return decide.probabilities(in_white(problem.white, fits))
+    out = decide.probabilities(fits, problem.floor)
+    late = [next((i for i, p in enumerate(places) if p.hypothesis.term == term), -1) for term in LATE]
+    if min(late) < 0:
+        return out
+    pair = [fits[i] for i in late]
+    best = min(pair, key=lambda f: f.cost)
+    if best.rms < decide.COMPLETE * problem.floor:
+        shares = decide.probabilities(in_white(White(problem, best.r), pair))
+    elif late[0] == 0 and chances.p_value(fits[0], fits[late[1]], problem.block) > IMITATED:
+        shares = np.array([0.5, 0.5])
+    else:
+        return out
+    own = [np.array([p.hypothesis.term == term for p in places]) for term in LATE]
+    both = sum(float(out[which].sum()) for which in own)
+    for which, share in zip(own, shares, strict=True):
+        out[which] *= share * both / max(float(out[which].sum()), 1e-300)
+    return out
+
+
+def in_white(white: Problem, fits: Sequence[Fit]) -> list[Fit]:
+    """The models fitted to white errors."""
+    return [fit(white, f.space, f.x, rounds=IN_WHITE) for f in fits]
 
 
 def weigh(places: Sequence[Alternative], weights: np.ndarray) -> dict[str, float]:

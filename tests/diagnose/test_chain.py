@@ -43,6 +43,7 @@ CASE = {
     "reaches": {"parameter_tolerance": 0.15},
 }
 SPRING = {"term": "load.spring", "node": "carriage", "k": 600.0}
+COGGING = {"term": "ripple.cogging", "node": "carriage", "A": 0.25, "turn": 0.01}
 
 
 def recording(*physics, seconds=10.0, true=None, shaken=0.0) -> Record:
@@ -127,6 +128,22 @@ def test_random_forces_are_said_and_nothing_else():
     assert d.verdict == NOTHING
     assert d.random_forces and as_json(d)["random_forces"]
     assert d.heldout_before > 3.0 * d.noise_floor
+
+
+def test_what_drowns_in_random_forces_is_named_by_errors_that_are_made_white():
+    d = diagnose_record(recording(COGGING, shaken=0.5))
+    assert (d.verdict, [e.name for e in d.effects]) == (NAMED, ["ripple.cogging"])
+    size = d.effects[0].parameters["A"]
+    assert size.low < 0.25 < size.high
+    assert d.effects[0].parameters["turn"].value == pytest.approx(0.01, rel=0.01)
+
+
+@pytest.mark.parametrize(("made", "other"), [("timing.delay", "drive.lag"), ("drive.lag", "timing.delay")])
+def test_a_delay_and_a_lag_of_as_much_are_told_apart(made, other):
+    late = {"timing.delay": {"node": "loop", "extra": 1.5e-3}, "drive.lag": {"node": "drive", "tau": 1.5e-3}}[made]
+    d = diagnose_record(recording({"term": made, **late}, shaken=1.0))
+    assert (d.verdict, [e.name for e in d.effects]) == (NAMED, [made])
+    assert other in [r.name for r in d.effects[0].look_alikes]
 
 
 def test_a_second_recording_is_predicted_whole(spring):

@@ -21,7 +21,7 @@ class Floor:
     def __init__(self, floor, hiss=False, parted=False):
         self.floor, self.hiss, self.block, self.louder = floor, lambda r: hiss, 20, 1.0
         self.parted = lambda r: parted
-        self.loudness, self.measured = loudness, False
+        self.loudness, self.measured, self.white = loudness, False, None
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis, Space
 from rtctl.diagnose.verdict import Alternative
 
 R = np.random.default_rng(0).standard_normal(3000)
-PROBLEM = SimpleNamespace(floor=1.0)
+PROBLEM = SimpleNamespace(floor=1.0, white=None)
 
 
 def fitted(*terms, loud=1.0, size=0.1):

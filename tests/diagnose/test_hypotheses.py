@@ -230,3 +230,12 @@ def test_beside_the_owners_spring_another_about_the_middle_would_be_a_push(blank
     record = blank("axis", np.sin(t), 0.05 * (1 - np.cos(t)), parameters={"M": 95.0, "F_v": 200.0, "F_c": 20.0, "k": k})
     found = hypotheses(record, owner_model(record.case).base, only=("load.spring",))
     assert len(found) == places and "x0" not in found[0].fixed
+
+
+def test_what_comes_once_a_turn_is_no_cogging_of_a_shaft_that_may_be_out_of_balance(moved):
+    def orders(kind, *asked):
+        found = hypotheses(*moved(kind), {"order": list(asked)}, only=["ripple.cogging"])
+        return {round(c.scale) for h in found for c in h.coordinates if c.name == "per_turn"}
+
+    assert orders("ivu", 1.0, 2.0, 7.0) == {2, 7}
+    assert orders("ldu", 1.0, 2.0, 7.0) == {1, 2, 7}  # whose motor turns many times while its wheel turns once

@@ -39,9 +39,9 @@ def test_less_dry_and_more_of_another_friction_is_another_curve(sizes, expected)
     assert patched(fitted(**sizes)) == expected
 
 
-def test_a_lag_shares_with_a_delay_that_it_is_not_surely_better_than():
+def test_a_lag_shares_with_a_delay_that_it_is_not_surely_better_than_where_more_than_noise_is_left():
     noise = np.random.default_rng(2).normal(size=4000)
-    problem = SimpleNamespace(floor=0.1, block=40)
+    problem = SimpleNamespace(floor=0.1, block=40, white=None)
 
     def place(name, r):
         space = fitted(offset=1.0).space._replace(
