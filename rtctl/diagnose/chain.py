@@ -250,6 +250,7 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         seconds=0.0,
         on_track=shown.on_track,
         random_forces=not decide.quiet(problem, base, taken) and problem.hiss(taken.r),
+        faint=problem.white is not None and bool(shown.verdict.effects),
         resembles=resembled(found) if verdict.verdict == UNNAMED else None,
     )
 

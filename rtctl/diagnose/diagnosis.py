@@ -77,6 +77,7 @@ class Diagnosis(NamedTuple):
     seconds: float
     on_track: bool = False  # whether the rows that no fit saw were predicted there, since a free run ran away
     random_forces: bool = False  # whether what is left is of forces without a pattern, beside the noise of the sensor
+    faint: bool = False  # whether what was found is less than random forces do, and shows in errors made white
     resembles: tuple[str, str] | None = None  # term that the table has no name for and its node, where it explains more
 
 
@@ -104,6 +105,7 @@ def as_json(d: Diagnosis) -> dict[str, Any]:
             "noise_floor": d.noise_floor,
         },
         "random_forces": d.random_forces,
+        "faint": d.faint,
         "resembles": None if d.resembles is None else dict(zip(("name", "node"), d.resembles, strict=True)),
         "cannot_test": list(d.cannot_test),
         "hides": {k: {"value": v.value, "unit": v.unit} for k, v in d.hides.items()},

@@ -243,6 +243,10 @@ def verdict_sentences(d: Diagnosis) -> str:
             first = f"{count} things are missing: " + _join([f"{h} ({t})" for h, t in clauses], "and") + "."
         rest = "that" if len(clauses) == 1 else "them"
         second = f"With {rest} in the model the error on the part that was not fitted {falls(d)}."
+        if d.faint:
+            second = (
+                f"Random forces do more than that: {second[0].lower()}{second[1:-1]}, but beneath them it is plain."
+            )
     elif d.verdict == AMBIGUOUS and d.effects:
         first, second = _ambiguous(d), f"Run this next: {plan(d)}."
     elif d.verdict == UNNAMED or d.effects:

@@ -190,6 +190,12 @@ def test_random_forces_are_told_apart_from_the_noise_of_the_sensor():
     assert "by 12 counts, and noise makes 0.30 counts beside that" in text
 
 
+def test_what_is_less_than_random_forces_do_is_told_so():
+    text = verdict_sentences(diagnosis(effects=[STICKS], heldout_after=0.0118, faint=True))
+    assert "Random forces do more than that: with that in the model the error " in text
+    assert text.endswith(", but beneath them it is plain.")
+
+
 def test_nothing_without_sizes():
     assert "was not worked out" in verdict_sentences(diagnosis(NOTHING))
 
