@@ -49,7 +49,7 @@ class Found(NamedTuple):
 
     def bare(self) -> "Found":
         """The same without any term."""
-        return self._replace(best=self.base, rivals=(), beyond=None)
+        return self._replace(problem=self.problem.weighed_in(None), best=self.base, rivals=(), beyond=None)
 
 
 def quiet(text: str) -> None:

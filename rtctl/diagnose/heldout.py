@@ -86,7 +86,7 @@ def holds_in_white(white: Problem, before: Fit, after: Fit, cut: int) -> bool:
     return float(new @ new) < float(old @ old)
 
 
-def faint(problem: Problem, before: Fit, after: Fit, cut: int) -> bool:
+def early(problem: Problem, before: Fit, after: Fit, cut: int) -> bool:
     """Whether what tells `after` from `before` acts before row `cut`, and beyond it is less than what `after` leaves.
 
     As a limit that is reached in two moments: a free run beyond tells of all else and next to nothing of it.

@@ -64,7 +64,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
         hiss = not quiet and problem.hiss(best.r)
         if problem.white is not None:
             closed = 1.0 if heldout.holds_in_white(problem.white, old, new, cut) else 0.0
-        elif hiss or heldout.faint(problem, old, new, cut):
+        elif hiss or heldout.early(problem, old, new, cut):
             if not closed > CLOSED_BY_SEVERAL:  # which random forces bring to no name
                 closed, several = on_track, several and not hiss
         elif quiet and (np.isnan(closed) or on_track > CLOSED_BY_SEVERAL):

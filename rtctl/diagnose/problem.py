@@ -109,8 +109,8 @@ class Problem:
         """The same with every model corrected as one whose contact slips is."""
         return self.of(self.sim.pushed_behind())
 
-    def weighed_in(self, white: "Problem") -> "Problem":
-        """The same, in which names are weighed by the errors of `white`."""
+    def weighed_in(self, white: "Problem | None") -> "Problem":
+        """The same, in which names are weighed by the errors of `white`, or else by its own."""
         other = copy(self)
         other.white = white
         return other

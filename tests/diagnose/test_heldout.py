@@ -8,7 +8,7 @@ import pytest
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import NoLaw
 from rtctl.diagnose.fit import fit
-from rtctl.diagnose.heldout import faint, free_fit, mode_of, nrmse, refit, rms
+from rtctl.diagnose.heldout import early, free_fit, holds_in_white, mode_of, nrmse, refit, rms
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
@@ -69,7 +69,7 @@ def test_a_limit_that_is_reached_once_at_the_beginning_is_too_faint_to_be_judged
     errors = {"right": noise, "once": noise + once, "always": noise + always, "late": noise + np.where(late, 9.0, 0.0)}
     problem = SimpleNamespace(time_rows=np.arange(400), residual=errors.get)
     right, *others = (SimpleNamespace(model=name) for name in errors)
-    assert [faint(problem, other, right, 300) for other in others] == [True, False, False]
+    assert [early(problem, other, right, 300) for other in others] == [True, False, False]
 
 
 def test_what_was_found_predicts_better_than_the_base(tilted, searched):
@@ -115,3 +115,14 @@ def test_a_term_gets_the_richer_form_that_the_free_run_asks_for(make_axis):
 def test_where_the_law_is_not_known_the_track_is_all_there_is(plain):
     on_track = base_fit(plain.sim, Problem(plain.sim))
     assert free_fit(plain.sim, on_track) is on_track
+
+
+def test_in_white_errors_a_model_holds_where_it_does_better_on_rows_that_no_fit_saw():
+    rows, noise = np.arange(400), np.random.default_rng(0).standard_normal(400)
+    white = SimpleNamespace(time_rows=rows, residual=lambda errors: errors)
+    missing = 0.5 * np.sin(0.3 * rows)
+    before, after = SimpleNamespace(model=noise + missing), SimpleNamespace(model=noise)
+    only_early = SimpleNamespace(model=noise + np.where(rows < 300, 0.0, 1.5 * missing))
+    assert holds_in_white(white, before, after, 300)
+    assert not holds_in_white(white, before, only_early, 300)
+    assert not holds_in_white(white, after, after, 300)
