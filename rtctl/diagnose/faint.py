@@ -54,7 +54,7 @@ def faint(
         return None
     progress("looking beneath the random forces")
     white = White(problem, base.r)
-    ground = fit(white, base.space, base.x, rounds=6)
+    ground = fit(white, base.space, base.x, rounds=6, J=white.through(base.J))
     scores = screen(white, ground, list(candidates))
     rough = parallel([partial(roughly, white, ground, score) for score in shortlist(scores, LIKELY)])
     likely = sorted(rough, key=lambda f: f.cost)[:FULL]

@@ -5,6 +5,7 @@ Source: Ljung, System Identification (1999), ch. 7 for the prediction error in c
 
 from collections.abc import Sequence
 from copy import copy
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from rtctl.diagnose.model import Model
 from rtctl.diagnose.rest import averaged, shares
 from rtctl.diagnose.simulate import Simulator, resolution
 from rtctl.diagnose.stretches import loudness, rms
+
+if TYPE_CHECKING:
+    from rtctl.diagnose.white import White
 
 EDGE = 0.6  # of an edge's sigma, on quiet machines
 EDGES = 0.5  # share of the main sensor's rows that all edges count for: they are few, but each is worth many rows
@@ -77,7 +81,7 @@ class Problem:
         self.clock = np.ones(len(rows))  # (errors,): share of the weights, for what ticks off their times make
         self.louder = 1.0  # than a quiet machine, as far as is known
         self.measured = sim.record.shows_speed  # the floor is the noise of this very record
-        self.white: Problem | None = None  # the same with white errors, in which names are weighed
+        self.white: White | None = None  # the same with white errors, in which names are weighed
 
     def seen_by(self, model: Model) -> "Problem":
         """The same with the edges of counters that cannot tell direction, which the model tells; there must be no
@@ -109,7 +113,7 @@ class Problem:
         """The same with every model corrected as one whose contact slips is."""
         return self.of(self.sim.pushed_behind())
 
-    def weighed_in(self, white: "Problem | None") -> "Problem":
+    def weighed_in(self, white: "White | None") -> "Problem":
         """The same, in which names are weighed by the errors of `white`, or else by its own."""
         other = copy(self)
         other.white = white

@@ -182,16 +182,16 @@ def weights(problem: Problem, places: Sequence[Alternative]) -> np.ndarray:
         shares = np.array([0.5, 0.5])
     else:
         return out
-    own = [np.array([p.hypothesis.term == term for p in places]) for term in LATE]
-    both = sum(float(out[which].sum()) for which in own)
-    for which, share in zip(own, shares, strict=True):
-        out[which] *= share * both / max(float(out[which].sum()), 1e-300)
+    of_either = np.array([p.hypothesis.term in LATE for p in places])
+    both = float(out[of_either].sum())
+    out[of_either] = 0.0
+    out[late] = shares * both
     return out
 
 
-def in_white(white: Problem, fits: Sequence[Fit]) -> list[Fit]:
+def in_white(white: White, fits: Sequence[Fit]) -> list[Fit]:
     """The models fitted to white errors."""
-    return [fit(white, f.space, f.x, rounds=IN_WHITE) for f in fits]
+    return [fit(white, f.space, f.x, rounds=IN_WHITE, J=white.through(f.J)) for f in fits]
 
 
 def weigh(places: Sequence[Alternative], weights: np.ndarray) -> dict[str, float]:
