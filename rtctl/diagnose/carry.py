@@ -11,8 +11,8 @@ import numpy as np
 from rtctl.config.fields import Shape, fill, put, written
 from rtctl.config.load import load_settings
 from rtctl.config.yaml_file import find
-from rtctl.diagnose.case import CascadeLaw, Case, NoLaw, PdLaw, SectionsLaw, believed
-from rtctl.diagnose.model import DAMPING, DIRECT, Model
+from rtctl.diagnose.case import DAMPING, CascadeLaw, Case, NoLaw, PdLaw, SectionsLaw, believed
+from rtctl.diagnose.model import DIRECT, Model
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SUBSTEP
 

@@ -17,6 +17,8 @@ from rtctl.config.errors import UserError, nearest
 from rtctl.idiom import Settings
 from rtctl.plants import axis, ivu, ldu
 
+DAMPING = math.sqrt(0.5)  # of a drive of which the owner says nothing
+
 Plant = Literal["ivu", "ldu", "axis"]
 PARAMETERS: dict[str, type[Settings]] = {
     "ivu": ivu.IvuParameters,
@@ -70,6 +72,14 @@ class Drive(_Part):
     newton_metre_per_volt: float | None = Field(None, gt=0)
     column: str | None = None  # what the recorded command is called at its origin
     unit: str = "V"
+
+    @property
+    def late(self) -> float:
+        """Delay in s by which a second-order low pass of this bandwidth holds back what is slow; 0 where the owner says
+        nothing of it."""
+        if self.bandwidth_hz is None:
+            return 0.0
+        return 2 * (self.damping or DAMPING) / (2 * math.pi * self.bandwidth_hz)
 
     @property
     def step_volt(self) -> float | None:

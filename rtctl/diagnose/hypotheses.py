@@ -34,6 +34,7 @@ class Size(NamedTuple):
     undoes: str = ""  # what of the base's a negative one takes away, and no more: friction never pushes
     finest: float = 0.0  # in steps of the sensor: less is no effect that this sensor could show
     slight: float = 0.0  # in units of share times measure: less is missed by nobody, however clearly it shows
+    blur: str = ""  # a measure: less may be what the owner's own value of the same is off by
 
 
 class Shape(NamedTuple):
@@ -138,13 +139,13 @@ SEARCH: dict[str, tuple[Part, ...]] = {
     "drive.deadband": (Size("band", "volts", 0.1), Choice("form", ("shift", "cut", "floor"))),
     "drive.gain_asymmetry": (Size("a", "one", 0.1, signed=True),),
     "drive.saturation": (Limit("limit", "peak", (0.5, 0.8)),),
-    "drive.lag": (Size("tau", "tick", 0.5), Choice("order", (1, 2))),
+    "drive.lag": (Size("tau", "tick", 0.5, blur="driver"), Choice("order", (1, 2))),
     "drive.supply_sag": (Size("k", "per_volt", 0.05), Choice("form", ("current", "power"))),
     "drive.thermal": (
         Size("a", "one", 0.1, signed=True), Shape("tau", "duration", (0.1, 0.5, 2.0), 5.0),
         Choice("V_ref", (1.0,), "volts"),
     ),
-    "timing.delay": (Size("extra", "tick", 0.5),),
+    "timing.delay": (Size("extra", "tick", 0.5, blur="driver"),),
     "ripple.cogging": (Turn("A", "phi", "force", 0.05), Hint("per_turn", "order")),
     "ripple.encoder": (Turn("A", "phi", "one", 2e-3),),
     "ripple.reel": (Turn("e", "phi", "one", 1e-4),),
@@ -252,7 +253,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             if part.undoes:
                 least = -(m.dry(node) if part.undoes == "dry" else m.thick(node)) / scale - 1e-3
             most = part.most / scale if part.measure == "one" else part.most
-            yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset, slight=part.slight),), {}
+            slight = max(part.slight, m.of(part.blur, node) / scale if part.blur else 0.0)
+            yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset, slight=slight),), {}
     elif isinstance(part, Shape):
         measure = m.of(part.measure, node)
         low, high = min(part.starts) * measure / part.reach, max(part.starts) * measure * part.reach

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.case import Case, believed
+from rtctl.diagnose.case import DAMPING, Case, believed
 from rtctl.diagnose.tacho import signed
 from rtctl.idiom import Settings
 from rtctl.plants import axis, ivu, ldu
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rtctl.diagnose.record import Record
 
 DIRECT = 20e3  # Hz: bandwidth of a drive of which the owner says nothing
-DAMPING = np.sqrt(0.5)
 
 FITTED = {  # what a fit may move, in the order of the Jacobian's columns; the rest is geometry and counts
     "ivu": (

@@ -18,7 +18,7 @@ from rtctl.config.errors import UserError
 from rtctl.diagnose import kernel, law
 from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
-from rtctl.diagnose.model import DAMPING, Model, plant_params
+from rtctl.diagnose.model import Model, plant_params
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.tacho import noise
 from rtctl.idiom import fill_record, record_dtype
@@ -166,8 +166,8 @@ class Simulator:
         j["mode"], j["substeps"], j["rate"], j["half"] = mode, substeps, 1.0 / (stride * self.record.dt), self.half
         j["stride"] = stride
         late = case.delay_samples * self.record.dt
-        if plant == "axis" and case.drive.bandwidth_hz:  # its plant has no driver: what that holds back is a delay
-            late += 2 * (case.drive.damping or DAMPING) / (2 * np.pi * case.drive.bandwidth_hz)
+        if plant == "axis":  # its plant has no driver: what that holds back is a delay
+            late += case.drive.late
         j["part"], j["delay"] = np.modf(late / self.record.dt * substeps)
         j["gain"] = case.drive.amp_per_volt[0] if case.drive.amp_per_volt else 1.0
         j["current_limit"] = case.drive.current_limit or np.inf

@@ -54,6 +54,7 @@ class Measures:
             "seconds": 1.0,
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.record.dt)),  # who samples slowly looks at what is slow
             "tick": self.record.dt,
+            "driver": (self.record.case.reaches.parameter_tolerance or 0.0) * drive.late,
             "duration": len(self.record.t) * self.record.dt,
             "volts": max(self.volts(node), LITTLE * volts),
             "grain": self.grain * s.span / (self.scales.get("encoder") or self.scales["sensor"]).span,

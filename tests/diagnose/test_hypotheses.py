@@ -239,3 +239,11 @@ def test_what_comes_once_a_turn_is_no_cogging_of_a_shaft_that_may_be_out_of_bala
 
     assert orders("ivu", 1.0, 2.0, 7.0) == {2, 7}
     assert orders("ldu", 1.0, 2.0, 7.0) == {1, 2, 7}  # whose motor turns many times while its wheel turns once
+
+
+@pytest.mark.parametrize("term", ["timing.delay", "drive.lag"])
+def test_less_lateness_than_the_owner_s_bandwidth_may_be_off_by_is_no_effect(moved, term):
+    record, base = moved("ivu")
+    for h in hypotheses(record, base, only=[term]):
+        (size,) = h.coordinates
+        assert size.slight * size.scale == pytest.approx(0.15 * record.case.drive.late)
