@@ -232,6 +232,16 @@ def extend(m, j, e, v):
 
 
 @tick
+def slid(m, j, d, v, T):
+    """Let link `j` go by `d` m or rad in all, at the rate `v`, which changes its pull by `T`: every law that asks for
+    the stretch is told of it, as by `extend`."""
+    pull(m, j, T)
+    m.link_e[j] -= d
+    m.link_v[j] -= v
+    m.link_T[j] += m.link_c[j] * d + m.link_k[j] * v
+
+
+@tick
 def advance(m):
     """One substep with the inputs `m.u` and the smooth forces `m.f` held; dry friction `m.dry` closes it."""
     nx, nu, nq = m.x.shape[0], m.u.shape[0], m.r.shape[0]

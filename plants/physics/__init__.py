@@ -23,9 +23,9 @@ from rtctl.plants.physics.place import Place, place
 from rtctl.plants.physics.term import Term
 
 FAMILIES = (  # in the order in which they act: what asymmetry scales and presliding replaces must be there before, and
-    # so must the tape that a reel winds, before anything asks for its tension
-    timing, drive, drive_dynamics, geometry, ripple_tape, friction, friction_load, load, friction_direction, presliding,
-    transmission, contact, structure, tape, ripple, guide, sensor,
+    # so must all that stretches, lets go or slackens a spring, before anything rubs by its tension
+    timing, drive, drive_dynamics, ripple_tape, geometry, transmission, contact, structure, tape, friction,
+    friction_load, load, friction_direction, presliding, ripple, guide, sensor,
 )  # fmt: skip
 TERMS: dict[str, Term] = {
     term.name: term for family in FAMILIES for term in vars(family).values() if isinstance(term, Term)

@@ -100,18 +100,21 @@ def micro(s, grip, T, c, k, h):
 
 
 @tick
-def share(m, change):
-    """Spread a change of T2 - T1 over the two tapes as their springs do: both slide the same way."""
+def share(m, d, v, change):
+    """Spread a change of T2 - T1 over the two tapes as their springs do: both have slid the same way, by `d` at the
+    rate `v`."""
     both = m.link_c[0] + m.link_c[1]
-    linear.pull(m, 1, change * m.link_c[1] / both)
-    linear.pull(m, 0, -change * m.link_c[0] / both)
+    linear.slid(m, 1, d, v, change * m.link_c[1] / both)
+    linear.slid(m, 0, -d, -v, -change * m.link_c[0] / both)
 
 
 @tick
 def slip_tape(p, s, m):
     """Slip of the tape on the capstan of the IVU."""
     T = linear.tension(m, 1) - linear.tension(m, 0)
-    share(m, slide(s, p.F_max, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h))
+    before = s.d
+    change = slide(s, p.F_max, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h)
+    share(m, s.d, (s.d - before) / p.h, change)
 
 
 @tick
@@ -119,7 +122,9 @@ def creep_tape(p, s, m, i):
     """Creep of the tape on the capstan, node `i` of the IVU."""
     grip = p.kappa * abs(m.link_b[1] * m.vm[i])
     T = linear.tension(m, 1) - linear.tension(m, 0)
-    share(m, micro(s, grip, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h))
+    before = s.d
+    change = micro(s, grip, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h)
+    share(m, s.d, (s.d - before) / p.h, change)
 
 
 @tick

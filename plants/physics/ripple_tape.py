@@ -95,21 +95,28 @@ def tape_of(m, i):
 
 @tick
 def reel(p, m, i):
-    """Stretch the tape of reel `i` by what the reel has wound too much, and let it pull at the arm that it has."""
-    j = tape_of(m, i)
-    extra = arm(p, m.qm[i])
-    linear.extend(m, j, way(p, m.qm[i]), extra * m.vm[i])
-    m.f[i] -= extra * linear.tension(m, j)
+    """Stretch the tape of reel `i` by what the reel has wound too much."""
+    linear.extend(m, tape_of(m, i), way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i])
+
+
+@tick
+def reel_arm(p, m, i):
+    """Let it pull at the arm that it has, with what slip and slack have left of its tension."""
+    m.f[i] -= arm(p, m.qm[i]) * linear.tension(m, tape_of(m, i))
 
 
 @tick
 def capstan(p, m, i):
     """Move both tapes by what the capstan `i` has passed too much: tape 1 gets shorter by it and tape 2 longer."""
-    extra = arm(p, m.qm[i])
-    moved, speed = way(p, m.qm[i]), extra * m.vm[i]
+    moved, speed = way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i]
     linear.extend(m, 0, -moved, -speed)
     linear.extend(m, 1, moved, speed)
-    m.f[i] += extra * (linear.tension(m, 0) - linear.tension(m, 1))
+
+
+@tick
+def capstan_arm(p, m, i):
+    """As `reel_arm`."""
+    m.f[i] += arm(p, m.qm[i]) * (linear.tension(m, 0) - linear.tension(m, 1))
 
 
 REEL = Term(
@@ -119,7 +126,7 @@ REEL = Term(
     source="Shelton 1986",
     settings=ReelSettings,
     build=build_reel,
-    act={"force": "ripple_tape.reel({p}, {m}, {i})"},
+    act={"force": "ripple_tape.reel({p}, {m}, {i})", "last": "ripple_tape.reel_arm({p}, {m}, {i})"},
     nodes={"ivu": ("reel1", "reel2")},
     look_alikes={
         "load.imbalance": "the same turns at another tension: an eccentric reel follows the tension, a weight does not",
@@ -139,6 +146,7 @@ CAPSTAN = Term(
     build=build_capstan,
     act={
         "force:ivu": "ripple_tape.capstan({p}, {m}, {i})",
+        "last:ivu": "ripple_tape.capstan_arm({p}, {m}, {i})",
         "reading:ldu": "{m}.y[1] += ripple_tape.way({p}, {m}.x[{i}])",
     },
     nodes={"ivu": ("capstan",), "ldu": ("capstan",)},

@@ -15,7 +15,8 @@ The sites of a substep in their order:
     command   {m}.volts[{c}], what stands at the driver's input, may be changed; {m}.volts holds all drives
     force     {m}.qm and {m}.vm are position and speed at the middle of the substep; {r} times a force goes to
               {m}.f[{i}], {r} times a limit of dry friction to {m}.dry[{i}]; linear.pull({m}, {l}, T) pulls at a link
-    last      as force, once every term has pushed and pulled: for what acts on all of it, as a reel that grows heavier
+    last      as force, once every term has pushed and pulled: for what acts on all of it, as a reel that grows heavier,
+              or pulls with what the others have left of a tension, as the arm of a wheel out of round
     reading   {m}.y[{c}], what the sensor would show before it is cut into counts, may be changed; {m}.x is the state at
               the sample, {m}.t its time. It may be called once a substep or once a tick: it keeps no memory.
 """

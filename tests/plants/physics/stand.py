@@ -10,7 +10,7 @@ import numpy as np
 
 from rtctl.idiom import Settings, fill_record, record_dtype, state
 from rtctl.plants import axis, ivu, ldu
-from rtctl.plants.physics import drive, drive_dynamics, geometry, guide, ripple, ripple_tape, sensor, timing
+from rtctl.plants.physics import drive, drive_dynamics, geometry, guide, ordered, ripple, ripple_tape, sensor, timing
 from rtctl.plants.physics.place import place
 from rtctl.plants.physics.term import SITES, Term
 
@@ -165,7 +165,7 @@ def run(
             s.m.v_before[i - nq] = value
     q, z = np.zeros(SLOTS, slot).view(np.recarray), np.zeros(SLOTS, memory).view(np.recarray)
     names = [term.name for term in of(kind)]
-    for n, settings in enumerate(terms):
+    for n, settings in enumerate(ordered(terms)):
         name, spot = settings.term, place(kind, settings.node)  # type: ignore[attr-defined]
         q[n].number, q[n].i, q[n].l, q[n].c = names.index(name) + 1, spot.node, spot.link, spot.channel
         q[n].r = getattr(p, spot.factor) if spot.factor else 1.0

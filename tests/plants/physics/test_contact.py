@@ -3,10 +3,12 @@
 import bench
 import numpy as np
 import pytest
+import stand
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.plants.physics import contact
+from rtctl.plants import ivu, linear
+from rtctl.plants.physics import contact, ripple_tape
 
 forces = st.floats(-100, 100)
 
@@ -83,3 +85,40 @@ def test_the_tape_slides_on_a_capstan_that_will_not_turn():
     assert abs(r.q[-1, 2]) < 1e-3
     assert r.q[-1, 1] * 0.038 > stuck.q[-1, 1] * 0.038 + 5e-3
     assert r.q[-1, 1] * 0.038 == pytest.approx(-r.q[-1, 3] * 0.022, abs=2e-3)  # what one winds the other gives
+
+
+def taut(e1: float, e2: float) -> np.recarray:
+    """The record of a reel unit whose tapes are stretched by so much, at rest."""
+    _, plant = stand.plant("ivu", 5e-4, d_tape=0.0)
+    plant.m.qm[ivu.REEL1], plant.m.qm[ivu.REEL2] = e1 / plant.m.link_a[0], e2 / plant.m.link_a[1]
+    return plant.m
+
+
+def slipped(m: np.recarray) -> None:
+    p = contact.build_slip(contact.SlipSettings(node="capstan", F_max=0.05), 5e-4)
+    contact.slip_tape(p, state(), m)
+
+
+def crept(m: np.recarray) -> None:
+    p = contact.build_creep(contact.CreepSettings(node="capstan", kappa=1.0), 5e-4)
+    s = state()
+    s.d = 3e-4  # all that the tapes differ by, so that nothing is left to creep for
+    m.vm[ivu.CAPSTAN] = 1.0
+    contact.creep_tape(p, s, m, ivu.CAPSTAN)
+
+
+@pytest.mark.parametrize(("act", "left"), [(slipped, 0.05), (crept, 0.0)])
+def test_every_law_of_the_tape_sees_what_has_slid(act, left):
+    """Friction by load, an arm out of round, a tape that stiffens: the pull and the stretch are those of the tape
+    itself, and not of a tape that held."""
+    m = taut(2e-4, 8e-4)
+    m.link_k[:] = 0.0  # what a damper takes up of a sudden slip is not looked at
+    act(m)
+    T = np.array([linear.tension(m, 0), linear.tension(m, 1)])
+    assert T[1] - T[0] == pytest.approx(left, abs=2e-3)
+    assert T.sum() == pytest.approx(450.0 * 1e-3)  # what one tape loses the other gains
+    assert [450.0 * linear.stretch(m, j) for j in (0, 1)] == pytest.approx(list(T), abs=2e-3)
+    before = m.f.copy()
+    wheel = ripple_tape.build_capstan(ripple_tape.CapstanSettings(node="capstan", a=1e-4), 5e-4)
+    ripple_tape.capstan_arm(wheel, m, ivu.CAPSTAN)
+    assert (m.f - before)[ivu.CAPSTAN] == pytest.approx(-1e-4 * (T[1] - T[0]))

@@ -21,6 +21,7 @@ def wind(p, s, volts, substeps, x, reel):
             linear.midpoint(m)
             ivu.follow_tape(p, s)
             ripple_tape.reel(reel, m, ivu.REEL2)
+            ripple_tape.reel_arm(reel, m, ivu.REEL2)
             linear.advance(m)
         for i in range(m.x.shape[0]):
             x[k, i] = m.x[i]
@@ -110,5 +111,8 @@ def test_what_a_reel_winds_is_there_before_anything_asks_for_its_tension():
     """Or creep and friction under load would see the tension of another tape."""
     names = list(TERMS)
     winding = ("geometry.radius_change", "ripple.reel", "ripple.capstan")
-    asking = ("friction.load", "transmission.slip", "transmission.creep", "tape.slack", "tape.viscoelastic")
-    assert max(map(names.index, winding)) < min(map(names.index, asking))
+    contacts = ("transmission.slip", "transmission.creep")
+    tape = ("structure.stiffening", "tape.viscoelastic", "tape.slack")
+    assert max(map(names.index, winding)) < min(map(names.index, contacts))
+    assert max(map(names.index, contacts)) < min(map(names.index, tape))
+    assert max(map(names.index, tape)) < names.index("friction.load")
