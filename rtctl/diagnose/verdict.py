@@ -12,7 +12,9 @@ import numpy as np
 from rtctl.diagnose import chances, decide, plausible
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
 from rtctl.diagnose.fit import Fit, fit
+from rtctl.diagnose.hypotheses import FALLING
 from rtctl.diagnose.jitter import Jitter, interval
+from rtctl.diagnose.model import DRY, dry_friction
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped
 from rtctl.diagnose.space import Hypothesis
@@ -128,11 +130,24 @@ def leans(verdict: Verdict) -> bool:
 def patched(best: Fit) -> bool:
     """Whether frictions that take from each other imitate a curve over speed that the library has not.
 
-    Less of one kind and more of another is no machine's doing.
+    Less of one kind and more of another is no machine's doing: less than nothing of what was added, friction that falls
+    with speed to dry friction of which the owner's tolerance leaves no less, or that does not fall but rises.
     """
+    model = best.model
+    for h, x in zip(best.space.hypotheses, best.space.parts(best.x), strict=True):
+        if h.term == FALLING and (
+            lowest(best, DRY[model.kind].get(h.node, ""))
+            or h.values(x)["F_s"] < dry_friction(model.kind, model.base, h.node)
+        ):
+            return True
     found = {h.term: h.values(x) for h, x in zip(best.space.hypotheses, best.space.parts(best.x), strict=True)}
     others = {"friction.viscous", "friction.stribeck", "friction.load"} & set(found)
     return bool(others) and found.get("friction.coulomb", {}).get("F_C", 0.0) < 0.0
+
+
+def lowest(fitted: Fit, name: str) -> bool:
+    """Whether a plant parameter is as low as the owner's tolerance lets it be."""
+    return name in fitted.bound() and float(fitted.x[fitted.space.names.index(name)]) < 0.0
 
 
 def with_known(verdict: Verdict, known: Sequence[Effect]) -> Verdict:

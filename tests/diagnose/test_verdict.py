@@ -39,6 +39,15 @@ def test_less_dry_and_more_of_another_friction_is_another_curve(sizes, expected)
     assert patched(fitted(**sizes)) == expected
 
 
+@pytest.mark.parametrize(("dry", "F_s", "expected"), [
+    (-0.1, 1.0, False), (np.log(1.15), 1.3, False), (np.log(0.85), 1.3, True), (0.1, 1.05, True),
+])  # fmt: skip
+def test_friction_that_falls_to_the_least_that_the_owner_allows_or_rises_is_another_curve(dry, F_s, expected):
+    falls = Hypothesis("friction.stribeck", "carriage", (Coordinate("F_s", SIZE, 1.0),))
+    space = Space(Model("axis", {"F_c": 1.0}), ("F_c",), lambda name: 0.15, (falls,))
+    assert patched(Fit(space, np.array([dry, F_s]), np.ones(10), np.zeros((10, 2)), 5.0)) == expected
+
+
 def test_a_lag_shares_with_a_delay_that_it_is_not_surely_better_than_where_more_than_noise_is_left():
     noise = np.random.default_rng(2).normal(size=4000)
     problem = SimpleNamespace(floor=0.1, block=40, white=None)
