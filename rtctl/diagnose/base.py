@@ -23,7 +23,9 @@ AGAIN = 4  # fits from where the last one stopped
 NEAR = 2.5  # times the noise floor: a base this close is worth every round
 TROUGHS = (1.1, 4.5)  # times the noise floor: below there is nothing to gain, above one trough takes all
 SPREAD = {"ivu": 2, "ldu": 8, "axis": 2}  # other starts: a reel unit and an axis seldom have two troughs
-RINGS = {"ivu": (), "ldu": (("k_c", "M"),), "axis": ()}  # spring and mass: another frequency is a trough of its own
+PAIRS = {  # whose ratio makes a trough of its own: which motor is the heavier, and where a spring and its mass ring
+    "ivu": (("J_m1", "J_m2"),), "ldu": (("k_c", "M"),), "axis": (),
+}  # fmt: skip
 UNFOLDED = 0.8  # of the cost
 AWAY = 0.8  # of the tolerance
 
@@ -38,7 +40,7 @@ def base_fit(sim: Simulator, problem: Problem, start: np.ndarray | None = None) 
     if start is None and space.names and TROUGHS[0] * problem.floor < fitted.rms < TROUGHS[1] * problem.floor:
         starts += spread(space, fitted.x, SPREAD[sim.record.plant])
     if fitted.rms > COMPLETE * problem.floor:
-        starts += rings(space, fitted.x, sim.record.plant)
+        starts += pairs(space, fitted.x, sim.record.plant)
     for other in parallel([partial(fit, problem, space, x, rounds=12) for x in starts]):
         if other.cost < 0.98 * fitted.cost:
             fitted = settle(problem, other)
@@ -59,11 +61,11 @@ def spread(space: Space, x: np.ndarray, count: int) -> list[np.ndarray]:
     return [np.where(space.reach() < WIDE, other, x) for other in space.spread(count)]
 
 
-def rings(space: Space, x: np.ndarray, plant: str) -> list[np.ndarray]:
-    """Places beside x (parameters,) where a spring and its mass ring higher and lower."""
+def pairs(space: Space, x: np.ndarray, plant: str) -> list[np.ndarray]:
+    """Places beside x (parameters,) where one of a pair is larger and the other smaller, and the other way."""
     low, high = space.bounds()
     out = []
-    for pair in RINGS[plant]:
+    for pair in PAIRS[plant]:
         for sides in ((high, low), (low, high)):
             other = x.copy()
             for name, side in zip(pair, sides, strict=True):

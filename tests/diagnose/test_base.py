@@ -74,3 +74,13 @@ def test_places_to_start_from_are_within_the_tolerance_and_what_has_none_stays()
     assert places.shape == (8, 2)
     assert (places[:, 1] == 0.2).all()
     assert np.log(0.85) < places[:, 0].min() < -0.05 < 0.05 < places[:, 0].max() < np.log(1.15)
+
+
+def test_which_motor_is_the_heavier_and_where_a_mass_rings_are_troughs_to_begin_in():
+    space = Space(Model("ivu", {"J_m1": 1.0, "J_m2": 1.0, "c1": 1.0}), ("J_m1", "J_m2", "c1"), lambda name: 0.15)
+    one, two = base.pairs(space, np.array([0.0, 0.0, 0.07]), "ivu")
+    up, down = 0.8 * np.log(1.15), 0.8 * np.log(0.85)
+    assert one == pytest.approx([up, down, 0.07])
+    assert two == pytest.approx([down, up, 0.07])
+    assert len(base.pairs(Space(Model("ldu", {"M": 1.0}), ("M",), lambda name: 0.15), np.zeros(1), "ldu")) == 2
+    assert base.pairs(Space(Model("axis", {"M": 1.0}), ("M",), lambda name: 0.15), np.zeros(1), "axis") == []
