@@ -27,6 +27,7 @@ from rtctl.diagnose.stretches import rms
 TRIES = 4  # weights of the two errors, by what the last fit left of each
 NONE = 1e-12  # an rms to divide by is never quite 0
 NO_GAP = 0.1  # of what is left
+QUARTERS = 4
 WORSE = 1.5  # times the rms on track: a free run is not bought at any price
 
 
@@ -65,18 +66,34 @@ def spread(y: np.ndarray) -> float:
     return float(np.std(y)) or 1.0
 
 
-def closed_on_track(problem: Problem, before: Fit, after: Fit, cut: int) -> float:
-    """Share of the gap to the noise that `after`, fitted on rows before `cut`, closes beyond them, of errors on track.
+def closed_on_track(problem: Problem, before: Fit, after: Fit, unseen: np.ndarray) -> float:
+    """Share of the gap to the noise that `after`, not fitted on the errors `unseen` (errors,), closes there, on track.
 
     The noise is what `after` leaves of the rows that it was fitted on: where forces are random, a free run adds them up
     and tells nothing. Nan where `before` leaves no gap.
     """
-    late = problem.time_rows >= cut
     old, new = problem.residual(before.model), problem.residual(after.model)
-    gap = rms(old[late]) ** 2 - rms(new[~late]) ** 2
-    if gap < NO_GAP * rms(new[~late]) ** 2:
+    gap = rms(old[unseen]) ** 2 - rms(new[~unseen]) ** 2
+    if gap < NO_GAP * rms(new[~unseen]) ** 2:
         return float("nan")
-    return (rms(old[late]) ** 2 - rms(new[late]) ** 2) / gap
+    return (rms(old[unseen]) ** 2 - rms(new[unseen]) ** 2) / gap
+
+
+def elsewhere(sim: Simulator, rows: np.ndarray) -> float:
+    """Share of the `rows` (n,) at which the machine is where it was in none of the others."""
+    rest = sim.seen[~rows]
+    return float(np.mean((sim.seen[rows] < rest.min()) | (sim.seen[rows] > rest.max())))
+
+
+def closed_within(problem: Problem, before: Fit, after: Fit) -> float:
+    """As `closed_on_track`, of that quarter of the record which lies best within the way of all the rest."""
+    n = len(problem.sim.seen)
+    quarter = np.arange(n) // (n // QUARTERS)
+    inner = min(range(QUARTERS), key=lambda k: elsewhere(problem.sim, quarter == k))
+    unseen = (quarter == inner)[problem.time_rows]
+    rest = problem.weighed((~unseen).astype(float))
+    old, new = (fit(rest, f.space, f.x, rounds=5) for f in (before, after))
+    return closed_on_track(problem, old, new, unseen)
 
 
 def holds_in_white(white: Problem, before: Fit, after: Fit, cut: int) -> bool:

@@ -3,6 +3,7 @@
 Where the law is known the prediction is a free run, the loop closed. It tells nothing of terms where random forces act,
 which it adds up, where it wanders though the model is right to the noise, of what hardly acts in these rows, and of a
 contact that slips: whether that holds or lets the motor run away hangs on a hair. There the model is kept on track.
+Where the machine goes on to places where it never was before, another quarter of the record may bear out one name.
 """
 
 from typing import NamedTuple
@@ -18,9 +19,10 @@ from rtctl.diagnose.model import Model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SLIPS, Simulator
-from rtctl.diagnose.verdict import CLOSED_BY_SEVERAL, LOST, TELLING, Verdict, judged, proven, with_known
+from rtctl.diagnose.verdict import CLOSED, CLOSED_BY_SEVERAL, LOST, TELLING, Verdict, judged, proven, with_known
 
 WORSE = 3.0  # times the error before: a free run this bad is judged as it is
+OUTSIDE = 0.5  # of these rows: where the machine was never before, no law of the place can be judged
 HELDOUT = 0.25  # share of a record, at its end, that the prediction is judged on
 
 
@@ -59,16 +61,10 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     # what is left of several that were refused has to do as much as they
     several = again or sum(e.instead_of is None for e in verdict.effects) > 1
     if other is None and errors[1] < WORSE * errors[0]:
-        on_track = heldout.closed_on_track(problem, old, new, cut)
-        quiet = decide.quiet(problem, base, best)
-        hiss = not quiet and problem.hiss(best.r)
-        if problem.white is not None:
-            closed = 1.0 if heldout.holds_in_white(problem.white, old, new, cut) else 0.0
-        elif hiss or heldout.early(problem, old, new, cut):
-            if not closed > CLOSED_BY_SEVERAL:  # which random forces bring to no name
-                closed, several = on_track, several and not hiss
-        elif quiet and (np.isnan(closed) or on_track > CLOSED_BY_SEVERAL):
-            closed = on_track
+        closed, several = told_by(found, old, new, cut, closed, several)
+    refusable = other is None and not several and closed < CLOSED
+    if refusable and heldout.elsewhere(sim, np.arange(len(sim.seen)) >= cut) > OUTSIDE:
+        closed, several = heldout.closed_within(problem, base, taken), True  # has to do as much as several
     loud = decide.loud(problem, base)
     proved = proven(verdict, closed if max(errors) < LOST else np.nan, several, UNNAMED if loud else NOTHING)
     refused = bool(verdict.effects) and not proved.effects
@@ -76,6 +72,23 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     if not proved.effects:
         taken, errors[1] = base, errors[0]
     return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor, mode != usual)
+
+
+def told_by(found: Found, old: Fit, new: Fit, cut: int, closed: float, several: bool) -> tuple[float, bool]:
+    """What `new` closes of the gap beyond row `cut`, and whether it has to do as much as several names: as the free run
+    has it, which `closed` this share, or as the errors on track do where the free run tells nothing."""
+    problem, base, best = found.problem, found.base, found.best
+    there = heldout.closed_on_track(problem, old, new, problem.time_rows >= cut)
+    quiet = decide.quiet(problem, base, best)
+    hiss = not quiet and problem.hiss(best.r)
+    if problem.white is not None:
+        return (1.0 if heldout.holds_in_white(problem.white, old, new, cut) else 0.0), several
+    if hiss or heldout.early(problem, old, new, cut):
+        # which random forces bring to no name
+        return (closed, several) if closed > CLOSED_BY_SEVERAL else (there, several and not hiss)
+    if quiet and (np.isnan(closed) or there > CLOSED_BY_SEVERAL):
+        return there, several
+    return closed, several
 
 
 def errors_of(judge: Problem, old: Fit, new: Fit, rows: slice, mode: int) -> tuple[list[float], int]:

@@ -8,7 +8,18 @@ import pytest
 from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import NoLaw
 from rtctl.diagnose.fit import fit
-from rtctl.diagnose.heldout import early, free_fit, holds_in_white, mode_of, nrmse, refit, rms
+from rtctl.diagnose.heldout import (
+    closed_on_track,
+    closed_within,
+    early,
+    elsewhere,
+    free_fit,
+    holds_in_white,
+    mode_of,
+    nrmse,
+    refit,
+    rms,
+)
 from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.measure import begin, free_run
@@ -126,3 +137,32 @@ def test_in_white_errors_a_model_holds_where_it_does_better_on_rows_that_no_fit_
     assert holds_in_white(white, before, after, 300)
     assert not holds_in_white(white, before, only_early, 300)
     assert not holds_in_white(white, after, after, 300)
+
+
+def test_where_a_machine_was_never_before():
+    sim = SimpleNamespace(seen=np.concatenate([np.linspace(0, 3, 300), np.linspace(3, 5, 50), np.linspace(5, 2, 50)]))
+    late = np.arange(400) >= 300
+    assert elsewhere(sim, late) == pytest.approx(0.5 + 0.5 * 2 / 3, abs=0.02)
+    assert elsewhere(sim, np.arange(400) < 100) == pytest.approx(1.0, abs=0.02)
+    assert elsewhere(sim, ~late & (np.arange(400) >= 200)) == 0.0  # passed on the way back
+
+
+def test_the_share_of_the_gap_is_that_of_errors_that_no_fit_saw():
+    noise = np.random.default_rng(1).standard_normal(4000)
+    unseen = np.arange(4000) >= 3000
+    problem = SimpleNamespace(residual=lambda errors: errors)
+    before, half = (
+        SimpleNamespace(model=2.0 * noise),
+        SimpleNamespace(model=np.where(unseen, np.sqrt(2.5), 1.0) * noise),
+    )
+    assert closed_on_track(problem, before, SimpleNamespace(model=noise), unseen) == pytest.approx(1.0, abs=0.1)
+    assert closed_on_track(problem, before, half, unseen) == pytest.approx(0.5, abs=0.1)
+    assert np.isnan(closed_on_track(problem, SimpleNamespace(model=noise), SimpleNamespace(model=noise), unseen))
+
+
+def test_a_quarter_within_the_way_of_the_rest_bears_out_what_is_there(tilted, searched):
+    problem, base, looked = searched(tilted)
+    found = looked.rounds[0][0]
+    assert closed_within(problem, base, found) > 0.9
+    spoiled = found._replace(space=found.space.without(0), x=found.x[: found.space.nb])
+    assert not closed_within(problem, base, spoiled) > 0.1
