@@ -36,6 +36,7 @@ IN_WHITE = 8  # rounds of a fit to white errors
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
 LATE = "drive.lag", "timing.delay"  # laws that bend to what the other is
 IMITATED = 1e-4  # chance that one does no more than that
+MORE = "friction.viscous", "friction.stribeck", "friction.load"  # that make up for dry friction that a model takes away
 
 
 class Alternative(NamedTuple):
@@ -130,19 +131,21 @@ def leans(verdict: Verdict) -> bool:
 def patched(best: Fit) -> bool:
     """Whether frictions that take from each other imitate a curve over speed that the library has not.
 
-    Less of one kind and more of another is no machine's doing: less than nothing of what was added, friction that falls
-    with speed to dry friction of which the owner's tolerance leaves no less, or that does not fall but rises.
+    Less of one kind and more of another is no machine's doing, nor less dry friction at one body and more at another;
+    nor is friction that falls with speed to dry friction of which the owner's tolerance leaves no less, or that does
+    not fall but rises.
     """
     model = best.model
-    for h, x in zip(best.space.hypotheses, best.space.parts(best.x), strict=True):
+    found = [(h, h.values(x)) for h, x in zip(best.space.hypotheses, best.space.parts(best.x), strict=True)]
+    for h, values in found:
         if h.term == FALLING and (
             lowest(best, DRY[model.kind].get(h.node, ""))
-            or h.values(x)["F_s"] < dry_friction(model.kind, model.base, h.node)
+            or values["F_s"] < dry_friction(model.kind, model.base, h.node)
         ):
             return True
-    found = {h.term: h.values(x) for h, x in zip(best.space.hypotheses, best.space.parts(best.x), strict=True)}
-    others = {"friction.viscous", "friction.stribeck", "friction.load"} & set(found)
-    return bool(others) and found.get("friction.coulomb", {}).get("F_C", 0.0) < 0.0
+    dry = [values["F_C"] for h, values in found if h.term == "friction.coulomb"]
+    more = max(dry, default=0.0) > 0.0 or any(h.term in MORE for h, _ in found)
+    return more and min(dry, default=0.0) < 0.0
 
 
 def lowest(fitted: Fit, name: str) -> bool:

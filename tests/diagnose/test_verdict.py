@@ -39,6 +39,13 @@ def test_less_dry_and_more_of_another_friction_is_another_curve(sizes, expected)
     assert patched(fitted(**sizes)) == expected
 
 
+@pytest.mark.parametrize(("sizes", "expected"), [((2.0, -1.0), True), ((2.0, 1.0), False), ((-2.0, -1.0), False)])
+def test_less_dry_friction_at_one_body_and_more_at_another_is_no_machine_s(sizes, expected):
+    of = (Hypothesis("friction.coulomb", node, (Coordinate("F_C", SIZE, 1.0),)) for node in ("motor2", "reel2"))
+    space = Space(Model("ivu", {}), (), lambda name: 0.1, tuple(of))
+    assert patched(Fit(space, np.array(sizes), np.ones(10), np.zeros((10, 2)), 5.0)) == expected
+
+
 @pytest.mark.parametrize(("dry", "F_s", "expected"), [
     (-0.1, 1.0, False), (np.log(1.15), 1.3, False), (np.log(0.85), 1.3, True), (0.1, 1.05, True),
 ])  # fmt: skip
