@@ -61,7 +61,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     # what is left of several that were refused has to do as much as they
     several = again or sum(e.instead_of is None for e in verdict.effects) > 1
     if other is None and errors[1] < WORSE * errors[0]:
-        closed, several = told_by(found, old, new, cut, closed, several)
+        closed, several = free_or_on_track(found, old, new, cut, closed, several)
     refusable = other is None and not several and closed < CLOSED
     if refusable and heldout.elsewhere(sim, np.arange(len(sim.seen)) >= cut) > OUTSIDE:
         closed, several = heldout.closed_within(problem, base, taken), True  # has to do as much as several
@@ -74,7 +74,7 @@ def predicted(sim: Simulator, other: Record | None, found: Found, known: list[Ef
     return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor, mode != usual)
 
 
-def told_by(found: Found, old: Fit, new: Fit, cut: int, closed: float, several: bool) -> tuple[float, bool]:
+def free_or_on_track(found: Found, old: Fit, new: Fit, cut: int, closed: float, several: bool) -> tuple[float, bool]:
     """What `new` closes of the gap beyond row `cut`, and whether it has to do as much as several names: as the free run
     has it, which `closed` this share, or as the errors on track do where the free run tells nothing."""
     problem, base, best = found.problem, found.base, found.best
