@@ -127,7 +127,7 @@ IVU_STATE = state(
     R2_lin=float,
     J1_lin=float,
     J2_lin=float,
-    T1=float,  # N
+    T1=float,  # N, as `tensions` wrote it
     T2=float,
 )
 
@@ -269,14 +269,12 @@ def wound(q, R, grow, R_min):
 
 
 @tick
-def tensions(p, s):
-    """Write the tape tensions T1, T2 in N into the state (positive when taut)."""
-    grow = p.d_tape / (2.0 * np.pi)
-    x, nq = s.m.x, NQ
-    l1 = wound(x[REEL1], p.R1, grow, p.R_min)
-    l2 = wound(x[REEL2], p.R2, grow, p.R_min)
-    s.T1 = -(p.c1 * (p.R_c * x[CAPSTAN] - l1) + p.k1 * (p.R_c * x[nq + CAPSTAN] - s.R1 * x[nq + REEL1]))
-    s.T2 = p.c2 * (p.R_c * x[CAPSTAN] + l2) + p.k2 * (p.R_c * x[nq + CAPSTAN] + s.R2 * x[nq + REEL2])
+def tensions(s):
+    """Write the tape tensions T1, T2 in N into the state, positive when taut, with the pull of every term of physics.
+
+    They are those of the last substep, at its middle; 0 before the first.
+    """
+    s.T1, s.T2 = linear.tension(s.m, 0), linear.tension(s.m, 1)
 
 
 def state_space(p: IvuParams) -> tuple[np.ndarray, np.ndarray]:

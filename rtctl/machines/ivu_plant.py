@@ -90,7 +90,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
         (
             "truth",
             (
-                "ivu.tensions(p.plant, s.plant)",
+                "ivu.tensions(s.plant)",
                 "rx.truth[0] = s.plant.T1",
                 "rx.truth[1] = s.plant.T2",
                 "rx.truth[2] = s.plant.m.x[ivu.CAPSTAN]",

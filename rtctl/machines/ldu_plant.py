@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rtctl.machines.ldu import LduConfig
 
 TRUTH = (
-    Column("truth_x", "m", "carriage position in the emulator"),
+    Column("truth_x", "m", "capstan angle times R_c in the emulator; slip, capstan and guide errors are in scale"),
     Column("truth_speed", "m/s", "carriage speed in the emulator"),
     Column("truth_current", "A", "motor current in the emulator"),
 )

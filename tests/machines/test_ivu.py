@@ -55,6 +55,32 @@ def test_tape_is_never_slack(mode, reference):
     assert tension(rows).min() > 0.0
 
 
+def pushed(**changes: Any) -> np.ndarray:
+    """Truth of both tapes (n, 2) in N in steps of a radian that are not shaped: the model's tape pushes in them."""
+    steps = [{"at": 0.5, "to": -1.0}]
+    changes = {"law__shaper": {}, "law__inertia": {}, "safety__following_error": 0, **changes, **radii(0.025, 0.035)}
+    return tension(fused.run(fused.config("ivu", reference__steps=steps, **changes), 3.0))
+
+
+def test_truth_of_the_tension_has_the_slack_in_it():
+    """A tape that cannot push has a tension of 0 N where the linear model alone has -0.3 N."""
+    assert pushed().min() < -0.2
+    slack = pushed(plant__physics=[{"term": "tape.slack", "node": "tape1"}])
+    assert slack.min() > -1e-9 and (slack == 0.0).sum() > 20
+
+
+def test_truth_of_the_tension_has_a_relaxing_branch_in_it():
+    """Half of the stiffness in a branch that does not relax meanwhile: the tension is that of the plain tape."""
+    half = {"plant__parameters__c1": 225.0, "plant__parameters__c2": 225.0}
+    branches = [{"term": "tape.viscoelastic", "node": n, "c_branch": 225.0, "tau": 1e4} for n in ("tape1", "tape2")]
+    plain, split = (
+        tension(fused.run(fused.config("ivu", "steps", plant__parameters__d_tape=0.0, **changes), 2.5))
+        for changes in ({}, {**half, "plant__physics": branches})
+    )
+    np.testing.assert_allclose(split, plain, atol=0.015)  # friction holds them a little apart
+    assert plain.max() > F_T
+
+
 def test_tension_stays_at_constant_speed():
     run = fused.shipped("ivu", "constant_speed", 13.5)
     for begin, end in ((2.5, 4.8), (7.5, 9.8)):

@@ -51,7 +51,7 @@ def record_run(p, s, u, every, out):
         s.m.u[0] = u[k, 0]
         s.m.u[1] = u[k, 1]
         run(p, s, every)
-        ivu.tensions(p, s)
+        ivu.tensions(s)
         out[k, 0] = s.m.x[ivu.CAPSTAN]
         out[k, 1] = s.T1
         out[k, 2] = s.T2
@@ -146,7 +146,7 @@ def test_end_deflection_under_tension():
     assert wanted == pytest.approx(3.3e-2, rel=0.01)
     assert (s.m.x[ivu.REEL1], s.m.x[ivu.REEL2]) == pytest.approx((wanted, wanted), rel=1e-3)
     assert abs(s.m.x[ivu.CAPSTAN]) < 1e-9
-    ivu.tensions(p, s)
+    ivu.tensions(s)
     assert pytest.approx((0.049 * 0.061 / 0.03,) * 2, rel=1e-3) == (s.T1, s.T2)
 
 

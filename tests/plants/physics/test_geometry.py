@@ -64,8 +64,12 @@ def test_the_plant_tells_the_tension_on_its_true_radius():
     wind(p, s, volts(600), 8, np.zeros((600, 14)), ROUND)
     linear.midpoint(s.m)
     ivu.follow_tape(p, s)
-    ivu.tensions(p, s)
-    assert [linear.tension(s.m, 0), linear.tension(s.m, 1)] == pytest.approx([s.T1, s.T2], abs=0.02)
+    ivu.tensions(s)
+    grow, x = p.d_tape / (2 * np.pi), s.m.x
+    for T, reel, R, way, c, k in ((s.T1, ivu.REEL1, s.R1, -1, p.c1, p.k1), (s.T2, ivu.REEL2, s.R2, 1, p.c2, p.k2)):
+        stretch = way * p.R_c * x[ivu.CAPSTAN] + ivu.wound(x[reel], p.R1 if way < 0 else p.R2, grow, p.R_min)
+        rate = way * p.R_c * x[ivu.NQ + ivu.CAPSTAN] + R * x[ivu.NQ + reel]
+        assert pytest.approx(c * stretch + k * rate, abs=0.02) == T
 
 
 @pytest.mark.parametrize("node", ["reel1", "reel2"])
