@@ -3,8 +3,8 @@
 A full reel is light at the tape and a little lossy there, so the loop gain and the resonance of the motor's shaft both
 rise with the radius: the margin is least where both reels are full.
 
-Source: thesis 5.2, which expects the worst case at R1 = 40 mm, and chapter 9. Erratum: 'stable for the complete range
-of reel radii' is 1.2 dB of gain margin at 40/40 mm.
+Source: thesis 5.2, which expects the worst case at R1 = 40 mm, and chapter 9. The text has no margins over the radii:
+its 'stable for the complete range of reel radii' holds, with 1.2 dB of gain margin at 40/40 mm.
 """
 
 from typing import Any, NamedTuple

@@ -5,10 +5,10 @@ start and dry friction is seen in both directions but never turns within a leg. 
 speed keeps its sign and the drive its limits. One motor of the reel unit carries the whole command (`motor`): with the
 usual allocation the two pull by turns, which is not one response.
 
-    ivu   5 V/rad and 0.5 Vs/rad, a loop of 1 Hz; that is 1 V/rad and 0.1 Vs/rad of 8.1 with the driver's 0.2 A/V in it
+    ivu   5 V/rad and 0.5 Vs/rad, |L| = 1 at 0.9 Hz; chosen, five times the 1 V/rad and 0.1 Vs/rad of 8.1
     ldu   1e3 V/m and 0.1 s, 5 mm/s, 0.25 V rms                                                                   (12.3)
 
-Source: thesis 8.1 and 12.3. Erratum: 8.1 leaves out the driver; by its equations 1 V/rad gives 0.4 Hz.
+Source: thesis 8.1 and 12.3. With the printed gains |L| is 1 at 0.4 Hz, and |T| falls by 3 dB at 0.6 Hz.
 """
 
 from math import ceil

@@ -10,7 +10,7 @@ chi-square a line where the misfit is more than the noise, and by an error of 0.
 the encoder is no noise), times Student's t: the interval covers 95 %.
 
 What the capstan's angle alone carries, one motor pulling (reel unit): J_m from the level, since K_m and the radii are
-known; c and k of the tape from the decoupling of the far reel at 2.6 Hz; c_m and k_m from the mode at 42 Hz, where reel
+known; c and k of the tape from the decoupling of the far reel at 1.9 Hz; c_m and k_m from the mode at 41 Hz, where reel
 1 (its inertia from its radius, 4.1) swings between its shaft and the tape. The reel sensors are not needed. It takes
 both sides as equal, as the thesis does (c_1 = c_2 and so on). What it hardly carries is K_m beside J_m: their ratio is
 the level, and only the known inertia of the reel tells them apart, to some 5 %.

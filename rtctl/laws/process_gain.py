@@ -8,7 +8,7 @@ At the tape, the reels (with their motors) and the capstan are three masses coup
 
 At w = 0 this is the rigid sum K_m amp_per_volt / (R_drive R_c (m_1 + m_2 + m_c)). With the identified set at
 R1 = 38, R2 = 22 mm the rigid sum is 29.7 and the gain at 1 Hz is 25.6 rad/s^2 per A: the second reel, which decouples
-at 2.6 Hz, already takes part of the motion. The coupling between motor and reel (40 Hz) is taken as stiff.
+at 1.9 Hz, already takes part of the motion. The coupling between motor and reel (40 Hz) is taken as stiff.
 
 Source: thesis 4.1-4.2, 4.9-4.17 and appendix A (identified); K_p = 25.4 in section 8.2.
 Erratum: section 8.2 leaves out the motor driver; by the equations 25.4 is per ampere, 5.1 per volt at 0.2 A/V.

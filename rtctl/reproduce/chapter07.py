@@ -10,28 +10,59 @@ from rtctl.identify.frf import drive
 from rtctl.plants import ivu
 from rtctl.reproduce import figures as fig
 from rtctl.reproduce.played import config, play
-from rtctl.reproduce.rows import Part, Picture, Row
+from rtctl.reproduce.rows import NONE, Part, Picture, Row, under
 
 STALL, SLIP = 0.1, 2.5e-3  # A that moves the fullest reel, and Nm of the slip couplings (7.3)
+SLIP_5 = 3.0e-3  # Nm, the same by 5.1
+GEAR, NOMINAL, AT_NOMINAL, AT_NO_LOAD = 150.4, 0.45, 0.118, 0.024  # ratio, Nm and A of motor 707 (appendix E)
 ACCURACY = 1e-3  # m, of positioning (7.4)
 
-DRIVER = (
-    Row("7.sensing_resistor", "R_S for 2 A at 10 V", "(7.2)", 0.24, "ohm", 0.01),
-    Row("7.cutoff_filter", "corner of the current filter with R_F and C_F", "7.2", 3.0, "kHz", 0.02),
-    Row("7.error_capacitor", "C for zeta = 0.71", "7.2", 6.6, "nF", 0.03),
-    Row("7.error_resistor", "R that cancels the motor's pole", "(7.3)", 170.0, "kohm", 0.02),
-    Row("7.damping", "damping of the current loop", "7.2", 0.5 * math.sqrt(2), "", 0.02),
-    Row("7.bandwidth", "bandwidth of the driver, -3 dB", "7.2, figure 7.4", 1.0, "kHz", bound="at least"),
-    Row("7.oscillator", "switching frequency with R_O and C_O", "7.2", 22.0, "kHz", 0.02),
+L_M = "L_M = 65 mH, from R = 170 kohm; the text lists no inductance"
+R_4 = "R_4 = 400 ohm, from the printed C = 1.24e-4 R_F C_F"
+
+DRIVER = under(
+    Row("7.sensing_resistor", "R_S for 2 A at 10 V", "7.2, (7.2)", 0.24, "ohm", 0.01,
+        quote=r"hence  $R_S = 0.24$  [ $\Omega$ ]", chosen="R_2 R_4 / (R_1 R_3) = 0.048, from R_S = 0.24 ohm",
+        remark="24 V drive no more than 0.41 A through the 58 ohm of appendix E"),
+    Row("7.cutoff_filter", "corner of the current filter with R_F and C_F", "7.2", 3.0, "kHz", 0.02,
+        quote="for this bandwidth is 3 [kHz]"),
+    Row("7.error_capacitor", "C for zeta = 0.71", "7.2", 6.6, "nF", 0.03, quote="$C = 6.6$  [nF]", chosen=R_4),
+    Row("7.error_resistor", "R that cancels the motor's pole", "7.2, (7.3)", 170.0, "kohm", 0.02,
+        quote=r"we now have  $R = 170$  [k $\Omega$ ]", chosen=L_M),
+    Row("7.damping", "damping of the current loop", "7.2", 0.5 * math.sqrt(2), "", 0.02,
+        quote=r"If we now choose a damping ratio of  $\zeta = \frac{1}{2}\sqrt{2}$", chosen=R_4),
+    Row("7.bandwidth", "bandwidth of the driver, -3 dB", "7.2, figure 7.4", 1.0, "kHz", bound="at least",
+        quote="the bandwidth is larger than  $10^3$  [Hz]", remark=f"with {R_4}"),
+    Row("7.oscillator", "switching frequency with R_O and C_O", "7.2", 22.0, "kHz", 0.02,
+        quote="will be set to 22 [kHz]"),
+    set="components of 7.2 and appendix E",
 )  # fmt: skip
-MOTOR = (
+MOTOR = under(
     Row("7.friction_torque", "torque of 0.1 A that puts the fullest reel in motion", "7.3", 61.0, "mNm", 0.01,
+        quote=r"= 0.1 \cdot 61 \cdot 10^{-3} = 6.1 \cdot 10^{-2}$  [Nm]",
         erratum="0.1 A times 61e-3 Nm/A is 6.1e-3 Nm, a factor of 10", expected=6.1),
-    Row("7.least_torque", "with the 2.5 mNm of the slip couplings", "7.3", 64.0, "mNm", 0.01,
-        erratum="follows from the row above", expected=8.6),
+    Row("7.slip_torque", "torque of the slip couplings", "7.3", 2.5, "mNm",
+        quote=r"the torque applied by the slip couplings, which is  $2.5 \cdot 10^{-3}$  [Nm]",
+        erratum="5.1 has 3.0e-3 Nm, at the mean radius", expected=3.0, set=NONE),
+    Row("7.least_torque", "least torque, friction and the 2.5 mNm of the slip couplings", "7.3", 64.0, "mNm", 0.01,
+        quote=r"The total minimum required torque is then  $T = 6.4 \cdot 10^{-2}$  [Nm]",
+        erratum="follows from the first row", expected=8.6,
+        remark="the motors of the old system, 25 mNm, would be enough; 9.1 mNm with the 3.0 mNm of 5.1"),
+    Row("7.motor_constant", "torque of the motor's shaft behind its gear, a current", "7.3, appendix E", 61.0, "mNm/A",
+        0.01, quote="see appendix E, motor 9904 120 53 707",
+        erratum="61 mNm/A are those of the rotor; behind the gear of 150.4:1 it is 0.45 Nm at 118 mA, 24 mA of them "
+        "without load", expected=4787.0,
+        set="motor and gear of appendix E",
+        remark=f"all of part I takes 61 mNm/A at the reel. Without losses the gear gives {GEAR * 0.061:.1f} Nm/A"),
+    set="61 mNm/A of appendix E",
+) + under(
     Row("7.motor_torque", "continuous torque of the motor that was chosen, enough for it", "7.3", 450.0, "mNm",
-        bound="at most", remark="what the emulated machine takes at most in its steps"),
-    Row("7.increments", "least increments of the encoder for 1 mm", "7.4", 80.0, "", 0.03),
+        bound="at most", quote="DC motor with a continuous torque of 0.45 [Nm], which is more than sufficient",
+        remark="what the emulated machine takes at most in its steps, by 61 mNm/A; 450 mNm are those behind the gear"),
+    law="shipped PD, steps of 1 rad", set="identified", filter="derivative 40 Hz",
+) + under(
+    Row("7.increments", "least increments of the encoder for 1 mm", "7.4", 80.0, "", 0.03,
+        quote=r"we need an encoder with a minimum of  $2\pi \cdot 12.5 = 80$  increments", remark="78.5 rounded up"),
 )  # fmt: skip
 
 
@@ -61,7 +92,9 @@ def motors(short: bool) -> dict[str, float]:
     most = max(float(np.abs(run[name]).max()) for name in ("u1", "u2")) * l292.gain(made.plant.driver) * p.K_m1
     return {
         "7.friction_torque": 1e3 * STALL * p.K_m1,
+        "7.slip_torque": 1e3 * SLIP_5,
         "7.least_torque": 1e3 * (STALL * p.K_m1 + SLIP),
+        "7.motor_constant": 1e3 * NOMINAL / (AT_NOMINAL - AT_NO_LOAD),
         "7.motor_torque": 1e3 * most,
         "7.increments": 2 * np.pi * made.R_c / ACCURACY,
     }
@@ -79,7 +112,7 @@ def figure_7_4(short: bool) -> Picture:
     turn.set(ylabel="phase [deg]", xlabel="frequency [Hz]")
     fig.legend(above)
     sentence = (
-        "The motor driver from volts to amperes with the components of the text: flat to "
+        "The motor driver from volts to amperes with the components of the text, R_4 and L_M chosen here: flat to "
         f"{1e-3 * l292.cutoff(L292Settings()):.1f} kHz, far beyond the tape and the reels."
     )
     return Picture("7.4", sentence, figure)

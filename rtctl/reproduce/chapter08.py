@@ -5,16 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.design import check, margins, pd, robustness
+from rtctl.design import check, margins, pd, response, robustness
 from rtctl.identify import bench, best_linear, experiment, model_fit, reel_radius, sensitivity, steps
 from rtctl.identify import friction as fr
 from rtctl.identify.records import Record, take
 from rtctl.laws import pd as law
 from rtctl.loop import fused
 from rtctl.plants import ivu
+from rtctl.reproduce.chapter04 import R_C, damped_modes, mass_line, paper_mass
 from rtctl.reproduce.chapter05 import AMPERE_PER_VOLT
 from rtctl.reproduce.played import config, crossover, reels
-from rtctl.reproduce.rows import Row
+from rtctl.reproduce.rows import NONE, Row, under
 
 W_N = 4 * np.pi  # rad/s (8.2)
 BELIEVED = {"J_m": 1.5e-3, "c": 450.0, "k": 12.5, "c_m": 12.0, "k_m": 1.3e-2}
@@ -24,78 +25,149 @@ NOISE_RMS = 0.7  # V, with which u keeps within 5 V beside what tension and fric
 LOOP_RMS = 2.0  # V, so much that a count of the encoder, 1.6 V through tau_d, does not matter
 TAU_C, UNDER = 2.4e-3, 1.5e-3  # Nm, compensated in figure 8.6 (a) and (b)
 
-IDENTIFIED = (
-    Row("8.process_gain", "process gain at 1 Hz, 38/22 mm", "8.2", 25.4, "rad/s^2/A", 0.03),
-    Row("8.c", "spring constant of the paper", "appendix A", 450.0, "N/m", 0.05),
-    Row("8.k", "damping of the paper", "appendix A", 12.5, "Ns/m", 0.05),
-    Row("8.c_m", "spring constant of a motor shaft", "appendix A", 12.0, "Nm/rad", 0.05),
-    Row("8.k_m", "damping of a motor shaft", "appendix A", 13.0, "mNms/rad", 0.05),
-    Row("8.J_m", "inertia of a motor", "appendix A", 1.5, "g m^2", 0.05),
-    Row("8.J_1", "inertia of reel 1 at the measured radius", "(4.1), appendix A", 0.19, "g m^2", 0.03),
-    Row("8.J_2", "inertia of reel 2 at the measured radius", "(4.2), appendix A", 8.2e-3, "g m^2", 0.05),
-    Row("8.R_c", "radius of the capstan", "appendix A", 1.25, "mm", 0.01,
+PRINTED_ERROR = 10.6e-3  # rad, the larger error of figure 8.6(a) as it is printed
+SLACK = [{"term": "tape.slack", "node": "tape1"}]  # without it the tape pushes by 0.3 N in these steps
+
+MEASURING = "5 V/rad, 0.5 Vs/rad, one motor"
+PD_PRINTED = "PD as printed, 6.2 A/rad and 0.16 s"
+FULL, LESS = (f"PD as printed, friction {tau} mNm" for tau in ("2.4", "1.5"))
+NO_NUMBER = "no number in the text"
+RISE = "The system shows a gain increase at  $f = 2$  [Hz], which indicates mass decoupling"
+DAMPED = "It also shows a damped eigenfrequency at  $f = 40$  [Hz]"
+MARGINS = "The gain margin obtained is 6 [dB], the phase margin is 70 [deg]"
+COMPLETE = "robust and stable for the complete range of reel radii"
+PD_GAIN = r"$\zeta = 1$ , we obtain  $G = 6.2$  and  $\tau_d = 0.16$"
+
+IDENTIFIED = under(
+    Row("8.process_gain", "process gain at 1 Hz, 38/22 mm", "8.2", 25.4, "rad/s^2/A", 0.03,
+        quote="the process gain  $K_p = 25.4$"),
+    Row("8.c", "spring constant of the paper", "Appendix A", 450.0, "N/m", 0.05,
+        quote="$c_1 = c_2$	1.0e2	4.5e2	spring constant paper"),
+    Row("8.k", "damping of the paper", "Appendix A", 12.5, "Ns/m", 0.05,
+        quote="$k_1 = k_2$	1.0e1	1.25e1	damping constant paper"),
+    Row("8.c_m", "spring constant of a motor shaft", "Appendix A", 12.0, "Nm/rad", 0.05,
+        quote="$c_{m1} = c_{m2}$	8.0e1	1.2e1	torsion spring constant motor shaft"),
+    Row("8.k_m", "damping of a motor shaft", "Appendix A", 13.0, "mNms/rad", 0.05,
+        quote="$k_{m1} = k_{m2}$	1.0e-5	1.3e-2	torsion damping constant motor shaft"),
+    Row("8.J_m", "inertia of a motor", "Appendix A", 1.5, "g m^2", 0.05,
+        quote="$J_{m1} = J_{m2}$	7.5e-4	1.5e-3	Inertia DC motor"),
+    Row("8.J_1", "inertia of reel 1 by (4.1), R1 = 38 mm", "Appendix A, (4.1)", 0.19, "g m^2", 0.03,
+        law=NONE, filter=NONE, quote="$J_1$	2.4e-4	1.9e-4	Inertia reel & paper roll 1"),
+    Row("8.J_2", "inertia of reel 2 by (4.2), R2 = 22 mm", "Appendix A, (4.2)", 8.2e-3, "g m^2", 0.05,
+        law=NONE, filter=NONE, quote="$J_2$	1.0e-5	8.2e-6	Inertia reel & paper roll 2"),
+    Row("8.m_1", "mass of the paper on reel 1, R1 = 38 mm", "Appendix A, 4.1", 0.02, "kg", 0.02,
+        law=NONE, filter=NONE, quote="$m_1$	2.3e-1	2.0e-2	reel mass", expected=0.206,
+        erratum="m = pi rho h (R^2 - R_min^2) is 0.21 kg, a factor of 10"),
+    Row("8.m_2", "mass of the paper on reel 2, R2 = 22 mm", "Appendix A, 4.1", 0.2, "g", 0.02,
+        law=NONE, filter=NONE, quote="$m_2$	0	0.2e-3	reel mass", expected=16.6,
+        erratum="m = pi rho h (R^2 - R_min^2) is 17 g, a factor of 80"),
+    Row("8.R_c", "radius of the capstan by (5.2) and a known reel", "Appendix A", 1.25, "mm", 0.01,
+        law="shipped PD, 0.5 rad/s", quote="$R_c$	1.25e-2	1.25e-3	radius capstan",
         erratum="a typing error, 12.5 mm", expected=12.5),
-    Row("8.delay", "delay in the loop", "(8.2)", 3.0, "ms", 0.03),
-    Row("8.mode_tape", "mode of tape and reels in the fit, where the gain rises", "8.1, figure 8.3", 2.0, "Hz", 0.03,
-        erratum="the identified set has it at 2.6 Hz", expected=2.55),
-    Row("8.mode_shaft", "damped mode of the shaft in the fit", "8.1, figure 8.3", 40.0, "Hz", 0.03,
-        erratum="the identified set has it at 41.6 Hz", expected=41.6),
+    Row("8.delay", "delay in the loop", "8.1, (8.2)", 3.0, "ms", 0.03, quote=r"hence  $\tau = 0.003$  [s]"),
+    Row("8.mode_tape", "where the gain begins to rise in the fit: least |H|", "8.1, figure 8.3", 2.0, "Hz", 0.1,
+        quote=RISE, remark="mass decoupling is the anti-resonance, 1.87 Hz damped; the mode of tape and reels is at "
+        "2.49 Hz"),
+    Row("8.mode_shaft", "damped mode of the shaft in the fit", "8.1, figure 8.3", 40.0, "Hz", 0.03, quote=DAMPED),
+    Row("8.hump_shaft", "largest |H| f^2 above 10 Hz in the fit", "8.1, figure 8.3", 40.0, "Hz", 0.03, quote=DAMPED),
+    law=MEASURING, set="identified", filter="derivative 40 Hz",
 )  # fmt: skip
-NOISE = (
-    Row("8.averages", "windows of 2048 samples averaged", "8.1", 50.0, "", bound="at least"),
-    Row("8.excitation", "largest |u| with the noise", "8.1", 5.0, "V", bound="at most"),
-    Row("8.bandwidth", "bandwidth with the law of the measurement, |L| = 1", "8.1, figure 8.2", 1.0, "Hz", 0.15,
-        remark="approximately 1 Hz in the text. P = 1 V/rad and D = 0.1 Vs/rad taken per ampere; as printed, with the "
-        "driver's 0.2 A/V, the equations give 0.4 Hz"),
-    Row("8.process_gain_noise", "process gain at 1 Hz by the noise", "8.1, 8.2", 25.4, "rad/s^2/A", 0.05),
+NOISE = under(
+    Row("8.averages", "windows of 2048 samples averaged", "8.1", 50.0, "", bound="at least",
+        quote="averaging 50 time series of 2048 samples"),
+    Row("8.excitation", "largest |u| with the noise", "8.1", 5.0, "V", bound="at most",
+        quote=r"with a RMS value so  $u$  is kept within  $\pm 5$  [V]", chosen="0.7 V rms"),
+    Row("8.bandwidth", "bandwidth with the law of the measurement as printed, |T| = -3 dB", "8.1, figure 8.2", 1.0,
+        "Hz", 0.5, relative=False, law="1 V/rad, 0.1 Vs/rad, 3 ms", filter=NONE,
+        quote="the closed loop bandwidth is approximately 1 [Hz]",
+        remark="by the model; |L| = 1 at 0.39 Hz, and |S| is 1.2 dB at 1 Hz. Whole hertz in the text"),
+    Row("8.bandwidth_fivefold", "bandwidth with five times that gain, |L| = 1", "8.1, figure 8.2", 1.0, "Hz", 0.15,
+        quote="the closed loop bandwidth is approximately 1 [Hz]",
+        chosen="5 V/rad and 0.5 Vs/rad, the printed numbers read as per ampere",
+        remark="|S| is 4 dB at 1 Hz, where the text has 0 dB"),
+    Row("8.process_gain_noise", "process gain at 1 Hz by the noise", "8.2", 25.4, "rad/s^2/A", 0.05,
+        quote="the process gain  $K_p = 25.4$"),
+    law=MEASURING, set="identified", filter="derivative 40 Hz",
 )  # fmt: skip
-UNKNOWN = (
+UNKNOWN = under(
     Row("8.unknown", "largest error of K_p, c, c_m, k_m, J_m on machines up to 30 % off", "8.1", None, "%",
-        bound="at most", expected=5.0, remark="no number in the text; 5 % is our own demand"),
+        bound="at most", expected=5.0, quote="we try to fit the theoretical transfer function",
+        remark=f"{NO_NUMBER}; 5 % is our own demand"),
     Row("8.unknown_inside", "share of these that lie in their 95 % interval", "8.1", None, "%", bound="at least",
-        expected=95.0, remark="no number in the text"),
+        expected=95.0, quote="we try to fit the theoretical transfer function", remark=NO_NUMBER),
+    law=MEASURING, set="identified, each parameter 0.7 to 1.3 times", filter="derivative 40 Hz",
 )  # fmt: skip
-FRICTION = (
-    Row("8.friction", "dry friction of motor 1", "(8.4), appendix A", 2.4, "mNm", 0.03),
+FRICTION = under(
+    Row("8.friction", "dry friction of motor 1", "8.2, (8.4)", 2.4, "mNm", 0.03,
+        quote=r"$$T_F = 2.4 \cdot 10^{-3} \text{sign}(\dot{\varphi}_c) \quad (8.4)$$"),
     Row("8.friction_2", "dry friction of motor 2 over that of motor 1: slightly higher", "8.1", None, "",
-        bound="at least", expected=1.0, remark="no number in the text"),
-    Row("8.friction_speed", "change of friction from 0.15 to 4 rad/s: a very small dependence on velocity", "8.2", None,
-        "%", bound="at most", expected=5.0, remark="no number in the text; 5 % is taken for very small"),
+        bound="at least", expected=1.0, quote="but estimation results in a slightly higher Coulomb part",
+        chosen="tau_F2 = 2.6 mNm", remark=NO_NUMBER),
+    Row("8.friction_speed", "change of friction from 0.15 to 4 rad/s: a very small dependence", "8.2", None,
+        "%", bound="at most", expected=5.0, quote="the friction force shows a very small dependence on the velocity",
+        remark=f"{NO_NUMBER}; 5 % is taken for very small. The emulated friction does not depend on velocity"),
+    law="shipped PD, constant velocity", set="identified, three pairs of reels", filter="derivative 40 Hz",
 )  # fmt: skip
-LOOP = (
-    Row("8.gain", "G for 4 pi rad/s and zeta = 1 by the measured process gain", "8.2, (5.4)", 6.2, "A/rad", 0.03),
-    Row("8.tau_d", "derivative time for it", "8.2, (5.4)", 0.16, "s", 0.01),
+LOOP = under(
+    Row("8.gain", "G for 4 pi rad/s and zeta = 1 by the measured process gain", "8.2, (5.4)", 6.2, "A/rad", 0.03,
+        quote=PD_GAIN),
+    Row("8.tau_d", "derivative time for it", "8.2, (5.4)", 0.16, "s", 0.01, quote=PD_GAIN),
     Row("8.gain_margin", "gain margin at 38/22 mm, by a multisine in the running loop", "8.2, figure 8.5", 6.0, "dB",
-        1.0, relative=False, remark="whole decibels in the text; its equations give 5.2 dB"),
+        0.5, relative=False, quote=MARGINS, remark="whole decibels in the text"),
     Row("8.phase_margin", "phase margin at 38/22 mm, likewise", "8.2, figure 8.5", 70.0, "deg", 4.0, relative=False,
-        remark="the equations give 72 deg"),
+        quote=MARGINS, remark="read from a plot in the text"),
+    law="PD (5.4) by the fitted K_p, 6.18 A/rad", set="identified",
+) + under(
+    Row("8.gain_margin_model", "gain margin at 38/22 mm by the equations, 3 ms", "8.2, figure 8.5", 6.0, "dB", 1.0,
+        relative=False, quote=MARGINS, remark="5.2 dB; the text reads whole decibels of its own fit"),
+    Row("8.phase_margin_model", "phase margin at 38/22 mm, likewise", "8.2, figure 8.5", 70.0, "deg", 4.0,
+        relative=False, quote=MARGINS, remark="72 deg; read from a plot in the text"),
+    law=PD_PRINTED, set="identified",
 )  # fmt: skip
-RADII = tuple(
-    Row(f"8.gain_margin_{name}", f"gain margin at {name.replace('_', '/')} mm", "5.2, 8.3", 6.0, "dB", off,
-        relative=False,
-        erratum=f"stable for all radii with 6 dB, but the equations give {value} dB here",
-        expected=value)
-    for name, value, off in (("40_40", 1.2, 0.1), ("40_20", 3.7, 0.1), ("20_20", 20.9, 0.15))
+RADII = under(
+    Row("8.stable", "least gain margin over the radii: stable for all", "8.3", None, "dB", bound="at least",
+        expected=0.0, quote=COMPLETE, remark=f"{NO_NUMBER}. It is stable everywhere, and hardly robust at 40/40 mm"),
+    *(
+        Row(f"8.gain_margin_{name}", f"gain margin at {name.replace('_', '/')} mm", "8.3", None, "dB", off,
+            relative=False, quote=COMPLETE, expected=value, remark=f"{NO_NUMBER}; held against (8.2) computed apart")
+        for name, value, off in (("40_40", 1.2, 0.1), ("40_20", 3.7, 0.1), ("20_20", 20.9, 0.15))
+    ),
+    law=PD_PRINTED + ", 3 ms", set="identified",
 )  # fmt: skip
-STEPS = (
-    Row("8.step_error_1", "error after the step of -1 rad, 25/35 mm", "8.3, figure 8.6(a)", 9.77, "mrad",
-        bound="at most", remark="the emulator's friction is the same at any angle, a plastic gear's is not"),
-    Row("8.step_error_2", "error after the step of +1 rad", "8.3, figure 8.6(a)", 10.6, "mrad", bound="at most",
-        remark="with the shipped law, which filters its derivative; figure 8.6 has the law as printed too, whose error "
-        "here is larger than that of the text"),
-    Row("8.accuracy", "accuracy of positioning, ten times that of the old unit", "8.3", 0.1, "mm",
-        bound="at most"),
+OTHER_WAYS = (
+    "tape.slack is not in the text: without it the tape pushes by 0.3 N. 3.4 and 11.9 mrad (0.149 mm) where the tape "
+    "can push. With the shipped filter of 40 Hz 12.2 and 7.5 mrad, and 2.8 and 1.3 mrad where the tape can push"
+)
+STICKS = "where the motor comes to rest is a matter of friction, which in the emulator is the same at any angle"
+SECOND = "(in both experiments the second step), figure 8.6(a) shows a larger overshoot"
+STEPS = under(
+    Row("8.step_error_1", "error after the step of -1 rad, 25/35 mm", "8.3, figure 8.6(a)", 9.77, "mrad", 0.1,
+        quote=r"The resulting error is  $e = 9.77 \cdot 10^{-3}$  [rad]", differs=STICKS, remark=OTHER_WAYS),
+    Row("8.step_error_2", "error after the step of +1 rad", "8.3, figure 8.6(a)", 10.6, "mrad", 0.1,
+        quote=r"The resulting error is  $e = -1.06 \cdot 10^{-2}$  [rad]", remark="likewise"),
+    Row("8.accuracy_printed", "the printed 10.6 mrad on the capstan's 12.5 mm", "8.3", 0.1, "mm", 0.01,
+        quote=r"the redesign improved the performance 10 times, resulting an accuracy of  $\pm 0.1$  [mm]",
+        law=NONE, set=NONE, erratum="10.6 mrad x 12.5 mm is 0.133 mm, 7.5 times better than 1 mm", expected=0.1325),
+    Row("8.accuracy", "accuracy of positioning, ten times that of the old unit", "8.3", 0.1, "mm", bound="at most",
+        quote=r"the redesign improved the performance 10 times, resulting an accuracy of  $\pm 0.1$  [mm]",
+        differs=STICKS),
+    Row("8.within_margin", "largest error of both steps, within the camera's margin", "8.3, 3", 0.5, "mm",
+        bound="at most", quote="the resulting error is within the required margin"),
     Row("8.overshoot_full", "least overshoot of both steps with 2.4 mNm: there is some", "8.3, figure 8.6(a)", None,
-        "%", bound="at least", expected=0.063,
-        remark="no number in the text; a count of the encoder is the least to be seen"),
+        "%", bound="at least", expected=0.063, quote="Both step responses show an overshoot",
+        remark=f"{NO_NUMBER}; a count of the encoder is the least to be seen"),
     Row("8.overshoot_second", "overshoot of the second step over that of the first: larger", "8.3, figure 8.6(a)", None,
-        "", bound="at least", expected=1.0,
-        remark="no number in the text; with the law as printed. The shipped law, which filters its derivative, has it "
-        "the other way round: where the loop gain is higher, friction leaves less, and less overshoot too. As printed "
-        "there is overshoot with 1.5 mNm as well: no one law does all that 8.3 says"),
+        "", bound="at least", expected=1.0, quote=SECOND,
+        differs="smaller; larger, 3.5, only where the tape can push", remark=NO_NUMBER),
     Row("8.error_second", "with 1.5 mNm, error after the second step over that after the first: smaller",
-        "8.3, figure 8.6(b)", None, "", bound="at most", expected=1.0, remark="no number in the text"),
-    Row("8.overshoot_under", "overshoot with 1.5 mNm: none", "figure 8.6(b)", 0.0, "%", 0.1, relative=False),
+        "8.3, figure 8.6(b)", None, "", bound="at most", expected=1.0,
+        quote="figure 8.6(b) shows a smaller steady state error", law=LESS,
+        differs="alike; 0.7 with the shipped filter where the tape can push", remark=NO_NUMBER),
+    Row("8.overshoot_under", "overshoot with 1.5 mNm: none", "8.3, figure 8.6(b)", 0.0, "%", 0.1, relative=False,
+        quote="the step responses do not have an overshoot and the system is overdamped", law=LESS,
+        differs="some, whether the tape can push or not; none with the shipped filter where it can",
+        remark="a count of the encoder is 0.06 %"),
+    law=FULL, set="identified, tape.slack",
 )  # fmt: skip
 
 
@@ -123,10 +195,9 @@ def identification(short: bool) -> dict[str, float]:
     found = fitted(short)
     p = ivu.parameters(found.settings)
     values = {name: e.value for name, e in found.parameters.items()}
-    drives = [(AMPERE_PER_VOLT, 1e4, 0.7, 0.0)] * 2
-    A, _ = ivu.state_space(ivu.build(found.settings, 1e-3, drives))
-    swing = np.linalg.eigvals(A[: 2 * ivu.NQ, : 2 * ivu.NQ])
-    modes = np.sort(np.abs(swing[swing.imag > 1e-3])) / (2 * np.pi)
+    model = response.take(config("ivu", {"plant.parameters": p.model_dump()})).model
+    modes = damped_modes(model)
+    f = np.geomspace(1.0, 2.5, 2000)
     return {
         "8.process_gain": found.K_p.value,
         "8.c": values["c"],
@@ -138,8 +209,11 @@ def identification(short: bool) -> dict[str, float]:
         "8.J_2": 1e3 * float(p.J_2 or 0.0),
         "8.R_c": 1e3 * capstan(),
         "8.delay": 1e3 * found.tau.value,
-        "8.mode_tape": modes[0],
+        "8.m_1": paper_mass(0.038),
+        "8.m_2": 1e3 * paper_mass(0.022),
+        "8.mode_tape": float(f[np.argmin(np.abs(response.plant_response(model, f)))]),
         "8.mode_shaft": modes[1],
+        "8.hump_shaft": mass_line(model, 10.0, 60.0)[1],
     }
 
 
@@ -166,9 +240,16 @@ def by_noise(short: bool) -> dict[str, float]:
     return {
         "8.averages": found.averages,
         "8.excitation": max(float(np.abs(r[name]).max()) for r in records for name in ("u1", "u2")),
-        "8.bandwidth": crossover(found.f, found.S),
+        "8.bandwidth": printed_bandwidth(),
+        "8.bandwidth_fivefold": crossover(found.f, found.S),
         "8.process_gain_noise": fit.K_p.value,
     }
+
+
+def printed_bandwidth() -> float:
+    """Bandwidth in Hz, |T| = -3 dB, with 1 V/rad and 0.1 Vs/rad as (8.1) has them, and the delay of (8.2)."""
+    law_printed = {"law.position": {"gain": 1.0, "tau_d": 0.1}, "law.gain_schedule.mode": "off"}
+    return margins.of_config(config("ivu", law_printed), printed=True, quick=True).bandwidth
 
 
 def unknown(short: bool) -> dict[str, float]:
@@ -228,11 +309,14 @@ def loop(short: bool) -> dict[str, float]:
     """PD and its margins."""
     found, _ = designed(short)
     reached = running_loop(short).margins
+    model = robustness.at(config("ivu"), 0.038, 0.022, printed=True)
     return {
         "8.gain": found.gain * AMPERE_PER_VOLT,
         "8.tau_d": found.tau_d,
         "8.gain_margin": reached.GM,
         "8.phase_margin": reached.PM,
+        "8.gain_margin_model": model.GM,
+        "8.phase_margin_model": model.PM,
     }
 
 
@@ -240,13 +324,17 @@ def over_radii(short: bool) -> dict[str, float]:
     """Margins of the printed loop (8.2) at the corners of the radii."""
     corners = {"40_40": (0.04, 0.04), "40_20": (0.04, 0.02), "20_20": (0.02, 0.02)}
     made = config("ivu")
-    return {f"8.gain_margin_{name}": robustness.at(made, *R, printed=True).GM for name, R in corners.items()}
+    found = {f"8.gain_margin_{name}": robustness.at(made, *R, printed=True).GM for name, R in corners.items()}
+    every = robustness.over_radii(made, printed=True)
+    return {**found, "8.stable": every.worst[0] if every.stable.all() else -np.inf}
 
 
 @cache
-def radian(tau_C: float, printed: bool = False) -> Record:
-    """Figure 8.6: steps of a radian with `tau_C` Nm of friction compensated; `printed` without the filter."""
-    made = config("ivu", {"law.position.derivative_filter": None} if printed else None)
+def radian(tau_C: float, printed: bool = True, slack: bool = True) -> Record:
+    """Figure 8.6: steps of a radian with `tau_C` Nm of friction compensated; `printed` without the filter, `slack` of a
+    tape that cannot push."""
+    changes = {"law.position.derivative_filter": None} if printed else {}
+    made = config("ivu", {**changes, "plant.physics": SLACK if slack else []})
     return bench.play(steps.radian_config(made, tau_C))
 
 
@@ -261,17 +349,18 @@ def overshoots(done: steps.Steps) -> list[float]:
 
 
 def radians(short: bool) -> dict[str, float]:
-    """Errors and overshoot of the steps."""
-    full, under = (steps.steps(radian(tau)) for tau in (TAU_C, UNDER))
-    printed = steps.steps(radian(TAU_C, printed=True))
+    """Errors and overshoot of the steps with the law as it is printed."""
+    full, under_ = (steps.steps(radian(tau)) for tau in (TAU_C, UNDER))
     return {
         "8.step_error_1": errors(full)[0],
         "8.step_error_2": errors(full)[1],
+        "8.accuracy_printed": 1e3 * PRINTED_ERROR * R_C,
         "8.accuracy": abs(full.worst_mm),
+        "8.within_margin": abs(full.worst_mm),
         "8.overshoot_full": min(overshoots(full)),
-        "8.overshoot_second": overshoots(printed)[1] / overshoots(printed)[0],
-        "8.error_second": errors(under)[1] / errors(under)[0],
-        "8.overshoot_under": under.overshoot_pct,
+        "8.overshoot_second": overshoots(full)[1] / overshoots(full)[0],
+        "8.error_second": errors(under_)[1] / errors(under_)[0],
+        "8.overshoot_under": under_.overshoot_pct,
     }
 
 

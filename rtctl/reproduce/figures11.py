@@ -95,8 +95,8 @@ def figure_11_6(short: bool) -> Picture:
     below.set(ylabel="without trend [um]", xlabel="position [mm]", xlim=(0, 600))
     value = ch.by_scale(short)
     sentence = (
-        f"Position error of the printer against its linear scale: {value['11.trend']:.2f} mm over 600 mm, a "
-        f"capstan that is {value['11.radius']:.2f} um too large."
+        f"Position error of the emulated printer against its linear scale: {value['11.trend']:.2f} mm over 600 mm by a "
+        f"capstan that is {value['11.radius']:.2f} um too large, chosen here from the 0.36 mm of the text."
     )
     return Picture("11.6", sentence, figure)
 
@@ -110,8 +110,14 @@ def figure_11_7(short: bool) -> Picture:
         inside = found.wavelength <= 1e-3 * longest
         one.set(xlim=(0, longest), ylim=(0, 1.15e6 * float(np.abs(found.E[inside]).max())), ylabel="|E| [um]")
     axes[1].set_xlabel("wavelength [mm]")
+    size = {mm: 1e6 * float(np.abs(found.E[np.argmin(np.abs(found.wavelength - 1e-3 * mm))])) for mm in (150, 200, 300)}
     bins = ", ".join(f"{1e3 * peak.bin:.2f}" for peak in peaks)
-    sentence = f"Fourier transform (11.10) of that error on two scales, with peaks at {bins} mm."
+    sentence = (
+        "Fourier transform (11.10) of that error on two scales. Waves fitted to it have "
+        f"{bins} mm. It does not show 150 and 300 mm as two peaks, as the text says of its own figure: under the "
+        f"window both run into one hill, with {size[300]:.1f}, {size[200]:.1f} and {size[150]:.1f} um at 300, 200 and "
+        "150 mm."
+    )
     return Picture("11.7", sentence, figure)
 
 
@@ -135,15 +141,21 @@ def figure_11_8(short: bool) -> Picture:
 
 
 def figure_11_9(short: bool) -> Picture:
-    """Cross power spectrum."""
+    """Cross power spectrum on two scales."""
     _, cross = ch.image()
-    figure, (axes,) = fig.panels(1)
-    axes.plot(1e3 * cross.wavelength, 1e6 * np.abs(cross.S), ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
-    axes.set(xlim=(0, 60), xlabel="wavelength [mm]", ylabel="|S| [um L*]")
-    axes.set_ylim(bottom=0, top=1.15e6 * float(np.abs(cross.S[cross.wavelength < 0.06]).max()))
+    figure, axes = fig.panels(2)
+    for one, longest in zip(axes, (600, 40), strict=True):
+        one.plot(1e3 * cross.wavelength, 1e6 * np.abs(cross.S), ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
+        inside = cross.wavelength <= 1e-3 * longest
+        one.set(xlim=(0, longest), ylim=(0, 1.15e6 * float(np.abs(cross.S[inside]).max())), ylabel="|S| [um L*]")
+    axes[1].set_xlabel("wavelength [mm]")
+    share = [100 * float(np.abs(cross.S[np.argmin(np.abs(cross.wavelength - mm))]) / np.abs(cross.S).max())
+             for mm in (0.15, 0.3)]  # fmt: skip
     sentence = (
-        "Cross power spectrum of position error and luminance: they share "
-        f"{ch.by_luminance(short)['11.peak_cross']:.2f} mm, the turn of the capstan."
+        "Cross power spectrum of position error and emulated luminance on two scales: they share "
+        f"{ch.by_luminance(short)['11.peak_cross']:.2f} mm, the turn of the capstan. The long waves of the guide are "
+        f"hardly in it, {share[0]:.0f} % of that at 150 mm and {share[1]:.0f} % at 300 mm: the emulated luminance "
+        "follows the slope of the error."
     )
     return Picture("11.9", sentence, figure)
 

@@ -1,6 +1,7 @@
 """The page: one table a chapter, thesis beside measured, what is to be said of the rows, and the figures."""
 
 import textwrap
+from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -35,13 +36,20 @@ rtctl reproduce --json           # the rows for a program
 ```
 
 A row passes where the measured number is within the tolerance of the thesis's, or above or below it where it says so.
-Where the thesis contradicts its own equations (erratum) the row is held against the number that the equations give.
 A row without a number in the text is held against what the text claims, in parentheses.
+
+- **erratum**: the thesis contradicts its own equations. The row is held against the number that the equations give.
+- **chosen**: an input is not of the thesis. It was chosen here so that the number comes out.
+- **differs**: the emulated machine does not give the number. The note says why.
+
+The second table of a chapter says which law, which parameter set and which filter a row was computed with, and quotes
+the text. `identified` and `simulation` are the columns of appendix A; what follows the name was put in here.
 
 The emulated machines have the parameters of the thesis. So a row that identifies one of them shows that the experiment
 finds what is there; it does not show again what the real machines had.
 """
 COLUMNS = ("name", "quantity", "thesis", "measured", "tolerance", "", "source")
+WITH = ("name", "law", "parameter set", "filter", "text of the thesis")
 
 
 def write(results: Sequence[Result], out: Path) -> Path:
@@ -53,24 +61,30 @@ def write(results: Sequence[Result], out: Path) -> Path:
 
 def text(results: Sequence[Result]) -> str:
     """The page of these results."""
-    parts = [HEAD.format(words=summary([row for result in results for row in result.rows]))]
+    parts = [HEAD.format(words=_wrapped(summary([row for result in results for row in result.rows])))]
     for chapter, group in groupby(results, key=lambda result: result.chapter):
         parts.append(_chapter(chapter, list(group)))
     return "\n".join(parts)
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """How many rows pass and how many are errata, in a sentence."""
-    bad = [row.name for row in rows if not row.passes]
-    errata = sum(bool(row.erratum) for row in rows)
-    said = f"{len(rows) - len(bad)} of {len(rows)} rows pass; {errata} of them show an erratum of the thesis."
-    return said + (f" Failing: {', '.join(bad)}." if bad else "")
+    """How many rows have which verdict, in two sentences."""
+    count = Counter(row.verdict for row in rows)
+    agree, some = count["pass"] + count["chosen"], "row" if len(rows) == 1 else "rows"
+    text = (
+        f"{len(rows)} {some}: {agree} agree with the thesis, {count['chosen']} of them by an input chosen here; "
+        f"{count['erratum']} show an erratum of the thesis; in {count['differs']} the emulated machine differs."
+    )
+    bad = [row.name for row in rows if row.verdict == "fail"]
+    return text + (f" Failing: {', '.join(bad)}." if bad else "")
 
 
 def _chapter(chapter: int, results: Sequence[Result]) -> str:
     rows = [row for result in results for row in result.rows]
     lines = [f"## {TITLES[chapter]}", "", f"| {' | '.join(COLUMNS)} |", "|---|---|---:|---:|---|---|---|"]
     lines += [f"| {' | '.join(_cells(row))} |" for row in rows]
+    lines += ["", f"| {' | '.join(WITH)} |", "|---|---|---|---|---|"]
+    lines += [f"| {' | '.join(_with(row))} |" for row in rows]
     notes = [_wrapped(f"- `{row.name}`: {note}", "  ") for row in rows if (note := _note(row))]
     lines += ["", *notes] if notes else []
     figures = sorted((one for result in results for one in result.figures), key=lambda one: _order(one.number))
@@ -91,13 +105,19 @@ def _cells(row: Row) -> list[str]:
     elif row.thesis is None:
         thesis = f"({value(row.against, row.unit)})"
     measured = "-" if row.refused else value(row.measured, row.unit)
-    mark = "pass" if row.passes else "**fail**"
+    mark = row.verdict if row.verdict == "pass" else f"**{row.verdict}**"
     cells = [f"`{row.name}`", row.quantity, thesis, measured, tolerance(row), mark, row.source]
     return [cell.replace("|", "\\|") for cell in cells]
 
 
+def _with(row: Row) -> list[str]:
+    cells = [f"`{row.name}`", row.law, row.set, row.filter, f"`{' '.join(row.quote.split())}`" if row.quote else ""]
+    return [cell.replace("|", "\\|") for cell in cells]
+
+
 def _note(row: Row) -> str:
-    said = [f"erratum, {row.erratum}" if row.erratum else "", row.remark]
+    said = [f"erratum, {row.erratum}" if row.erratum else "", f"differs, {row.differs}" if row.differs else ""]
+    said += [f"chosen here so that the row passes: {row.chosen}" if row.chosen else "", row.remark]
     said.append(f"not measured, {row.refused}" if row.refused else "")
     return "; ".join(part for part in said if part)
 

@@ -116,7 +116,7 @@ def _alone() -> None:
 
 
 def _words(result: Result) -> str:
-    bad = sum(not row.passes for row in result.rows)
+    bad = sum(row.verdict == "fail" for row in result.rows)
     count = len(result.rows)
-    passed = f"{bad} of {count} fail" if bad else f"{count} rows pass" if count > 1 else "1 row passes"
+    passed = f"{bad} of {count} fail" if bad else f"{count} rows as stated" if count > 1 else "1 row as stated"
     return f"chapter {result.chapter}, {result.title}: {passed} ({result.seconds:.1f} s)"

@@ -26,8 +26,10 @@ def test_json_has_the_rows():
     assert len(rows) == len(chapter07.DRIVER) + len(chapter07.MOTOR)
     for row in rows:
         assert {"name", "source", "thesis", "measured", "tolerance", "pass", "erratum"} <= set(row)
+        assert {"law", "set", "filter", "quote", "verdict"} <= set(row)
         assert row["pass"] is True
-    assert sum(row["erratum"] is not None for row in rows) == 2
+    assert sum(row["erratum"] is not None for row in rows) == 4
+    assert sum(row["verdict"] == "chosen" for row in rows) == 4
     assert "[2/2] chapter 7" in done.stderr
 
 
@@ -37,7 +39,16 @@ def test_a_failing_row_makes_exit_code_1(monkeypatch):
     monkeypatch.setattr(run, "parts", lambda only: [part])
     done = asked("--only", "7.sensing_resistor")
     assert done.exit_code == 1
-    assert "FAIL 7.sensing_resistor" in done.stdout and "Failing: 7.sensing_resistor" in done.stdout
+    assert "FAIL    7.sensing_resistor" in done.stdout and "Failing: 7.sensing_resistor" in done.stdout
+
+
+def test_a_row_that_differs_as_it_says_is_no_failure(monkeypatch):
+    row = chapter07.DRIVER[0]._replace(thesis=0.5, chosen="", differs="another resistor")
+    monkeypatch.setattr(run, "parts", lambda only: [chapter07.PARTS[0]._replace(rows=(row,))])
+    done = asked("--only", "7.sensing_resistor")
+    assert done.exit_code == 0 and "differs 7.sensing_resistor" in done.stdout
+    monkeypatch.setattr(run, "parts", lambda only: [chapter07.PARTS[0]._replace(rows=(row._replace(thesis=0.24),))])
+    assert asked("--only", "7.sensing_resistor").exit_code == 1
 
 
 def test_page_and_figures_where_they_are_asked_for(tmp_path):

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rtctl.config.errors import NoAnswer
-from rtctl.reproduce.rows import Part, Row, measured
+from rtctl.reproduce.rows import NONE, Part, Row, measured, under
 
 ROW = Row("8.delay", "delay", "(8.2)", 3.0, "ms", 0.03)
 
@@ -27,12 +27,41 @@ def test_passes(row, good, bad):
     assert not any(row._replace(measured=value).passes for value in bad)
 
 
+@pytest.mark.parametrize(
+    ("row", "measured", "verdict"),
+    [
+        (ROW, 3.0, "pass"),
+        (ROW, 4.0, "fail"),
+        (ROW, math.nan, "fail"),
+        (ROW._replace(chosen="T_c = 2 ms"), 3.0, "chosen"),
+        (ROW._replace(chosen="T_c = 2 ms"), 4.0, "fail"),
+        (ROW._replace(erratum="a factor of 2", expected=6.0), 6.0, "erratum"),
+        (ROW._replace(erratum="a factor of 2", expected=6.0), 3.0, "fail"),
+        (ROW._replace(differs="friction"), 4.0, "differs"),
+        (ROW._replace(differs="friction"), 3.0, "fail"),  # it says that it differs, and it does not
+        (ROW._replace(differs="friction"), math.nan, "fail"),
+    ],
+)
+def test_verdict(row, measured, verdict):
+    assert row._replace(measured=measured).verdict == verdict
+
+
+def test_rows_under_one_law():
+    own = ROW._replace(law="PD")
+    made = under(ROW, own, law="none at all", set="identified")
+    assert [(row.law, row.set, row.filter) for row in made] == [
+        ("none at all", "identified", NONE),
+        ("PD", "identified", NONE),
+    ]
+
+
 def test_json_says_what_it_was_held_against():
     row = ROW._replace(expected=6.0, erratum="a factor of 2", measured=6.1)
     made = row.as_json()
     assert {"name", "source", "thesis", "measured", "tolerance", "pass", "erratum"} <= set(made)
     assert made["thesis"] == 3.0 and made["against"] == 6.0 and made["erratum"] == "a factor of 2"
     assert made["pass"] is (abs(made["measured"] - made["against"]) <= made["tolerance"]) is True
+    assert {"law", "set", "filter", "quote", "chosen", "differs"} <= set(made) and made["verdict"] == "erratum"
     assert ROW.as_json()["measured"] is None and ROW.as_json()["erratum"] is None
 
 

@@ -22,15 +22,22 @@ def played(i: int) -> dict[str, rows.Row]:
     return {row.name: row for row in rows.measured(PARTS[i], short=True)}
 
 
+@cache
+def drawn(i: int, number: str) -> rows.Picture:
+    return PARTS[i].figures[number](True)
+
+
 @pytest.mark.parametrize(("i", "name"), NAMES, ids=[name for _, name in NAMES])
 def test_row(i, name):
     row = played(i)[name]
-    assert row.passes, row.refused or f"{row.measured:.5g} {row.unit}, against {row.against:g} within {row.margin:.3g}"
+    assert row.verdict != "fail", (
+        row.refused or f"{row.measured:.5g} {row.unit}, against {row.against:g} within {row.margin:.3g}"
+    )
 
 
 @pytest.mark.parametrize(("i", "number"), FIGURES, ids=[number for _, number in FIGURES])
 def test_figure(i, number, tmp_path):
-    picture = PARTS[i].figures[number](True)
+    picture = drawn(i, number)
     assert picture.number == number
     assert picture.sentence.endswith(".") and not re.search(r"\bnan\b", picture.sentence)
     assert all(axes.lines for axes in picture.figure.axes)
@@ -44,11 +51,92 @@ def test_all_rows_and_figures_are_there():
     assert sorted(number for _, number in FIGURES) == sorted(WANTED.split())
 
 
+CORRECTED = {  # verdict, and what is measured: each of these said something else before
+    "5.process_gain": ("erratum", 64.0),
+    "5.bandwidth_high": ("erratum", 3.64),
+    "5.phase_margin_empty": ("erratum", 68.4),  # of the set as listed; 56 deg are those of another J_m
+    "5.phase_margin_empty_heavy": ("differs", 55.8),
+    "6.overshoot": ("differs", 1.18),  # mm, with the 500 increments of the text; the camera has 0.5 mm
+    "6.overshoot_10000": ("differs", 0.70),
+    "6.tension_moving": ("differs", 0.245),
+    "6.tension_moving_10000": ("chosen", 0.1),
+    "7.sensing_resistor": ("chosen", 0.24),
+    "7.error_capacitor": ("chosen", 6.6),
+    "7.error_resistor": ("chosen", 170.0),
+    "7.slip_torque": ("erratum", 3.0),
+    "7.motor_constant": ("erratum", 4790.0),
+    "8.m_1": ("erratum", 0.206),
+    "8.m_2": ("erratum", 16.6),
+    "8.mode_tape": ("pass", 1.88),  # where the gain rises, not the mode at 2.55 Hz
+    "8.mode_shaft": ("pass", 40.6),  # damped, not |lambda| = 41.6
+    "8.hump_shaft": ("pass", 39.7),
+    "8.bandwidth": ("pass", 0.595),  # as printed
+    "8.stable": ("pass", 1.18),
+    "8.gain_margin_40_40": ("pass", 1.18),
+    "8.step_error_1": ("differs", 11.6),  # the law as printed, a tape that cannot push
+    "8.step_error_2": ("pass", 11.3),
+    "8.accuracy": ("differs", 0.145),
+    "8.accuracy_printed": ("erratum", 0.1325),
+    "8.overshoot_second": ("differs", 0.63),
+    "8.error_second": ("differs", 1.05),
+    "8.overshoot_under": ("differs", 0.97),
+    "9.gain_margin_fixed": ("pass", 1.18),
+    "9.accuracy_fixed": ("pass", 0.2),  # mm, worst of five pairs of radii
+    "9.accuracy": ("pass", 0.286),
+    "9.error": ("differs", 1.43),
+    "11.peak_150": ("chosen", 150.0),
+    "12.k_s": ("erratum", 557.0),
+    "12.k_c": ("erratum", 891.0),
+    "12.J_c": ("erratum", 0.01),
+    "12.J_t": ("erratum", 20.0),
+    "12.process_gain": ("pass", 2.97),  # against the same mass
+    "12.optimum_R_c": ("differs", 5.73),
+    "12.optimum_R_t": ("differs", 19.2),
+    "12.normal_force": ("chosen", 125.0),
+    "12.present_bandwidth": ("chosen", 8.2),
+    "12.notches": ("differs", 1.0),
+}
+
+
+@pytest.mark.parametrize("name", CORRECTED)
+def test_corrected(name):
+    (i,) = (i for i, row in NAMES if row == name)
+    row = played(i)[name]
+    assert (row.verdict, row.measured) == (CORRECTED[name][0], pytest.approx(CORRECTED[name][1], rel=0.02))
+
+
+def test_the_error_of_a_step_hangs_on_law_and_tape():
+    """Rows have one law throughout: as printed, with a tape that cannot push. Three others are in the remark."""
+    from rtctl.reproduce import chapter08 as ch
+
+    def errors(printed: bool, slack: bool) -> list[float]:
+        return ch.errors(ch.steps.steps(ch.radian(ch.TAU_C, printed, slack)))
+
+    assert errors(True, False) == pytest.approx([3.4, 11.9], abs=0.06)
+    assert errors(False, True) == pytest.approx([12.2, 7.5], abs=0.06)
+    assert errors(False, False) == pytest.approx([2.8, 1.3], abs=0.06)
+    pushed, slack = (ch.radian(ch.TAU_C, slack=s) for s in (False, True))
+    assert min(pushed["truth_tension1"].min(), pushed["truth_tension2"].min()) < -0.2
+    assert min(slack["truth_tension1"].min(), slack["truth_tension2"].min()) > -1e-9
+
+
+def test_captions_say_what_is_not_the_figure_of_the_thesis():
+    said = {
+        "5.2": "with the identified J_m", "6.2": "in place of the 500", "8.2": "five times the printed gains",
+        "8.4": "chosen here", "8.6": "the law as printed", "11.7": "does not show 150 and 300 mm as two peaks",
+        "11.9": "hardly in it", "12.2": "chosen here", "12.4": "In place of the block diagram",
+        "12.5": "are not in the emulator", "12.8": "chosen here", "12.9": "one acts",
+    }  # fmt: skip
+    for i, number in FIGURES:
+        if number in said:
+            assert said[number] in drawn(i, number).sentence, number
+
+
 def test_wide_tolerances_say_why():
     for part in PARTS:
         for row in part.rows:
             if row.bound == "within" and row.margin > 0.1 * abs(row.against) * (1 + 1e-9) and row.against:
-                assert row.remark, row.name
+                assert row.remark or row.differs, row.name
             assert (row.thesis is None or row.erratum or row.expected is None) and row.source and row.quantity
 
 
@@ -69,7 +157,7 @@ def test_parts_are_played_in_order_with_a_word_each(tmp_path):
     which = run.parts("7")
     results = run.reproduce(which, True, tmp_path, say=said.append)
     assert [result.title for result in results] == [part.title for part in which]
-    assert said[0].startswith("[1/2] chapter 7, motor driver: 7 rows pass (")
+    assert said[0].startswith("[1/2] chapter 7, motor driver: 7 rows as stated (")
     assert [one.file for result in results for one in result.figures] == ["figure_7_4.png"]
     assert (tmp_path / run.FOLDER / "figure_7_4.png").is_file()
 
