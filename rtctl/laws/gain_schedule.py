@@ -8,8 +8,8 @@ The process gain (`process_gain`) says what one motor does to the capstan; the o
 the unit is symmetric. A fixed gain that has 5.2 dB of gain margin at 38/22 mm has 1.2 dB at 40/40 and 20.9 dB at
 20/20: low-frequency gain alone does not set the margin, so `margin` takes a table designed on the full model.
 
-Source: thesis chapter 9 (gain scheduling recommended), process gain of 4.1-4.17. Chapter 9 expects less loop gain at a
-larger radius; by the equations it is more, so the schedule lowers the gain of full reels.
+Source: thesis chapter 9 (gain scheduling recommended), process gain of 4.1-4.17. The loop gain is
+smaller where the larger reel of a pair pulls, as chapter 9 says, and largest where both reels are full.
 """
 
 from typing import Any, Literal, NamedTuple

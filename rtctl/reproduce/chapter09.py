@@ -32,8 +32,10 @@ SCHEDULE = under(
         remark="0.5 mm is the margin of the camera (3)"),
     Row("9.error", "largest error with the schedule over that with a fixed gain: reduced", "9", None, "",
         bound="at most", expected=1.0, quote=REDUCED, law=SCHEDULED,
-        differs="the schedule must lower the gain, where 6 dB are to be left, so friction leaves more error",
-        remark="no number in the text. By (4.9)-(4.17) the loop gain is larger where both reels are full, not smaller"),
+        differs="the printed gain is that of 38/22 mm, where the loop bears most; to leave 6 dB elsewhere the schedule "
+        "lowers it, and friction leaves more error",
+        remark="no number in the text. The loop gain is smaller where the larger reel of a pair pulls, as the text "
+        "says, and largest where both are full"),
     set=SLACK_SET,
 )  # fmt: skip
 

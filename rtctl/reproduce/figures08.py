@@ -48,7 +48,7 @@ def figure_8_3(short: bool) -> Picture:
     axes[2].set_ylabel("phase [deg]")
     fig.legend(axes[0])
     sentence = (
-        f"Measured and fitted response of the reel unit at 38/22 mm: K_p = {found.K_p.value:.1f} rad/s^2/A at 1 "
+        f"Measured and fitted response of the identified set at 38/22 mm: K_p = {found.K_p.value:.1f} rad/s^2/A at 1 "
         f"Hz, and the phase is that of the model once {1e3 * found.tau.value:.2f} ms of delay are in it."
     )
     return Picture("8.3", sentence, figure)

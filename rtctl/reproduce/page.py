@@ -51,6 +51,14 @@ finds what is there; it does not show again what the real machines had.
 COLUMNS = ("name", "quantity", "thesis", "measured", "tolerance", "", "source")
 WITH = ("name", "law", "parameter set", "filter", "text of the thesis")
 
+ERRATA = (  # errata of the thesis without a number: section, its words, what is right
+    ("12.1", r"-\frac{b_c + N^2b_m}{J_t}", "b_m is b_s, in appendix F too"),
+    ("Appendix F", "0 & 1 & 0 & 0 & 0 & 0 & 0 & 0 & 0", "A, B and C have a ninth column for eight states"),
+    ("Appendix A", "$c_{m1} = c_{m2}$	8.0e1	1.2e1	torsion spring constant motor shaft	[Nm]",
+     "Nm/rad, and Nms/rad for the damping; in appendix F too"),
+    ("7.2", r"f_0 = \sqrt{\frac{G_{mo} R_S}{R_F R_4 C_F C}}", "that is the angular frequency, 2 pi f_0"),
+)  # fmt: skip
+
 
 def write(results: Sequence[Result], out: Path) -> Path:
     """Write the page into the folder `out` and return its path. Raises OSError where that cannot be."""
@@ -64,7 +72,7 @@ def text(results: Sequence[Result]) -> str:
     parts = [HEAD.format(words=_wrapped(summary([row for result in results for row in result.rows])))]
     for chapter, group in groupby(results, key=lambda result: result.chapter):
         parts.append(_chapter(chapter, list(group)))
-    return "\n".join(parts)
+    return "\n".join([*parts, *_errata()])
 
 
 def summary(rows: Sequence[Row]) -> str:
@@ -96,6 +104,11 @@ def _chapter(chapter: int, results: Sequence[Result]) -> str:
             _wrapped(f"Figure {one.number}. {one.sentence}"),
         ]
     return "\n".join([*lines, ""])
+
+
+def _errata() -> list[str]:
+    lines = ["## Errata without a number", "", "| section | text of the thesis | what is right |", "|---|---|---|"]
+    return [*lines, *(f"| {section} | `{' '.join(quote.split())}` | {right} |" for section, quote, right in ERRATA), ""]
 
 
 def _cells(row: Row) -> list[str]:

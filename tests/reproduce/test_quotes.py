@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rtctl.reproduce import run
+from rtctl.reproduce import page, run
 
 THESIS = Path(__file__).parents[2].parent / "shared" / "spec" / "thesis.txt"
 HEADING = re.compile(r"^\s*#+ \**(?:Chapter (\d+)|(\d+\.\d+)(?:\.\d+)? |(Appendix [A-F]))", re.M)
@@ -43,6 +43,12 @@ def test_the_quote_is_in_the_section(row):
     section = row.source.split(",")[0]
     assert section in sections(), section
     assert one_line(row.quote) in sections()[section]
+
+
+@pytest.mark.parametrize(("section", "quote", "right"), page.ERRATA)
+def test_errata_without_a_number(section, quote, right):
+    assert one_line(quote) in sections()[section] and right
+    assert f"| {section} | `{one_line(quote)}` |" in page.text([])
 
 
 def test_a_number_without_a_quote_of_it_is_none():
