@@ -18,7 +18,7 @@ from rtctl.plants.ldu import LduParameters, LduSettings
 
 STEEL_ON_STEEL = 0.8  # friction coefficient, dry (12.5)
 MOTOR_FORCE, STRIP_FORCE = 12.0, 20.0  # N, motor on wheel and capstan on strip (12.5)
-MOTOR_TORQUE = 15e-3  # Nm, most that the motor is capable of: what (12.5) makes of its 125 N
+MOTOR_TORQUE = 15e-3  # Nm, largest of the motor; chosen so that 12.5 gives its 125 N, the text names none
 SHEAR, DENSITY = 70e9, 7.85e3  # N/m^2 and kg/m^3, steel as appendix F has it
 
 

@@ -25,7 +25,7 @@ COUNTS = {500: {"lines": 125}, 10000: {"lines": 2500}}  # increments a turn: fou
 WINDOW = 0.5  # mm, margin of the camera (3)
 OVERDAMPED = "the closed loop behavior is stable and the system is overdamped"
 TENSION = "The tension force is kept at the desired level during constant velocity"
-NOISY = "the derivative of 500 increments is so noisy that the motors pull by turns, which pulls the tape taut"
+NOISY = "500 increments make the derivative noisy; the motors pull in turn, and the mean tension rises"
 
 OPEN = under(
     Row("6.deflection", "end deflection of reel 1 at 0.049 A, R = 30 mm", "6.1, figure 6.1(c)", 6.8e-2, "rad", 0.03,
@@ -43,11 +43,11 @@ RADIUS = under(
 CLOSED = under(
     Row("6.overshoot", "overshoot of a move of 0.1 m, 500 increments, 20/40 mm", "6.3, figure 6.2", 0.0, "mm", WINDOW,
         relative=False, quote=OVERDAMPED, set="simulation, 500 increments",
-        differs="friction of 1 mNm is compensated in full, so it damps nothing; " + NOISY,
+        differs="friction of 1 mNm is compensated in full and does not damp; " + NOISY,
         remark="the tolerance is the margin of the camera (3)"),
     Row("6.overshoot_10000", "the same with 10000 counts", "6.3, figure 6.2", 0.0, "mm", WINDOW, relative=False,
         quote=OVERDAMPED, set="simulation, 10000 counts",
-        differs="friction of 1 mNm is compensated in full, so it damps nothing"),
+        differs="friction of 1 mNm is compensated in full and does not damp"),
     Row("6.overshoot_uncompensated", "the same with 10000 counts, friction not compensated", "6.3, figure 6.2", 0.0,
         "mm", WINDOW, relative=False, quote="is reduced by the Coulomb friction", set="simulation, 10000 counts",
         law="PD (5.4), no friction feedforward",

@@ -126,7 +126,7 @@ LOOP = under(
 )  # fmt: skip
 RADII = under(
     Row("8.stable", "least gain margin over the radii: stable for all", "8.3", None, "dB", bound="at least",
-        expected=0.0, quote=COMPLETE, remark=f"{NO_NUMBER}. It is stable everywhere, and hardly robust at 40/40 mm"),
+        expected=0.0, quote=COMPLETE, remark=f"{NO_NUMBER}. Stable at all radii; 1.2 dB at 40/40 mm is not robust"),
     *(
         Row(f"8.gain_margin_{name}", f"gain margin at {name.replace('_', '/')} mm", "8.3", None, "dB", off,
             relative=False, quote=COMPLETE, expected=value, remark=f"{NO_NUMBER}; held against (8.2) computed apart")
@@ -138,7 +138,7 @@ OTHER_WAYS = (
     "tape.slack is not in the text: without it the tape pushes by 0.3 N. 3.4 and 11.9 mrad (0.149 mm) where the tape "
     "can push. With the shipped filter of 40 Hz 12.2 and 7.5 mrad, and 2.8 and 1.3 mrad where the tape can push"
 )
-STICKS = "where the motor comes to rest is a matter of friction, which in the emulator is the same at any angle"
+STICKS = "dry friction decides the error at rest, and the emulated friction does not depend on the angle"
 SECOND = "(in both experiments the second step), figure 8.6(a) shows a larger overshoot"
 STEPS = under(
     Row("8.step_error_1", "error after the step of -1 rad, 25/35 mm", "8.3, figure 8.6(a)", 9.77, "mrad", 0.1,
@@ -350,7 +350,7 @@ def overshoots(done: steps.Steps) -> list[float]:
 
 def radians(short: bool) -> dict[str, float]:
     """Errors and overshoot of the steps with the law as it is printed."""
-    full, under_ = (steps.steps(radian(tau)) for tau in (TAU_C, UNDER))
+    full, less = (steps.steps(radian(tau)) for tau in (TAU_C, UNDER))
     return {
         "8.step_error_1": errors(full)[0],
         "8.step_error_2": errors(full)[1],
@@ -359,8 +359,8 @@ def radians(short: bool) -> dict[str, float]:
         "8.within_margin": abs(full.worst_mm),
         "8.overshoot_full": min(overshoots(full)),
         "8.overshoot_second": overshoots(full)[1] / overshoots(full)[0],
-        "8.error_second": errors(under_)[1] / errors(under_)[0],
-        "8.overshoot_under": under_.overshoot_pct,
+        "8.error_second": errors(less)[1] / errors(less)[0],
+        "8.overshoot_under": less.overshoot_pct,
     }
 
 

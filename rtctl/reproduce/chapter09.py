@@ -32,8 +32,8 @@ SCHEDULE = under(
         remark="0.5 mm is the margin of the camera (3)"),
     Row("9.error", "largest error with the schedule over that with a fixed gain: reduced", "9", None, "",
         bound="at most", expected=1.0, quote=REDUCED, law=SCHEDULED,
-        differs="the printed gain is that of 38/22 mm, where the loop bears most; to leave 6 dB elsewhere the schedule "
-        "lowers it, and friction leaves more error",
+        differs="the printed gain is designed at 38/22 mm; the schedule lowers it elsewhere to keep 6 dB, and the "
+        "error by friction grows",
         remark="no number in the text. The loop gain is smaller where the larger reel of a pair pulls, as the text "
         "says, and largest where both are full"),
     set=SLACK_SET,

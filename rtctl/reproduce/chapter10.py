@@ -6,7 +6,7 @@ from rtctl.identify import bench, steps
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Row, under
 
-PRESENT_LAW = "present controller, 6400 V/m, 4 s, 172 Vs/m"  # gains of the shipped config, chosen here
+PRESENT_LAW = "present controller, gains chosen here: 6400 V/m, 4 s, 172 Vs/m"  # those of the shipped config
 SIZES = {"10.step_twelfth": steps.TWELFTH, "10.step_twenty_fourth": steps.TWENTY_FOURTH}
 
 STEPS = under(

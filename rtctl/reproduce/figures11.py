@@ -114,9 +114,9 @@ def figure_11_7(short: bool) -> Picture:
     bins = ", ".join(f"{1e3 * peak.bin:.2f}" for peak in peaks)
     sentence = (
         "Fourier transform (11.10) of that error on two scales. Waves fitted to it have "
-        f"{bins} mm. It does not show 150 and 300 mm as two peaks, as the text says of its own figure: under the "
-        f"window both run into one hill, with {size[300]:.1f}, {size[200]:.1f} and {size[150]:.1f} um at 300, 200 and "
-        "150 mm."
+        f"{bins} mm. It does not show 150 and 300 mm as two peaks, as the text says of its own figure: the "
+        f"window merges both into one maximum, with {size[300]:.1f}, {size[200]:.1f} and {size[150]:.1f} um at 300, "
+        "200 and 150 mm."
     )
     return Picture("11.7", sentence, figure)
 
@@ -154,7 +154,7 @@ def figure_11_9(short: bool) -> Picture:
     sentence = (
         "Cross power spectrum of position error and emulated luminance on two scales: they share "
         f"{ch.by_luminance(short)['11.peak_cross']:.2f} mm, the turn of the capstan. The long waves of the guide are "
-        f"hardly in it, {share[0]:.0f} % of that at 150 mm and {share[1]:.0f} % at 300 mm: the emulated luminance "
+        f"weak in it, {share[0]:.0f} % of that at 150 mm and {share[1]:.0f} % at 300 mm: the emulated luminance "
         "follows the slope of the error."
     )
     return Picture("11.9", sentence, figure)

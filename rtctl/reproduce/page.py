@@ -43,10 +43,15 @@ A row without a number in the text is held against what the text claims, in pare
 - **differs**: the emulated machine does not give the number. The note says why.
 
 The second table of a chapter says which law, which parameter set and which filter a row was computed with, and quotes
-the text. `identified` and `simulation` are the columns of appendix A; what follows the name was put in here.
+the text. What follows the name of a parameter set was put in here.
 
-The emulated machines have the parameters of the thesis. So a row that identifies one of them shows that the experiment
-finds what is there; it does not show again what the real machines had.
+- `simulation` is that column of appendix A.
+- `identified` is the other one, with R_c = 12.5 mm. Friction of 2.6 mNm at motor 2 and 0.1 mNm at the capstan is
+  chosen here.
+- `appendix_f` is as listed, `figure_12_2` has k_s, k_c and M chosen here. The text has no damping; it is chosen here.
+
+The emulated machines have these parameters. So a row that identifies one of them shows that the experiment finds what
+is there; it does not show again what the real machines had.
 """
 COLUMNS = ("name", "quantity", "thesis", "measured", "tolerance", "", "source")
 WITH = ("name", "law", "parameter set", "filter", "text of the thesis")
@@ -78,10 +83,11 @@ def text(results: Sequence[Result]) -> str:
 def summary(rows: Sequence[Row]) -> str:
     """How many rows have which verdict, in two sentences."""
     count = Counter(row.verdict for row in rows)
-    agree, some = count["pass"] + count["chosen"], "row" if len(rows) == 1 else "rows"
+    bare, some = sum(row.thesis is None for row in rows), "row" if len(rows) == 1 else "rows"
     text = (
-        f"{len(rows)} {some}: {agree} agree with the thesis, {count['chosen']} of them by an input chosen here; "
-        f"{count['erratum']} show an erratum of the thesis; in {count['differs']} the emulated machine differs."
+        f"{len(rows)} {some}: {count['pass']} agree with the thesis, {count['chosen']} by an input chosen here; "
+        f"{count['erratum']} show an erratum of the thesis; in {count['differs']} the emulated machine differs. "
+        f"The text has no number for {bare} of them, only a claim."
     )
     bad = [row.name for row in rows if row.verdict == "fail"]
     return text + (f" Failing: {', '.join(bad)}." if bad else "")

@@ -63,6 +63,6 @@ def test_a_number_without_a_quote_of_it_is_none():
     ["7.sensing_resistor", "7.error_capacitor", "7.error_resistor", "12.normal_force", "12.present_bandwidth",
      "12.present_gain_margin", "12.gain_margin", "11.trend", "6.tension_moving_10000", "12.resonance_1"],
 )  # fmt: skip
-def test_inputs_taken_from_the_number_itself_are_told(name):
+def test_inputs_taken_from_the_number_itself_are_named(name):
     (row,) = (row for row in ROWS if row.name == name)
     assert row.chosen

@@ -105,7 +105,7 @@ def test_corrected(name):
     assert (row.verdict, row.measured) == (CORRECTED[name][0], pytest.approx(CORRECTED[name][1], rel=0.02))
 
 
-def test_the_error_of_a_step_hangs_on_law_and_tape():
+def test_error_of_a_step_depends_on_law_and_tape():
     """Rows have one law throughout: as printed, with a tape that cannot push. Three others are in the remark."""
     from rtctl.reproduce import chapter08 as ch
 
@@ -124,7 +124,7 @@ def test_captions_say_what_is_not_the_figure_of_the_thesis():
     said = {
         "5.2": "with the identified J_m", "6.2": "in place of the 500", "8.2": "five times the printed gains",
         "8.4": "chosen here", "8.6": "the law as printed", "11.7": "does not show 150 and 300 mm as two peaks",
-        "11.9": "hardly in it", "12.2": "chosen here", "12.4": "In place of the block diagram",
+        "11.9": "weak in it", "12.2": "chosen here", "12.4": "In place of the block diagram",
         "12.5": "are not in the emulator", "12.8": "chosen here", "12.9": "one acts",
     }  # fmt: skip
     for i, number in FIGURES:
