@@ -170,6 +170,7 @@ SLIP = Term(
         "force:ldu": "contact.slip_wheel({p}, {s}, {m}, {i}, {l})",
         "reading:ldu": "{m}.y[1] -= {s}.fallen",
     },
+    moves=True,
     nodes=NODES,
     look_alikes={
         "transmission.creep": "one way, softly and hard: creep is lost both times, slip only when hard",
@@ -194,6 +195,7 @@ CREEP = Term(
         "force:ldu": "contact.creep_wheel({p}, {s}, {m}, {i}, {l})",
         "reading:ldu": "{m}.y[1] -= {s}.fallen",
     },
+    moves=True,
     nodes=NODES,
     look_alikes={
         "sensor.scale": "out with load and back without: a wrong scale errs the same both ways, creep by the load",

@@ -127,6 +127,7 @@ THICKNESS = Term(
     source="thesis 11.1, figure 11.7",
     settings=ThicknessSettings,
     build=build_thickness,
+    moves=True,
     act={"reading": "{m}.y[{c}] += guide.thickness({p}, {m}.y[{c}])"},
     nodes=GUIDES,
     look_alikes={
@@ -147,6 +148,7 @@ STRIP = Term(
     source="thesis (11.6)",
     settings=StripSettings,
     build=build_strip,
+    moves=True,
     act={"reading": "{m}.y[{c}] += guide.strip({p}, {m}.y[{c}])"},
     nodes=GUIDES,
     look_alikes={
@@ -163,6 +165,7 @@ DIRT = Term(
     source="thesis 11.1",
     settings=DirtSettings,
     build=build_dirt,
+    moves=True,
     act={"reading": "{m}.y[{c}] += guide.dirt({p}, {m}.y[{c}])"},
     nodes=GUIDES,
     look_alikes={

@@ -149,6 +149,7 @@ CAPSTAN = Term(
         "last:ivu": "ripple_tape.capstan_arm({p}, {m}, {i})",
         "reading:ldu": "{m}.y[1] += ripple_tape.way({p}, {m}.x[{i}])",
     },
+    moves=True,
     nodes={"ivu": ("capstan",), "ldu": ("capstan",)},
     look_alikes={
         "ripple.encoder": "on the LDU both give the same difference of the sensors, and only in closed loop does the "

@@ -51,6 +51,7 @@ class Term:
     scale: dict[str, str] = field(default_factory=dict)  # parameter -> what its typical range is a multiple of
     axis: str = "velocity"  # where the effect shows: time, velocity, position, angle, command, tension, frequency
     passive: bool = True  # never feeds energy in
+    moves: bool = False  # its reading line is where the carriage stands, not an error of a sensor
     tabled: bool = True  # the exchange format has its name
     state: np.dtype | None = None
 

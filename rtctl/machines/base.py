@@ -171,6 +171,7 @@ class PhysicsLines(NamedTuple):
     command: tuple[str, ...]  # lines by site, see plants/physics/term.py
     force: tuple[str, ...]
     reading: tuple[str, ...]
+    moves: tuple[str, ...]  # those of the reading lines that say where the carriage stands
 
 
 def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
@@ -181,6 +182,7 @@ def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
     blocks: list[Block] = []
     uses: list[str] = []
     lines: dict[str, list[str]] = {site: [] for site in SITES}
+    moves: list[str] = []
     for number, settings in enumerate(ordered(terms)):
         term = TERMS[settings.term]
         name = f"term{number}"
@@ -195,7 +197,14 @@ def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
                     r=f"p.plant.{spot.factor}" if spot.factor else "1.0",
                 )  # fmt: skip
                 lines[site] += line.split("\n")
+                if site == "reading" and term.moves:
+                    moves += line.split("\n")
     force = (*lines["force"], *lines["last"])
     return PhysicsLines(
-        tuple(dict.fromkeys(uses)), tuple(blocks), tuple(lines["command"]), force, tuple(lines["reading"])
+        tuple(dict.fromkeys(uses)),
+        tuple(blocks),
+        tuple(lines["command"]),
+        force,
+        tuple(lines["reading"]),
+        tuple(moves),
     )

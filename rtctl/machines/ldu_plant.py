@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rtctl.machines.ldu import LduConfig
 
 TRUTH = (
-    Column("truth_x", "m", "capstan angle times R_c in the emulator; slip, capstan and guide errors are in scale"),
-    Column("truth_speed", "m/s", "carriage speed in the emulator"),
+    Column("truth_x", "m", "carriage position in the emulator, with slip, capstan and guide"),
+    Column("truth_speed", "m/s", "capstan speed times R_c in the emulator"),
     Column("truth_current", "A", "motor current in the emulator"),
 )
 
@@ -79,7 +79,9 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
         (
             "truth",
             (
-                "rx.truth[0] = p.plant.R_c * s.plant.m.x[ldu.CAPSTAN]",
+                "ldu.read(p.plant, s.plant)",  # anew, without the errors of the sensors
+                *terms.moves,
+                "rx.truth[0] = s.plant.m.y[1]",
                 "rx.truth[1] = p.plant.R_c * s.plant.m.x[ldu.NQ + ldu.CAPSTAN]",
                 "rx.truth[2] = s.plant.m.x[2 * ldu.NQ]",
             ),

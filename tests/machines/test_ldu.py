@@ -46,6 +46,24 @@ def test_encoder_and_scale_agree_with_the_carriage(run):
     assert run["encoder_counts"] * COUNT == pytest.approx(run["position"], abs=1e-12)
 
 
+def test_truth_of_the_carriage_has_slip_and_guide_in_it():
+    """The scale reads where the carriage is, but for its pitch and for errors of its own."""
+    terms = [
+        {"term": "transmission.slip", "node": "capstan", "F_max": 7.5},
+        {"term": "ripple.capstan", "node": "capstan", "a": 2e-5},
+        {"term": "guide.thickness", "node": "carriage", "A": 2e-5, "wavelength": 0.02, "phi": 1.0},
+    ]
+    steps = [{"at": 0.2, "to": 0.01, "ramp": 0.05}]
+    changes = {"reference__steps": steps, "safety__disagreement": 0, "safety__following_error": 0}
+    run = fused.run(fused.config("ldu", plant__physics=terms, **changes), 2.0)
+    assert np.abs(run["scale"] - run["position"]).max() > 1e-5
+    assert np.abs(run["scale"] - run["truth_x"]).max() < 2e-6
+    wrong = [*terms, {"term": "sensor.scale", "node": "scale", "relative": 0.01}]
+    off = fused.run(fused.config("ldu", plant__physics=wrong, **changes), 2.0)
+    assert np.abs(off["truth_x"] - run["truth_x"]).max() < 1e-6
+    assert np.abs(off["scale"] - off["truth_x"]).max() > 5e-5
+
+
 def loop_response(config: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Loop gain with both feedbacks open at the amplifier, and reference to encoder, from model and law."""
     machine = machines.build(config)
