@@ -29,7 +29,7 @@ from rtctl.diagnose.verdict import (
     judged,
     label,
     proven,
-    testable,
+    only_testable,
     with_known,
 )
 
@@ -95,7 +95,7 @@ def predicted(
     proved = proven(verdict, closed, several, UNNAMED if loud else NOTHING)
     refused = bool(verdict.effects) and not proved.effects
     borne_out = with_known(proved, known)
-    verdict = testable(borne_out, cannot)
+    verdict = only_testable(borne_out, cannot)
     untestable = () if verdict.effects else tuple(e for e in map(label, borne_out.effects) if e in cannot)
     if not verdict.effects:
         taken, errors[1] = base, errors[0]

@@ -133,7 +133,7 @@ def proven(verdict: Verdict, closed: float, several: bool, otherwise: str = UNNA
     return verdict._replace(effects=tuple(e._replace(confidence=min(e.confidence, sure)) for e in verdict.effects))
 
 
-def testable(verdict: Verdict, cannot: Collection[str]) -> Verdict:
+def only_testable(verdict: Verdict, cannot: Collection[str]) -> Verdict:
     """The verdict without a name that the record cannot test, as "term:node" in `cannot`: the one place that every
     verdict of a diagnosis passes last.
 
