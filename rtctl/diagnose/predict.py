@@ -28,8 +28,8 @@ from rtctl.diagnose.verdict import (
     Verdict,
     judged,
     label,
-    proven,
     only_testable,
+    proven,
     with_known,
 )
 
@@ -102,7 +102,9 @@ def predicted(
     unpredicted = verdict.verdict == NOTHING and not predicts(judge, old, rows, errors[0], usual, forces(problem, base))
     if unpredicted:
         verdict = verdict._replace(verdict=UNNAMED)
-    return Shown(verdict, refused, taken, old.model, errors[0], errors[1], floor, mode != usual, untestable, unpredicted)
+    return Shown(
+        verdict, refused, taken, old.model, errors[0], errors[1], floor, mode != usual, untestable, unpredicted
+    )
 
 
 def forces(problem: Problem, fitted: Fit) -> bool:

@@ -5,7 +5,7 @@ it is let go with all states of the observer; position and speed are fitted to t
 first predicted row. The error of a right model grows from there by its parameters' and its first state's uncertainty,
 and by random forces; of an integrating plant without bound. `band` is the size of the error by these.
 
-Source: Ljung, System Identification (1999), 3.3 for simulation from a filtered state and 9.4 for the variance of a model.
+Source: Ljung, System Identification (1999), 3.3 for simulation and 9.4 for the variance of a model.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,6 @@
 """Shrinkage of a model to the numbers that predict, before it is written.
 
-A size that the record hardly determines moves the prediction of another day by its error, and gains nothing there. It is
+A size that the record hardly determines moves the prediction of another day by its error, and gains nothing. It is
 left out where its interval nearly holds zero and its gain does not repeat on quarters of the record that no fit saw: a
 free run, which adds up a constant error, has to gain by it in nearly all of them, and so has the tracking error.
 
@@ -51,8 +51,8 @@ def shrunk(problem: Problem, fitted: Fit) -> Shrunk:
         unit = parameter_unit(fitted.model.kind, h, name)
         size, half = (nice(x, unit) if unit else f"{x:.2g}" for x in (value, Z90 * sigma))
         reasons.append(
-            f"{h.term} at {h.node}, {name}: the record says {size} +- {half} (90 %), and a free run on rows that no fit "
-            f"saw was better with it in {better} of {QUARTERS} quarters"
+            f"{h.term} at {h.node}, {name}: the record says {size} +- {half} (90 %), and a free run on rows that no "
+            f"fit saw was better with it in {better} of {QUARTERS} quarters"
         )
         fitted = less
 

@@ -318,8 +318,8 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
         )
     if d.unpredicted:
         return (
-            "The model does not predict: run freely from the recorded state it leaves the record by more than noise and "
-            "the uncertainty of its parameters make it, and no known effect explains why.",
+            "The model does not predict: run freely from the recorded state it leaves the record by more than noise "
+            "and the uncertainty of its parameters make it, and no known effect explains why.",
             f"{_capital(amount)}.",
         )
     if d.resembles is not None:

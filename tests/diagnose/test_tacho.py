@@ -166,7 +166,9 @@ def test_it_is_named(terms, monkeypatch):
 
 def counted(rate, command):
     """A position that shows the sum of `rate` under a command."""
-    return SimpleNamespace(plant="axis", shows_speed=False, dt=1e-3, y={"x": np.cumsum(rate) * 1e-3}, u=command[:, None])
+    return SimpleNamespace(
+        plant="axis", shows_speed=False, dt=1e-3, y={"x": np.cumsum(rate) * 1e-3}, u=command[:, None]
+    )
 
 
 def test_a_position_that_adds_up_either_direction_is_told_from_one_that_stops_or_turns():

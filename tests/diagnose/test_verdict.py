@@ -17,10 +17,10 @@ from rtctl.diagnose.verdict import (
     confidence,
     listed,
     of_jitter,
+    only_testable,
     patched,
     proven,
     shared,
-    only_testable,
     with_known,
 )
 
