@@ -187,7 +187,7 @@ def test_our_own_fault_is_told_as_ours(tmp_path, monkeypatch):
 def plain(monkeypatch):
     """A diagnosis of which only the writing counts."""
     monkeypatch.setattr(diagnosis, "as_json", lambda d: {"verdict": "nothing", "bad": float("nan"), "n": np.float64(2)})
-    monkeypatch.setattr(export, "write_model", lambda after, record, path, config: path.write_text(f"{config}"))
+    monkeypatch.setattr(export, "write_model", lambda after, record, path, config, left: path.write_text(f"{config}"))
     monkeypatch.setattr(report, "html", lambda d: "<p>")
     return SimpleNamespace(after=None, left_out=(), record=SimpleNamespace(plant="ivu"), experiment=None)
 
