@@ -1,6 +1,7 @@
 # make run    the reel unit under control, against its emulated twin, with a picture at the end
 # make test   the whole test suite
 # make check  lint, format and types
+# make bounds the oldest libraries that pyproject.toml allows, tried in an environment of their own
 # make docs   the manual as a web site, build/site/index.html, and the man page
 
 PYTHON ?= python3
@@ -11,7 +12,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
-.PHONY: run test check format docs bench clean
+.PHONY: run test bounds check format docs bench clean
 
 run: $(VENV)/installed
 	$(BIN)/rtctl run configs/ivu.yaml --reference configs/references/steps.yaml --for 12s
@@ -19,6 +20,9 @@ run: $(VENV)/installed
 # one thread of linear algebra for each of the two workers: more would wait for one another
 test: $(VENV)/installed-dev
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadgroup
+
+bounds: $(VENV)/installed-dev
+	tests/packaging/lower_bounds.sh $(BIN)/python
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -2,10 +2,12 @@
 
 import itertools
 import os
+import pwd
 import shutil
+import site
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, MutableMapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -29,9 +31,24 @@ from rtctl.trace.replay import replay
 TESTS = Path(__file__).parent
 sys.path.insert(0, str(TESTS))  # for served.py and compiled.py, under importlib mode
 CONFIGS = Path(__file__).parents[1] / "configs"
+KEPT = Path(__file__).parents[1] / "build" / "tests"  # home and caches of every process that the tests start
 number = itertools.count(1)
 settings.register_profile("any machine", deadline=None)  # no test is wrong because it was slow
 settings.load_profile("any machine")
+
+
+def at_home(environment: MutableMapping[str, str]) -> None:
+    """Home and caches within the project, so that the tests neither write outside of it nor depend on the account that
+    runs them. A cache that the caller names stays."""
+    environment.setdefault("PYTHONUSERBASE", site.getuserbase())  # where `pip install --user` has put the libraries
+    for name in ("XDG_CONFIG_HOME", "XDG_CACHE_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "HOME"):
+        environment.pop(name, None)
+    environment["HOME"] = str(KEPT)
+    environment.setdefault("RTCTL_CACHE_DIR", str(KEPT / "rtctl"))
+    KEPT.mkdir(parents=True, exist_ok=True)
+
+
+at_home(os.environ)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -71,6 +88,17 @@ def is_helper(module: ModuleType) -> bool:
 def keeps(value: Any) -> bool:
     """Whether it is a function that keeps what it once made."""
     return hasattr(value, "cache_info")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_is_written_elsewhere() -> Iterator[None]:
+    """No home and no folder of rtctl's is made for an account that the tests run as, root or nobody."""
+    homes = {Path(pwd.getpwuid(os.getuid()).pw_dir), Path(pwd.getpwnam("nobody").pw_dir)}
+    places = [home / name for home in homes for name in ("", ".cache/rtctl", ".config/rtctl", ".local/share/rtctl")]
+    missing = [place for place in places if not place.exists()]
+    yield
+    made = [str(place) for place in missing if place.exists()]
+    assert not made, f"a test, or a process that it started, made {', '.join(made)}"
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -25,7 +25,7 @@ from rtctl.config.cache import cache_folder
 from rtctl.config.errors import UserError
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import excitation, reference
-from rtctl.loop import faults, frames, runner
+from rtctl.loop import faults, frames, runner, shm_link
 from rtctl.machines import Machine
 from rtctl.machines.base import Block, Column
 from rtctl.sources import sources_hash
@@ -197,7 +197,12 @@ def warm(entry: Any, arguments: tuple[Any, ...]) -> None:
 
 
 def generate(machine: Machine, link: str) -> Generated:
-    """Write and load the tick of a machine for a link, `zmq` or `shm`."""
+    """The tick of a machine for a link, `zmq` or `shm`, written and loaded.
+
+    Raises UserError on a processor on which a link over shared memory cannot wait.
+    """
+    if link == "shm" and machine.config.loop.mode != "fused":
+        shm_link.check_architecture()
     path = write(machine, link)
     if machine.config.own:
         from rtctl.own.machine import require  # here: the plain tick has nothing of the user's own

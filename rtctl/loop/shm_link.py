@@ -5,22 +5,38 @@ A slot is a sequence lock: odd while it is written. Whoever reads takes the newe
 Source: futex(2).
 """
 
+import platform
+import sys
 from typing import Any
 
 import numpy as np
 from numba import types
 
+from rtctl.config.errors import UserError
 from rtctl.idiom import tick
 from rtctl.loop import frames
 from rtctl.loop.memory import fence
 
-SYS_FUTEX = 202  # x86-64
+FUTEX = {"x86_64": 202, "aarch64": 98}  # number of the system call, from the kernel's unistd.h of each architecture
+SYS_FUTEX = FUTEX.get(platform.machine(), 0)
 WAIT, WAKE = 0, 1
 TIMEOUT_NS = 5_000_000_000
 
 syscall: Any = types.ExternalFunction(
     "syscall", types.int64(types.int64, types.intp, types.int64, types.int64, types.intp, types.intp, types.int64)
 )
+
+
+def check_architecture(machine: str = platform.machine(), bits: int = sys.maxsize.bit_length() + 1) -> None:
+    """Refusal of an architecture whose system calls are not known here. Raises UserError.
+
+    `machine` is the name by uname(2), `bits` the width of an address in this Python.
+    """
+    if machine not in FUTEX or bits != 64:
+        raise UserError(
+            f"this processor is {machine} with a {bits}-bit Python; rtctl knows the system calls of 64-bit "
+            f"{' and '.join(FUTEX)}: use a 64-bit system on one of them"
+        )
 
 
 def slot_dtype(frame: np.dtype) -> np.dtype:

@@ -1,9 +1,11 @@
+import platform
 import threading
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rtctl.config.errors import UserError
 from rtctl.idiom import tick
 from rtctl.loop import frames, generate, shm_link
 
@@ -175,3 +177,15 @@ def test_torn_frames_are_never_taken(ends: Ends) -> None:
 def test_a_frame_that_is_there_is_not_waited_for(ends: Ends) -> None:
     ends.send(1)
     assert ends.wait() == 1 and ends.got["seq"] == 1
+
+
+def test_the_futex_of_each_architecture() -> None:
+    """Numbers of futex(2) by the kernel's own tables: arch/x86/entry/syscalls/syscall_64.tbl, asm-generic/unistd.h."""
+    assert shm_link.FUTEX == {"x86_64": 202, "aarch64": 98}
+    assert shm_link.SYS_FUTEX == shm_link.FUTEX[platform.machine()]
+
+
+@pytest.mark.parametrize("machine, bits", [("riscv64", 64), ("armv7l", 32), ("aarch64", 32), ("i686", 32)])
+def test_a_processor_whose_futex_is_not_known_is_refused(machine: str, bits: int) -> None:
+    with pytest.raises(UserError, match=f"{machine} with a {bits}-bit Python.*x86_64 and aarch64"):
+        shm_link.check_architecture(machine, bits)
