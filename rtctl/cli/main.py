@@ -1,5 +1,6 @@
 """`rtctl`: every command is a module of its own, imported when it is used, so that `rtctl status` starts at once."""
 
+import contextlib
 import os
 import sys
 import traceback
@@ -8,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rtctl.cli.failures import words
 from rtctl.cli.lazy import LazyGroup
 from rtctl.config.errors import NoAnswer, UserError
 
@@ -83,20 +85,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
     2 for the user's mistake, 3 for data that carry no answer, 1 for a run that tripped and for ours, 130 for Ctrl-C.
     """
     try:
-        return app(arguments, prog_name="rtctl", standalone_mode=False) or 0
+        code = app(arguments, prog_name="rtctl", standalone_mode=False) or 0
+        sys.stdout.flush()  # here, where a full disk has words; at the end of the interpreter it has none
+        return code
     except (UserError, NoAnswer) as error:
         return _fail(str(error), error.exit_code)
     except USAGE_ERROR as error:
         return _fail(_usage(error), 2) if str(error) else 2  # empty: typer has shown the help instead
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        _forget_output()
         return 1
     except (KeyboardInterrupt, typer.Abort):
         return 130
     except Exception as error:
+        if (said := words(error)) is not None:
+            _forget_output()
+            return _fail(said, 2)
         if os.environ.get("RTCTL_TRACEBACK"):
             traceback.print_exc()
         return _fail(f"internal error: {error!r}; RTCTL_TRACEBACK=1 shows where", 1)
+
+
+def _forget_output() -> None:
+    """What waits for a standard output that takes nothing more goes nowhere."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _usage(error: Any) -> str:

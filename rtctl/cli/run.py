@@ -41,6 +41,7 @@ def run(
     """
     import structlog
 
+    from rtctl.config.yaml_file import told
     from rtctl.daemon.session import Session
 
     def read() -> Any:
@@ -52,6 +53,7 @@ def run(
     folder = out if out is not None else common.default_folder(settings.name)
     console = _console(json)
     structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # standard output is the JSON's
+    console.say(told(config))
     session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
     with console.live():
         result = session.run(console.update)

@@ -47,12 +47,32 @@ class Document(NamedTuple):
         return None
 
 
+def is_name(text: str) -> bool:
+    """Whether a text may name a config that comes with rtctl: a bare file name, or a path below its configs without a
+    suffix."""
+    path = Path(text)
+    dotted = text.startswith((".", "~")) or path.is_absolute()
+    return bool(text) and not dotted and ".." not in path.parts and (len(path.parts) == 1 or not path.suffix)
+
+
+def told(path: str | Path) -> str:
+    """Sentence on which file a config's name or path stands for. Raises UserError as `find` does."""
+    file = find(path)
+    shipped = file.is_relative_to(Path(str(resources.files("rtctl.configs"))))
+    return f"config {file.resolve()}" + (", which comes with rtctl" if shipped else "")
+
+
 def find(path: str | Path) -> Path:
-    """The file: as given, else with .yaml, else among the configs that come with rtctl. Raises UserError."""
+    """File of a config: the one at the path, else that path with .yaml, else for a name the one that comes with rtctl.
+
+    A name has no folder of the caller's in it: `ivu`, `ivu.yaml`, `boards/ldu_nidaqmx`. What has one, such as
+    `./ivu.yaml`, is that file or none. Raises UserError with the nearest name.
+    """
     text = str(path)
     folder = Path(str(resources.files("rtctl.configs")))
     places = [Path(text), Path(f"{text}.yaml")]
-    places += [base / name for base in (folder, folder / "references") for name in (text, f"{text}.yaml")]
+    if is_name(text):
+        places += [base / name for base in (folder, folder / "references") for name in (text, f"{text}.yaml")]
     try:
         found = [place for place in places if place.is_file()] or [place for place in places[:2] if place.exists()]
     except (OSError, ValueError):
@@ -63,6 +83,8 @@ def find(path: str | Path) -> Path:
     by_name = {name.rpartition("/")[2]: name for name in known}
     near = nearest(Path(text).stem, by_name)
     hint = f"did you mean '{by_name[near]}'?" if near else f"rtctl comes with {', '.join(known)}"
+    if near and Path(text).stem == near and not is_name(text):
+        hint = f"the one that comes with rtctl is called by its bare name, {by_name[near]}"
     raise UserError(f"{text!r:.200}: no such file; {hint}")
 
 
