@@ -52,8 +52,7 @@ def unfolded(problem: Problem, fitted: Fit) -> Fit:
     where that explains no more. No values of theirs make a machine go one way only."""
     space, record = fitted.space, problem.sim.record
     (blind,) = hypotheses(record, fitted.model.base, only=("sensor.rectified",))
-    starts = (fitted.x, np.zeros(len(space.names)))
-    both = min((settle(problem, fit(problem, space.add(blind), x)) for x in starts), key=lambda f: f.cost)
+    both = settle(problem, fit(problem, space.add(blind)))
     return fit(problem, space, both.x[: space.nb], rounds=0) if both.cost < UNFOLDED * fitted.cost else fitted
 
 
