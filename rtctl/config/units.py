@@ -105,7 +105,7 @@ def to_si(value: Any, unit: str) -> Any:
     match = QUANTITY.fullmatch(value[:200])
     if match is None:
         kind = "a number with a unit" if unit else "a number"
-        raise ValueError(f"'{value[:LONGEST]}' is not {kind}; write e.g. '{example(unit)}'")
+        raise ValueError(f"{value[:LONGEST]!r} is not {kind}; write e.g. '{example(unit)}'")
     return float(match[1]) if not match[2] else convert(float(match[1]), match[2], unit)
 
 

@@ -67,3 +67,9 @@ def test_any_text_is_a_number_or_a_value_error(text, unit):
 def test_there_and_back_is_the_same(value, units):
     there, back = units
     assert convert(convert(value, there, back), back, there) == pytest.approx(value, rel=1e-12, abs=1e-300)
+
+
+def test_a_message_about_a_value_is_one_line():
+    with pytest.raises(ValueError) as told:
+        to_si("\x85", "V")
+    assert len(str(told.value).splitlines()) == 1
