@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text
 from rtctl.config.fields import Shape, fill
 from rtctl.config.load import load_settings, to_yaml
 from rtctl.config.yaml_file import find, load_yaml
@@ -55,7 +56,7 @@ def write_model(model: Model, record: Record, path: Path | str, config: dict[str
         raise UserError(f"the model cannot be run: {error}") from error
     path = Path(path)
     try:
-        path.write_text(_head(model, record, config is not None, left) + to_yaml(settings), encoding="utf-8")
+        write_text(path, _head(model, record, config is not None, left) + to_yaml(settings))
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None
     return path
@@ -70,7 +71,7 @@ def write_turn(found: Turn, path: Path | str) -> Path:
     rows = zip(found.angle, found.torque, found.band, found.visits, strict=True)
     text = "".join(f"{a:.6f},{_number(y)},{_number(half)},{n}\n" for a, y, half, n in rows)
     try:
-        path.write_text("angle_rad,torque_Nm,band_Nm,visits\n" + text, encoding="utf-8")
+        write_text(path, "angle_rad,torque_Nm,band_Nm,visits\n" + text)
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None
     return path

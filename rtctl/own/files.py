@@ -15,6 +15,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from rtctl.config.files import write_text
+
 OWN = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_]\w*)")
 MOST_BYTES = 1 << 18
 
@@ -99,7 +101,7 @@ def keep(texts: dict[str, str], folder: Path) -> None:
     for file, text in texts.items():
         path = folder / "own" / Path(file).name
         path.parent.mkdir(exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_text(path, text)
 
 
 def _missing(file: str, path: Path) -> str:
