@@ -23,6 +23,7 @@ from rtctl.diagnose.model import Model
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
+from rtctl.own.files import OwnError
 from rtctl.own.term import texts
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import TERMS
@@ -48,7 +49,10 @@ def write_model(model: Model, record: Record, path: Path | str, config: dict[str
 
     data, left = _settings_data(model, record, config)
     own = data.get("own", {}) | texts(entry["term"] for entry in data["plant"]["physics"])
-    kind, data = machines.widened({**data, "own": own} if own else data)
+    try:
+        kind, data = machines.widened({**data, "own": own} if own else data)
+    except OwnError as error:
+        raise UserError(str(error)) from None
     settings = _checked(data, kind)
     try:
         machines.build(settings)
