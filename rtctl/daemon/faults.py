@@ -215,10 +215,7 @@ class Faults:
 
     def _cpu_hog(self, planned: Planned) -> Undo:
         """They read a pipe of ours: its end is theirs, too, even if we are killed."""
-        hogs = [
-            subprocess.Popen(python("-S", "-c", BUSY), stdin=subprocess.PIPE)
-            for _ in range(round(planned.size))
-        ]
+        hogs = [subprocess.Popen(python("-S", "-c", BUSY), stdin=subprocess.PIPE) for _ in range(round(planned.size))]
 
         def undo() -> None:
             for hog in hogs:

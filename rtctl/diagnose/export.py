@@ -13,8 +13,8 @@ from pydantic import ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError
-from rtctl.config.files import write_text
 from rtctl.config.fields import Shape, fill
+from rtctl.config.files import write_text
 from rtctl.config.load import load_settings, to_yaml
 from rtctl.config.yaml_file import find, load_yaml
 from rtctl.diagnose.carry import carried, digits

@@ -32,7 +32,9 @@ class Journal:
 
     def open(self, folder: Path) -> None:
         """Keep the journal in this folder from now on. Raises OSError."""
-        self._file = os.fdopen(open_stream(folder / ORDERS, os.O_APPEND), "ab", buffering=0)  # no line waits in a buffer
+        self._file = os.fdopen(
+            open_stream(folder / ORDERS, os.O_APPEND), "ab", buffering=0
+        )  # no line waits in a buffer
         self._file.write("".join(self._early).encode())
         self._early = []
 
