@@ -166,6 +166,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
         (
             "read",
             (
+                "y.watchdog = rx.watchdog",
                 "y.x_counts = daq_stc.counter_position(s.encoder, rx.counter_codes[0])",
                 "y.x = linear_scale.metres(p.encoder, y.x_counts)",
             ),

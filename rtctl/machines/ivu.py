@@ -111,7 +111,7 @@ def _set_radii(m, R1, R2, phi):
 def prepare(p, s, phi, n1_counts, n2_counts, k):
     """While armed: measure the radii if asked to, tighten the tape, then run from where the capstan stands."""
     if p.machine.measure != 0 and s.machine.prepared == 0:
-        if reel_radius.step(p.reel_radius, s.reel_radius, phi, n1_counts, n2_counts) == 0:
+        if reel_radius.step(p.reel_radius, s.reel_radius, phi, n1_counts, n2_counts, s.safety.passed) == 0:
             reference.hold(0, s.reference, phi)
             shaper.reset(p.shaper, s.shaper, phi)
             return
@@ -204,6 +204,7 @@ STAGES = (
     (
         "read",
         (
+            "y.watchdog = rx.watchdog",
             "y.capstan_counts = daq_stc.counter_position(s.capstan, rx.counter_codes[0])",
             "y.capstan = ls7084.radians(p.capstan, y.capstan_counts)",
             "y.reel1_counts = optical_sensor.count("
