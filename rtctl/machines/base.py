@@ -136,6 +136,9 @@ class MachineSettings(Settings):
     commands: CommandSettings = CommandSettings()
     metrics: MetricsSettings = MetricsSettings()
     faults: list[FaultSettings] = Field(default=[], description="faults to inject; `rtctl fault list` explains them")
+    live: dict[str, Any] = Field(
+        default={}, description="bounds of changes while the machine runs, wider than the values above: path: value"
+    )
     own: dict[str, str] = Field(
         default={}, description="texts of the own files that the config names; filled in when it is read, and recorded"
     )
