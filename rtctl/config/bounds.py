@@ -54,7 +54,7 @@ class Bounds:
                     f"live: {path} has no bound that could be widened; there is {', '.join(sorted(self._most))}"
                 )
         for given in guarded(set_paths(config, config.live) if config.live else config):
-            if given.path in config.live:
+            if given.path in config.live or given.value is None:  # it may mean a sibling that is in it
                 self._most[given.path] = given
 
     def crossed(self, config: Any) -> dict[str, str]:
