@@ -355,9 +355,10 @@ def parameters(d: Diagnosis, sim: Simulator | None = None) -> Figure:
         ends = [[max(value - low, 0)], [max(high - value, 0)]]
         ax.errorbar(value, row, xerr=ends, fmt="o", ms=4, color=AFTER, capsize=3)
     ax.axvline(0, color=INK, lw=0.8)
-    ax.set_yticks(range(len(names)), names)
+    estimated = d.record.case.estimated
+    ax.set_yticks(range(len(names)), [f"{n} (estimated)" if n in estimated else n for n in names])
     ax.invert_yaxis()
-    label(ax, "fitted over the owner's value, %; grey: how far it may be off")
+    label(ax, "fitted over the nominal value, %; grey: how far it may be off")
     return figure
 
 

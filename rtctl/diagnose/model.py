@@ -49,10 +49,13 @@ class Model(NamedTuple):
 
 
 def owner_model(case: Case, record: "Record | None" = None) -> Model:
-    """What the owner believes, without any term. An axis whose mass nobody knows is guessed from the record."""
+    """The nominal model, without any term; what `case.estimated` names comes from the record."""
     base = {k: v for k, v in believed(case).items() if v is not None}
-    if case.plant == "axis" and "M" not in base and record is not None:
-        base |= guess(record, base)
+    if case.estimated and record is not None:
+        found = guess(record, base)
+        if "M" in base:  # known in kg or kg m^2, so the record gives the force of one unit of the command
+            found = {"K": base["M"] / found["M"]}
+        base |= {name: found[name] for name in case.estimated}
     return Model(case.plant, base)
 
 

@@ -103,6 +103,12 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
     """The Record of these columns, by the same rules as `load_record`."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
+    if case.estimated:
+        names = ", ".join(case.estimated)
+        warnings.append(
+            f"{path.parent / 'case.json'}: parameters does not say {case.estimated[0]}; {names} estimated from the "
+            "recording, without a tolerance"
+        )
     t = _column(path, columns, "t", "s, clock at the tick")
     u = np.column_stack([_command(path, columns, case, name) for name in COMMANDS[case.plant]])
     ref = _column(path, columns, "ref", "position reference", missing=not case.controller_known)

@@ -40,8 +40,8 @@ PICTURES: dict[str, tuple[Draw, str]] = {
               "below is what the sensor resolves."),
     "evidence": (figures.evidence_bars, "What each hypothesis explains of the error beyond noise. Left of the dashed "
                  "line is chance; brackets join what was found with its look-alikes."),
-    "parameters": (figures.parameters, "Fitted parameters over the owner's values. A wrong value is not missing "
-                   "physics."),
+    "parameters": (figures.parameters, "Fitted parameters over the nominal values: the owner's, or where case.json gives "
+                   "none, estimated from the recording. A wrong value is not missing physics."),
     "spectra": (figures.spectra, "Error by frequency, and missing force by order of the shaft, before and after."),
     "coverage": (figures.coverage, "Each effect at each node: a dot could be tested, a cross could not."),
 }  # fmt: skip
@@ -151,12 +151,14 @@ def effect_unit(d: Diagnosis, e: Effect, name: str) -> str:
 
 
 def parameter_rows(d: Diagnosis) -> list[tuple[str, ...]]:
-    """Parameter, owner's value, fitted value, 90 % interval, unit."""
+    """Parameter, nominal value and where it is from, fitted value, 90 % interval, unit."""
+    estimated = d.record.case.estimated
     rows: list[tuple[str, ...]] = []
     order = [n for n in FITTED[d.record.plant] if n in d.parameters]
     for name in [*order, *(n for n in d.parameters if n not in order)]:
         v, owner = d.parameters[name], d.owner.base.get(name, np.nan)
-        rows.append((name, f"{owner:.4g}", f"{v.value:.4g}", f"{v.low:.4g} to {v.high:.4g}", v.unit))
+        told = f"{owner:.4g}" + (" (estimated from the recording)" if name in estimated else "")
+        rows.append((name, told, f"{v.value:.4g}", f"{v.low:.4g} to {v.high:.4g}", v.unit))
     return rows
 
 
