@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
 from rtctl.idiom import Settings
+from rtctl.diagnose.quantities import EFFORT
 from rtctl.own.files import is_own
 from rtctl.plants import axis, ivu, ldu
 
@@ -245,6 +246,7 @@ def believed(case: Case) -> dict[str, float]:
     drive = case.drive
     if case.plant == "axis":
         gain = drive.newton_per_volt or drive.newton_metre_per_ampere or drive.newton_metre_per_volt
+        gain = gain or (1.0 if drive.unit in EFFORT else None)  # the command is the force or the torque itself
         full = dict.fromkeys(TERMS["axis"], 0.0)
         return {**full, **({"K": gain} if gain else {}), **given}
     own = {k: v for k, v in given.items() if k not in DERIVED[case.plant]}

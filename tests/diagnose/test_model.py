@@ -100,7 +100,7 @@ def test_what_the_case_does_not_say_is_estimated_from_the_record(given, wanted):
     t = np.arange(4000) / 1000.0
     u = np.sin(2 * np.pi * 3 * t) + np.sin(2 * np.pi * 7 * t)
     x = -2.0 * (np.sin(2 * np.pi * 3 * t) / (6 * np.pi) ** 2 + np.sin(2 * np.pi * 7 * t) / (14 * np.pi) ** 2)
-    record = check({"t": t, "u": u, "x": x}, case)
+    record = check({"t": t, "ref": 0 * t, "w": 0 * t, "u": u, "x": x}, case)
     base = owner_model(record.case, record).base
     for name, value in wanted.items():
         assert base[name] == pytest.approx(value, rel=0.03)
