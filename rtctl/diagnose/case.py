@@ -14,8 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
-from rtctl.idiom import Settings
 from rtctl.diagnose.quantities import EFFORT
+from rtctl.idiom import Settings
 from rtctl.own.files import is_own
 from rtctl.plants import axis, ivu, ldu
 

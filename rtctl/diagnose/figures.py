@@ -238,7 +238,10 @@ def spectra(d: Diagnosis, sim: Simulator) -> Figure:
     map_ = Missing(d, sim)
     x, along = map_.ratio(node) * map_.x[first], f"order of {words.node_words(node, d.owner.units.rotary)}, per turn"
     if map_.slides(node):
-        x, along = x * 2 * np.pi / (float(np.ptp(x)) or 1.0), f"waves along the way of {words.node_words(node, d.owner.units.rotary)}"
+        x, along = (
+            x * 2 * np.pi / (float(np.ptp(x)) or 1.0),
+            f"waves along the way of {words.node_words(node, d.owner.units.rotary)}",
+        )
     thinned = slice(None, None, max(1, len(x) // 3000))
     size = min(len(x), max(256, int(4 * rate)))
     for name, model, color in models:
@@ -279,7 +282,9 @@ def evidence_bars(d: Diagnosis, sim: Simulator | None = None) -> Figure:
     for row, bar in enumerate(top):
         color = AFTER if found == set(bar.names) else BEFORE if bar.fitted else SEEN
         ax.barh(row, 100 * bar.gain, color=color, height=0.7)
-    ax.set_yticks(range(len(top)), [" + ".join(words.entry_noun(n, d.owner.units.rotary) for n in b.names) for b in top])
+    ax.set_yticks(
+        range(len(top)), [" + ".join(words.entry_noun(n, d.owner.units.rotary) for n in b.names) for b in top]
+    )
     ax.tick_params(axis="y", labelsize=8.5)
     ax.invert_yaxis()
     ax.set_xlim(0, 118)
@@ -373,7 +378,12 @@ def coverage(d: Diagnosis, sim: Simulator | None = None) -> Figure:
             blind = f"{name}:{node}" in cannot
             ax.plot(nodes.index(node), row, "x" if blind else "o", ms=6, color=BEFORE if blind else AFTER)
     ax.set_yticks(range(len(names)), [words.noun(n) for n in names])
-    ax.set_xticks(range(len(nodes)), [words.node_words(n, d.owner.units.rotary).removeprefix("the ") for n in nodes], rotation=30, ha="left")
+    ax.set_xticks(
+        range(len(nodes)),
+        [words.node_words(n, d.owner.units.rotary).removeprefix("the ") for n in nodes],
+        rotation=30,
+        ha="left",
+    )
     ax.tick_params(axis="both", labelsize=8.5)
     ax.xaxis.tick_top()
     ax.invert_yaxis()

@@ -138,7 +138,11 @@ def effect_rows(d: Diagnosis) -> list[tuple[str, ...]]:
         parameters = list(e.parameters.items()) or [("", Interval(np.nan, np.nan, np.nan))]
         for k, (name, v) in enumerate(parameters):
             value, ends = interval(v, effect_unit(d, e, name)) if name else ("", "")
-            first = (f"{words.noun(e.name)} ({e.name})", words.node_words(e.node, d.owner.units.rotary)) if k == 0 else ("", "")
+            first = (
+                (f"{words.noun(e.name)} ({e.name})", words.node_words(e.node, d.owner.units.rotary))
+                if k == 0
+                else ("", "")
+            )
             rows.append(
                 (*first, f"{name} = {value}" if name else "", ends, f"{100 * e.confidence:.0f} %" if k == 0 else "")
             )
@@ -204,7 +208,9 @@ def cannot_lines(d: Diagnosis) -> list[str]:
     for entry in d.cannot_test:
         name, _, node = entry.partition(":")
         nodes[name].append(node)
-    return [words.sentence(f"{name}:{found[0]}", *found[1:], rotary=d.owner.units.rotary) for name, found in nodes.items()]
+    return [
+        words.sentence(f"{name}:{found[0]}", *found[1:], rotary=d.owner.units.rotary) for name, found in nodes.items()
+    ]
 
 
 def experiment(d: Diagnosis) -> dict[str, Any] | None:

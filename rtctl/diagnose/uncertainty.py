@@ -74,9 +74,7 @@ def parameter_intervals(fitted: Fit, cov: np.ndarray) -> dict[str, Interval]:
         half = Z90 * float(np.sqrt(max(cov[i, i], 0.0)))
         ends = np.clip([fitted.x[i] - half, fitted.x[i] + half], low[i], high[i])
         a, b = sorted(owner * np.exp(ends))
-        out[name] = Interval(
-            float(owner * np.exp(fitted.x[i])), float(a), float(b), plant_unit(fitted.model, name)
-        )
+        out[name] = Interval(float(owner * np.exp(fitted.x[i])), float(a), float(b), plant_unit(fitted.model, name))
     return out
 
 

@@ -34,7 +34,9 @@ def case_of(table: Table, plan: Plan, units: dict[str, str], rate: float | None,
         "format": FORMAT,
         "plant": plan.plant,
         "sample_rate": rate,
-        "parameters": {name: _parameter(plan.plant or "", name, value, axis) for name, value in plan.parameters.items()},
+        "parameters": {
+            name: _parameter(plan.plant or "", name, value, axis) for name, value in plan.parameters.items()
+        },
         **({"sensors": sensors} if sensors else {}),
         **({"drive": drive} if drive else {}),
         **law,
