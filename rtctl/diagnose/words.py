@@ -45,7 +45,7 @@ SPECIAL = {"f_Hz": "Hz", "transmission.creep.kappa": "1/N", "transmission.slip.F
 
 
 def node_words(node: str, rotary: bool = False) -> str:
-    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; the body of a `rotary` axis is a rotor."""
+    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; a `rotary` axis has a rotor."""
     if rotary and node == "carriage":
         return "the rotor"
     if node in NODES:
@@ -311,7 +311,8 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
     if d.resembles is not None:
         name, node = d.resembles
         return (
-            f"Something is missing at {node_words(node, d.owner.units.rotary)} that has no name in the table: it looks like {noun(name)}.",
+            f"Something is missing at {node_words(node, d.owner.units.rotary)} that has no name in the table: "
+            f"it looks like {noun(name)}.",
             f"{_capital(amount)}.",
         )
     if d.located is None:
