@@ -24,6 +24,7 @@ from rtctl.loop import generate, zmq_link
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.machines import Machine
+from rtctl.own.files import trust
 
 # Frames a link may hold. ZeroMQ learns what has left its queue only now and then, every 100 frames received at the
 # latest: fewer than twice that, and in lockstep a frame could find a queue full that has long been empty.
@@ -47,6 +48,7 @@ def report(event: str, **values: Any) -> None:
 def machine_from(order: dict[str, Any]) -> Machine:
     """The machine of an order, which carries its config in full."""
     config = order["config"]
+    trust(config.get("own", {}).values())  # from the supervisor of the same user
     return machines.build(machines.settings(config))
 
 

@@ -17,6 +17,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from rtctl.config.files import write_text
 from rtctl.diagnose import figures, numbers, repair, words
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Interval
 from rtctl.diagnose.model import FITTED
@@ -56,7 +57,7 @@ def write(d: Diagnosis, folder: Path | str) -> Path:
     """Write report.html into `folder`, which is made where it is missing; its path."""
     path = Path(folder) / NAME
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(html(d), encoding="utf-8")
+    write_text(path, html(d))
     return path
 
 

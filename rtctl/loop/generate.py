@@ -21,8 +21,9 @@ import numba
 import numpy as np
 
 from rtctl import __version__
-from rtctl.config.cache import cache_folder
+from rtctl.config.cache import cache_folder, check, made
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text as write_file
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import excitation, reference
 from rtctl.loop import faults, frames, runner, shm_link
@@ -162,10 +163,7 @@ def write_text(kind: str, text: str, made_of: str | None = None) -> Path:
     path = cache_folder() / f"{kind}_{name}.py"
     if not path.exists():
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            draft = path.with_suffix(f".{os.getpid()}.tmp")
-            draft.write_text(text)
-            draft.replace(path)
+            write_file(made(path.parent) / path.name, text)
         except OSError as error:
             raise UserError(f"{path.parent}: cannot write the generated tick ({error}); set RTCTL_CACHE_DIR") from error
     return path
@@ -183,6 +181,7 @@ def load(path: Path) -> ModuleType:
     name = f"rtctl_generated_{path.stem}"
     if name in sys.modules:
         return sys.modules[name]
+    check(path.parent / "__pycache__")  # numba's machine code lies there
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
