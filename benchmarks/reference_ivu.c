@@ -44,7 +44,7 @@ const char wholes[] = WHOLES(NAME);
 
 struct row {
     int64_t tick;
-    double t, period, lateness, state, trip, link_age, order, target, ref, w, u1, u2, capstan_counts, reel1_counts,
+    double t, period, lateness, state, trip, link_age, order, watchdog, target, ref, w, u1, u2, capstan_counts, reel1_counts,
         reel2_counts, capstan, capstan_error, capstan_speed, u_c, R1, R2, gain_factor, tension1_estimate,
         tension2_estimate, truth_tension1, truth_tension2, truth_capstan, truth_motor1, truth_motor2, truth_R1,
         truth_R2;
@@ -247,6 +247,7 @@ static void tick(int64_t k)
     y->trip = safety->trip;
     y->link_age = safety->silent;
     y->order = command.order;
+    y->watchdog = 0;
     y->truth_tension1 = in.truth[0];
     y->truth_tension2 = in.truth[1];
     y->truth_capstan = in.truth[2];

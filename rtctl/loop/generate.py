@@ -40,7 +40,7 @@ import numpy as np
 from numba import njit
 
 from rtctl.idiom import tick as compiled
-from rtctl.loop import clock, faults, histogram, mailbox, ring
+from rtctl.loop import clock, faults, histogram, mailbox, ring, safety
 from rtctl.loop.memory import borrowed
 from rtctl.machines import {machine} as machine
 {imports}
@@ -76,7 +76,7 @@ def source(machine: Machine, link: str) -> str:
         header(machine, title, uses).replace(f"import {link}_link", f"import {link}_link as link"),
         function(
             "tick",
-            "p, s, t, c, rx, tx, y, m, k, fresh, late",
+            "p, s, t, c, rx, tx, y, m, k, fresh, late, passed, gone",
             "One tick of the loop.",
             (*timed(loop.stages), *extras(machine)),
         ),
@@ -85,7 +85,7 @@ def source(machine: Machine, link: str) -> str:
         function("sample", "p, s, rx", "What the board reads now.", plant.sample),
     ]
     parts += [copied(f) for f in (runner.post, runner.send, runner.account, runner.stages, runner.note_late)]
-    parts += [copied(f) for f in (runner.answer, runner.virtual)]
+    parts += [copied(f) for f in (runner.answer, runner.behind, runner.guard, runner.virtual)]
     parts += [copied(f, "entry") for f in (runner.run_real, runner.run_lockstep, runner.run_fused)]
     parts += [copied(f, "entry") for f in (runner.plant_real, runner.plant_lockstep)]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)

@@ -24,6 +24,7 @@ from rtctl.sources import sources_hash
 from rtctl.trace.bundle import Bundle, load_bundle
 from rtctl.trace.orders import orders, restore
 
+ABSENT = {"watchdog": 0.0}  # what a recording means that was made before there was this column
 GIVEN = ("tick", "t", "period", "lateness")  # of a row, beside what was read
 
 
@@ -130,7 +131,7 @@ def _machine(config: Any) -> machines.Machine:
 def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
     """Recorded rows (n,) up to the first that is missing, and why there are no more."""
     row = generate.row_dtype(machine)
-    lacking = [name for name in row.names or () if name not in bundle.columns]
+    lacking = [name for name in row.names or () if name not in bundle.columns and name not in ABSENT]
     lacking = [name for name in lacking if name in (*GIVEN, *read_columns(machine), "order", "link_age")]
     if lacking:
         raise NoAnswer(f"{bundle.folder}: column '{lacking[0]}' is missing; a replay needs all that the law has read")
@@ -144,7 +145,7 @@ def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
     count = int(gaps[0]) + 1 if len(gaps) else len(ticks)
     rows = np.zeros(count, row)
     for name in row.names or ():
-        rows[name] = bundle.columns[name][:count] if name in bundle.columns else np.nan
+        rows[name] = bundle.columns[name][:count] if name in bundle.columns else ABSENT.get(name, np.nan)
     return rows, f"rows behind tick {ticks[count - 1]} are missing" if len(gaps) else ""
 
 

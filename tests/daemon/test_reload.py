@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from rtctl import machines
+from rtctl.config.bounds import Bounds
 from rtctl.config.errors import UserError
 from rtctl.config.load import set_paths
 from rtctl.daemon.reload import differences, mixed, reload
@@ -16,6 +17,7 @@ class Supervisor:
 
     def __init__(self, config: Any):
         self.config, self.machine, self.link = config, machines.build(config), "shm"
+        self.bounds = Bounds(config)
         self.commands = self
         self.changes: list[tuple[str, Any]] = []
         self.taken = 0
