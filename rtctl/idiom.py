@@ -112,7 +112,7 @@ def quantity(
     or "larger", keeps a running machine from the other direction (rtctl/config/bounds.py); `off` is the value that
     switches the limit off, `absent` the setting whose negative is meant where this one is None.
     """
-    words = {"unit": unit, **guard(safer, off)} if safer else {"unit": unit}
+    words: dict[str, Any] = {"unit": unit, **guard(safer, off)} if safer else {"unit": unit}
     words |= {"absent": absent} if absent else {}
     field = Field(default, description=help, json_schema_extra=words, **bounds)
     assert isinstance(field, FieldInfo)

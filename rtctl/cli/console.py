@@ -92,7 +92,9 @@ class RunConsole:
         lost = result["lost_rows"]
         if lost or result["missed"]:
             words = f"{lost} rows were lost and {result['missed']} ticks missed: "
-            words += "steps that they fall into are not measured right" if result["steps"] else "the recording has holes"
+            words += (
+                "steps that they fall into are not measured right" if result["steps"] else "the recording has holes"
+            )
             console.print(Text(words + ("; the bundle's case.json says which rows" if lost else ""), "red"))
         if result["trip"]:
             console.print(Text(f"tripped at tick {result['trip']['tick']}: {result['trip']['why']}", "bold red"))

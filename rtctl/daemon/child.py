@@ -71,7 +71,7 @@ def watch_parent(on_lost: Callable[[], None], on_stop: Callable[[], None], inter
     # Ctrl-C goes to the whole group: a child leaves it to the supervisor, a process of its own (`interrupt`) stops
     signal.signal(signal.SIGINT, (lambda *_: None) if interrupt else signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: on_stop())  # here too: a wait that it cuts short is no fault
-    # a terminal that closes sends this to the whole group: the supervisor ends its children, and a plant by itself stops
+    # a terminal that closes sends it to the whole group: the supervisor ends its children, a plant by itself stops
     if not interrupt:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     elif signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # which nohup has set

@@ -54,7 +54,7 @@ class Commands:
         self._of.status["commander_ns"] = time.monotonic_ns()
 
     def watch_commander(self) -> None:
-        """On virtual time, tell the loop when the commander has been silent for too long, where the config requires one.
+        """On virtual time, tell the loop when the commander is silent for too long, where the config requires one.
 
         On the wall clock the loop finds that out by itself: this process may hang.
         """

@@ -18,9 +18,7 @@ _POINTER = _TIMESPEC.as_pointer()
 
 def _read(builder, which):
     """Code that reads a clock, ns."""
-    function = cgutils.get_or_insert_function(
-        builder.module, ir.FunctionType(_I32, [_I32, _POINTER]), "clock_gettime"
-    )
+    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(_I32, [_I32, _POINTER]), "clock_gettime")
     spec = cgutils.alloca_once(builder, _TIMESPEC)
     builder.call(function, [ir.Constant(_I32, which), spec])
     seconds = builder.load(cgutils.gep_inbounds(builder, spec, 0, 0))

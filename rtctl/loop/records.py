@@ -47,7 +47,15 @@ STATUS = state(
 )
 
 PLANT_STATUS = state(
-    pid=int, ready=int, ended=int, tick=int, stop=int, catch_ups=int, skipped=int, frames=int, ticks=HISTOGRAM,
+    pid=int,
+    ready=int,
+    ended=int,
+    tick=int,
+    stop=int,
+    catch_ups=int,
+    skipped=int,
+    frames=int,
+    ticks=HISTOGRAM,
     watchdog=int,  # times that the outputs were taken to zero because none came
 )
 

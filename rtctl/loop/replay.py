@@ -35,7 +35,10 @@ def source(machine: Machine) -> str:
     stages = tuple((name, taken if name == "read" else lines) for name, lines in machine.diagram.stages)
     traced = tuple(lines for lines in generate.extras(machine) if lines[0] == "traced state")
     body = generate.function(
-        "tick", "p, s, t, c, rx, tx, y, m, k, fresh, late, passed, gone", "One tick on a recorded row.", (*stages, *traced)
+        "tick",
+        "p, s, t, c, rx, tx, y, m, k, fresh, late, passed, gone",
+        "One tick on a recorded row.",
+        (*stages, *traced),
     )
     head = generate.header(machine, f"The tick of {machine.kind} on a recording.", machine.diagram.uses)
     return "\n\n".join([head.strip("\n") + "\n", body + "\n", generate.copied(run, "entry")])
@@ -49,7 +52,9 @@ def run(recorded, rows, p, s, tables, c, tx, y, m, late_ns, period):
         fresh = 1 if r.link_age == 0.0 else 0
         late = 1 if np.round(r.lateness * 1e9) > late_ns else 0
         passed = 1 + int(np.round(r.lateness * 1e9)) // period
-        gone = int(r.trip) if r.trip == safety.COMMANDER or r.trip == safety.SUPERVISOR else 0  # what the loop had found
+        gone = (
+            int(r.trip) if r.trip == safety.COMMANDER or r.trip == safety.SUPERVISOR else 0
+        )  # what the loop had found
         tick(p[0], s[0], tables[c[0].table], c[0], r, tx[0], y[0], m[0], r.tick, fresh, late, passed, gone)
         rows[k] = y[0]
 
@@ -80,6 +85,7 @@ class Replay:
         """Rows (n,) that come of the recorded rows (n,), which follow those of the call before."""
         rows = np.zeros(len(recorded), self.row)
         self._run(
-            recorded, rows, self.p, self.s, self._tables, self.c, self._tx, self._y, self._m, self._late_ns, self._period
+            recorded, rows, self.p, self.s, self._tables, self.c, self._tx, self._y, self._m,
+            self._late_ns, self._period,
         )  # fmt: skip
         return rows

@@ -245,7 +245,9 @@ def virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, lat
     tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late, 1 + skipped, 0)
     tx[0].state = s[0].safety.state
     wrote = clock.now() if m[0].on != 0 else 0
-    if ahead == 0 or skipped > 0 or (s[0].safety.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
+    if (
+        ahead == 0 or skipped > 0 or (s[0].safety.state != was and (was == 1 or was == 2))
+    ):  # a trip does not wait for a tick
         faults.transmit(c[0], f[0], tx, held, k)
     ring.put(ring_[0], rows, y)
     account(st, s[0].safety, k, rx[0].lost_counts)

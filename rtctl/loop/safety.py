@@ -31,7 +31,10 @@ TRIPS = {
     TENSION: ("tension", "the estimated tape tension is out of range: torn, folded or jammed tape"),
     CURRENT: ("current_time", "the drive has been asked for more than its continuous current for too long"),
     NOT_A_NUMBER: ("not_a_number", "a signal or the law's output is not a number"),
-    MISSED: ("missed_ticks", "too many ticks in a row came late or not at all: the loop stood still, or cannot hold this rate"),
+    MISSED: (
+        "missed_ticks",
+        "too many ticks in a row came late or not at all: the loop stood still, or cannot hold this rate",
+    ),
     COMMANDER: ("commander_lost", "nobody has talked to the command socket for too long, and the config requires it"),
     START_UP: ("start_up", "the start-up routine did not find the reel radii"),
     SUPERVISOR: ("supervisor_lost", "the supervisor has died or hangs: nobody could take a disarm"),
@@ -47,25 +50,58 @@ TRIPS = {
 
 
 class SafetySettings(Settings):
-    link_timeout: float = quantity(0.05, unit="s", safer="smaller", gt=0, help="longest time without a frame from plant or board")
-    frozen_time: float = quantity(0.2, unit="s", safer="smaller", off=0.0, ge=0, help="longest effort without a count; 0 switches it off")
-    frozen_effort: float = quantity(1.0, unit="V", safer="smaller", gt=0, help="command above which something should move")
-    following_error: float = quantity(0.0, unit="", safer="smaller", off=0.0, ge=0, help="largest error, rad or m; 0 switches it off")
+    link_timeout: float = quantity(
+        0.05, unit="s", safer="smaller", gt=0, help="longest time without a frame from plant or board"
+    )
+    frozen_time: float = quantity(
+        0.2, unit="s", safer="smaller", off=0.0, ge=0, help="longest effort without a count; 0 switches it off"
+    )
+    frozen_effort: float = quantity(
+        1.0, unit="V", safer="smaller", gt=0, help="command above which something should move"
+    )
+    following_error: float = quantity(
+        0.0, unit="", safer="smaller", off=0.0, ge=0, help="largest error, rad or m; 0 switches it off"
+    )
     tension_min: float = quantity(-1e9, unit="N", safer="larger", help="lowest estimated tension while running")
     tension_max: float = quantity(1e9, unit="N", safer="smaller", help="highest estimated tension while running")
-    tension_time: float = quantity(0.05, unit="s", safer="smaller", ge=0, help="how long the tension may be out of range")
+    tension_time: float = quantity(
+        0.05, unit="s", safer="smaller", ge=0, help="how long the tension may be out of range"
+    )
     current: float = quantity(1.0, unit="A", safer="smaller", gt=0, help="continuous current of a drive")
-    current_time: float = quantity(2.0, unit="s", safer="smaller", off=0.0, ge=0, help="how long it may be exceeded; 0 switches it off")
-    missed_ticks: int = Field(default=10, ge=0, json_schema_extra=guard("smaller", 0), description="late ticks in a row that trip; 0 switches it off")
-    require_commander: bool = Field(default=False, json_schema_extra=guard("larger"), description="trip where nobody commands, or sends a ping")
-    commander_timeout: float = quantity(1.0, unit="s", safer="smaller", gt=0, help="how long the commander may be silent")
+    current_time: float = quantity(
+        2.0, unit="s", safer="smaller", off=0.0, ge=0, help="how long it may be exceeded; 0 switches it off"
+    )
+    missed_ticks: int = Field(
+        default=10,
+        ge=0,
+        json_schema_extra=guard("smaller", 0),
+        description="late ticks in a row that trip; 0 switches it off",
+    )
+    require_commander: bool = Field(
+        default=False, json_schema_extra=guard("larger"), description="trip where nobody commands, or sends a ping"
+    )
+    commander_timeout: float = quantity(
+        1.0, unit="s", safer="smaller", gt=0, help="how long the commander may be silent"
+    )
     supervisor_timeout: float = quantity(
-        2.0, unit="s", safer="smaller", off=0.0, ge=0, help="how long the supervisor, which takes disarm, may be silent; 0 switches it off"
+        2.0,
+        unit="s",
+        safer="smaller",
+        off=0.0,
+        ge=0,
+        help="how long the supervisor, which takes disarm, may be silent; 0 switches it off",
     )
     disagreement: float = quantity(
-        0.0, unit="m", safer="smaller", off=0.0, ge=0, help="most that two sensors of one motion may come apart after arming; 0 switches it off"
+        0.0,
+        unit="m",
+        safer="smaller",
+        off=0.0,
+        ge=0,
+        help="most that two sensors of one motion may come apart after arming; 0 switches it off",
     )
-    ramp: float = quantity(0.0, unit="s", safer="smaller", ge=0, help="time in which a trip takes the outputs to zero; 0 is at once")
+    ramp: float = quantity(
+        0.0, unit="s", safer="smaller", ge=0, help="time in which a trip takes the outputs to zero; 0 is at once"
+    )
 
 
 class SafetyParams(NamedTuple):

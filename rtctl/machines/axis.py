@@ -75,7 +75,9 @@ class AxisConfig(MachineSettings):
     output: AnalogOutputSettings = AnalogOutputSettings(channel=0)
     encoder: LinearScaleSettings = LinearScaleSettings(pitch=1e-6)
     radius: float = quantity(1.0, unit="m", gt=0, help="metres per radian, for reports in rad")
-    amp_per_volt: float = quantity(0.5, unit="A/V", safer="larger", gt=0, help="gain of the drive, for the current limit")
+    amp_per_volt: float = quantity(
+        0.5, unit="A/V", safer="larger", gt=0, help="gain of the drive, for the current limit"
+    )
     law: AxisLawSettings
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()

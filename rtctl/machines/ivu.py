@@ -140,7 +140,7 @@ def follow_radii(p, m, phi):
 
 @tick
 def _grown(R_0, area, core):
-    """Radius in m of a reel of `R_0` m whose paper has grown by `area` pi m^2; a smaller reel than `core` is its own."""
+    """Radius in m of a reel of `R_0` m whose paper has grown by `area` pi m^2, and at least that of the `core`."""
     least = min(core, R_0)
     return np.sqrt(max(R_0 * R_0 + area, least * least))
 

@@ -151,8 +151,8 @@ def load(source: Source) -> ModuleType:
     name = source.module
     if not is_trusted(source.text):
         raise ForeignError(
-            f"{source.file}: its text came with the data, and rtctl runs no code that comes with data; read it, and give "
-            f"the file by path: --own {source.file} (sha256 {_sha256(source.text)[:16]}...)"
+            f"{source.file}: its text came with the data, and rtctl runs no code that comes with data; read it and "
+            f"give the file by path: --own {source.file} (sha256 {_sha256(source.text)[:16]}...)"
         )
     if name in sys.modules:
         return sys.modules[name]

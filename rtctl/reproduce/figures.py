@@ -81,7 +81,6 @@ def save(figure: Figure, folder: Path, number: str) -> Path:
     buffer = BytesIO()
     figure.savefig(buffer)
     path = folder / f"figure_{number.replace('.', '_')}.png"
-    with Image.open(buffer) as image:  # few colours are enough for lines, and half the bytes
-        with replaced(path, "wb") as file:
-            image.convert("RGB").quantize(PALETTE).save(file, format="png", optimize=True)
+    with Image.open(buffer) as image, replaced(path, "wb") as file:  # few colours do for lines, and halve the bytes
+        image.convert("RGB").quantize(PALETTE).save(file, format="png", optimize=True)
     return path

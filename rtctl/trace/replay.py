@@ -115,9 +115,9 @@ def _foreign(bundle: Bundle, given: dict[str, Any]) -> str:
     words = " ".join(f"--own {shlex.quote(name)}" for name in texts)
     sums = ", ".join(f"{name} {hashlib.sha256(text.encode()).hexdigest()}" for name, text in texts.items())
     return (
-        f"{bundle.folder} was recorded with code of its owner, and rtctl runs no code that comes with data. Read it, and "
-        f"give the files by path: rtctl replay {shlex.quote(str(bundle.folder))} {words}; their sha256 has to be that of "
-        f"the texts in case.json: {sums}"
+        f"{bundle.folder} was recorded with code of its owner, and rtctl runs no code that comes with data. Read it "
+        f"and give the files by path: rtctl replay {shlex.quote(str(bundle.folder))} {words}; their sha256 has to be "
+        f"that of the texts in case.json: {sums}"
     )
 
 

@@ -54,7 +54,7 @@ def test_the_section_live_widens_one_bound_and_no_other(config: Callable[..., An
 
 @pytest.mark.parametrize("path", ["law.position.gain", "safety.following_eror"])
 def test_live_names_settings_that_have_a_bound(config: Callable[..., Any], path: str) -> None:
-    with pytest.raises(UserError, match="live: .* has no bound"):
+    with pytest.raises(UserError, match=r"live: .* has no bound"):
         Bounds(config("ivu", set={"live": {path: 1.0}}))
 
 

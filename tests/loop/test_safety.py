@@ -36,7 +36,8 @@ SETTINGS = SafetySettings(
 )  # fmt: skip
 P = safety.build(SETTINGS, DT)
 GOOD: dict[str, Any] = {
-    "fresh": 1, "late": 0, "passed": 1, "gone": 0, "watchdog": 0, "lost": 0, "error": 0.0, "effort": 0.5, "amperes": 0.2, "T1": 1.0, "T2": 1.0, "moves": True,
+    "fresh": 1, "late": 0, "passed": 1, "gone": 0, "watchdog": 0, "lost": 0, "error": 0.0, "effort": 0.5,
+    "amperes": 0.2, "T1": 1.0, "T2": 1.0, "moves": True,
 }  # fmt: skip
 
 

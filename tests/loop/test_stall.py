@@ -1,4 +1,4 @@
-"""A loop that stands still: the machine goes on, time is counted by the clock, and the trip comes before the outputs."""
+"""A loop that stands still: the machine goes on, time goes by the clock, and the trip comes before the outputs."""
 
 from typing import Any
 
