@@ -21,6 +21,7 @@ from rtctl.config.yaml_file import find, load_yaml
 from rtctl.diagnose.carry import carried, digits
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
@@ -118,7 +119,7 @@ def read_model(path: Path | str, record: Record) -> Model:
         base["N"] = base["R_t"] / base["R_s"]
     else:
         base = _numbers(plant.parameters)
-    return Model(kind, base, tuple(plant.physics))
+    return Model(kind, base, tuple(plant.physics), of_case(record.case))
 
 
 def _numbers(parameters: Settings) -> dict[str, float]:

@@ -103,6 +103,12 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
     """The Record of these columns, by the same rules as `load_record`."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
+    if case.estimated:
+        names = ", ".join(case.estimated)
+        warnings.append(
+            f"{path.parent / 'case.json'}: parameters does not say {case.estimated[0]}; {names} estimated from the "
+            "recording, without a tolerance"
+        )
     t = _column(path, columns, "t", "s, clock at the tick")
     u = np.column_stack([_command(path, columns, case, name) for name in COMMANDS[case.plant]])
     ref = _column(path, columns, "ref", "position reference", missing=not case.controller_known)
@@ -341,10 +347,16 @@ def _supports(
 
 
 def _disagrees(case: Case, agreement: Agreement | None) -> str:
+    if case.beyond and agreement is not None:
+        return (
+            f"the law of the config has {', '.join(case.beyond)}, which 'controller' of case.json does not say; "
+            f"'{case.controller.kind}' alone is off the recorded command by up to {agreement.worst:.3g} V (row "
+            f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
+        )
     has = f"; in its config the law has {', '.join(case.beyond)}" if case.beyond else ""
     if agreement is None:
         return f"the law '{case.controller.kind}' cannot be recomputed from this recording{has}"
     return (
         f"the law '{case.controller.kind}' does not give the recorded command (off by {agreement.worst:.3g} V in row "
-        f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms{has})"
+        f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
     )

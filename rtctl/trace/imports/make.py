@@ -20,7 +20,7 @@ from rtctl.trace.part import refuse_taken
 OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of one recording alike
     "m": ("m", "rad", "V"),
     "m/s": ("m/s", "rad/s", "V/s"),
-    "V": ("V", "A"),
+    "V": ("V", "A", "N", "Nm"),
 }
 TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
 UNEVEN = 0.5  # share of a period by which one row may be off the others' distance
