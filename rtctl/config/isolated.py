@@ -14,8 +14,23 @@ def python(*words: str) -> list[str]:
 
 
 def isolate() -> None:
-    """Let processes that multiprocessing starts leave the current folder out too, and this one from here on."""
+    """Let processes that multiprocessing starts leave the current folder out too, and this one from here on.
+
+    `python -m` and `python -c` put the current folder first; a folder that PYTHONPATH or an installation names stays.
+    """
     os.environ["PYTHONSAFEPATH"] = "1"
-    here = os.path.realpath(os.getcwd()) if os.path.isdir(".") else None  # noqa: PTH109, PTH112
-    given = {os.path.realpath(word) for word in os.environ.get("PYTHONPATH", "").split(os.pathsep) if word}
-    sys.path[:] = [p for p in sys.path if p and not (p == here and here not in given)]
+    sys.path[:] = [folder for folder in sys.path if folder]
+    if not sys.flags.safe_path and sys.path and sys.path[0] == _here() and not _is_given(sys.path[0]):
+        del sys.path[0]
+
+
+def _here() -> str | None:
+    """The current folder; None where it is gone."""
+    try:
+        return os.getcwd()  # noqa: PTH109
+    except OSError:
+        return None
+
+
+def _is_given(folder: str) -> bool:
+    return folder in os.environ.get("PYTHONPATH", "").split(os.pathsep)

@@ -45,7 +45,7 @@ SPECIAL = {"f_Hz": "Hz", "transmission.creep.kappa": "1/N", "transmission.slip.F
 
 
 def node_words(node: str, rotary: bool = False) -> str:
-    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; the body of a `rotary` axis is a rotor."""
+    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; a `rotary` axis has a rotor."""
     if rotary and node == "carriage":
         return "the rotor"
     if node in NODES:

@@ -15,6 +15,7 @@ from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
 from rtctl.trace.imports.case import case_of, checked
 from rtctl.trace.imports.plan import ColumnPlan, Plan
 from rtctl.trace.imports.table import Table
+from rtctl.trace.imports.times import is_date
 from rtctl.trace.part import refuse_taken
 
 OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of one recording alike
@@ -26,6 +27,9 @@ TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
 UNEVEN = 0.5  # share of a period by which one row may be off the others' distance
 RATE_OFF = 0.01
 COUNTS = "_counts"
+SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
+    "ns us \u00b5s \u03bcs ms nm um \u00b5m \u03bcm mm cm km deg rad mrad rev rpm Hz uV mV V kV uA mA A mN N kN mNm Nm".split()
+)
 
 
 class Imported(NamedTuple):
@@ -101,11 +105,18 @@ def _signals(
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     assumed = []
+    notes: list[str] = list(table.notes)
     for name, given in wanted.items():
-        values = table.numbers(given.column, name)
         theirs = given.unit if given.unit is not None else table.units.get(given.column)
+        if name == "t":
+            if theirs is None and not is_date(table.has(given.column, "t")):
+                assumed.append("t in s")
+            columns[name], units[name] = _times(table, given.column, theirs), "s"
+            continue
+        values = table.numbers(given.column, name)
         ours = known[name].unit if name in known else theirs or ""
         if theirs is None:
+            _ask_suffix(table, name, given.column, ours, plan.plant == "axis")
             assumed += [f"{name} in {ours}"] if ours not in ("", "counts", "ticks") else []
         elif name in known:
             factor, ours = _factor(table, name, given.column, theirs, ours, plan.plant == "axis")
@@ -123,7 +134,36 @@ def _signals(
             )
     if not lengths[first]:
         raise UserError(f"{table.path} holds no rows")
-    return columns, units, [f"no unit is given: {', '.join(assumed)} assumed"] if assumed else []
+    if assumed:
+        notes.append(f"no unit is given: {', '.join(assumed)} assumed")
+    return columns, units, notes
+
+
+def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
+    """Times (n,) in s."""
+    if is_date(table.has(column, "t")):
+        return table.times(column, 1.0)
+    if theirs is None:
+        _ask_suffix(table, "t", column, "s", False)
+    return table.times(column, 1.0 if theirs is None else _factor(table, "t", column, theirs, "s", False)[0])
+
+
+def _ask_suffix(table: Table, name: str, column: str, ours: str, axis: bool) -> None:
+    """Refuse a name such as `pos_mm` that ends in another unit of the same dimension, where no unit is given."""
+    base, mark, unit = column.rpartition("_")
+    if not (base and mark and unit in SUFFIXES):
+        return
+    choices = OTHER_UNITS.get(ours, (ours,)) if axis else (ours,)
+    for choice in choices:
+        try:
+            if convert(1.0, unit, choice) == 1.0 and choice == ours:
+                return
+        except ValueError:
+            continue
+        raise UserError(
+            f"{table.path}: column '{column}' ({name}) has no unit, and its name ends in {unit}; "
+            f"--unit {name}={unit} if it is, --unit {name}={ours} if it is not"
+        )
 
 
 def _factor(table: Table, name: str, column: str, theirs: str, ours: str, axis: bool) -> tuple[float, str]:

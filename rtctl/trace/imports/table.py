@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import UserError, nearest
+from rtctl.trace.imports.times import is_date, seconds
 
 
 def row_number(row: int) -> str:
@@ -20,6 +21,7 @@ class Table(NamedTuple):
     units: dict[str, str]  # where the file names them
     clock: str = ""  # column that is the time, in s, where nothing else is
     where: Callable[[int], str] = row_number
+    notes: tuple[str, ...] = ()  # sentences for people: what the reader assumed or passed over
 
     def has(self, name: str, use: str) -> np.ndarray:
         """The column; `use` says what it is wanted for. Raises UserError with the nearest name."""
@@ -30,9 +32,31 @@ class Table(NamedTuple):
         hint = f"is it '{near}'?" if near else f"it has {', '.join(there) or 'none'}"
         raise UserError(f"{self.path} has no column '{name}' (wanted as {use}); {hint}")
 
+    def times(self, name: str, factor: float) -> np.ndarray:
+        """The column as times (n,) in s; `factor` is the unit of its numbers in s.
+
+        Columns keep the type of the file: time stamps (datetime64), durations (timedelta64), integers, doubles.
+        Raises UserError that names the first row without a time.
+        """
+        values = self.has(name, "t")
+        if is_date(values):
+            gone = np.flatnonzero(np.isnat(values))
+            if len(gone):
+                raise UserError(
+                    f"{self.path}: column '{name}', {self.where(int(gone[0]))}: empty; every row needs a time"
+                )
+        elif values.dtype.kind not in "iu":
+            values = self.numbers(name, "t")
+        return seconds(values, factor)
+
     def numbers(self, name: str, use: str) -> np.ndarray:
         """The column as doubles (n,), each finite. Raises UserError that names the first row that is not."""
         values = self.has(name, use)
+        if is_date(values):
+            raise UserError(
+                f"{self.path}: column '{name}' (wanted as {use}) holds dates or durations; only t can be one: "
+                f"--map t={name}"
+            )
         if values.dtype.kind not in "fiub":
             row = next((k for k, cell in enumerate(values) if not _is_number(cell)), None)
             if row is not None:

@@ -1,4 +1,4 @@
-"""Seconds from a column of any type: dates and durations carry their unit, integers are subtracted before they round."""
+"""Seconds from a column of any type: dates and durations carry their unit, integers are subtracted exactly."""
 
 import numpy as np
 
