@@ -28,8 +28,9 @@ UNEVEN = 0.5  # share of a period by which one row may be off the others' distan
 RATE_OFF = 0.01
 COUNTS = "_counts"
 SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
-    "ns us \u00b5s \u03bcs ms nm um \u00b5m \u03bcm mm cm km deg rad mrad rev rpm Hz uV mV V kV uA mA A mN N kN mNm Nm".split()
-)
+    ("ns", "us", "\u00b5s", "\u03bcs", "ms", "nm", "um", "\u00b5m", "\u03bcm", "mm", "cm", "km", "deg", "rad", "mrad",
+     "rev", "rpm", "Hz", "uV", "mV", "V", "kV", "uA", "mA", "A", "mN", "N", "kN", "mNm", "Nm")
+)  # fmt: skip
 
 
 class Imported(NamedTuple):
