@@ -285,6 +285,8 @@ static void follow_tape(void)
     double F2_lin = c2 * (-x - R2_lin * q2) + k2 * (-dx - R2_lin * v2);
     double F1 = c1 * (x - l1) + k1 * (dx - plant.R1 * v1);
     double F2 = c2 * (-x - l2) + k2 * (-dx - plant.R2 * v2);
+    plant.T1 = -F1;
+    plant.T2 = -F2;
     double tau1 = p.plant_plant_c_m1 * (m->qm[MOTOR1] - q1) + p.plant_plant_k_m1 * (m->vm[MOTOR1] - v1);
     double tau2 = p.plant_plant_c_m2 * (m->qm[MOTOR2] - q2) + p.plant_plant_k_m2 * (m->vm[MOTOR2] - v2);
     m->f[REEL1] += (F1 * plant.R1 + tau1) * (J1_lin / plant.J1) - (F1_lin * R1_lin + tau1);
@@ -325,12 +327,6 @@ static void sample(void)
     double v2 = optical_volts(p.plant_reel2_periods_per_radian, p.plant_reel2_phase, p.plant_reel2_flank, theta2);
     in.ai[0] = to_codes(v1 / p.plant_input1_volts_per_code, p.plant_input1_code_min, p.plant_input1_code_max);
     in.ai[1] = to_codes(v2 / p.plant_input2_volts_per_code, p.plant_input2_code_min, p.plant_input2_code_max);
-    double grow = p.plant_plant_d_tape / (2.0 * M_PI), R_c = p.plant_plant_R_c;
-    double l1 = wound(x[REEL1], p.plant_plant_R1, grow), l2 = wound(x[REEL2], p.plant_plant_R2, grow);
-    plant.T1 = -(p.plant_plant_c1 * (R_c * x[CAPSTAN] - l1) +
-                 p.plant_plant_k1 * (R_c * x[NQ + CAPSTAN] - plant.R1 * x[NQ + REEL1]));
-    plant.T2 = p.plant_plant_c2 * (R_c * x[CAPSTAN] + l2) +
-               p.plant_plant_k2 * (R_c * x[NQ + CAPSTAN] + plant.R2 * x[NQ + REEL2]);
     in.truth[0] = plant.T1;
     in.truth[1] = plant.T2;
     in.truth[2] = x[CAPSTAN];
