@@ -24,12 +24,12 @@ from rtctl.diagnose.columns import (
     unwrap_turns,
 )
 from rtctl.trace.bundle import PARQUET, load_bundle
+from rtctl.trace.clock import even_rows, increasing
 
 COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
 READINGS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts",), "axis": ()}
 COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
-RATE_OFF = 0.01  # share by which the median tick may differ from the sample rate
 AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
 AGREES_MEDIAN = 2e-3
 
@@ -114,7 +114,7 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
     ref = _column(path, columns, "ref", "position reference", missing=not case.controller_known)
     w = _column(path, columns, "w", "V, excitation, 0 where there is none")
     raw = _readings(path, columns, case, warnings)
-    dt = _clock(path, t, case)
+    t, dt = _clock(path, t, case, warnings)
     if isinstance(case.controller, PdLaw | SectionsLaw | CascadeLaw) and np.isnan(ref).any():
         case = case._replace(controller_known=False)
     y = {}
@@ -308,24 +308,20 @@ def _readings(path: Path, columns: dict, case: Case, warnings: list[str]) -> dic
     return raw
 
 
-def _clock(path: Path, t: np.ndarray, case: Case) -> float:
-    """Nominal tick in s."""
+def _clock(path: Path, t: np.ndarray, case: Case, warnings: list[str]) -> tuple[np.ndarray, float]:
+    """Times (n,) in s and the nominal tick in s, by the rule of `rtctl import`; gaps stay for preflight."""
     if len(t) < 2:
         raise NoAnswer(f"{path} holds {len(t)} rows; a verdict needs {LEAST_ROWS}")
-    d = np.diff(t)
-    back = np.flatnonzero(d <= 0)
-    if len(back):
-        k = int(back[0]) + 1
-        raise UserError(f"{path}: column 't', row {k}: {t[k]:.9g} s after {t[k - 1]:.9g} s; time should increase")
-    median = float(np.median(d))
+
+    def row(k: int) -> str:
+        return f"{path}: column 't', row {k}"
+
     if case.sample_rate is None:
-        return median
-    if abs(median * case.sample_rate - 1.0) > RATE_OFF:
-        raise UserError(
-            f"{path}: column 't' has {1 / median:.6g} rows a second where sample_rate in case.json is "
-            f"{case.sample_rate:g} Hz; one of the two is wrong"
-        )
-    return 1.0 / case.sample_rate
+        increasing(t, row)
+        return t, float(np.median(np.diff(t)))
+    clock = even_rows(t, case.sample_rate, row, "sample_rate in case.json is {:g} Hz", gaps=True)
+    warnings += [f"{path}: {clock.note}"] if clock.note else []
+    return clock.t, 1.0 / case.sample_rate
 
 
 def _supports(

@@ -12,6 +12,7 @@ from rtctl.config.units import convert
 from rtctl.machines import axis, ivu_plant, ldu_plant
 from rtctl.machines.base import Column
 from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
+from rtctl.trace.clock import even_rows, increasing
 from rtctl.trace.imports.case import case_of, checked
 from rtctl.trace.imports.plan import ColumnPlan, Plan
 from rtctl.trace.imports.table import Table
@@ -24,8 +25,6 @@ OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of
     "V": ("V", "A", "N", "Nm"),
 }
 TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
-UNEVEN = 0.5  # share of a period by which one row may be off the others' distance
-RATE_OFF = 0.01
 COUNTS = "_counts"
 SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
     "ns us \u00b5s \u03bcs ms nm um \u00b5m \u03bcm mm cm km deg rad mrad rev rpm Hz uV mV V kV uA mA A mN N kN mNm Nm".split()
@@ -50,7 +49,8 @@ def make_bundle(table: Table, plan: Plan, folder: Path | str) -> Imported:
         raise UserError("--plant: say what kind of machine it is: axis, ivu or ldu")
     known = known_columns(plan.plant)
     columns, units, notes = _signals(table, _wanted(table, plan, known), plan, known)
-    t, rate = _clock(table, plan, columns)
+    t, rate, more = _clock(table, plan, columns)
+    notes += more
     columns = {"t": t, **{name: values for name, values in columns.items() if name != "t"}}
     units = {"t": "s", **units}
     if "w" not in columns:
@@ -191,45 +191,24 @@ def _whole(table: Table, column: str, values: np.ndarray) -> None:
         )
 
 
-def _clock(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None]:
-    """Times (n,) s and the rate, None where they are uneven and may be."""
+def _clock(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None, list[str]]:
+    """Times (n,) s, the rate (None where they are uneven and may be), and notes."""
     n = len(next(iter(columns.values())))
     if "t" not in columns:
         if plan.rate is None:
             raise UserError(
                 f"{table.path}: which column is the time? --map t=NAME says it, or --rate 1000 where none is"
             )
-        return np.arange(n) / plan.rate, plan.rate
+        return np.arange(n) / plan.rate, plan.rate, []
     t = columns["t"]
     if n < 2:
         raise UserError(f"{table.path} holds one row; a recording has two or more")
-    d = np.diff(t)
-    back = np.flatnonzero(d <= 0)
-    if len(back):
-        k = int(back[0]) + 1
-        raise UserError(
-            f"{table.path}: time, {table.where(k)}: {t[k]:.9g} s after {t[k - 1]:.9g} s; time should increase"
-        )
+
+    def row(k: int) -> str:
+        return f"{table.path}: time, {table.where(k)}"
+
     if plan.uneven:
-        return t, None
-    usual = float(np.median(d))
-    off = np.flatnonzero(np.abs(d - usual) > UNEVEN * usual)
-    if len(off):
-        k = int(off[0]) + 1
-        more = f", as at {len(off) - 1} more places" if len(off) > 1 else ""
-        raise UserError(
-            f"{table.path}: time, {table.where(k)}: {d[k - 1]:.6g} s after the row before where {usual:.6g} s is usual"
-            f"{more}; --uneven keeps such a clock, else lay the rows on an even one first"
-        )
-    rate = _tidy((n - 1) / float(t[-1] - t[0]))
-    if plan.rate is not None and abs(rate / plan.rate - 1) > RATE_OFF:
-        raise UserError(
-            f"{table.path}: time runs at {rate:g} rows a second where --rate says {plan.rate:g}; one is wrong"
-        )
-    return t, plan.rate or rate
-
-
-def _tidy(rate: float) -> float:
-    """1000 and not 999.99998: a millionth is less than any clock here is good for."""
-    short = float(f"{rate:.5g}")
-    return short if abs(short / rate - 1) < 1e-6 else rate
+        increasing(t, row)
+        return t, None, []
+    clock = even_rows(t, plan.rate, row)
+    return clock.t, clock.rate, [clock.note] if clock.note else []
