@@ -32,9 +32,9 @@ def even_rows(
 ) -> Clock:
     """Clock of the times `t` (n,) in s, n >= 2, finite; `rate` in Hz where it is told.
 
-    `row(k)` says file, column and row k; `told` says where `rate`, `{:g}`, comes from. With `gaps` steps that are too long stay
-    as they are. Raises UserError that names the row where time does not increase, where a step is missing, or where the
-    rate is another than the one told.
+    `row(k)` says file, column and row k; `told` says where the rate, `{:g}`, comes from. With `gaps` steps that are too
+    long stay as they are. Raises UserError that names the row where time does not increase, where a step is missing, or
+    where the rate is another than the one told.
     """
     stairs = _staircase(t, rate)
     if stairs is not None:

@@ -144,7 +144,7 @@ def test_an_archive_is_checked_before_it_is_unpacked(tmp_path, names, words):
 def test_an_archive_that_unpacks_to_gigabytes_is_refused_by_its_directory(tmp_path, monkeypatch):
     monkeypatch.setattr(fmu_file, "UNPACKED_LIMIT", 1 << 20)
     path = packed(tmp_path / "c.fmu", {"resources/zeros": bytes(2 << 20), **LINUX})
-    with pytest.raises(UserError, match="its files are .* GiB when unpacked"):
+    with pytest.raises(UserError, match=r"its files are .* GiB when unpacked"):
         plan(given(path), *AXIS, 1e-3)
 
 
@@ -153,13 +153,13 @@ def test_an_archive_with_a_damaged_or_locked_file_is_refused(tmp_path):
     whole = path.read_bytes()
     at = whole.index(b"<?xml") if b"<?xml" in whole else 60
     path.write_bytes(whole[:at] + b"\xff" * 20 + whole[at + 20 :])
-    with pytest.raises(UserError, match="the file is damaged .*; export it again|is not valid"):
+    with pytest.raises(UserError, match=r"the file is damaged .*; export it again|is not valid"):
         plan(given(path), *AXIS, 1e-3)
     locked = bytearray(whole)
     directory = whole.index(b"PK\x01\x02")
     locked[directory + 8] |= 1
     path.write_bytes(locked)
-    with pytest.raises(UserError, match="modelDescription.xml in it is encrypted; export it without a password"):
+    with pytest.raises(UserError, match=r"modelDescription.xml in it is encrypted; export it without a password"):
         plan(given(path), *AXIS, 1e-3)
 
 

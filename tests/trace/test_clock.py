@@ -72,7 +72,11 @@ JITTER = np.random.default_rng(7).uniform(-0.2e-3, 0.2e-3, len(K))
         (np.insert(K, 900, 899) / 1000, None, "line 902: 0.899 s after 0.899 s; time should increase; .* --rate says"),
         (np.insert(K, 900, 899) / 1000, 1000.0, "line 902: 0.899 s after 0.899 s; time should increase$"),
         (np.where(K == 700, 0.0, K / 1000), None, r"line 702: 0 s after 0.699 s; time should increase"),
-        (np.sort(np.concatenate((K[:500], K[:500]))) / 1000, 1000.0, "a.csv: time runs at 2000.* rows a second where --rate says 1000; one is wrong"),
+        (
+            np.sort(np.concatenate((K[:500], K[:500]))) / 1000,
+            1000.0,
+            "runs at 2000.* rows a second where --rate says 1000",
+        ),
         (K / 1000, 500.0, "a.csv: time runs at 1000 rows a second where --rate says 500; one is wrong"),
         (np.round(K / 10_000, 3), 8000.0, "a.csv: time"),
     ],
@@ -91,6 +95,7 @@ def test_jitter_and_gaps_of_a_real_loop_are_no_staircase():
 
 
 def test_a_rate_that_is_a_little_off_is_noted():
-    assert "time runs at 1000 rows a second and --rate says 1005: 1005 Hz is taken" in even_rows(
-        K / 1000, 1005.0, row
-    ).note
+    assert (
+        "time runs at 1000 rows a second and --rate says 1005: 1005 Hz is taken"
+        in even_rows(K / 1000, 1005.0, row).note
+    )

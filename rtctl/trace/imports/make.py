@@ -14,6 +14,7 @@ from rtctl.machines.base import Column
 from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
 from rtctl.trace.clock import even_rows, increasing
 from rtctl.trace.imports.case import case_of, checked
+from rtctl.trace.imports.counters import per_turn, unwrapped
 from rtctl.trace.imports.plan import ColumnPlan, Plan
 from rtctl.trace.imports.table import Table
 from rtctl.trace.imports.times import is_date
@@ -27,8 +28,9 @@ OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of
 TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
 COUNTS = "_counts"
 SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
-    "ns us \u00b5s \u03bcs ms nm um \u00b5m \u03bcm mm cm km deg rad mrad rev rpm Hz uV mV V kV uA mA A mN N kN mNm Nm".split()
-)
+    ("ns", "us", "\u00b5s", "\u03bcs", "ms", "nm", "um", "\u00b5m", "\u03bcm", "mm", "cm", "km", "deg", "rad", "mrad",
+     "rev", "rpm", "Hz", "uV", "mV", "V", "kV", "uA", "mA", "A", "mN", "N", "kN", "mNm", "Nm")
+)  # fmt: skip
 
 
 class Imported(NamedTuple):
@@ -87,6 +89,9 @@ def _wanted(table: Table, plan: Plan, known: dict[str, Column]) -> dict[str, Col
         named["t"] = ColumnPlan(column=table.clock)
     if not set(named) - {"t"}:
         there = ", ".join(list(table.columns)[:20])
+        if not there:
+            left = "; ".join(f"{name} is {why}" for name, why in list(table.left.items())[:10])
+            raise UserError(f"{table.path} has no column of numbers; {left or 'it is empty'}")
         raise UserError(f"{table.path} has {there}; say which is which, e.g. --map 'u=vir,x=qm'")
     for name, given in plan.columns.items():
         if not given.column:
@@ -123,6 +128,8 @@ def _signals(
             values = values if factor == 1.0 else values * factor
         if name.endswith(COUNTS):
             _whole(table, given.column, values)
+            values, wrapped = unwrapped(name, values, per_turn(plan.case))
+            notes += [wrapped] if wrapped else []
         columns[name], units[name] = values, ours
     lengths = {name: len(values) for name, values in columns.items()}
     first = next(iter(columns))
