@@ -98,7 +98,7 @@ def _tree(path: Path, value: Any, notes: list[str]) -> Any:
         return {str(key): _tree(path, item, notes) for key, item in value.items()}
     if not isinstance(value, list) or len(value) < 2:
         return value
-    if all(isinstance(item, Mapping) for item in value) and not any(_is_series(item) for item in value):
+    if all(isinstance(item, Mapping) for item in value) and not _are_series(value):
         return _rows(path, value, notes)
     if all(isinstance(item, list) for item in value):
         head = value[0]
@@ -119,9 +119,9 @@ def _tree(path: Path, value: Any, notes: list[str]) -> Any:
     return made.values.get("value", [])
 
 
-def _is_series(item: Mapping[str, Any]) -> bool:
-    """Whether an element is a signal of its own, with a list of values, and no row."""
-    return any(isinstance(value, list) and len(value) > 64 for value in item.values())
+def _are_series(items: list[Mapping[str, Any]]) -> bool:
+    """Whether the elements are signals, each with a list of values that is longer than the list of elements."""
+    return all(any(isinstance(value, list) and len(value) > len(items) for value in item.values()) for item in items)
 
 
 def _rows(path: Path, rows: list[Any], notes: list[str]) -> dict[str, np.ndarray]:

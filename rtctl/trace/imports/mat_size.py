@@ -16,8 +16,12 @@ WIDTHS = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 
 
 def check_size(path: Path) -> None:
     """Raise UserError where the variables take more than the limit. Other errors are those of a damaged file."""
+    try:
+        variables = whosmat(path)
+    except TypeError:  # an object of MATLAB has no shape
+        variables = []
     size = 0
-    for _, shape, kind in whosmat(path):
+    for _, shape, kind in variables:
         count = 1
         for length in shape:
             count *= max(int(length), 0)

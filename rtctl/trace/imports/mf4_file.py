@@ -3,6 +3,8 @@
 Channel groups that share one clock are one. With several clocks a column is `group/name`.
 """
 
+import gc
+import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,6 +32,7 @@ class _Clock(NamedTuple):
 
 def read(path: Path) -> Table:
     """The columns of all groups. Raises UserError, OSError."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None  # the destructor fails where a file did not open
     try:
         with MDF(path) as mdf:
             refuse_large(path, sum(_size(group) for group in mdf.groups), "its channels")
@@ -37,7 +40,11 @@ def read(path: Path) -> Table:
     except (OSError, UserError):
         raise
     except Exception:  # whatever a damaged file makes of the reader
-        raise UserError(f"{path} cannot be read as MDF: it is damaged or cut off; save it again") from None
+        pass  # its traceback holds the reader, which goes here
+    finally:
+        gc.collect()
+        sys.unraisablehook = hook
+    raise UserError(f"{path} cannot be read as MDF: it is damaged or cut off; save it again")
 
 
 def _size(group: Any) -> int:

@@ -116,7 +116,7 @@ def _mapping(tree: Tree, value: Mapping[str, Any], before: str, depth: int) -> N
         for key, text in table.items():
             name = f"{before}{key}"
             mine = (column for column in made if column == name or column.startswith(f"{name}."))
-            tree.units.update(dict.fromkeys(mine, unit_text(text)))
+            tree.units.update(dict.fromkeys(mine, unit_text(text) if isinstance(text, str) else ""))
     if len(made) == 1 or (made and all(name.rpartition(".")[0] == made[0].rpartition(".")[0] for name in made)):
         for key in UNITS:
             if key in texts:
@@ -132,7 +132,10 @@ def _mapping(tree: Tree, value: Mapping[str, Any], before: str, depth: int) -> N
 
 
 def _is_texts(item: Any) -> bool:
-    return isinstance(item, Mapping) and bool(item) and all(isinstance(text, str) for text in item.values())
+    """Whether all fields are texts; an empty text of MATLAB is an empty array."""
+    return isinstance(item, Mapping) and bool(item) and all(
+        isinstance(text, str) or (isinstance(text, np.ndarray) and text.size == 0) for text in item.values()
+    )  # fmt: skip
 
 
 def _elements(tree: Tree, items: list[Any], name: str, depth: int) -> None:

@@ -5,6 +5,7 @@ import gzip
 import lzma
 import shutil
 import tempfile
+import weakref
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +24,14 @@ SUFFIXES = (".gz", ".gzip", ".bz2", ".xz")
 PIECE = 1 << 20
 
 
+class _Folder:
+    """Private folder that goes with the last reference to it."""
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="rtctl-import-"))
+        weakref.finalize(self, shutil.rmtree, self.path, True)
+
+
 def packing(head: bytes) -> str:
     """Name of the packing that a file with these first bytes has; empty for none."""
     return next((name for magic, (name, _) in OPENERS.items() if head.startswith(magic)), "")
@@ -33,8 +42,8 @@ def read_packed(path: Path, read: Callable[[Path], Table]) -> Table:
     with path.open("rb") as file:
         head = file.read(8)
     kind, opener = next(found for magic, found in OPENERS.items() if head.startswith(magic))
-    folder = tempfile.TemporaryDirectory(prefix="rtctl-import-")
-    inner = Path(folder.name) / (path.stem if path.suffix.lower() in SUFFIXES else path.name)
+    folder = _Folder()
+    inner = folder.path / (path.stem if path.suffix.lower() in SUFFIXES else path.name)
     try:
         with opener(path, "rb") as source, inner.open("wb") as out:
             _copy(path, source, out)
@@ -47,7 +56,7 @@ def read_packed(path: Path, read: Callable[[Path], Table]) -> Table:
     except UserError as error:
         raise type(error)(str(error).replace(str(inner), str(path))) from None
 
-    def where(row: int, kept: tempfile.TemporaryDirectory[str] = folder) -> str:
+    def where(row: int, kept: _Folder = folder) -> str:
         return table.where(row)  # lines are counted in the unpacked file, which is there as long as the table is
 
     return table._replace(path=path, where=where)

@@ -36,9 +36,11 @@ def read(path: Path) -> Table:
     try:
         table = _arrow(path) if arrow else _parquet(path)
         columns, units, left = {}, {}, {}
-        for field in table.schema:
+        for field, column in zip(table.schema, table.columns, strict=True):
             unit = _unit(field)
-            for part in _parts(field.name, pa.chunked_array(table.column(field.name).chunks, field.type)):
+            for part in _parts(field.name, pa.chunked_array(column.chunks, field.type)):
+                if part.name in columns:
+                    raise UserError(f"{path}: two columns are called '{part.name}'; give each a name of its own")
                 if part.values is None:
                     left[part.name] = part.why
                     continue

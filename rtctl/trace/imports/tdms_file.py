@@ -25,7 +25,7 @@ def read(path: Path) -> Table:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with TdmsFile.open(path) as file:
+            with path.open("rb") as source, TdmsFile.open(source) as file:
                 return _table(path, file)
     except (OSError, UserError):
         raise

@@ -20,7 +20,10 @@ def seconds(values: np.ndarray, factor: float) -> np.ndarray:
         return np.empty(0)
     if is_date(values):
         ticks = values - values[0]
-        return ticks.astype(np.int64) * (np.timedelta64(1, np.datetime_data(ticks.dtype)) / np.timedelta64(1, "s"))
+        one = np.array(1, ticks.dtype)
+        per_second = float(np.timedelta64(1, "s") / one)
+        whole = ticks.astype(np.int64)  # divided where it can be: 15e9 ns are 15 s, 15e9 * 1e-9 s are not
+        return whole / per_second if per_second >= 1.0 else whole * float(one / np.timedelta64(1, "s"))
     if values.dtype.kind in "iu" and len(values) > 1:
         first = values[0]
         below = values < first  # unsigned integers wrap
