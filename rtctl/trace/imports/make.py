@@ -81,8 +81,8 @@ def known_columns(plant: str) -> dict[str, Column]:
 def _wanted(table: Table, plan: Plan, known: dict[str, Column]) -> dict[str, ColumnPlan]:
     """Our columns and theirs: as the plan says, or those that have our names already where it names none."""
     named = {name: given for name, given in plan.columns.items() if given.column}
-    if not named:
-        named = {name: ColumnPlan(column=name) for name in table.columns if name in known}
+    if not set(named) - {"t"}:
+        named = {**{name: ColumnPlan(column=name) for name in table.columns if name in known}, **named}
     if "t" not in named and "t" in table.columns:
         named["t"] = ColumnPlan(column="t")
     elif "t" not in named and table.clock and plan.rate is None:

@@ -76,7 +76,8 @@ def _walk(tree: Tree, value: Any, name: str, depth: int) -> None:
     elif isinstance(value, Valued):
         before = set(tree.columns)
         _walk(tree, value.values, name, depth)
-        tree.units.update(dict.fromkeys((c for c in tree.columns if c not in before), unit_text(value.unit)))
+        if value.unit.strip():
+            tree.units.update(dict.fromkeys((c for c in tree.columns if c not in before), unit_text(value.unit)))
     elif isinstance(value, Mapping):
         _mapping(tree, value, f"{name}.", depth + 1)
     elif isinstance(value, str | bytes):
@@ -116,10 +117,11 @@ def _mapping(tree: Tree, value: Mapping[str, Any], before: str, depth: int) -> N
         for key, text in table.items():
             name = f"{before}{key}"
             mine = (column for column in made if column == name or column.startswith(f"{name}."))
-            tree.units.update(dict.fromkeys(mine, unit_text(text) if isinstance(text, str) else ""))
+            if isinstance(text, str) and text.strip():  # an empty text says nothing
+                tree.units.update(dict.fromkeys(mine, unit_text(text)))
     if len(made) == 1 or (made and all(name.rpartition(".")[0] == made[0].rpartition(".")[0] for name in made)):
         for key in UNITS:
-            if key in texts:
+            if texts.get(key, "").strip():
                 tree.units.update({name: unit_text(texts[key]) for name in made if name not in tree.units})
     if len(made) == 1 and before:
         for key in NAMES:
