@@ -43,6 +43,8 @@ def even_rows(
         kept = rate or _tidy(found)
         note = f"time has steps of {digit:.3g} s: the rows are laid on an even clock of {kept:.9g} Hz"
         return Clock(start + np.arange(len(t)) / kept, kept, note + _off(found, rate, told))
+    if rate is not None and (np.diff(t) <= 0).any():
+        _refuse_break(t, rate, row)
     increasing(t, row, hint=rate is None)
     d = np.diff(t)
     usual = usual_step(d)
@@ -93,11 +95,37 @@ def _staircase(t: np.ndarray, rate: float | None) -> tuple[float, float, float] 
     if irregular >= STAIRS:
         slopes.append((float(np.polyfit(k, t - t[0], 1)[0]), 1.0 + FITTED))
     for slope, share in slopes:
-        left = t - t[0] - slope * k
-        low, high = float(left.min()), float(left.max())
-        if high - low < digit * share:
-            return float(t[0]) + 0.5 * (low + high), 1.0 / slope, digit
+        if not _within(t, slope, digit * share):
+            continue
+        if rate is None:  # the shortest number that explains each step
+            short = (1.0 / float(f"{1.0 / slope:.{digits}g}") for digits in range(2, 7))
+            slope = next((s for s in short if _within(t, s, digit * (1.0 + ROUNDING))), slope)
+        left = t - slope * k
+        return 0.5 * float(left.min() + left.max()), 1.0 / slope, digit
     return None
+
+
+def _within(t: np.ndarray, slope: float, digit: float) -> bool:
+    """Whether the times stay within one digit of an even clock with this step in s."""
+    left = t - t[0] - slope * np.arange(len(t))
+    return float(np.ptp(left)) < digit
+
+
+def _refuse_break(t: np.ndarray, rate: float, row: Callable[[int], str]) -> None:
+    """Raise UserError at the first row where a staircase of few digits leaves the clock that is told."""
+    d = np.diff(t)
+    digit = float(d[d > 0].min()) if (d > 0).any() else 0.0
+    if (d < 0).any() or not digit or np.abs(t / digit - np.round(t / digit)).max() > 1e-3:
+        return
+    left = t - t[0] - np.arange(len(t)) / rate
+    band = np.maximum.accumulate(left) - np.minimum.accumulate(left)
+    off = np.flatnonzero(band > digit * (1.0 + ROUNDING))
+    if len(off) and t[off[0]] - t[0] > STAIRS * digit:
+        k = int(off[0])
+        raise UserError(
+            f"{row(k)}: {t[k]:.9g} s is more than the last digit ({digit:.3g} s) off an even clock of {rate:g} Hz, "
+            "which holds up to there: rows are missing or doubled; lay the rows on an even clock first"
+        )
 
 
 def _digit(t: np.ndarray, d: np.ndarray, mean: float) -> tuple[float, int]:

@@ -32,8 +32,8 @@ FEW_DIGITS = {
 def test_few_digits_are_an_even_clock(name, told):
     t, rate = FEW_DIGITS[name]
     clock = even_rows(t, rate if told else None, row)
-    assert clock.rate == pytest.approx(rate, rel=1e-9 if told else 2e-6)
-    assert np.abs(clock.t - (clock.t[0] + K / rate)).max() < 3e-3 / rate * (1 if told else 100)
+    assert clock.rate == pytest.approx(rate, rel=1e-9)
+    assert np.abs(clock.t - (clock.t[0] + K / rate)).max() < 3e-3 / rate
     assert np.abs(clock.t - t).max() <= np.ptp(np.diff(t)) and "laid on an even clock of" in clock.note
 
 
@@ -46,6 +46,12 @@ def test_what_import_takes_diagnose_takes(tmp_path, name):
     record = load_record(tmp_path / "b")
     assert made.rate == rate and record.dt == 1 / rate
     assert np.diff(record.t) == pytest.approx(1 / rate, rel=1e-6)
+
+
+def test_a_row_that_is_lost_under_a_clock_of_few_digits_is_told(tmp_path):
+    t = np.round(np.delete(K, [1000, *range(5000, 5040)]) / 10_000, 3)
+    with pytest.raises(UserError, match=r"line 1016: 0.102 s is more than the last digit .0.001 s. off an even clock"):
+        even_rows(t, 10_000.0, row)
 
 
 def test_diagnosis_reads_the_same_digits_of_a_bundle_that_others_wrote(tmp_path):
@@ -99,3 +105,14 @@ def test_a_rate_that_is_a_little_off_is_noted():
         "time runs at 1000 rows a second and --rate says 1005: 1005 Hz is taken"
         in even_rows(K / 1000, 1005.0, row).note
     )
+
+
+@pytest.mark.parametrize("unit", ["ns", "us"])
+def test_a_time_that_would_be_days_apart_is_asked_about(tmp_path, unit):
+    per_second = {"ns": 10**9, "us": 10**6}[unit]
+    t = 1_700_000_000 * per_second + K * (per_second // 1000)
+    table = Table(tmp_path / "a.csv", {"t": t, "u": np.sin(K), "x": np.cos(K)}, {})
+    with pytest.raises(UserError, match=r"column 't' .t. has no unit, and its rows would be 1.* s apart; --unit t=ns"):
+        make_bundle(table, Plan(plant="axis"), tmp_path / "b")
+    made = make_bundle(table, Plan.model_validate({"plant": "axis", "columns": {"t": {"unit": unit}}}), tmp_path / "b")
+    assert made.rate == 1000.0

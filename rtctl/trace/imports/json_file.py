@@ -7,7 +7,7 @@ import json
 from array import array
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -17,19 +17,27 @@ from rtctl.trace.imports.messages import Messages
 from rtctl.trace.imports.nested import columns_of
 from rtctl.trace.imports.table import Table, row_number
 
+LONGEST = 1 << 20  # characters of a row; a longer first line is a document
 GROWTH = 10  # bytes of memory for a byte of text, where a whole document is taken in at once
 
 
 def read(path: Path) -> Table:
     """The columns of a file. Raises UserError, OSError, UnicodeDecodeError."""
     with path.open(encoding="utf-8-sig") as file:
-        first = next((line for line in file if line.strip()), "")
-        second = next((line for line in file if line.strip()), "")
+        first, second = _line(file), _line(file)
     if not first:
         raise UserError(f"{path} is empty")
     if _parsed(first) is not None and (second or _is_row(first)):
         return _lines(path)
     return _document(path)
+
+
+def _line(file: IO[str]) -> str:
+    """The next line that is not blank, up to the longest that a row may have."""
+    while line := file.readline(LONGEST):
+        if line.strip():
+            return line
+    return ""
 
 
 def _parsed(text: str) -> Any:
@@ -48,6 +56,7 @@ def _is_row(text: str) -> bool:
 
 
 def _lines(path: Path) -> Table:
+    refuse_large(path, path.stat().st_size, "its lines")
     rows, at, notes = Messages(path, "lines"), array("Q"), []
     with path.open(encoding="utf-8-sig") as file:
         for number, line in enumerate(file, 1):

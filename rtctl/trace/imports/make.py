@@ -27,6 +27,7 @@ OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of
 }
 TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
 COUNTS = "_counts"
+SLOWEST = 100.0  # s from row to row: beyond it a time without unit is asked about
 SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
     ("ns", "us", "\u00b5s", "\u03bcs", "ms", "nm", "um", "\u00b5m", "\u03bcm", "mm", "cm", "km", "deg", "rad", "mrad",
      "rev", "rpm", "Hz", "uV", "mV", "V", "kV", "uA", "mA", "A", "mN", "N", "kN", "mNm", "Nm")
@@ -150,9 +151,17 @@ def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
     """Times (n,) in s."""
     if is_date(table.has(column, "t")):
         return table.times(column, 1.0)
-    if theirs is None:
-        _ask_suffix(table, "t", column, "s", False)
-    return table.times(column, 1.0 if theirs is None else _factor(table, "t", column, theirs, "s", False)[0])
+    if theirs is not None:
+        return table.times(column, _factor(table, "t", column, theirs, "s", False)[0])
+    _ask_suffix(table, "t", column, "s", False)
+    t = table.times(column, 1.0)
+    step = float(np.median(np.abs(np.diff(t)))) if len(t) > 1 else 0.0
+    if step > SLOWEST:
+        raise UserError(
+            f"{table.path}: column '{column}' (t) has no unit, and its rows would be {step:.6g} s apart; --unit t=ns, "
+            "us or ms says what it counts, --unit t=s that it is so"
+        )
+    return t
 
 
 def _ask_suffix(table: Table, name: str, column: str, ours: str, axis: bool) -> None:
