@@ -285,8 +285,11 @@ static void follow_tape(void)
     double F2_lin = c2 * (-x - R2_lin * q2) + k2 * (-dx - R2_lin * v2);
     double F1 = c1 * (x - l1) + k1 * (dx - plant.R1 * v1);
     double F2 = c2 * (-x - l2) + k2 * (-dx - plant.R2 * v2);
-    plant.T1 = -F1;
-    plant.T2 = -F2;
+    double e1 = l1 - R1_lin * q1, e2 = l2 - R2_lin * q2, R_c = p.plant_plant_R_c; /* summed as linear.tension sums */
+    plant.T1 = c1 * (R1_lin * q1 + -R_c * m->qm[CAPSTAN] + e1) + k1 * (R1_lin * v1 + -R_c * m->vm[CAPSTAN]) +
+               (F1_lin - F1 - c1 * e1);
+    plant.T2 = c2 * (R2_lin * q2 + R_c * m->qm[CAPSTAN] + e2) + k2 * (R2_lin * v2 + R_c * m->vm[CAPSTAN]) +
+               (F2_lin - F2 - c2 * e2);
     double tau1 = p.plant_plant_c_m1 * (m->qm[MOTOR1] - q1) + p.plant_plant_k_m1 * (m->vm[MOTOR1] - v1);
     double tau2 = p.plant_plant_c_m2 * (m->qm[MOTOR2] - q2) + p.plant_plant_k_m2 * (m->vm[MOTOR2] - v2);
     m->f[REEL1] += (F1 * plant.R1 + tau1) * (J1_lin / plant.J1) - (F1_lin * R1_lin + tau1);

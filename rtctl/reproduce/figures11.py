@@ -1,5 +1,8 @@
 """Figures of chapter 11, and its parts."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from rtctl.design import mechanics
@@ -101,15 +104,20 @@ def figure_11_6(short: bool) -> Picture:
     return Picture("11.6", sentence, figure)
 
 
+def two_scales(axes: Sequence[Any], wavelength: np.ndarray, size: np.ndarray, label: str) -> None:
+    """A spectrum, sizes (n,) over wavelengths (n,) in m, up to 600 mm and up to 40 mm in two axes."""
+    for one, longest in zip(axes, (600, 40), strict=True):
+        one.plot(1e3 * wavelength, size, ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
+        inside = wavelength <= 1e-3 * longest
+        one.set(xlim=(0, longest), ylim=(0, 1.15 * float(size[inside].max())), ylabel=label)
+    axes[-1].set_xlabel("wavelength [mm]")
+
+
 def figure_11_7(short: bool) -> Picture:
     """Fourier transform of the error on two scales."""
     found, peaks = ch.analysed(ch.SPEEDS[0])
     figure, axes = fig.panels(2)
-    for one, longest in zip(axes, (600, 40), strict=True):
-        one.plot(1e3 * found.wavelength, 1e6 * np.abs(found.E), ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
-        inside = found.wavelength <= 1e-3 * longest
-        one.set(xlim=(0, longest), ylim=(0, 1.15e6 * float(np.abs(found.E[inside]).max())), ylabel="|E| [um]")
-    axes[1].set_xlabel("wavelength [mm]")
+    two_scales(axes, found.wavelength, 1e6 * np.abs(found.E), "|E| [um]")
     size = {mm: 1e6 * float(np.abs(found.E[np.argmin(np.abs(found.wavelength - 1e-3 * mm))])) for mm in (150, 200, 300)}
     bins = ", ".join(f"{1e3 * peak.bin:.2f}" for peak in peaks)
     sentence = (
@@ -127,12 +135,7 @@ def figure_11_8(short: bool) -> Picture:
     figure, axes = fig.panels(3, height=1.6)
     fig.line(axes[0], 1e3 * made.x, made.L, linewidth=0.8)
     axes[0].set(xlabel="position [mm]", ylabel="L*", xlim=(0, 600))
-    for one, longest in zip(axes[1:], (600, 40), strict=True):
-        inside = cross.wavelength <= 1e-3 * longest
-        size = np.abs(cross.Gamma)
-        one.plot(1e3 * cross.wavelength, size, ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
-        one.set(xlim=(0, longest), ylim=(0, 1.15 * float(size[inside].max())), ylabel="|Gamma| [L*]")
-    axes[2].set_xlabel("wavelength [mm]")
+    two_scales(axes[1:], cross.wavelength, np.abs(cross.Gamma), "|Gamma| [L*]")
     sentence = (
         "Luminance of an emulated grey image and its Fourier transform: a peak at "
         f"{ch.by_luminance(short)['11.peak_luminance']:.2f} mm over the slow drift of ink and paper."
@@ -144,11 +147,7 @@ def figure_11_9(short: bool) -> Picture:
     """Cross power spectrum on two scales."""
     _, cross = ch.image()
     figure, axes = fig.panels(2)
-    for one, longest in zip(axes, (600, 40), strict=True):
-        one.plot(1e3 * cross.wavelength, 1e6 * np.abs(cross.S), ".-", color=fig.BLUE, linewidth=0.9, markersize=3)
-        inside = cross.wavelength <= 1e-3 * longest
-        one.set(xlim=(0, longest), ylim=(0, 1.15e6 * float(np.abs(cross.S[inside]).max())), ylabel="|S| [um L*]")
-    axes[1].set_xlabel("wavelength [mm]")
+    two_scales(axes, cross.wavelength, 1e6 * np.abs(cross.S), "|S| [um L*]")
     share = [100 * float(np.abs(cross.S[np.argmin(np.abs(cross.wavelength - mm))]) / np.abs(cross.S).max())
              for mm in (0.15, 0.3)]  # fmt: skip
     sentence = (

@@ -80,7 +80,7 @@ COMMANDS = {
     "new": lambda log, out: ["new", "law", str(out / "my_law.py")],
     "repair": lambda log, out: ["trace", "repair", str(log.parent / "bundle")],
     "export": lambda log, out: ["trace", "export", str(log.parent / "bundle"), "--to", "csv", "-o", str(out / "x.csv")],
-    "info": lambda log, out: ["trace", "metrics", str(log.parent / "bundle")],
+    "metrics": lambda log, out: ["trace", "metrics", str(log.parent / "bundle")],
 }
 
 

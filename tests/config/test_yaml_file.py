@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from rtctl.config import yaml_file
 from rtctl.config.errors import UserError
-from rtctl.config.yaml_file import find, load_yaml, parse
+from rtctl.config.yaml_file import find, load_yaml, parse, told
 
 
 def test_scalars_follow_yaml_1_2():
@@ -82,6 +82,22 @@ def test_finds_files_as_given_with_suffix_and_packaged(tmp_path, monkeypatch):
     assert find("ivu").name == "ivu.yaml"
     assert find("ldu.yaml").is_file()
     assert find("references/steps") == find("steps") == find("steps.yaml")
+
+
+@pytest.mark.parametrize(
+    "path", ["./ivu.yaml", "./ivu", "sub/ivu.yaml", "../ivu.yaml", "{here}/ivu.yaml", "~/ivu.yaml"]
+)
+def test_a_path_with_a_folder_is_that_file_or_none(tmp_path, monkeypatch, path):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=r"no such file; the one that comes with rtctl is called by its bare name, ivu"):
+        find(path.format(here=tmp_path))
+
+
+def test_which_file_a_name_stands_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert told("ivu.yaml").endswith("configs/ivu.yaml, which comes with rtctl")
+    (tmp_path / "ivu.yaml").write_text("machine: ivu")
+    assert told("ivu.yaml") == told("./ivu.yaml") == f"config {tmp_path / 'ivu.yaml'}"
 
 
 @pytest.mark.parametrize(
