@@ -36,6 +36,12 @@ def run(tmp_path, runtime, *words, **environment):
     return process.returncode, data
 
 
+def first(lines):
+    """Index of the line of the summary that names the machine; above it stands which config runs, in as many lines as
+    its path takes."""
+    return next(k for k, line in enumerate(lines) if line.startswith(f"pty{os.getpid()}"))
+
+
 def test_a_panel_that_leaves_a_summary_behind(tmp_path, runtime):
     code, data = run(tmp_path, runtime, "--reference", "steps", NO_COLOR="1")
     assert code == 0
@@ -44,8 +50,11 @@ def test_a_panel_that_leaves_a_summary_behind(tmp_path, runtime):
     screen = pyte.Screen(COLUMNS, ROWS)
     pyte.ByteStream(screen).feed(data)
     lines = [line.rstrip() for line in screen.display]
-    assert lines[0].startswith(f"pty{os.getpid()}  60000 ticks at 500 Hz, fused: 0 missed")
-    assert lines[1].split()[:2] == ["t", "[s]"]
+    summary = first(lines)
+    above = "".join(lines[:summary])
+    assert above.startswith("config /") and above.replace(" ", "").endswith("ivu.yaml,whichcomeswithrtctl")
+    assert lines[summary].startswith(f"pty{os.getpid()}  60000 ticks at 500 Hz, fused: 0 missed")
+    assert lines[summary + 1].split()[:2] == ["t", "[s]"]
     assert any(line.startswith("bundle") for line in lines)
     assert not any("|error|" in line for line in lines)  # and has gone
     assert not screen.cursor.hidden
