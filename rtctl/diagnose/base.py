@@ -52,7 +52,8 @@ def unfolded(problem: Problem, fitted: Fit) -> Fit:
     where that explains no more. No values of theirs make a machine go one way only."""
     space, record = fitted.space, problem.sim.record
     (blind,) = hypotheses(record, fitted.model.base, only=("sensor.rectified",))
-    both = settle(problem, fit(problem, space.add(blind)))
+    starts = (fitted.x, np.zeros(len(space.names)))
+    both = min((settle(problem, fit(problem, space.add(blind), x)) for x in starts), key=lambda f: f.cost)
     return fit(problem, space, both.x[: space.nb], rounds=0) if both.cost < UNFOLDED * fitted.cost else fitted
 
 

@@ -24,6 +24,7 @@ from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.rest import telling
 from rtctl.diagnose.rework import drop
+from rtctl.diagnose.shrink import shrunk
 from rtctl.diagnose.simulate import BEHIND, SLIPS, Simulator
 from rtctl.diagnose.stretches import rms
 from rtctl.diagnose.uncertainty import covariance, parameter_intervals, parameter_unit
@@ -62,10 +63,10 @@ def diagnose_record(record: Record, other: Record | None = None, progress: Progr
         checked = replace(checked, findings=(*checked.findings, solved, *left_out))
         progress("predicting rows that were not fitted")
         known = [of_jitter(found.jitter)] if found.jitter is not None else []
-        shown = predicted(sim, other, found, known)
+        shown = predicted(sim, other, found, known, cannot=checked.cannot_test)
         while shown.refused and len(found.best.space.hypotheses) > 1:  # several that only imitate: one may be there
             found = with_fewer(found)
-            shown = predicted(sim, other, found, known, again=True)
+            shown = predicted(sim, other, found, known, again=True, cannot=checked.cannot_test)
         return _answer(sim, found, shown, checked)._replace(seconds=time.monotonic() - began)
 
 
@@ -227,7 +228,8 @@ def base_of(sim: Simulator) -> tuple[Problem, Fit]:
 def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> Diagnosis:
     """Intervals and all that the report needs."""
     record, problem, base, taken, verdict = sim.record, found.problem, found.base, shown.taken, shown.verdict
-    runs = heldout.free_fit(sim, taken).model
+    sure = shrunk(problem, taken)
+    runs = heldout.free_fit(sim, sure.fitted).model
     return Diagnosis(
         record=record,
         preflight=checked,
@@ -246,9 +248,12 @@ def _answer(sim: Simulator, found: Found, shown: Shown, checked: Preflight) -> D
         cannot_test=tuple(checked.cannot_test),
         hides=smallest(found) if verdict.verdict == NOTHING else {},
         experiment=_experiment(sim, found) if verdict.verdict == AMBIGUOUS else None,
+        left_out=sure.reasons,
         fit_rows=(problem.rows.start or 0, cut_of(record)),
         seconds=0.0,
         on_track=shown.on_track,
+        untestable=shown.untestable,
+        unpredicted=shown.unpredicted,
         random_forces=not decide.quiet(problem, base, taken) and problem.hiss(taken.r),
         faint=problem.white is not None and bool(shown.verdict.effects),
         resembles=resembled(found) if verdict.verdict == UNNAMED else None,

@@ -76,6 +76,9 @@ class Diagnosis(NamedTuple):
     fit_rows: tuple[int, int]  # first and last row fitted
     seconds: float
     on_track: bool = False  # whether the rows that no fit saw were predicted there, since a free run ran away
+    left_out: tuple[str, ...] = ()  # numbers that were found and are not in `after`, and why
+    untestable: tuple[str, ...] = ()  # term:node that fits best and cannot be tested: the reason for `unnamed`
+    unpredicted: bool = False  # nothing was found, and a free run is further off than noise and uncertainty make it
     random_forces: bool = False  # whether what is left is of forces without a pattern, beside the noise of the sensor
     faint: bool = False  # whether what was found is less than random forces do, and shows in errors made white
     resembles: tuple[str, str] | None = None  # term that the table has no name for and its node, where it explains more
@@ -106,6 +109,8 @@ def as_json(d: Diagnosis) -> dict[str, Any]:
         },
         "random_forces": d.random_forces,
         "faint": d.faint,
+        "untestable": list(d.untestable),
+        "unpredicted": d.unpredicted,
         "resembles": None if d.resembles is None else dict(zip(("name", "node"), d.resembles, strict=True)),
         "cannot_test": list(d.cannot_test),
         "hides": {k: {"value": v.value, "unit": v.unit} for k, v in d.hides.items()},

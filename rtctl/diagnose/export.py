@@ -6,6 +6,7 @@ other one, the config is made from its case (see `carry`).
 
 import math
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +39,16 @@ def to_config(model: Model, record: Record, config: dict[str, Any] | None = None
     return _settings_data(model, record, config)[0]
 
 
-def write_model(model: Model, record: Record, path: Path | str, config: dict[str, Any] | None = None) -> Path:
+def write_model(
+    model: Model,
+    record: Record,
+    path: Path | str,
+    config: dict[str, Any] | None = None,
+    left_out: Sequence[str] = (),
+) -> Path:
     """Write the config as YAML, its head saying where it comes from and what it lacks; arguments as `to_config`.
+
+    `left_out` has a sentence on each number that was found and is not in the model, since it does not predict.
 
     Raises UserError where a value is out of its bounds, where the machine cannot be built, or the file not written.
     """
@@ -55,7 +64,7 @@ def write_model(model: Model, record: Record, path: Path | str, config: dict[str
         raise UserError(f"the model cannot be run: {error}") from error
     path = Path(path)
     try:
-        path.write_text(_head(model, record, config is not None, left) + to_yaml(settings), encoding="utf-8")
+        path.write_text(_head(model, record, config is not None, left, left_out) + to_yaml(settings), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None
     return path
@@ -169,7 +178,7 @@ def _checked(data: dict[str, Any], model: type[Settings], where: str = "the mode
         raise UserError(sentences(error, model, data, lambda path: where)) from None
 
 
-def _head(model: Model, record: Record, own: bool, left: list[str]) -> str:
+def _head(model: Model, record: Record, own: bool, left: list[str], left_out: Sequence[str] = ()) -> str:
     """Comment lines on top of the file."""
     seconds = len(record.t) * record.dt
     lines = [
@@ -181,5 +190,7 @@ def _head(model: Model, record: Record, own: bool, left: list[str]) -> str:
         lines.append("All else is from the recording's case.json and, where that is silent, from the shipped config.")
     if left:
         lines += ["Not carried over:", *(f"- {words}" for words in left)]
+    if left_out:
+        lines += ["Found, and left out since it does not predict:", *(f"- {words}" for words in left_out)]
     wrapped = [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
     return "".join(f"# {line}\n" for line in wrapped)

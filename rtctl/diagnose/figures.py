@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from rtctl.diagnose import turn, words
 from rtctl.diagnose.diagnosis import Diagnosis
-from rtctl.diagnose.heldout import mode_of
+from rtctl.diagnose.heldout import mode_of, readings
 from rtctl.diagnose.hints import ORDERS, spectrum
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
 from rtctl.diagnose.missing import BLOCK, Missing, binned, observe
@@ -112,7 +112,7 @@ def heldout_overlay(d: Diagnosis, sim: Simulator) -> Figure:
     models = stages(d)
     worst = 0.0
     for name, model, color in models:
-        out = sim.run(model, mode)[rows, 0]
+        out = readings(sim, model, rows, mode)[rows, 0]
         e = sim.seen[rows] - out
         rms = float(np.sqrt(np.mean(e**2)))
         top.plot(*thin(t, out), color=color, lw=1.0, label=f"{name}", ls="--" if name == "before" else "-")

@@ -75,7 +75,7 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
     faults: list[str] = []
     _fresh(folder, (RESULT, MODEL, EXPERIMENT, TURN, "report.html"))
     try:
-        _put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config))
+        _put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config, d.left_out))
     except UserError as error:
         faults.append(f"{folder / MODEL} is not written: {error}")
     if d.experiment is not None:

@@ -8,7 +8,8 @@ Source: Janot, Gautier & Brunot (2019) and Champneys, Beintema, Toth, Schoukens 
 the recorded command as the measure of a model; Ljung, System Identification (1999), 3.3, for long predictions.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from rtctl.diagnose.measure import begin, free_run
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.problem import EDGE, Problem
 from rtctl.diagnose.record import Record
+from rtctl.diagnose.release import band, let_go
 from rtctl.diagnose.rework import enrich
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.stretches import rms
@@ -40,8 +42,8 @@ def mode_of(record: Record) -> int:
 
 def nrmse(sim: Simulator, model: Model, rows: slice, edges: Sequence[Edges] = (), mode: int | None = None) -> float:
     """Error of the free run over `rows`, or of a run in `mode`, by the spread of the whole recording; rms over the main
-    sensor and the reels whose edges are known."""
-    out = sim.run(model, mode_of(sim.record) if mode is None else mode, directed=bool(edges))
+    sensor and the reels whose edges are known. In open loop the run begins at the state that the record shows there."""
+    out = readings(sim, model, rows, mode_of(sim.record) if mode is None else mode, bool(edges))
     if not np.isfinite(out).all():
         return 1e3
     n = len(out)
@@ -54,11 +56,24 @@ def nrmse(sim: Simulator, model: Model, rows: slice, edges: Sequence[Edges] = ()
     return min(rms(np.array(shares)), 1e3)
 
 
+def readings(sim: Simulator, model: Model, rows: slice, mode: int, directed: bool = False) -> np.ndarray:
+    """Readings (n, sensors) of a run in `mode` that predicts `rows`; in open loop the model is on track before them."""
+    if mode == OPEN:
+        return let_go(sim, model, rows.start or 0).run(model, TRACK, directed=directed)
+    return sim.run(model, mode, directed=directed)
+
+
 def floor(problem: Problem) -> float:
     """The same of noise alone."""
     shares = [problem.main_floor * float(problem.sigma[0]) / spread(problem.sim.seen)]
     shares += [EDGE * rms(reel.sigma) / spread(reel.at) for reel in problem.edges]
     return rms(np.array(shares))
+
+
+def uncertain(problem: Problem, fitted: Fit, rows: slice, forces: bool) -> float:
+    """The same that a free run in open loop has by noise, by the uncertainty of the model and of its first state, and
+    with `forces` by random forces."""
+    return band(problem, fitted, rows, forces) / spread(problem.sim.seen)
 
 
 def spread(y: np.ndarray) -> float:
@@ -77,6 +92,40 @@ def closed_on_track(problem: Problem, before: Fit, after: Fit, unseen: np.ndarra
     if gap < NO_GAP * rms(new[~unseen]) ** 2:
         return float("nan")
     return (rms(old[unseen]) ** 2 - rms(new[unseen]) ** 2) / gap
+
+
+def repeated(problem: Problem, before: Fit, after: Fit) -> float:
+    """Share of the gain of `after` over `before` on fitted errors that rows which no fit saw show as well, under the
+    tracking observer, quarter by quarter. 0 without a gain."""
+    gained = float(before.r @ before.r - after.r @ after.r)
+    if gained <= 0.0:
+        return 0.0
+    predicted = 0.0
+    for rows, *models in without_quarters(problem, before, after):
+        unseen = (problem.time_rows >= rows.start) & (problem.time_rows < rows.stop)
+        old, new = (problem.residual(model)[unseen] for model in models)
+        predicted += float(old @ old - new @ new)
+    return predicted / gained
+
+
+def runs_better(problem: Problem, before: Fit, after: Fit) -> int:
+    """Number of quarters that a free run of `after` from the recorded state predicts better than one of `before`, each
+    fitted to the other quarters."""
+    count = 0
+    for rows, *models in without_quarters(problem, before, after):
+        old, new = (nrmse(problem.sim, model, rows, problem.edges, OPEN) for model in models)
+        count += new < old
+    return count
+
+
+def without_quarters(problem: Problem, *fits: Fit) -> Iterator[tuple[Any, ...]]:
+    """Rows of each quarter of the record, and the models of `fits` fitted to the other three."""
+    length = len(problem.sim.seen) // QUARTERS
+    for quarter in range(QUARTERS):
+        rows = slice(quarter * length, (quarter + 1) * length)
+        seen = (problem.time_rows < rows.start) | (problem.time_rows >= rows.stop)
+        rest = problem.weighed(seen.astype(float))
+        yield rows, *(fit(rest, f.space, f.x, rounds=5).model for f in fits)
 
 
 def elsewhere(sim: Simulator, rows: np.ndarray) -> float:

@@ -15,6 +15,7 @@ from rtctl.diagnose.model import Model, dry_with_terms
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis
+from rtctl.diagnose.tacho import counts_up
 from rtctl.diagnose.yardstick import Measures
 from rtctl.idiom import Settings
 from rtctl.own.term import sizes
@@ -201,7 +202,8 @@ def hypotheses(
     model = Model(record.plant, base, tuple(beside))
     scales = node_scales(record, base)
     measures = Measures(record, base, scales, hints or {})
-    alone = set(ALONE) - ({"sensor.rectified"} if record.shows_speed else set())  # which never falls below zero
+    blind = record.shows_speed or counts_up(record)  # what a sensor without direction makes of any motion
+    alone = set(ALONE) - ({"sensor.rectified"} if blind else set())
     out = []
     for name, term in TERMS.items():
         if (

@@ -107,6 +107,7 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
 
     jobs.mode 0 applies the recorded `volts` (n, drives); 1 adds a correction that makes the first sensor follow `seen`
     (n,) and leaves it in `push` (n,); 2 closes the loop by the law and leaves what it writes in `written` (n, drives).
+    In mode 1 the correction ends at row jobs.release, where jobs.jolt is added to position and speed of all bodies.
     """
     job, p, s, t, the_law, law_state = jobs[0], ps[0], ss[0], ts[0], laws[0], law_states[0]
     {kind}.start(p, s)
@@ -119,10 +120,15 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
             look(job, p, s, t)
             for c in range(m.y.shape[0]):
                 job.zero[c] = job.y[c] * (job.speed == 0)
+        if k <= job.release < k + stride:
+            for i in range({kind}.NQ):
+                m.x[i] += job.jolt[0] * job.rigid[i]
+                m.x[{kind}.NQ + i] += job.jolt[1] * job.rigid[i]
+                m.v_before[i] += job.jolt[1] * job.rigid[i]
         look(job, p, s, t)
         at = min(k, n - 1)
         job.correction = 0.0
-        if k < 0 or job.mode == 1:  # at first it is held where it will start
+        if k < 0 or (job.mode == 1 and k < job.release):  # at first it is held where it will start
             e = ((seen[at] if k >= 0 else 0.0) - (job.y[0] - job.zero[0])) / job.per_unit[0]
             if k < stride - lead or k == 0:
                 job.e = e
@@ -202,6 +208,9 @@ def job_dtype(ny: int, nu: int, nq: int) -> np.dtype:
         a=float,
         share=(float, nu),  # of the correction that goes to each drive
         push=(float, nq),  # and what it pushes with at each node instead
+        release=int,  # row at which the correction ends and the free run begins
+        jolt=(float, 2),  # rad (or m) and rad/s (or m/s) of the main sensor's body, added there
+        rigid=(float, nq),  # motion of each body for one of the main sensor's, all springs taken as stiff
         correction=float,
         e=float,
         d=float,

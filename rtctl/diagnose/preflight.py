@@ -18,7 +18,7 @@ from rtctl.diagnose.case import NoLaw, believed
 from rtctl.diagnose.columns import unwrap
 from rtctl.diagnose.record import Record, law_agreement
 from rtctl.diagnose.simulate import way
-from rtctl.diagnose.tacho import unsigned
+from rtctl.diagnose.tacho import counts_up, unsigned
 from rtctl.plants.physics import TERMS
 
 LOOK = 0.02  # s over which a speed is a difference
@@ -303,9 +303,11 @@ def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str,
             cannot.append(f"{name}:{node}")
     if shaft.turns and m.turns < 1.0:
         findings.append(f"{shaft.name} turns {m.turns:.2f} of a turn only; what repeats each turn is hard to see.")
-    if unsigned(record):
-        findings.append("The speed never goes below zero although the command pushes both ways.")
-    one_way = min(m.forward, m.backward) < SOME and not unsigned(record)
+    blind = unsigned(record) or counts_up(record)
+    if blind:
+        what = "speed" if record.shows_speed else "rate of the position"
+        findings.append(f"The {what} never goes below zero although the command pushes both ways.")
+    one_way = min(m.forward, m.backward) < SOME and not blind
     mechanical = [node for node in shaft.nodes if node not in ("encoder", "sensor")]
     commands = record.u[:, 0 if shaft.name != "reel2" else 1]
     pushed_both_ways = min(np.mean(commands > 0), np.mean(commands < 0)) >= SOME

@@ -26,6 +26,7 @@ from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import ordered
 from rtctl.plants.physics.place import PLANTS
 
+NEVER = np.iinfo(np.int64).max  # row
 FASTEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
 MODES = {"open": OPEN, "track": TRACK, "closed": CLOSED}
 SUBSTEP = {"ivu": 1e-3, "ldu": 100e-6, "axis": 0.25e-3}  # s, at most: the linear part is exact at any
@@ -67,6 +68,20 @@ class Simulator:
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
         self.w = np.array(record.w, float)  # of a file it cannot be written to, which would be compiled for anew
         self.law = law_params(record)
+        self.release = NEVER  # row at which the correction ends
+        self.jolt = np.zeros(2)  # position and speed of the main sensor's body that are added there
+
+    def released(self, row: int, jolt: np.ndarray | None = None) -> "Simulator":
+        """The same whose tracking correction ends at `row`: a free run from there, from all states that the observer
+        has reached.
+
+        `jolt` (2,) is added to position (rad or m) and speed of the main sensor's body at that row, the others moving
+        as on stiff springs.
+        """
+        other = copy(self)
+        other.release = row
+        other.jolt = np.zeros(2) if jolt is None else np.asarray(jolt, float)
+        return other
 
     def finer(self, times: int) -> "Simulator":
         """The same with steps that are so many `times` shorter."""
@@ -138,6 +153,8 @@ class Simulator:
         for slot, settings in zip(slots[0]["q"], ordered(list(model.terms)), strict=False):
             kernel.fill_slot(k, slot, settings, params)
         job = self._job(params, mode, self.follow if follow is None else follow, substeps, stride)
+        for node, number in PLANTS[self.record.plant].NODES.items():
+            job["rigid"][0, number] = gear(self.record.plant, model.base, node)
         if directed:
             job["rectified"] = 0
         past = slips or self.behind  # through the contact no drive could correct
@@ -165,6 +182,7 @@ class Simulator:
         j = job[0]
         j["mode"], j["substeps"], j["rate"], j["half"] = mode, substeps, 1.0 / (stride * self.record.dt), self.half
         j["stride"] = stride
+        j["release"], j["jolt"] = self.release, self.jolt
         late = case.delay_samples * self.record.dt
         if plant == "axis":  # its plant has no driver: what that holds back is a delay
             late += case.drive.late

@@ -24,6 +24,9 @@ TUNE = 4.685  # of Tukey's weights: 95 % efficient where all is normal
 NORMAL = 1.4826  # standard deviation by the median of sizes
 FEWEST = 5 * ORDER  # rows
 BACK = 0.05  # share of the highest speed, and of the time
+LOOK = 0.01  # s over which a rate is a difference
+SHARP = 0.6  # between 1/3 of a V and 1 of a parabola
+TOUCHES = 2  # of zero, fewer of which prove nothing
 LAGS, LONGEST = 25, 0.2  # lags tried, in ticks, up to that share of the record
 
 
@@ -51,8 +54,37 @@ def folded(speed: np.ndarray, u: np.ndarray) -> bool:
 
 
 def unsigned(record: "Record") -> bool:
-    """Whether a recording shows a speed without its sign."""
+    """Whether a recording of an axis shows a speed without its sign."""
     return record.shows_speed and folded(record.y["speed"], record.u[:, 0])
+
+
+def counts_up(record: "Record") -> bool:
+    """Whether a recording of an axis shows a position that adds up the way in either direction: its rate never goes
+    below zero although the command pushes both ways, and comes to zero with a kink, as the size of a speed does."""
+    if record.plant != "axis" or record.shows_speed:
+        return False
+    x = next(iter(record.y.values()))
+    look = max(1, min(round(LOOK / record.dt), len(x) // FEWEST))
+    rate = (x[look:] - x[:-look]) / (look * record.dt)
+    rate = rate if abs(rate.max()) >= abs(rate.min()) else -rate
+    return folded(rate, record.u[look:, 0]) and kinks(rate)
+
+
+def kinks(rate: np.ndarray) -> bool:
+    """Whether most of the touches of zero of a rate (n,) are V-shaped.
+
+    From four levels down to one and up again a V takes three times the time that it spends below that level; a parabola
+    takes as long for both, and a machine that stands still less.
+    """
+    level = BACK * float(rate.max())
+    sharp = []
+    far = np.flatnonzero(rate > 4.0 * level)
+    for k in np.flatnonzero(np.diff(far) > 1):
+        low = np.flatnonzero(rate[far[k] : far[k + 1]] < level)
+        if len(low):
+            dwell = low[-1] - low[0] + 1
+            sharp.append(dwell < SHARP * (far[k + 1] - far[k] - dwell))
+    return len(sharp) >= TOUCHES and float(np.mean(sharp)) > 0.5
 
 
 def signed(speed: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ A name stands when the model with it explains what there was to explain and no o
 place, where errors of neighbouring ticks that go together count as one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +29,7 @@ CLOSED, CLOSED_BY_SEVERAL = 0.6, 0.87  # of the gap to the noise, that one named
 LEANS = 0.6  # confidence in a name that is not sure, above which it has to predict as a sure one does
 RIGHT = (0.98, 0.95, 0.88)  # confidence in one, two, three names of a model that is right to the noise
 EVEN, BY_SIZE = 0.1, 0.8  # chance of a rival that does as well; confidence where usual sizes tell: 9 of 12 were right
+HALF = 0.5  # confidence in what a record cannot test, at most
 KNOWN = 0.95  # confidence in what nothing else gives the sign of
 MOST = 3  # names in an answer
 BESIDE = 2  # rivals told besides
@@ -57,8 +58,16 @@ class Verdict(NamedTuple):
     explained: float  # share of the excess over the noise
 
 
-def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alternative]], block: int) -> Verdict:
-    """The verdict on `best`; `rivals` holds for each of its hypotheses the fits with another one in its place."""
+def judged(
+    problem: Problem,
+    base: Fit,
+    best: Fit,
+    rivals: Sequence[Sequence[Alternative]],
+    block: int,
+    cannot: Collection[str] = (),
+) -> Verdict:
+    """The verdict on `best`; `rivals` holds for each of its hypotheses the fits with another one in its place, `cannot`
+    what the record cannot test, as "term:node": such a name is in doubt as soon as a rival does as well."""
     loud = decide.loud(problem, base)
     if not best.space.hypotheses:
         return Verdict(UNNAMED if loud else NOTHING, (), 0.0)
@@ -79,10 +88,12 @@ def judged(problem: Problem, base: Fit, best: Fit, rivals: Sequence[Sequence[Alt
         names = shared(problem, places)
         term = places[0].hypothesis.term
         own.append(_effect(places[0], names[term] * trust, best, rivals[index], block))
-        if names[term] < SURE:
+        untested = places[0].hypothesis.name in cannot
+        equal = {r.name for r in own[-1].look_alikes if untested and r.p_value > EVEN}
+        if names[term] < SURE or equal:
             doubt = True
             for name, weight in sorted(names.items(), key=lambda item: -item[1]):
-                if name != term and weight > POSSIBLE:
+                if name != term and (weight > POSSIBLE or name in equal):
                     place = next(p for p in places if p.hypothesis.term == name)
                     rival = _effect(place, weight * trust, best, (), block)
                     others.append(rival._replace(instead_of=places[0].hypothesis.name))
@@ -108,18 +119,40 @@ def by_weight(problem: Problem, best: Fit) -> list[int]:
 
 def proven(verdict: Verdict, closed: float, several: bool, otherwise: str = UNNAMED) -> Verdict:
     """The verdict once its model has predicted rows that it was not fitted on, and `closed` this share of the gap to
-    the noise that the model without its names leaves there; nan where hardly anything was to be gained. `otherwise` is
-    the verdict where the names are not borne out.
+    the noise that the model without its names leaves there. `otherwise` is the verdict where the names are not borne
+    out; a share that is not a number bears out none.
 
     Terms that only imitate what is missing fit the rows that they have seen and predict the others badly, `several` of
     them together most of all.
     """
-    if not (verdict.verdict == NAMED or leans(verdict)) or not np.isfinite(closed):
+    if not (verdict.verdict == NAMED or leans(verdict)):
         return verdict
-    if closed < (CLOSED_BY_SEVERAL if several else CLOSED):
+    if not closed >= (CLOSED_BY_SEVERAL if several else CLOSED):
         return Verdict(otherwise, (), verdict.explained)
     sure = 0.5 + 0.5 * min(closed, 1.0)
     return verdict._replace(effects=tuple(e._replace(confidence=min(e.confidence, sure)) for e in verdict.effects))
+
+
+def only_testable(verdict: Verdict, cannot: Collection[str]) -> Verdict:
+    """The verdict without a name that the record cannot test, as "term:node" in `cannot`: the one place that every
+    verdict of a diagnosis passes last.
+
+    An effect that cannot be tested may stand as one of several in an `ambiguous` verdict, where a rival could stand in
+    its place; without one something is there, and it has no name.
+    """
+    untested = {label(e) for e in verdict.effects if e.instead_of is None and label(e) in cannot}
+    rivalled = {e.instead_of for e in verdict.effects}
+    if not untested:
+        return verdict
+    if verdict.verdict != AMBIGUOUS or not untested <= rivalled:
+        return Verdict(UNNAMED, (), verdict.explained)
+    effects = (e._replace(confidence=min(e.confidence, HALF)) if label(e) in cannot else e for e in verdict.effects)
+    return verdict._replace(effects=tuple(effects))
+
+
+def label(effect: Effect) -> str:
+    """As in `cannot_test`: term:node."""
+    return f"{effect.name}:{effect.node}"
 
 
 def leans(verdict: Verdict) -> bool:

@@ -209,6 +209,12 @@ def sentence(entry: str, *more: str) -> str:
     return f"This record cannot show {PHRASES[name].noun}{at}: that takes {PHRASES[name].need}."
 
 
+def need(entry: str) -> str:
+    """What a record would have to hold to test "name:node"."""
+    name = entry.partition(":")[0]
+    return PHRASES[name].need if name in PHRASES else "a richer motion"
+
+
 def main_unit(d: Diagnosis) -> str:
     """Unit of the main channel: counts, or that of x."""
     channel = next(iter(d.record.y))
@@ -303,6 +309,19 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
     left, noise = heldout_error(d, d.heldout_after), heldout_error(d, d.noise_floor)
     one, two = both(left, noise, unit)
     amount = f"the error on the part that was not fitted is {one} where noise leaves {two}"
+    if d.untestable:
+        what = _join([at(entry) for entry in d.untestable], "and")
+        needs = _join(list(dict.fromkeys(need(entry) for entry in d.untestable)), "and")
+        return (
+            f"Something is missing, and what fits best, {what}, cannot be tested by this record, so it has no name.",
+            f"{_capital(amount)}. Record this next: {needs}.",
+        )
+    if d.unpredicted:
+        return (
+            "The model does not predict: run freely from the recorded state it leaves the record by more than noise "
+            "and the uncertainty of its parameters make it, and no known effect explains why.",
+            f"{_capital(amount)}.",
+        )
     if d.resembles is not None:
         name, node = d.resembles
         return (
@@ -311,12 +330,12 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
         )
     if d.located is None:
         return "Something is missing that no known effect explains.", f"It has no clear place: {amount}."
-    at = node_words(d.located.node)
+    place = node_words(d.located.node)
     since = f", from {nice(d.located.since_s, 's', 3)} on" if d.located.since_s > 0 else ""
     kind = f"{goes(d.located)}{since}"
     share = f"{percent(d.located.share)} of the error lies there"
     return (
-        f"Something is missing at {at} that no known effect explains: {kind}.",
+        f"Something is missing at {place} that no known effect explains: {kind}.",
         f"{_capital(channel_words(d.located.channel))} shows it, {share}; {amount}.",
     )
 

@@ -187,9 +187,9 @@ def test_our_own_fault_is_told_as_ours(tmp_path, monkeypatch):
 def plain(monkeypatch):
     """A diagnosis of which only the writing counts."""
     monkeypatch.setattr(diagnosis, "as_json", lambda d: {"verdict": "nothing", "bad": float("nan"), "n": np.float64(2)})
-    monkeypatch.setattr(export, "write_model", lambda after, record, path, config: path.write_text(f"{config}"))
+    monkeypatch.setattr(export, "write_model", lambda after, record, path, config, left: path.write_text(f"{config}"))
     monkeypatch.setattr(report, "html", lambda d: "<p>")
-    return SimpleNamespace(after=None, record=SimpleNamespace(plant="ivu"), experiment=None)
+    return SimpleNamespace(after=None, left_out=(), record=SimpleNamespace(plant="ivu"), experiment=None)
 
 
 def test_all_files_and_nothing_else(tmp_path, plain):

@@ -1,5 +1,7 @@
 """Recordings that show a speed: its noise, its reading in the simulation, and a sensor that does not know direction."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ from rtctl.diagnose.preflight import preflight
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator, resolution, way
-from rtctl.diagnose.tacho import folded, noise, signed
+from rtctl.diagnose.tacho import counts_up, folded, noise, signed
 from rtctl.plants.physics import TERMS
 
 RATE, ROWS, NOISE = 50.0, 500, 0.01
@@ -160,3 +162,20 @@ def test_it_is_named(terms, monkeypatch):
         f = next(e.parameters["f_Hz"] for e in told.effects if "f_Hz" in e.parameters)
         assert f.value == pytest.approx(1.7, rel=0.03)
         assert told.heldout_after < 3.0 * told.noise_floor < 0.5 * told.heldout_before
+
+
+def counted(rate, command):
+    """A position that shows the sum of `rate` under a command."""
+    return SimpleNamespace(
+        plant="axis", shows_speed=False, dt=1e-3, y={"x": np.cumsum(rate) * 1e-3}, u=command[:, None]
+    )
+
+
+def test_a_position_that_adds_up_either_direction_is_told_from_one_that_stops_or_turns():
+    phase = 3e-3 * np.arange(8000)
+    v, u = np.sin(phase), np.cos(phase)
+    assert counts_up(counted(np.abs(v), u))
+    assert not counts_up(counted(v, u))
+    assert not counts_up(counted(1.0 - u, v))  # comes to rest and goes on, without a kink
+    assert not counts_up(counted(np.maximum(v, 0.0), u))  # held where it is pushed back
+    assert not counts_up(counted(np.abs(v), u + 3.0))  # pushed one way only

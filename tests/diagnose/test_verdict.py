@@ -17,6 +17,7 @@ from rtctl.diagnose.verdict import (
     confidence,
     listed,
     of_jitter,
+    only_testable,
     patched,
     proven,
     shared,
@@ -110,7 +111,7 @@ def test_a_name_must_predict_and_several_must_predict_better(several, closed, ex
     told = proven(named, closed, several)
     assert told.verdict == expected
     assert all(0.88 < e.confidence < 0.96 for e in told.effects)
-    assert proven(named, float("nan"), several) is named  # where there was nothing to predict
+    assert proven(named, float("nan"), several).verdict == UNNAMED  # what no held-out row bears out has no name
 
 
 def test_usual_sizes_alone_make_no_name_sure():
@@ -126,9 +127,23 @@ def test_where_the_model_without_it_is_right_to_the_noise_a_name_that_does_not_p
 
 
 @pytest.mark.parametrize(("sure", "closed", "expected"), [
-    (0.8, 0.9, AMBIGUOUS), (0.8, 0.2, NOTHING), (0.5, 0.2, AMBIGUOUS), (0.8, float("nan"), AMBIGUOUS),
+    (0.8, 0.9, AMBIGUOUS), (0.8, 0.2, NOTHING), (0.5, 0.2, AMBIGUOUS), (0.8, float("nan"), NOTHING),
 ])  # fmt: skip
 def test_a_name_that_is_likelier_by_far_must_predict_too(sure, closed, expected):
     rival = Effect("friction.asymmetry", "carriage", 0.1, {}, (), "drive.offset:drive")
     doubt = Verdict(AMBIGUOUS, (Effect("drive.offset", "drive", sure, {}, ()), rival), 1.0)
     assert proven(doubt, closed, False, NOTHING).verdict == expected
+
+
+def test_what_the_record_cannot_test_is_never_named():
+    cannot = {"drive.gain_asymmetry:drive"}
+    tilt = Effect("drive.gain_asymmetry", "drive", 0.98, {}, ())
+    rival = Effect("friction.viscous", "carriage", 0.1, {}, (), instead_of="drive.gain_asymmetry:drive")
+    other = Effect("friction.coulomb", "carriage", 0.9, {}, ())
+    assert only_testable(Verdict(NAMED, (tilt,), 0.9), cannot) == Verdict(UNNAMED, (), 0.9)
+    assert only_testable(Verdict(NAMED, (other, tilt), 0.9), cannot).verdict == UNNAMED
+    assert only_testable(Verdict(AMBIGUOUS, (tilt,), 0.9), cannot).verdict == UNNAMED
+    told = only_testable(Verdict(AMBIGUOUS, (other, tilt, rival), 0.9), cannot)
+    assert told.verdict == AMBIGUOUS and [e.confidence for e in told.effects] == [0.9, 0.5, 0.1]
+    for verdict in (Verdict(NAMED, (other,), 0.9), Verdict(AMBIGUOUS, (other, tilt._replace(instead_of="x:y")), 0.9)):
+        assert only_testable(verdict, cannot) is verdict
