@@ -10,7 +10,8 @@ enum { MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 };
 /* Named as in rtctl: block_field, plant_block_field; whoever calls fills them in by name. */
 #define REALS(X) \
     X(capstan_radians_per_count) X(input1_volts_per_code) X(input2_volts_per_code) X(reel1_low) X(reel1_high) \
-    X(reel2_low) X(reel2_high) X(machine_R1) X(machine_R2) X(machine_grow) X(machine_trail_speed) \
+    X(reel2_low) X(reel2_high) X(machine_R1) X(machine_R2) X(machine_grow) X(machine_core) \
+    X(machine_trail_speed) \
     X(machine_hand_over) X(machine_R_c) X(machine_fast) X(reel1_radians_per_count) X(reel2_radians_per_count) X(velocity_a) X(velocity_dt) X(reference_speed_a) X(reference_speed_dt) \
     X(tension_estimate_torque_per_volt) X(tension_estimate_J) X(tension_estimate_tau_F) X(tension_estimate_R_c) \
     X(tension_estimate_v_min) X(tension_estimate_a) X(shaper_a) X(shaper_w) X(position_gain) X(position_tau_d) X(position_a) \
@@ -44,8 +45,8 @@ const char wholes[] = WHOLES(NAME);
 
 struct row {
     int64_t tick;
-    double t, period, lateness, state, trip, link_age, order, target, ref, w, u1, u2, capstan_counts, reel1_counts,
-        reel2_counts, capstan, capstan_error, capstan_speed, u_c, R1, R2, gain_factor, tension1_estimate,
+    double t, period, lateness, state, trip, link_age, order, watchdog, target, ref, w, u1, u2, capstan_counts,
+        reel1_counts, reel2_counts, capstan, capstan_error, capstan_speed, u_c, R1, R2, gain_factor, tension1_estimate,
         tension2_estimate, truth_tension1, truth_tension2, truth_capstan, truth_motor1, truth_motor2, truth_R1,
         truth_R2;
 };
@@ -127,6 +128,12 @@ static void switch_on(double phi)
     loop.phi_0 = phi;
 }
 
+static double grown(double R_0, double area)
+{
+    double least = lower(p.machine_core, R_0);
+    return sqrt(higher(R_0 * R_0 + area, least * least));
+}
+
 static double tape_apart(double phi, double speed, int64_t n1, int64_t n2, double R1, double R2)
 {
     double tape = fabs(phi - loop.phi_1) * p.machine_R_c;
@@ -141,7 +148,7 @@ static double tape_apart(double phi, double speed, int64_t n1, int64_t n2, doubl
     }
     double apart1 = (n1 - loop.n1) * p.reel1_radians_per_count * R1 - tape;
     double apart2 = (n2 - loop.n2) * p.reel2_radians_per_count * R2 - tape;
-    return higher(fabs(apart1), fabs(apart2));
+    return apart1 + apart2;
 }
 
 static void tick(int64_t k)
@@ -170,8 +177,8 @@ static void tick(int64_t k)
 
     /* estimates */
     double moved = p.machine_grow * (y->capstan - loop.phi_0);
-    y->R1 = sqrt(higher(loop.R1_0 * loop.R1_0 + moved, 1e-6));
-    y->R2 = sqrt(higher(loop.R2_0 * loop.R2_0 - moved, 1e-6));
+    y->R1 = grown(loop.R1_0, moved);
+    y->R2 = grown(loop.R2_0, -moved);
     y->capstan_speed = differentiate(p.velocity_a, p.velocity_dt, &loop.speed, y->capstan);
     double a = differentiate(p.velocity_a, p.velocity_dt, &loop.acceleration, y->capstan_speed);
     double moving = clamp(y->capstan_speed / p.tension_estimate_v_min, -1.0, 1.0);
@@ -247,6 +254,7 @@ static void tick(int64_t k)
     y->trip = safety->trip;
     y->link_age = safety->silent;
     y->order = command.order;
+    y->watchdog = 0;
     y->truth_tension1 = in.truth[0];
     y->truth_tension2 = in.truth[1];
     y->truth_capstan = in.truth[2];

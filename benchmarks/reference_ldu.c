@@ -31,7 +31,7 @@ const char wholes[] = WHOLES(NAME);
 
 struct row {
     int64_t tick;
-    double t, period, lateness, state, trip, link_age, order, target, ref, w, u, encoder_counts, scale_counts, position,
+    double t, period, lateness, state, trip, link_age, order, watchdog, target, ref, w, u, encoder_counts, scale_counts, position,
         scale, position_error, speed, u_c, truth_x, truth_speed, truth_current;
 };
 
@@ -154,6 +154,7 @@ static void tick(int64_t k)
     y->trip = safety->trip;
     y->link_age = safety->silent;
     y->order = command.order;
+    y->watchdog = 0;
     y->truth_x = in.truth[0];
     y->truth_speed = in.truth[1];
     y->truth_current = in.truth[2];

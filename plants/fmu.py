@@ -9,11 +9,10 @@ converted; board, converters and encoders stay emulated. It runs in lockstep, on
 Source: FMI 2.0.4 and 3.0.1 (fmi-standard.org); FMPy loads and calls it.
 """
 
-import contextlib
 import math
 import re
 import shutil
-import zipfile
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +22,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from rtctl.config.errors import UserError, nearest
 from rtctl.config.units import convert
 from rtctl.idiom import Settings
+from rtctl.plants.fmu_file import describe, instance, major, unpack
 
 REALS = ("Real", "Float64")
 
@@ -68,15 +68,13 @@ class Fmu:
         self.readings = self._read()
 
     def _start(self) -> None:
-        import fmpy
         from fmpy.fmi1 import FMICallException
-        from fmpy.simulation import instantiate_fmu
 
+        self._folder = Path(tempfile.mkdtemp())
+        unpack(self.settings.file, self._folder)
         try:
-            self._folder = Path(fmpy.extract(self.settings.file))
-            with contextlib.chdir(Path.cwd()):  # FMPy changes into the folder, and stays there where a library fails
-                self._fmu = instantiate_fmu(str(self._folder), self._model, "CoSimulation")
-            self._second = self._model.fmiVersion.startswith("2")
+            self._fmu = instance(self._folder, self._model)
+            self._second = major(self._model) == 2
             self._write_reals = self._fmu.setReal if self._second else self._fmu.setFloat64
             self._read_reals = self._fmu.getReal if self._second else self._fmu.getFloat64
             if self._set:
@@ -87,6 +85,8 @@ class Fmu:
             self._fmu.exitInitializationMode()
         except FMICallException as error:
             raise UserError(f"{self._where}: it does not start ({error}); see its parameters") from error
+        except UserError as error:
+            raise UserError(f"{self._where}: {error}") from error
         except Exception as error:  # FMPy raises plain exceptions where a library does not load
             raise UserError(f"{self._where}: it cannot be loaded: {error}") from error
 
@@ -143,7 +143,7 @@ class Plan(NamedTuple):
 
 def plan(settings: FmuSettings, drives: Sequence[Any], sensors: Sequence[Any], dt: float) -> Plan:
     """Check an FMU against a machine without loading its library. Raises UserError where they do not fit."""
-    model = describe(settings)
+    model = describe(settings.file)
     _check_step(settings, model, dt * settings.ticks)
     variables = {v.name: v for v in model.modelVariables}
     for name in settings.units:
@@ -157,34 +157,6 @@ def plan(settings: FmuSettings, drives: Sequence[Any], sensors: Sequence[Any], d
             for name, value in settings.parameters.items()
         ],
     )
-
-
-def describe(settings: FmuSettings) -> Any:
-    """Model description of the file, by FMPy. Raises UserError where it is no co-simulation FMU for this platform."""
-    try:
-        import fmpy
-    except ImportError as error:
-        raise UserError("plant.fmu: FMPy is not installed here; `pip install 'rtctl[fmu]'`") from error
-    where = f"plant.fmu.file: {settings.file}"
-    if not Path(settings.file).is_file():
-        raise UserError(f"{where}: there is no such file in {Path.cwd()}; give its path")
-    try:
-        model = fmpy.read_model_description(settings.file)
-        platforms = fmpy.supported_platforms(settings.file)
-    except (zipfile.BadZipFile, KeyError) as error:
-        raise UserError(f"{where}: it is no FMU: a zip with a modelDescription.xml ({error})") from error
-    except Exception as error:  # FMPy raises plain exceptions for what its validation finds
-        why = " ".join(str(error).split())
-        raise UserError(f"{where}: its modelDescription.xml is not valid: {why}") from error
-    if model.fmiVersion.startswith("1"):
-        raise UserError(f"{where}: it is of FMI {model.fmiVersion}; 2.0 and 3.0 are taken")
-    if model.coSimulation is None:
-        raise UserError(f"{where}: it is for model exchange only; export it for co-simulation")
-    ours = {fmpy.platform, fmpy.platform_tuple}
-    if not ours & set(platforms):
-        raise UserError(f"{where}: it has no library for {fmpy.platform}, only {', '.join(platforms) or 'none'}; "
-                        "export it for this platform")  # fmt: skip
-    return model
 
 
 def _check_step(settings: FmuSettings, model: Any, h: float) -> None:

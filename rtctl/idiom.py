@@ -102,15 +102,27 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False, allow_inf_nan=False)
 
 
-def quantity(default: Any = ..., *, unit: str, help: str, **bounds: Any) -> Any:
+def quantity(
+    default: Any = ..., *, unit: str, help: str, safer: str = "", off: float | None = None, absent: str = "",
+    **bounds: Any,
+) -> Any:  # fmt: skip
     """A setting with its unit and one line of help, both shown by `rtctl schema`.
 
-    A number is taken as SI; a string may carry any unit of the same dimension ("160 ms", "2.4 mNm").
+    A number is taken as SI; a string may carry any unit of the same dimension ("160 ms", "2.4 mNm"). `safer`, "smaller"
+    or "larger", keeps a running machine from the other direction (rtctl/config/bounds.py); `off` is the value that
+    switches the limit off, `absent` the setting whose negative is meant where this one is None.
     """
-    field = Field(default, description=help, json_schema_extra={"unit": unit}, **bounds)
+    words: dict[str, Any] = {"unit": unit, **guard(safer, off)} if safer else {"unit": unit}
+    words |= {"absent": absent} if absent else {}
+    field = Field(default, description=help, json_schema_extra=words, **bounds)
     assert isinstance(field, FieldInfo)
     field.metadata.append(BeforeValidator(lambda value: to_si(value, unit)))  # last: it runs first
     return field
+
+
+def guard(safer: str, off: float | None = None) -> dict[str, Any]:
+    """What a field says in `json_schema_extra` of its safer direction; see `quantity`."""
+    return {"safer": safer} if off is None else {"safer": safer, "off": off}
 
 
 def state(**fields: Any) -> np.dtype:

@@ -16,7 +16,8 @@ from rtctl import __version__
 NEVER_COMPILED = {
     "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "foxglove", "identify", "manual", "own",
     "proof", "reproduce", "scope", "soak", "terminal", "trace",
-    "api.py", "board.py", "boards.py", "comedi.py", "emulated.py", "fmu.py", "nidaqmx.py", "wiring.py",
+    "api.py", "board.py", "boards.py", "comedi.py", "emulated.py", "fmu.py", "fmu_file.py", "nidaqmx.py",
+    "wiring.py",
 }  # fmt: skip
 
 

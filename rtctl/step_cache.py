@@ -8,7 +8,6 @@ compiled code can come from, the versions, the step and its types.
 
 import hashlib
 import inspect
-import os
 import pickle
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,7 +15,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rtctl.config.cache import cache_folder
+from rtctl.config.cache import cache_folder, check, made
+from rtctl.config.files import replaced
 from rtctl.sources import files, sources_hash
 
 
@@ -40,7 +40,9 @@ class StepCache:
             from numba.core.compiler import CompileResult
 
             target_context.refresh()
-            kept, compiled = pickle.loads(self._path(sig, target_context).read_bytes())
+            path = self._path(sig, target_context)
+            _safe(path.parent)
+            kept, compiled = pickle.loads(path.read_bytes())
             same = kept == sig  # types may differ and be written alike
             return CompileResult._rebuild(target_context, *compiled) if same else None
         except Exception:  # not there, cut short, or of classes that are gone: then it is compiled
@@ -56,13 +58,9 @@ class StepCache:
             if data.library.has_dynamic_globals:
                 return
             path = self._path(sig, data.target_context)
-            draft = path.with_suffix(f".{os.getpid()}.tmp")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            try:
-                draft.write_bytes(dumps((sig, data._reduce())))
-                draft.replace(path)
-            finally:
-                draft.unlink(missing_ok=True)
+            made(path.parent)
+            with replaced(path, "wb") as file:
+                file.write(dumps((sig, data._reduce())))
 
     def _path(self, sig: Any, target_context: Any) -> Path:
         key = repr((self.function.__module__, self.use, str(sig), target_context.codegen().magic_tuple()))
@@ -77,6 +75,12 @@ class StepCache:
 
     def flush(self) -> None:
         """Nothing is ever out of date."""
+
+
+@cache
+def _safe(folder: Path) -> None:
+    """Raise UserError where others could put a pickle into the folder of steps."""
+    check(folder)
 
 
 @cache

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import zmq
 
+from rtctl.config.bounds import Bounds
 from rtctl.daemon.answers import Answers
 from rtctl.daemon.commands import Commands
 from rtctl.daemon.server import CommandServer
@@ -18,6 +19,7 @@ class Served(Answers):
     def __init__(self, bench: Any, endpoint: str):
         self.bench, self.endpoint = bench, endpoint
         self.machine, self.made, self.segment = bench.machine, bench.made, bench.segment
+        self.bounds = Bounds(bench.machine.config)
         self.config, self.link = bench.machine.config, "shm"
         self.status, self.mailbox, self.reader = bench.status, bench.mailbox, bench.reader
         self.lacks: list[str] = []

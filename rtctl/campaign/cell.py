@@ -16,6 +16,7 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.loop import fused, generate, safety
 from rtctl.loop.fused import Run
 from rtctl.machines import Machine
+from rtctl.own.files import trust
 
 _made: dict[Any, generate.Generated] = {}
 _plans: dict[str, Plan] = {}
@@ -25,6 +26,8 @@ _lock = threading.Lock()  # a Dask worker may have several threads
 def run_chunk(payload: dict[str, Any], identity: str, chunk: int) -> list[dict[str, Any]]:
     """Rows of the results of one chunk."""
     with _lock:
+        for base in payload["bases"].values():
+            trust(base.get("own", {}).values())  # from the process that read the campaign's file
         plan = _plans.get(identity) or _plans.setdefault(identity, Plan(payload))
     return [run_row(plan, number) for number in plan.numbers(chunk)]
 

@@ -17,6 +17,7 @@ from rtctl.campaign.metrics import METRICS
 from rtctl.campaign.plan import Plan
 from rtctl.campaign.store import load_results
 from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.files import write_text
 
 REPORT = "report.html"
 MOST_ROWS = 12  # of an axis's table; a longer axis is cut into that many pieces
@@ -48,7 +49,7 @@ def write(
     """Write report.html into the campaign's folder; its path. Raises UserError where the disk does not take it."""
     path = folder / REPORT
     try:
-        path.write_text(html(plan, table, bundles, compared, judged), encoding="utf-8")
+        write_text(path, html(plan, table, bundles, compared, judged))
     except OSError as error:
         raise UserError(f"{path}: cannot be written: {error.strerror or error}") from None
     return path

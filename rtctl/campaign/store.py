@@ -7,7 +7,6 @@ report.html  bundles/     see rtctl.campaign.report and .keep
 """
 
 import json
-import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from rtctl.campaign.plan import Plan
+from rtctl.config import files
 from rtctl.config.errors import UserError
-from rtctl.trace.bundle import replace
 
 CAMPAIGN, RESULTS, PARTS = "campaign.json", "results.parquet", "parts"
 IDENTITY = b"campaign"  # key in the metadata of a part
@@ -87,14 +86,11 @@ class Store:
         return pq.read_table(self.folder / RESULTS)
 
     def _save(self, table: pa.Table, path: Path) -> None:
-        draft = path.with_suffix(f".{os.getpid()}.tmp")
         try:
             path.parent.mkdir(exist_ok=True)
-            with pq.ParquetWriter(draft, table.schema, compression="zstd") as writer:
-                writer.write_table(table)
-            replace(draft, path)
+            with files.replaced(path, "wb", sync=True) as file:
+                pq.write_table(table, file, compression="zstd")
         except OSError as error:
-            draft.unlink(missing_ok=True)
             raise UserError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
@@ -142,9 +138,5 @@ def _text(value: Any) -> str | None:
 
 
 def _write(path: Path, text: bytes) -> None:
-    draft = path.with_suffix(".tmp")
-    with draft.open("wb") as file:
+    with files.replaced(path, "wb", sync=True) as file:
         file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    replace(draft, path)

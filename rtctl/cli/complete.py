@@ -74,18 +74,20 @@ def _starting(kind: str, incomplete: str) -> list[str]:
 def words() -> dict[str, list[str]]:
     """Keys, faults and terms, from a file in the cache: the settings take half a second to import."""
     from rtctl import __version__
-    from rtctl.config.cache import cache_folder
+    from rtctl.config.cache import cache_folder, made
+    from rtctl.config.errors import UserError
+    from rtctl.config.files import write_text
 
-    file = cache_folder() / f"completion-{__version__}.json"
+    try:
+        file = cache_folder() / f"completion-{__version__}.json"
+    except UserError:  # the shell completes; the next command tells it
+        return _collect()
     with contextlib.suppress(OSError, ValueError):
         if file.stat().st_mtime > max(_written()):
             return dict(json.loads(file.read_text()))
     found = _collect()
-    with contextlib.suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        draft = file.with_suffix(f".{os.getpid()}.tmp")
-        draft.write_text(json.dumps(found))
-        draft.replace(file)
+    with contextlib.suppress(OSError, UserError):
+        write_text(made(file.parent) / file.name, json.dumps(found))
     return found
 
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from rtctl.terminal.outlet import Outlet
 from rtctl.terminal.panel import Panel
 from rtctl.terminal.screen import Screen, takes_pictures
 from rtctl.terminal.traces import Traces
@@ -23,7 +24,8 @@ class RunConsole:
     """Everything goes to standard error, so that standard output is the JSON's alone."""
 
     def __init__(self, quiet: bool):
-        self.console = Console(stderr=True)
+        self.outlet = Outlet(sys.stderr)
+        self.console = Console(file=self.outlet)  # type: ignore[arg-type]
         self.quiet = quiet
         self._screen: Screen | None = None
         self._traces: Traces | None = None
@@ -32,7 +34,7 @@ class RunConsole:
     @property
     def log(self) -> Any:
         """The file for log lines: standard error, or above the panel while there is one."""
-        return self._screen or sys.stderr
+        return self._screen or self.outlet
 
     def say(self, message: str) -> None:
         """One line for the person at the terminal."""
@@ -57,6 +59,8 @@ class RunConsole:
 
     def update(self, supervisor: Any) -> None:
         """Called at every turn of the supervisor."""
+        if self.outlet.gone:
+            supervisor.terminal_gone = supervisor.interrupted = True
         now = time.monotonic()
         if self.quiet or now - self._last < (REFRESH if self._screen else LINE) or supervisor.last_row is None:
             return
@@ -85,14 +89,18 @@ class RunConsole:
         console.print(told)
         if result["steps"]:
             console.print(steps_table(result["steps"], console.width))
+        lost = result["lost_rows"]
+        if lost or result["missed"]:
+            words = f"{lost} rows were lost and {result['missed']} ticks missed: "
+            words += (
+                "steps that they fall into are not measured right" if result["steps"] else "the recording has holes"
+            )
+            console.print(Text(words + ("; the bundle's case.json says which rows" if lost else ""), "red"))
         if result["trip"]:
             console.print(Text(f"tripped at tick {result['trip']['tick']}: {result['trip']['why']}", "bold red"))
         elif result["interrupted"]:
             console.print("ended by Ctrl-C or SIGTERM, outputs at zero")
         rows = result["rows"]
-        lost = rows.get("lost", 0) + rows["lost_in_ring"]
-        if lost:
-            console.print(Text(f"{lost} rows were lost; the bundle's case.json says which", "red"))
         if rows.get("error"):
             console.print(Text(f"recording stopped: {rows['error']}", "red"))
         for what in ("bundle", "plot"):

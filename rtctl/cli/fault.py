@@ -122,6 +122,7 @@ def table(
     import structlog
 
     from rtctl.config.errors import UserError
+    from rtctl.config.files import write_text
     from rtctl.faults import page
     from rtctl.faults.cases import STANDS
     from rtctl.faults.table import run
@@ -133,7 +134,7 @@ def table(
     structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(40))  # the faults are meant
     found = run(list(STANDS) if machine == "all" else [machine], lambda line: typer.echo(line, err=True))
     if markdown is not None:
-        markdown.write_text(page.text(found), encoding="utf-8")
+        write_text(markdown, page.text(found))
     if json:
         rows = {"faults": [o._asdict() for o in found.outcomes], "processes": [s._asdict() for s in found.survived]}
         common.print_json({**rows, "ok": found.ok})

@@ -13,7 +13,9 @@ app = typer.Typer(add_completion=False)
 
 @app.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="csv, txt, tsv, mat, npz, parquet or mcap.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="csv, txt, mat, npz, parquet, json, mcap, mf4, tdms or hdf5.")
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="BUNDLE", help="Folder of the bundle to make.")],
     map_: Annotated[
         list[str] | None,

@@ -12,6 +12,7 @@ import typer
 from rtctl.cli.failures import words
 from rtctl.cli.lazy import LazyGroup
 from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.isolated import isolate
 
 # Name of each command, in the order of `rtctl --help`, and its module here. Modules import nothing heavy.
 COMMANDS = {
@@ -84,6 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     2 for the user's mistake, 3 for data that carry no answer, 1 for a run that tripped and for ours, 130 for Ctrl-C.
     """
+    isolate()
     try:
         code = app(arguments, prog_name="rtctl", standalone_mode=False) or 0
         sys.stdout.flush()  # here, where a full disk has words; at the end of the interpreter it has none

@@ -74,6 +74,7 @@ def picture(curve: Any, path: Path) -> None:
     from matplotlib.figure import Figure
 
     from rtctl.config.errors import UserError
+    from rtctl.config.files import replaced
 
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.add_subplot()
@@ -84,6 +85,7 @@ def picture(curve: Any, path: Path) -> None:
     axes.grid(alpha=0.3)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, format="png", dpi=150)
+        with replaced(path, "wb") as file:
+            figure.savefig(file, format="png", dpi=150)
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None

@@ -23,6 +23,10 @@ def replay(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Another setting, to see what it would have written."),
     ] = None,
+    own: Annotated[
+        list[Path] | None,
+        typer.Option("--own", metavar="FILE", help="Own file of the recording, by path; its text has to be the same."),
+    ] = None,
     json: JsonOption = False,
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Draw both and their difference into a PNG.")
@@ -41,7 +45,7 @@ def replay(
     """
     from rtctl.trace.replay import replay as play
 
-    found = play(bundle, _changes(set_))
+    found = play(bundle, _changes(set_), own or ())
     if plot is not None:
         _draw(found, plot)
     if json:

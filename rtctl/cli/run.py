@@ -8,6 +8,7 @@ import typer
 from rtctl.cli import common
 from rtctl.cli.common import ConfigArgument, JsonOption, LinkOption, ModeOption, ReferenceOption, SetOption
 
+HUNG_UP = 129  # exit code, 128 + SIGHUP
 app = typer.Typer(add_completion=False)
 
 
@@ -27,9 +28,14 @@ def run(
     ] = None,
     arm: Annotated[bool, typer.Option(help="Arm at once and play the reference.")] = True,
     plot: Annotated[bool, typer.Option(help="Draw the run into the bundle.")] = True,
+    fail_on_loss: Annotated[
+        bool, typer.Option("--fail-on-loss", help="Exit code 1 where rows were lost or ticks missed.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Run a machine under control, on a bench or against its emulated twin.
+
+    Exit code 1 where it tripped, 129 where its terminal was closed: outputs are zero and the recording is whole then.
 
     Examples:
 
@@ -55,15 +61,22 @@ def run(
     structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # standard output is the JSON's
     console.say(told(config))
     session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
-    with console.live():
-        result = session.run(console.update)
+    try:
+        with console.live():
+            result = session.run(console.update)
+    except KeyboardInterrupt:
+        if not session.supervisor.terminal_gone:
+            raise
+        raise typer.Exit(HUNG_UP) from None
+    if session.supervisor.terminal_gone:
+        raise typer.Exit(HUNG_UP)
     if plot:
         result["plot"] = session.draw()
     if json:
         common.print_json(result)
     else:
         console.report(result)
-    if result["tripped"]:
+    if result["tripped"] or (fail_on_loss and (result["lost_rows"] or result["missed"])):
         raise typer.Exit(1)
 
 

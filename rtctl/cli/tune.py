@@ -88,9 +88,10 @@ def check_files(file: Path, pictures: list[Path], force: bool) -> None:
 def write(file: Path, text: str) -> None:
     """Write the config. Raises UserError where it cannot be written."""
     from rtctl.config.errors import UserError
+    from rtctl.config.files import write_text
 
     try:
-        file.write_text(text, encoding="utf-8")
+        write_text(file, text)
     except OSError as error:
         raise UserError(f"--out {file}: cannot be written: {error.strerror}") from None
 

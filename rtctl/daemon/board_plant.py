@@ -72,12 +72,21 @@ class BoardPlant:
         """
         tx = self.end.tx
         off = [0] * len(self._codes)
-        if tx["state"] == safety.IDLE or now() - int(tx["inputs_t_ns"]) > self._hold:
+        if tx["state"] != safety.IDLE and now() - int(tx["inputs_t_ns"]) > self._hold:
+            if tx["state"] in (safety.ARMED, safety.RUNNING):
+                self._watchdog()
+            tx["state"] = safety.IDLE
+        if tx["state"] == safety.IDLE:
             return off, 0
         codes = [int(c) for c in tx["ao_codes"][: len(off)]]
         if tx["state"] == safety.TRIPPED:
             codes = [c if abs(c) <= abs(was) and c * was >= 0 else 0 for c, was in zip(codes, self._codes, strict=True)]
         return codes, int(tx["dio_lines"])
+
+    def _watchdog(self) -> None:
+        """Outputs were on and no new ones came: count it, and tell the loop with the next sample."""
+        self._status["watchdog"][0] += 1
+        self.end.rx["watchdog"] += 1
 
 
 def zero(config: Any) -> str | None:

@@ -24,6 +24,7 @@ from rtctl.loop import generate, zmq_link
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.machines import Machine
+from rtctl.own.files import trust
 
 # Frames a link may hold. ZeroMQ learns what has left its queue only now and then, every 100 frames received at the
 # latest: fewer than twice that, and in lockstep a frame could find a queue full that has long been empty.
@@ -47,6 +48,7 @@ def report(event: str, **values: Any) -> None:
 def machine_from(order: dict[str, Any]) -> Machine:
     """The machine of an order, which carries its config in full."""
     config = order["config"]
+    trust(config.get("own", {}).values())  # from the supervisor of the same user
     return machines.build(machines.settings(config))
 
 
@@ -69,6 +71,11 @@ def watch_parent(on_lost: Callable[[], None], on_stop: Callable[[], None], inter
     # Ctrl-C goes to the whole group: a child leaves it to the supervisor, a process of its own (`interrupt`) stops
     signal.signal(signal.SIGINT, (lambda *_: None) if interrupt else signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: on_stop())  # here too: a wait that it cuts short is no fault
+    # a terminal that closes sends it to the whole group: the supervisor ends its children, a plant by itself stops
+    if not interrupt:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    elif signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # which nohup has set
+        signal.signal(signal.SIGHUP, lambda *_: on_stop())
     signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
 
     def watch() -> None:

@@ -4,9 +4,10 @@ import contextlib
 import json
 import os
 import subprocess
-import sys
 from collections import deque
 from typing import Any
+
+from rtctl.config.isolated import python
 
 
 class ChildProcess:
@@ -19,7 +20,7 @@ class ChildProcess:
         self._errors: deque[str] = deque(maxlen=20)
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         self.process = subprocess.Popen(
-            [sys.executable, "-m", f"rtctl.daemon.{role}_process", json.dumps(order)],
+            python("-m", f"rtctl.daemon.{role}_process", json.dumps(order)),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -3,6 +3,8 @@
 import time
 from typing import TYPE_CHECKING, Any
 
+import structlog
+
 from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.config.load import get_path, set_path
@@ -15,9 +17,13 @@ from rtctl.machines import Machine
 if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
+log = structlog.get_logger()
 SWITCHED = (
     "loop", "link", "driver", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation",
-    "faults", "metrics", "own",
+    "faults", "metrics", "own", "live", "sensors", "encoder", "output", "amplifier", "R_c",
+)  # fmt: skip
+ORDERS = (  # that are logged
+    "arm", "disarm", "reset", "play", "stop", "setpoint", "set", "fault", "capture", "capture_stop",
 )  # fmt: skip
 LOOKS = ("status", "signals", "get", "capture_status")  # who only looks stands in for no commander
 
@@ -27,21 +33,33 @@ class Commands:
 
     def __init__(self, supervisor: "Supervisor"):
         self._of = supervisor
-        self._last_heard = time.monotonic()
+        self._virtual = supervisor.config.loop.mode != "real"
         self._commander_lost = 0
+        self.heard()
 
     def handle(self, op: str, args: Args) -> dict[str, Any]:
         """Carry out `op`. Raises UserError where the request makes no sense now."""
         if op not in LOOKS:
             self.heard()
-        return getattr(self, f"_{op}")(**args.model_dump(exclude_unset=True))
+        given = args.model_dump(exclude_unset=True)
+        result = getattr(self, f"_{op}")(**given)
+        if op in ORDERS:
+            told = {name: value for name, value in given.items() if name != "event"}
+            log.info(op, **told, tick=int(self._of.status["tick"]))
+        return result
 
     def heard(self) -> None:
-        """The commander is there: it commands, or sends a `ping` as its sign of life."""
+        """The commander is there: it commands, or sends a `ping` as its sign of life. The loop reads the time."""
         self._last_heard = time.monotonic()
+        self._of.status["commander_ns"] = time.monotonic_ns()
 
     def watch_commander(self) -> None:
-        """Tell the loop when the commander has been silent for too long, where the config requires one."""
+        """On virtual time, tell the loop when the commander is silent for too long, where the config requires one.
+
+        On the wall clock the loop finds that out by itself: this process may hang.
+        """
+        if not self._virtual:
+            return
         limits = self._of.config.safety
         lost = int(limits.require_commander and time.monotonic() - self._last_heard > limits.commander_timeout)
         if lost != self._commander_lost:
@@ -133,6 +151,8 @@ class Commands:
         if path.split(".")[0] in SWITCHED:
             raise UserError(f"{path} cannot change while the machine runs; stop it and start it with --set {path}=...")
         config = set_path(self._of.config, path, value)
+        for sentence in self._of.bounds.crossed(config).values():
+            raise UserError(sentence)
         try:
             machine = machines.build(config)
         except ValueError as error:

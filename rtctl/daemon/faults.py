@@ -7,7 +7,6 @@ supervisor; on virtual time the loop waits for that before the very tick (`statu
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from pydantic import ValidationError
 
 from rtctl.config import complaints
 from rtctl.config.errors import UserError
+from rtctl.config.isolated import python
 from rtctl.daemon.children import ChildProcess
 from rtctl.loop import faults
 from rtctl.trace.recorder import Recorder
@@ -215,10 +215,7 @@ class Faults:
 
     def _cpu_hog(self, planned: Planned) -> Undo:
         """They read a pipe of ours: its end is theirs, too, even if we are killed."""
-        hogs = [
-            subprocess.Popen([sys.executable, "-S", "-c", BUSY], stdin=subprocess.PIPE)
-            for _ in range(round(planned.size))
-        ]
+        hogs = [subprocess.Popen(python("-S", "-c", BUSY), stdin=subprocess.PIPE) for _ in range(round(planned.size))]
 
         def undo() -> None:
             for hog in hogs:

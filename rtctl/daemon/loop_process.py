@@ -11,7 +11,7 @@ import time
 import zmq
 
 from rtctl.config.errors import UserError
-from rtctl.daemon import child
+from rtctl.daemon import child, compiling
 from rtctl.loop import frames, generate, zmq_link
 from rtctl.loop.loop import Loop
 from rtctl.loop.realtime import RealTime
@@ -35,6 +35,7 @@ def main(argv: list[str]) -> int:
     def stop() -> None:
         status["stop"] = 1
 
+    compiling.tell()
     child.watch_parent(lost, stop)
     over_zmq = order["link"] == "zmq" and loop.mode != "fused"
     run = Loop(machine, made, segment, *((0, 0) if over_zmq else (segment["outputs"], segment["inputs"])))

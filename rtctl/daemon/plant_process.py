@@ -12,7 +12,7 @@ import numpy as np
 import zmq
 
 from rtctl.config.errors import UserError
-from rtctl.daemon import child
+from rtctl.daemon import child, compiling
 from rtctl.daemon.server import release
 from rtctl.drivers.board import BoardError
 from rtctl.loop import frames, generate
@@ -99,6 +99,7 @@ def main(argv: list[str]) -> int:
     def stop() -> None:
         status["stop"] = 1
 
+    compiling.tell()
     child.watch_parent(stop, stop)
     if order.get("cpu") is not None:
         with contextlib.suppress(OSError):  # it runs anywhere; only its samples come a little later

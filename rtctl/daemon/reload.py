@@ -28,18 +28,23 @@ def reload(supervisor: "Supervisor", fresh: Any) -> tuple[list[str], list[str]]:
         raise UserError(f"own: {' '.join(sorted({**old.own, **fresh.own}))} is another text now; restart the machine")
     changed = differences(old, fresh)
     refused = [path for path in changed if path.split(".")[0] in SWITCHED]
-    free = [path for path in changed if path not in refused]
+    crossed = supervisor.bounds.crossed(fresh)
+    beyond = [path for path in changed if any(p == path or p.startswith(f"{path}.") for p in crossed)]
+    free = [path for path in changed if path not in refused and path not in beyond]
     fixed: list[str] = []
     if _rebuilds(supervisor, fresh, free):
         fixed = [path for path in free if _rebuilds(supervisor, fresh, [path])]
     taken = [path for path in free if path not in fixed]
     if taken:
         config = mixed(old, fresh, taken)
+        for sentence in supervisor.bounds.crossed(config).values():
+            raise UserError(sentence)
         machine = _built(config)
         if generate.source(machine, supervisor.link) != generate.source(supervisor.machine, supervisor.link):
             raise UserError(f"{', '.join(taken)}: together they need another tick; restart the machine")
         supervisor.commands.take_over(config, machine, {path: written(get_path(fresh, path)) for path in taken})
     sentences = [f"{path} cannot change while the machine runs; restart it" for path in refused]
+    sentences += [crossed[p] for p in crossed if any(p == path or p.startswith(f"{path}.") for path in beyond)]
     sentences += [f"{path} changes the structure of the tick; restart the machine" for path in fixed]
     return taken, sentences
 

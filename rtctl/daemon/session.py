@@ -2,10 +2,13 @@
 
 import contextlib
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+import structlog
 
 from rtctl.config.errors import UserError
 from rtctl.daemon.notify import from_environment
@@ -33,6 +36,8 @@ class Session:
         if config.loop.mode == "fused" and not ticks:
             raise UserError("a fused run has no wall clock to follow: say how long with --for")
         self.config, self.arm, self.say = config, arm, say
+        if not structlog.is_configured():  # standard output belongs to whoever runs this
+            structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(sys.stderr))
         self.supervisor = Supervisor(config, out, ticks, say)
         self.supervisor.reread = reread
         self.supervisor.service = from_environment(rate=config.loop.rate)
@@ -62,6 +67,7 @@ class Session:
             "steps": self.steps,
             "tripped": result["trip"]["code"] if result["trip"] else None,
             "interrupted": supervisor.interrupted,
+            "lost_rows": lost_rows(result["rows"]),
             "bundle": str(self.bundle) if self.bundle else None,
         }
 
@@ -96,27 +102,42 @@ class Session:
         return str(path)
 
 
+def lost_rows(rows: dict[str, Any]) -> int:
+    """Rows of a run that are in no recording; without a recorder those that the ring lost."""
+    return int(rows.get("lost", rows["lost_in_ring"]))
+
+
 @contextlib.contextmanager
 def _signals(supervisor: Supervisor) -> Iterator[None]:
-    """Ctrl-C and SIGTERM end the run at its next turn; a second one does not wait for that.
+    """Ctrl-C, SIGTERM and a closed terminal end the run at its next turn; a second Ctrl-C does not wait for that.
+
+    SIGHUP has a service read its config again, and does nothing where it is ignored already, as under nohup.
 
     An exception at any point whatever could leave a lock of the recorder taken, and the recording unfinished.
     """
 
-    def note(*_: Any) -> None:
-        if supervisor.interrupted:
-            raise KeyboardInterrupt
-        supervisor.interrupted = True
+    noted = False
 
-    def hung_up(*_: Any) -> None:
+    def note(*_: Any) -> None:
+        nonlocal noted
+        if noted:
+            raise KeyboardInterrupt
+        noted = supervisor.interrupted = True
+
+    def reload(*_: Any) -> None:
         supervisor.hung_up = True
+
+    def closed(*_: Any) -> None:  # comes twice and more, from the kernel and from the shell
+        supervisor.terminal_gone = supervisor.interrupted = True
 
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     handlers = dict.fromkeys((signal.SIGINT, signal.SIGTERM), note)
-    if supervisor.service.listens:  # by a person's terminal it would mean that the terminal is gone
-        handlers[signal.SIGHUP] = hung_up
+    if supervisor.service.listens:
+        handlers[signal.SIGHUP] = reload
+    elif signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        handlers[signal.SIGHUP] = closed
     before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
     try:
         yield

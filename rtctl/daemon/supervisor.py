@@ -19,6 +19,7 @@ import structlog
 import zmq
 
 from rtctl import machines
+from rtctl.config.bounds import Bounds
 from rtctl.config.errors import UserError
 from rtctl.daemon import keys
 from rtctl.daemon.answers import Answers
@@ -26,12 +27,14 @@ from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
 from rtctl.daemon.children import ChildProcess
 from rtctl.daemon.commands import Commands
+from rtctl.daemon.events import Trips
 from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
 from rtctl.daemon.notify import Service
 from rtctl.daemon.reload import reload
 from rtctl.daemon.rows import RowsOut
 from rtctl.daemon.server import CommandServer, default_endpoint, runtime_dir
+from rtctl.daemon.starting import Starting, ended
 from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop import generate, safety
 from rtctl.loop.histogram import account
@@ -46,7 +49,7 @@ from rtctl.trace.rotation import Rotation
 
 log = structlog.get_logger()
 TURN_MS = 10  # between two turns of the supervisor on the wall clock
-START_TIMEOUT = 180.0  # s; a cold cache compiles for some ten seconds
+FOREVER = 1e9  # s that a loop waits for a plant of ours, which may have to compile; if it dies we hear of it
 SHM = Path("/dev/shm")
 
 
@@ -68,6 +71,7 @@ class Supervisor(Answers):
             self.machine = machines.build(config)
         except ValueError as error:
             raise UserError(f"{config.name}: {error}") from error
+        self.bounds = Bounds(config)  # what the file says now, whatever is changed later
         self.link = "shm" if config.loop.mode == "fused" else config.link.kind
         self.made = generate.generate(self.machine, self.link)
         self.lacks: list[str] = []
@@ -75,7 +79,9 @@ class Supervisor(Answers):
         self.interrupted = False  # set by a signal handler; looked at between turns, never in the middle of one
         self.hung_up = False  # so is this, by SIGHUP: read the config again
         self.reread: Callable[[], Any] | None = None  # gives the settings as the config file has them now
+        self.terminal_gone = False  # so is this: the terminal was closed, and with it whoever watched
         self.service = Service()
+        self._trips = Trips()
         self.changes: list[dict[str, Any]] = []
         self.recorder: Recorder | None = None
         self._ended = False
@@ -182,25 +188,27 @@ class Supervisor(Answers):
         if config.loop.mode != "fused" and link.spawns:
             self.plant = ChildProcess("plant", order)
             self.children.append(self.plant)
-            order["patience"] = START_TIMEOUT  # it may have to compile; if it dies we hear of it
+            order["patience"] = FOREVER
         self.loop = ChildProcess("loop", order)
         self.children.append(self.loop)
         self._wait_for_first_tick()
 
     def _wait_for_first_tick(self) -> None:
-        deadline = time.monotonic() + START_TIMEOUT
+        self._starting = starting = Starting(self.children, self.say)
         while not self.status["ready"] and not self.status["ended"]:
             if self.interrupted:
                 raise KeyboardInterrupt
+            self._beat()
+            self.commands.heard()  # nobody can command before the first tick
             self._hear()
             for child in self.children:
                 if not child.running() and not self.status["ready"] and not self.status["ended"]:
                     self._hear()
                     if child is self.plant and self.config.driver.kind != "emulated":
-                        raise UserError(f"driver: {child.last_words()}")
-                    raise RuntimeError(f"the {child.role} process ended while it started:\n{child.last_words()}")
-            if time.monotonic() > deadline:
-                raise RuntimeError(f"the loop did not start within {START_TIMEOUT:g} s")
+                        raise UserError(f"driver: {ended(child)}")
+                    what = f"the {child.role} process ended while it started: {ended(child)}"
+                    raise UserError(what) if (child.process.poll() or 0) < 0 else RuntimeError(what)
+            starting.look()
             time.sleep(0.002)
 
     def _hear(self) -> None:
@@ -209,6 +217,8 @@ class Supervisor(Answers):
             for report in child.reports():
                 if report["event"] == "error":
                     raise UserError(report["message"])
+                if report["event"] == "compiling" and self._starting is not None:
+                    self._starting.compiling[child.role] = report["what"]
                 if report["event"] == "lacks":
                     self.lacks = report["lacks"]
                     self.say("not fully real-time here: " + " | ".join(self.lacks))
@@ -217,7 +227,8 @@ class Supervisor(Answers):
 
     def turn(self) -> bool:
         """Drain, record, publish, answer. Returns False once the loop has ended and all of it is taken in."""
-        ended = bool(self.status["ended"]) or not self.loop.running()
+        self._beat()
+        over = bool(self.status["ended"]) or not self.loop.running()
         self._drain()
         self.faults.act()
         self.server.process()
@@ -228,7 +239,7 @@ class Supervisor(Answers):
             self._tell_service()
         if self.hung_up:
             self._reload()
-        if ended and not self._ended:
+        if over and not self._ended:
             self._ended = True
             self._drain()
             if self.loop.process.poll() not in (None, 0) and not self.status["ended"]:
@@ -240,6 +251,11 @@ class Supervisor(Answers):
                 self._board_off()
         return not self._ended
 
+    def _beat(self) -> None:
+        """Tell the loop that there is somebody to take a disarm."""
+        self.status["heartbeat_ns"] = time.monotonic_ns()
+
+    _starting: Starting | None = None
     _plant_died = False
 
     def _board_off(self) -> None:
@@ -262,6 +278,7 @@ class Supervisor(Answers):
             if not len(rows):
                 return
             self.last_row = rows[-1]
+            self._trips.feed(rows)
             self.captures.feed(rows)
             if self.recorder is not None:
                 self.recorder.put(rows)
@@ -352,8 +369,9 @@ class Supervisor(Answers):
     def _stop_children(self) -> None:
         self.segment["plant_status"][0]["stop"] = 1
         self.status["stop"] = 1
+        started = bool(self.status["ready"])  # a child that compiles does not hear us, and has nothing on
         for child in reversed(self.children):
-            child.stop()
+            child.stop() if started else child.stop(0.5)
 
 
 def _arm_and_play(_: Any, command: Any) -> None:

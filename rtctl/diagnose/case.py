@@ -14,7 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
+from rtctl.diagnose.quantities import EFFORT
 from rtctl.idiom import Settings
+from rtctl.own.files import is_own
 from rtctl.plants import axis, ivu, ldu
 
 DAMPING = math.sqrt(0.5)  # of a drive of which the owner says nothing
@@ -146,8 +148,22 @@ class Case(NamedTuple):
     warnings: tuple[str, ...]
     beyond: tuple[str, ...]  # what the law in `config` has that the exchange format cannot say
 
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Parameters of an axis that the recording gives, since case.json does not: M with F_v and k, and K beside M.
+
+        An estimate is a start of the fit and no belief: it has no tolerance.
+        """
+        if self.plant != "axis":
+            return ()
+        if "M" not in self.parameters:
+            return tuple(name for name in ("M", "F_v", "k") if name not in self.parameters)
+        return () if "K" in believed(self) else ("K",)
+
     def tolerance(self, name: str) -> float:
-        """Share by which the owner's value of a parameter may be wrong; inf where it may be anything."""
+        """Share by which a nominal value may be wrong; inf where it may be anything, as an estimated one may."""
+        if name in self.estimated:
+            return math.inf
         r = self.reaches
         if name == "R_c" and self.plant == "ivu":
             return 0.0
@@ -163,6 +179,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     if not isinstance(plant, str) or plant not in PARAMETERS:
         hint = nearest(str(plant), PARAMETERS)
         raise UserError(f"{where}: plant is {plant!r}; it should be ivu, ldu or axis" + _or(hint))
+    _refuse_own_plant(where, case.get("config"))
     warnings = [_strange(where, key, "", KEYS) for key in case if key not in (*KEYS, *FROM_ELSEWHERE)]
     rate = _number(where, "sample_rate", case.get("sample_rate"))
     if rate is not None and rate <= 0:
@@ -206,6 +223,18 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     )
 
 
+def _refuse_own_plant(where: Path, config: Any) -> None:
+    plant = config.get("plant") if isinstance(config, dict) else None
+    kind = plant.get("kind") if isinstance(plant, dict) else None
+    if isinstance(kind, str) and is_own(kind):
+        raise UserError(
+            f"{where}: config.plant.kind is '{kind}', a plant of the user's own; its equations are not those of ivu, "
+            "ldu or axis, so no model of this program can be fitted to it or simulated. `rtctl replay`, `trace plot`, "
+            "`trace compare` and `trace export` take this recording; to diagnose it as a plain axis, export it and "
+            "import the table with `rtctl import --plant axis`"
+        )
+
+
 def believed(case: Case) -> dict[str, float]:
     """Every parameter of the plant's model, SI, as the owner believes it.
 
@@ -217,6 +246,7 @@ def believed(case: Case) -> dict[str, float]:
     drive = case.drive
     if case.plant == "axis":
         gain = drive.newton_per_volt or drive.newton_metre_per_ampere or drive.newton_metre_per_volt
+        gain = gain or (1.0 if drive.unit in EFFORT else None)  # the command is the force or the torque itself
         full = dict.fromkeys(TERMS["axis"], 0.0)
         return {**full, **({"K": gain} if gain else {}), **given}
     own = {k: v for k, v in given.items() if k not in DERIVED[case.plant]}

@@ -316,5 +316,5 @@ def smallest(found: Found) -> dict[str, Interval]:
         name = c.name.partition("|")[0]
         value = abs(h.values(x)[name] - c.offset)
         if h.name not in out or value < out[h.name].value:
-            out[h.name] = Interval(value, value, value, parameter_unit(found.base.model.kind, h, name))
+            out[h.name] = Interval(value, value, value, parameter_unit(found.base.model, h, name))
     return out

@@ -15,14 +15,17 @@ from pydantic import ValidationError
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError
 from rtctl.config.fields import Shape, fill
+from rtctl.config.files import write_text
 from rtctl.config.load import load_settings, to_yaml
 from rtctl.config.yaml_file import find, load_yaml
 from rtctl.diagnose.carry import carried, digits
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
+from rtctl.own.files import OwnError
 from rtctl.own.term import texts
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import TERMS
@@ -56,7 +59,10 @@ def write_model(
 
     data, left = _settings_data(model, record, config)
     own = data.get("own", {}) | texts(entry["term"] for entry in data["plant"]["physics"])
-    kind, data = machines.widened({**data, "own": own} if own else data)
+    try:
+        kind, data = machines.widened({**data, "own": own} if own else data)
+    except OwnError as error:
+        raise UserError(str(error)) from None
     settings = _checked(data, kind)
     try:
         machines.build(settings)
@@ -64,7 +70,7 @@ def write_model(
         raise UserError(f"the model cannot be run: {error}") from error
     path = Path(path)
     try:
-        path.write_text(_head(model, record, config is not None, left, left_out) + to_yaml(settings), encoding="utf-8")
+        write_text(path, _head(model, record, config is not None, left, left_out) + to_yaml(settings))
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None
     return path
@@ -79,7 +85,7 @@ def write_turn(found: Turn, path: Path | str) -> Path:
     rows = zip(found.angle, found.torque, found.band, found.visits, strict=True)
     text = "".join(f"{a:.6f},{_number(y)},{_number(half)},{n}\n" for a, y, half, n in rows)
     try:
-        path.write_text("angle_rad,torque_Nm,band_Nm,visits\n" + text, encoding="utf-8")
+        write_text(path, "angle_rad,torque_Nm,band_Nm,visits\n" + text)
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None
     return path
@@ -113,7 +119,7 @@ def read_model(path: Path | str, record: Record) -> Model:
         base["N"] = base["R_t"] / base["R_s"]
     else:
         base = _numbers(plant.parameters)
-    return Model(kind, base, tuple(plant.physics))
+    return Model(kind, base, tuple(plant.physics), of_case(record.case))
 
 
 def _numbers(parameters: Settings) -> dict[str, float]:

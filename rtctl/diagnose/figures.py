@@ -154,7 +154,7 @@ def missing_force(d: Diagnosis, sim: Simulator) -> Figure:
             near = 8 * words.Sizes(name, node, {}, d.after).value("v_s")
             if np.isfinite(near):
                 ax.set_xlim(*np.clip((-near, near), *ax.get_xlim()))
-        at = words.node_words(node)
+        at = words.node_words(node, d.owner.units.rotary)
         title = f"{words.noun(name)} at {at}" if name else f"what is left at {at}"
         label(ax, f"{along} of {at}, {shown}" if along != "time" else "time, s", f"{what}, {y_unit}", title)
         legend(ax, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.98))
@@ -199,7 +199,7 @@ def polar_map(d: Diagnosis, sim: Simulator) -> Figure | None:
         ax.set_rlim(-radius, 0.75 * radius)
         ax.set_rticks([-radius / 2, 0, radius / 2], [f"{v:.2g}" for v in (-radius / 2, 0, radius / 2)])
         ax.spines["polar"].set_visible(False)
-        label(ax, title=f"{what} around {words.node_words(node)}, {shown}")
+        label(ax, title=f"{what} around {words.node_words(node, d.owner.units.rotary)}, {shown}")
         legend(ax, loc="upper left", bbox_to_anchor=(1.02, 1.0))
     return figure
 
@@ -236,9 +236,12 @@ def spectra(d: Diagnosis, sim: Simulator) -> Figure:
     first = slice(d.fit_rows[0], None)
     unit, rate = words.main_unit(d), 1.0 / d.record.dt
     map_ = Missing(d, sim)
-    x, along = map_.ratio(node) * map_.x[first], f"order of {words.node_words(node)}, per turn"
+    x, along = map_.ratio(node) * map_.x[first], f"order of {words.node_words(node, d.owner.units.rotary)}, per turn"
     if map_.slides(node):
-        x, along = x * 2 * np.pi / (float(np.ptp(x)) or 1.0), f"waves along the way of {words.node_words(node)}"
+        x, along = (
+            x * 2 * np.pi / (float(np.ptp(x)) or 1.0),
+            f"waves along the way of {words.node_words(node, d.owner.units.rotary)}",
+        )
     thinned = slice(None, None, max(1, len(x) // 3000))
     size = min(len(x), max(256, int(4 * rate)))
     for name, model, color in models:
@@ -279,7 +282,9 @@ def evidence_bars(d: Diagnosis, sim: Simulator | None = None) -> Figure:
     for row, bar in enumerate(top):
         color = AFTER if found == set(bar.names) else BEFORE if bar.fitted else SEEN
         ax.barh(row, 100 * bar.gain, color=color, height=0.7)
-    ax.set_yticks(range(len(top)), [" + ".join(words.entry_noun(n) for n in b.names) for b in top])
+    ax.set_yticks(
+        range(len(top)), [" + ".join(words.entry_noun(n, d.owner.units.rotary) for n in b.names) for b in top]
+    )
     ax.tick_params(axis="y", labelsize=8.5)
     ax.invert_yaxis()
     ax.set_xlim(0, 118)
@@ -355,9 +360,10 @@ def parameters(d: Diagnosis, sim: Simulator | None = None) -> Figure:
         ends = [[max(value - low, 0)], [max(high - value, 0)]]
         ax.errorbar(value, row, xerr=ends, fmt="o", ms=4, color=AFTER, capsize=3)
     ax.axvline(0, color=INK, lw=0.8)
-    ax.set_yticks(range(len(names)), names)
+    estimated = d.record.case.estimated
+    ax.set_yticks(range(len(names)), [f"{n} (estimated)" if n in estimated else n for n in names])
     ax.invert_yaxis()
-    label(ax, "fitted over the owner's value, %; grey: how far it may be off")
+    label(ax, "fitted over the nominal value, %; grey: how far it may be off")
     return figure
 
 
@@ -372,7 +378,12 @@ def coverage(d: Diagnosis, sim: Simulator | None = None) -> Figure:
             blind = f"{name}:{node}" in cannot
             ax.plot(nodes.index(node), row, "x" if blind else "o", ms=6, color=BEFORE if blind else AFTER)
     ax.set_yticks(range(len(names)), [words.noun(n) for n in names])
-    ax.set_xticks(range(len(nodes)), [words.node_words(n).removeprefix("the ") for n in nodes], rotation=30, ha="left")
+    ax.set_xticks(
+        range(len(nodes)),
+        [words.node_words(n, d.owner.units.rotary).removeprefix("the ") for n in nodes],
+        rotation=30,
+        ha="left",
+    )
     ax.tick_params(axis="both", labelsize=8.5)
     ax.xaxis.tick_top()
     ax.invert_yaxis()

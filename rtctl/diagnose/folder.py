@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.files import replaced_path, write_text
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
 
 RESULT, MODEL, EXPERIMENT = "diagnosis.json", "model.yaml", "experiment.yaml"
@@ -80,7 +81,7 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
         faults.append(f"{folder / MODEL} is not written: {error}")
     if d.experiment is not None:
         text = experiment_yaml(d, config)
-        _put(folder / EXPERIMENT, lambda path: path.write_text(text, encoding="utf-8"))
+        _put(folder / EXPERIMENT, lambda path: write_text(path, text))
     turn = of_diagnosis(d)
     if turn is not None:
         _put(folder / TURN, lambda path: write_turn(turn, path))
@@ -89,7 +90,7 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
             from rtctl.diagnose import report as page
 
             html = page.html(d)
-            _put(folder / page.NAME, lambda path: path.write_text(html, encoding="utf-8"))
+            _put(folder / page.NAME, lambda path: write_text(path, html))
         except UserError:
             raise
         except Exception as error:  # a figure that fails must not take the verdict with it
@@ -97,7 +98,7 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
                 traceback.print_exc()
             faults.append(f"the report is not written: internal error: {error!r}; RTCTL_TRACEBACK=1 shows where")
     result = json.dumps(finite(as_json(d)), indent=1) + "\n"
-    _put(folder / RESULT, lambda path: path.write_text(result, encoding="utf-8"))
+    _put(folder / RESULT, lambda path: write_text(path, result))
     return faults
 
 
@@ -112,14 +113,11 @@ def _fresh(folder: Path, names: tuple[str, ...]) -> None:
 
 
 def _put(path: Path, make: Callable[[Path], Any]) -> None:
-    part = path.with_name(f".{path.name}.tmp")
     try:
-        make(part)
-        part.replace(path)
+        with replaced_path(path) as part:
+            make(part)
     except OSError as error:
         raise UserError(f"{path} cannot be written: {error.strerror}") from None
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def own_config(bundle: Path) -> dict[str, Any] | None:

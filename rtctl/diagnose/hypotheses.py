@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.model import Model, dry_with_terms
+from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis
@@ -199,7 +200,7 @@ def hypotheses(
     `hints` gives, as "kind" or "kind:node", what the record suggests for a Hint (see `hints.py`). `beside` are the
     terms that the model has already: friction that falls with speed asks for dry friction that it falls to.
     """
-    model = Model(record.plant, base, tuple(beside))
+    model = Model(record.plant, base, tuple(beside), of_case(record.case))
     scales = node_scales(record, base)
     measures = Measures(record, base, scales, hints or {})
     blind = record.shows_speed or counts_up(record)  # what a sensor without direction makes of any motion

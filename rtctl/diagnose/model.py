@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rtctl.diagnose.case import DAMPING, Case, believed
+from rtctl.diagnose.quantities import Quantities, of_case, quantities
 from rtctl.diagnose.tacho import signed
 from rtctl.idiom import Settings
 from rtctl.plants import axis, ivu, ldu
@@ -38,6 +39,7 @@ class Model(NamedTuple):
     kind: str
     base: dict[str, float]
     terms: tuple[Settings, ...] = ()
+    units: Quantities = quantities(None)  # of an axis
 
     def change(self, **base: float) -> "Model":
         """The same with other parameters."""
@@ -49,11 +51,14 @@ class Model(NamedTuple):
 
 
 def owner_model(case: Case, record: "Record | None" = None) -> Model:
-    """What the owner believes, without any term. An axis whose mass nobody knows is guessed from the record."""
+    """The nominal model, without any term; what `case.estimated` names comes from the record."""
     base = {k: v for k, v in believed(case).items() if v is not None}
-    if case.plant == "axis" and "M" not in base and record is not None:
-        base |= guess(record, base)
-    return Model(case.plant, base)
+    if case.estimated and record is not None:
+        found = guess(record, base)
+        if "M" in base:  # known in kg or kg m^2, so the record gives the force of one unit of the command
+            found = {"K": base["M"] / found["M"]}
+        base |= {name: found[name] for name in case.estimated}
+    return Model(case.plant, base, units=of_case(case))
 
 
 def guess(record: "Record", base: dict[str, float]) -> dict[str, float]:

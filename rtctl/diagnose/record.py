@@ -24,12 +24,12 @@ from rtctl.diagnose.columns import (
     unwrap_turns,
 )
 from rtctl.trace.bundle import PARQUET, load_bundle
+from rtctl.trace.clock import even_rows, increasing
 
 COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
 READINGS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts",), "axis": ()}
 COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
-RATE_OFF = 0.01  # share by which the median tick may differ from the sample rate
 AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
 AGREES_MEDIAN = 2e-3
 
@@ -103,12 +103,18 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
     """The Record of these columns, by the same rules as `load_record`."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
+    if case.estimated:
+        names = ", ".join(case.estimated)
+        warnings.append(
+            f"{path.parent / 'case.json'}: parameters does not say {case.estimated[0]}; {names} estimated from the "
+            "recording, without a tolerance"
+        )
     t = _column(path, columns, "t", "s, clock at the tick")
     u = np.column_stack([_command(path, columns, case, name) for name in COMMANDS[case.plant]])
     ref = _column(path, columns, "ref", "position reference", missing=not case.controller_known)
     w = _column(path, columns, "w", "V, excitation, 0 where there is none")
     raw = _readings(path, columns, case, warnings)
-    dt = _clock(path, t, case)
+    t, dt = _clock(path, t, case, warnings)
     if isinstance(case.controller, PdLaw | SectionsLaw | CascadeLaw) and np.isnan(ref).any():
         case = case._replace(controller_known=False)
     y = {}
@@ -302,24 +308,20 @@ def _readings(path: Path, columns: dict, case: Case, warnings: list[str]) -> dic
     return raw
 
 
-def _clock(path: Path, t: np.ndarray, case: Case) -> float:
-    """Nominal tick in s."""
+def _clock(path: Path, t: np.ndarray, case: Case, warnings: list[str]) -> tuple[np.ndarray, float]:
+    """Times (n,) in s and the nominal tick in s, by the rule of `rtctl import`; gaps stay for preflight."""
     if len(t) < 2:
         raise NoAnswer(f"{path} holds {len(t)} rows; a verdict needs {LEAST_ROWS}")
-    d = np.diff(t)
-    back = np.flatnonzero(d <= 0)
-    if len(back):
-        k = int(back[0]) + 1
-        raise UserError(f"{path}: column 't', row {k}: {t[k]:.9g} s after {t[k - 1]:.9g} s; time should increase")
-    median = float(np.median(d))
+
+    def row(k: int) -> str:
+        return f"{path}: column 't', row {k}"
+
     if case.sample_rate is None:
-        return median
-    if abs(median * case.sample_rate - 1.0) > RATE_OFF:
-        raise UserError(
-            f"{path}: column 't' has {1 / median:.6g} rows a second where sample_rate in case.json is "
-            f"{case.sample_rate:g} Hz; one of the two is wrong"
-        )
-    return 1.0 / case.sample_rate
+        increasing(t, row)
+        return t, float(np.median(np.diff(t)))
+    clock = even_rows(t, case.sample_rate, row, "sample_rate in case.json is {:g} Hz", gaps=True)
+    warnings += [f"{path}: {clock.note}"] if clock.note else []
+    return clock.t, 1.0 / case.sample_rate
 
 
 def _supports(
@@ -341,10 +343,16 @@ def _supports(
 
 
 def _disagrees(case: Case, agreement: Agreement | None) -> str:
+    if case.beyond and agreement is not None:
+        return (
+            f"the law of the config has {', '.join(case.beyond)}, which 'controller' of case.json does not say; "
+            f"'{case.controller.kind}' alone is off the recorded command by up to {agreement.worst:.3g} V (row "
+            f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
+        )
     has = f"; in its config the law has {', '.join(case.beyond)}" if case.beyond else ""
     if agreement is None:
         return f"the law '{case.controller.kind}' cannot be recomputed from this recording{has}"
     return (
         f"the law '{case.controller.kind}' does not give the recorded command (off by {agreement.worst:.3g} V in row "
-        f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms{has})"
+        f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
     )

@@ -17,6 +17,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from rtctl.config.files import write_text
 from rtctl.diagnose import figures, numbers, repair, words
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Interval
 from rtctl.diagnose.model import FITTED
@@ -40,8 +41,8 @@ PICTURES: dict[str, tuple[Draw, str]] = {
               "below is what the sensor resolves."),
     "evidence": (figures.evidence_bars, "What each hypothesis explains of the error beyond noise. Left of the dashed "
                  "line is chance; brackets join what was found with its look-alikes."),
-    "parameters": (figures.parameters, "Fitted parameters over the owner's values. A wrong value is not missing "
-                   "physics."),
+    "parameters": (figures.parameters, "Fitted parameters over the nominal values: the owner's, or where case.json has "
+                   "none, estimated from the recording. A wrong value is not missing physics."),
     "spectra": (figures.spectra, "Error by frequency, and missing force by order of the shaft, before and after."),
     "coverage": (figures.coverage, "Each effect at each node: a dot could be tested, a cross could not."),
 }  # fmt: skip
@@ -56,7 +57,7 @@ def write(d: Diagnosis, folder: Path | str) -> Path:
     """Write report.html into `folder`, which is made where it is missing; its path."""
     path = Path(folder) / NAME
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(html(d), encoding="utf-8")
+    write_text(path, html(d))
     return path
 
 
@@ -74,7 +75,7 @@ def html(d: Diagnosis) -> str:
         summary=summary(d),
         effects=effect_rows(d),
         located=located(d),
-        hides=[(words.entry_noun(k), words.hidden_size(d, k)) for k in d.hides],
+        hides=[(words.entry_noun(k, d.owner.units.rotary), words.hidden_size(d, k)) for k in d.hides],
         rivals=rival_rows(d),
         experiment=experiment(d),
         parameters=parameter_rows(d),
@@ -138,7 +139,11 @@ def effect_rows(d: Diagnosis) -> list[tuple[str, ...]]:
         parameters = list(e.parameters.items()) or [("", Interval(np.nan, np.nan, np.nan))]
         for k, (name, v) in enumerate(parameters):
             value, ends = interval(v, effect_unit(d, e, name)) if name else ("", "")
-            first = (f"{words.noun(e.name)} ({e.name})", words.node_words(e.node)) if k == 0 else ("", "")
+            first = (
+                (f"{words.noun(e.name)} ({e.name})", words.node_words(e.node, d.owner.units.rotary))
+                if k == 0
+                else ("", "")
+            )
             rows.append(
                 (*first, f"{name} = {value}" if name else "", ends, f"{100 * e.confidence:.0f} %" if k == 0 else "")
             )
@@ -147,16 +152,18 @@ def effect_rows(d: Diagnosis) -> list[tuple[str, ...]]:
 
 def effect_unit(d: Diagnosis, e: Effect, name: str) -> str:
     """Of an effect's parameter: as given, or as the node has it."""
-    return e.parameters[name].unit or words.unit_at(d.record.plant, e.name, e.node, name)
+    return e.parameters[name].unit or words.unit_at(d.record.plant, e.name, e.node, name, d.owner.units.rotary)
 
 
 def parameter_rows(d: Diagnosis) -> list[tuple[str, ...]]:
-    """Parameter, owner's value, fitted value, 90 % interval, unit."""
+    """Parameter, nominal value and where it is from, fitted value, 90 % interval, unit."""
+    estimated = d.record.case.estimated
     rows: list[tuple[str, ...]] = []
     order = [n for n in FITTED[d.record.plant] if n in d.parameters]
     for name in [*order, *(n for n in d.parameters if n not in order)]:
         v, owner = d.parameters[name], d.owner.base.get(name, np.nan)
-        rows.append((name, f"{owner:.4g}", f"{v.value:.4g}", f"{v.low:.4g} to {v.high:.4g}", v.unit))
+        told = f"{owner:.4g}" + (" (estimated from the recording)" if name in estimated else "")
+        rows.append((name, told, f"{v.value:.4g}", f"{v.low:.4g} to {v.high:.4g}", v.unit))
     return rows
 
 
@@ -167,7 +174,7 @@ def rival_rows(d: Diagnosis) -> list[tuple[str, ...]]:
         for r in e.look_alikes:
             tell = TERMS[e.name].look_alikes.get(r.name, "") if e.name in TERMS else ""
             tell = tell or (TERMS[r.name].look_alikes.get(e.name, "") if r.name in TERMS else "")
-            names = words.noun(e.name, e.node), words.noun(r.name, r.node)
+            names = words.noun(e.name, e.node, d.owner.units.rotary), words.noun(r.name, r.node, d.owner.units.rotary)
             rows.append((*names, f"{r.p_value:.2g}" if r.p_value >= 1e-4 else "< 0.0001", f"{r.rms:.3g}", tell))
     return rows
 
@@ -192,7 +199,7 @@ def located(d: Diagnosis) -> str:
     since = f" from {numbers.nice(at.since_s, 's', 3)} on" if at.since_s > 0 else ""
     return (
         f"{shown[:1].upper()}{shown[1:]} shows it{since}. Of the error {numbers.percent(at.share)} comes from "
-        f"{words.node_words(at.node)}; {words.goes(at)}."
+        f"{words.node_words(at.node, d.owner.units.rotary)}; {words.goes(at)}."
     )
 
 
@@ -202,7 +209,9 @@ def cannot_lines(d: Diagnosis) -> list[str]:
     for entry in d.cannot_test:
         name, _, node = entry.partition(":")
         nodes[name].append(node)
-    return [words.sentence(f"{name}:{found[0]}", *found[1:]) for name, found in nodes.items()]
+    return [
+        words.sentence(f"{name}:{found[0]}", *found[1:], rotary=d.owner.units.rotary) for name, found in nodes.items()
+    ]
 
 
 def experiment(d: Diagnosis) -> dict[str, Any] | None:

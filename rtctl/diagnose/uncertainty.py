@@ -17,7 +17,7 @@ from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
 from rtctl.diagnose.forms import COUNTED
-from rtctl.diagnose.model import DRY, dry_friction
+from rtctl.diagnose.model import DRY, Model, dry_friction
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, SINE, Hypothesis
 from rtctl.diagnose.stretches import in_blocks
 from rtctl.diagnose.words import unit_at
@@ -74,15 +74,13 @@ def parameter_intervals(fitted: Fit, cov: np.ndarray) -> dict[str, Interval]:
         half = Z90 * float(np.sqrt(max(cov[i, i], 0.0)))
         ends = np.clip([fitted.x[i] - half, fitted.x[i] + half], low[i], high[i])
         a, b = sorted(owner * np.exp(ends))
-        out[name] = Interval(
-            float(owner * np.exp(fitted.x[i])), float(a), float(b), plant_unit(fitted.model.kind, name)
-        )
+        out[name] = Interval(float(owner * np.exp(fitted.x[i])), float(a), float(b), plant_unit(fitted.model, name))
     return out
 
 
 def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Interval]:
     """90 % intervals of the parameters of one hypothesis."""
-    h, kind = fitted.space.hypotheses[index], fitted.model.kind
+    h, model = fitted.space.hypotheses[index], fitted.model
     columns = fitted.space.columns(index)
     own = cov[np.ix_(columns, columns)]
     x = fitted.space.parts(fitted.x)[index]
@@ -91,19 +89,19 @@ def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Inte
     for i, c in enumerate(h.coordinates):
         half = Z90 * float(np.sqrt(max(own[i, i], 0.0)))
         if c.kind == COSINE:
-            out |= _turn(kind, h, x, i, own[i : i + 2, i : i + 2], values)
+            out |= _turn(model, h, x, i, own[i : i + 2, i : i + 2], values)
         elif c.kind == SHAPE:
             v = values[c.name]
             out[c.name] = Interval(
-                v, v * float(np.exp(-min(half, 5))), v * float(np.exp(min(half, 5))), parameter_unit(kind, h, c.name)
+                v, v * float(np.exp(-min(half, 5))), v * float(np.exp(min(half, 5))), parameter_unit(model, h, c.name)
             )
         elif c.kind == INVERSE:
             least, most = (c.scale / max(x[i] + s * half, 1e-9) for s in (1, -1))
-            out[c.name] = Interval(values[c.name], least, most, parameter_unit(kind, h, c.name))
+            out[c.name] = Interval(values[c.name], least, most, parameter_unit(model, h, c.name))
         elif c.kind in ("size", PLACE):
             v, w = values[c.name], abs(c.scale) * half
-            out[c.name] = Interval(v, v - w, v + w, parameter_unit(kind, h, c.name))
-    out |= {n: Interval(v, v, v, parameter_unit(kind, h, n)) for n, v in h.fixed.items() if n in COUNTED}
+            out[c.name] = Interval(v, v - w, v + w, parameter_unit(model, h, c.name))
+    out |= {n: Interval(v, v, v, parameter_unit(model, h, n)) for n, v in h.fixed.items() if n in COUNTED}
     if h.term == "friction.coulomb":
         return with_total(out, fitted, h, cov, columns[0])
     return at_standstill(out, fitted, index, cov) if h.term == "friction.stribeck" else out
@@ -144,7 +142,7 @@ def _half(slope: np.ndarray, columns: list[int], cov: np.ndarray) -> float:
 
 
 def _turn(
-    kind: str, h: Hypothesis, x: np.ndarray, i: int, cov: np.ndarray, values: dict[str, float]
+    model: Model, h: Hypothesis, x: np.ndarray, i: int, cov: np.ndarray, values: dict[str, float]
 ) -> dict[str, Interval]:
     c = h.coordinates[i]
     amplitude, phase = c.name.split("|")
@@ -155,18 +153,21 @@ def _turn(
     p = Z90 * float(np.sqrt(max(across @ cov @ across, 0.0))) / size
     A, phi = values[amplitude], values[phase]
     return {
-        amplitude: Interval(A, A - a, A + a, parameter_unit(kind, h, amplitude)),
+        amplitude: Interval(A, A - a, A + a, parameter_unit(model, h, amplitude)),
         phase: Interval(phi, phi - p, phi + p, "rad"),
     }
 
 
-def parameter_unit(kind: str, h: Hypothesis, name: str) -> str:
+def parameter_unit(model: Model, h: Hypothesis, name: str) -> str:
     """Unit of a term's parameter at its node."""
-    return unit_at(kind, h.term, h.node, name)
+    return unit_at(model.kind, h.term, h.node, name, model.units.rotary)
 
 
-def plant_unit(kind: str, name: str) -> str:
+def plant_unit(model: Model, name: str) -> str:
     """Unit of a plant's parameter."""
+    if model.kind == "axis" and (unit := model.units.of(name)) is not None:
+        return unit
+    kind = model.kind
     info = PARAMETERS[kind].model_fields.get(name)
     extra = info.json_schema_extra if info is not None else None
     return str(extra.get("unit", "")) if isinstance(extra, dict) else ""

@@ -12,6 +12,7 @@ from rtctl.diagnose.numbers import both, nice, percent
 from rtctl.diagnose.numbers import figures as figures
 from rtctl.diagnose.numbers import prefix as prefix
 from rtctl.diagnose.phrases import PHRASES
+from rtctl.diagnose.quantities import of_case
 from rtctl.plants.physics import TERMS
 
 LIKELY = 0.5  # confidence below which an effect without a rival is no more than possible
@@ -43,8 +44,10 @@ SPECIAL = {"f_Hz": "Hz", "transmission.creep.kappa": "1/N", "transmission.slip.F
            "sensor.missed_counts.at": "s"}  # fmt: skip
 
 
-def node_words(node: str) -> str:
-    """A node as it is called at the machine: "motor 1", "the tape at reel 2"."""
+def node_words(node: str, rotary: bool = False) -> str:
+    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; a `rotary` axis has a rotor."""
+    if rotary and node == "carriage":
+        return "the rotor"
     if node in NODES:
         return NODES[node]
     stem = node.rstrip("0123456789")
@@ -58,13 +61,13 @@ def channel_words(channel: str) -> str:
     return {"x": "the position", "speed": "the speed"}.get(channel, channel.replace("_", " "))
 
 
-def unit_at(kind: str, name: str, node: str, parameter: str) -> str:
+def unit_at(kind: str, name: str, node: str, parameter: str, rotary: bool = False) -> str:
     """Unit of a term's parameter at a node; "" for a bare number."""
     if parameter in SPECIAL:
         return SPECIAL[parameter]
     key = f"{name}.{parameter}"
     if key in SPECIAL:
-        turns = name.startswith("transmission") and node == "wheel"
+        turns = rotary or (name.startswith("transmission") and node == "wheel")
         return {"N": "Nm", "1/N": "1/Nm"}[SPECIAL[key]] if turns else SPECIAL[key]
     field = TERMS[name].settings.model_fields.get(parameter) if name in TERMS else None
     unit = (
@@ -76,7 +79,7 @@ def unit_at(kind: str, name: str, node: str, parameter: str) -> str:
     dimension = BY_NODE.get(parameter) or (AMPLITUDES.get(name) if stem == "A" else None)
     if unit or dimension is None:
         return unit
-    return DIMENSIONS[dimension][node in SLIDING.get(kind, ())]
+    return DIMENSIONS[dimension][not rotary and node in SLIDING.get(kind, ())]
 
 
 class Sizes:
@@ -84,7 +87,7 @@ class Sizes:
 
     def __init__(self, name: str, node: str, parameters: dict[str, Interval], model: Model):
         self.name, self.node, self.parameters, self.model = name, node, parameters, model
-        self.here = node_words(node)
+        self.here = node_words(node, model.units.rotary)
         terms: list[Any] = list(model.terms)
         self.term: Any = next((t for t in terms if (t.term, t.node) == (name, node)), None)
 
@@ -105,7 +108,7 @@ class Sizes:
     def unit(self, name: str) -> str:
         """Of a parameter."""
         given = self.parameters[name].unit if name in self.parameters else ""
-        return given or unit_at(self.model.kind, self.name, self.node, name)
+        return given or unit_at(self.model.kind, self.name, self.node, name, self.model.units.rotary)
 
 
 class _Slot:
@@ -182,28 +185,28 @@ def effect_clause(effect: Effect, model: Model) -> tuple[str, str]:
     return phrase.head.format_map(slots), phrase.detail.format_map(slots)
 
 
-def noun(name: str, node: str = "") -> str:
+def noun(name: str, node: str = "", rotary: bool = False) -> str:
     """An effect in a few words: "sticking, motor 1"."""
     word = PHRASES[name].noun if name in PHRASES else name
-    return f"{word}, {node_words(node).removeprefix('the ')}" if node else word
+    return f"{word}, {node_words(node, rotary).removeprefix('the ')}" if node else word
 
 
-def entry_noun(entry: str) -> str:
+def entry_noun(entry: str, rotary: bool = False) -> str:
     """The same of "name:node"."""
     name, _, node = entry.partition(":")
-    return noun(name, node)
+    return noun(name, node, rotary)
 
 
-def at(entry: str) -> str:
+def at(entry: str, rotary: bool = False) -> str:
     """The same as part of a sentence: "sticking at motor 1"."""
     name, _, node = entry.partition(":")
-    return f"{noun(name)} at {node_words(node)}" if name in PHRASES and node else entry
+    return f"{noun(name)} at {node_words(node, rotary)}" if name in PHRASES and node else entry
 
 
-def sentence(entry: str, *more: str) -> str:
+def sentence(entry: str, *more: str, rotary: bool = False) -> str:
     """Why a hypothesis "name:node" cannot be tested, and at `more` nodes: what a record would have to hold."""
     name, _, node = entry.partition(":")
-    at = f" at {_join([node_words(n) for n in (node, *more)], 'and')}" if node else ""
+    at = f" at {_join([node_words(n, rotary) for n in (node, *more)], 'and')}" if node else ""
     if name not in PHRASES:
         return f"This record cannot show {name}{at}."
     return f"This record cannot show {PHRASES[name].noun}{at}: that takes {PHRASES[name].need}."
@@ -220,7 +223,9 @@ def main_unit(d: Diagnosis) -> str:
     channel = next(iter(d.record.y))
     if channel.endswith("counts"):
         return "counts"
-    return "m/s" if channel == "speed" else (d.record.case.sensors.unit or "m")
+    if channel == "speed":
+        return of_case(d.record.case).speed
+    return d.record.case.sensors.unit or "m"
 
 
 def heldout_error(d: Diagnosis, nrmse: float) -> float:
@@ -325,12 +330,13 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
     if d.resembles is not None:
         name, node = d.resembles
         return (
-            f"Something is missing at {node_words(node)} that has no name in the table: it looks like {noun(name)}.",
+            f"Something is missing at {node_words(node, d.owner.units.rotary)} that has no name in the table: "
+            f"it looks like {noun(name)}.",
             f"{_capital(amount)}.",
         )
     if d.located is None:
         return "Something is missing that no known effect explains.", f"It has no clear place: {amount}."
-    place = node_words(d.located.node)
+    place = node_words(d.located.node, d.owner.units.rotary)
     since = f", from {nice(d.located.since_s, 's', 3)} on" if d.located.since_s > 0 else ""
     kind = f"{goes(d.located)}{since}"
     share = f"{percent(d.located.share)} of the error lies there"
@@ -366,7 +372,7 @@ def _nothing(d: Diagnosis) -> tuple[str, str]:
         name, _, node = entry.partition(":")
         if name not in seen and len(words) < MOST_HIDDEN:
             seen.add(name)
-            words.append(f"{noun(name)} of {hidden_size(d, entry)} at {node_words(node)}")
+            words.append(f"{noun(name)} of {hidden_size(d, entry)} at {node_words(node, d.owner.units.rotary)}")
     return first, f"It would have shown {_join(words, 'and')}."
 
 
@@ -375,7 +381,7 @@ def hidden_size(d: Diagnosis, entry: str) -> str:
     size = d.hides[entry]
     name, _, node = entry.partition(":")
     known = name in TERMS and size.unit in TERMS[name].settings.model_fields  # the main parameter instead of its unit
-    unit = unit_at(d.record.plant, name, node, size.unit) if known else size.unit
+    unit = unit_at(d.record.plant, name, node, size.unit, d.owner.units.rotary) if known else size.unit
     return nice(abs(size.value), unit) if unit else percent(abs(size.value))
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from rtctl.config.isolated import python
 from rtctl.idiom import state, tick
 from rtctl.loop import clock, histogram
 from rtctl.loop.memory import borrowed
@@ -75,7 +76,7 @@ class Sleeper:
     """
 
     def __init__(self, cpu: int, priority: int):
-        command = (sys.executable, "-m", "rtctl.doctor.wakeup", str(cpu), str(priority))
+        command = python("-m", "rtctl.doctor.wakeup", str(cpu), str(priority))
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

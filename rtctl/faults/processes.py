@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.config.errors import UserError
+from rtctl.config.isolated import python
 from rtctl.config.load import to_yaml
 from rtctl.daemon.supervisor import Supervisor, segment_path
 from rtctl.faults.cases import Stand
@@ -159,7 +159,7 @@ def supervisor_killed(stand: Stand, folder: Path, truth: Any) -> Survived:
     made = config(stand, [{"fault": "supervisor.kill", "at": stand.begin}])
     path, bundle = folder / "config.yaml", folder / "bundle"
     path.write_text(to_yaml(made))
-    order = [sys.executable, "-m", "rtctl.cli.main", "run", str(path), "--for", f"{stand.last}s"]
+    order = python("-m", "rtctl.cli.main", "run", str(path), "--for", f"{stand.last}s")
     code = subprocess.run([*order, "--out", str(bundle), "--no-plot", "--json"], capture_output=True).returncode
     left = _left(made)
     ended = left is not None and code == -signal.SIGKILL

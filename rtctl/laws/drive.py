@@ -12,7 +12,7 @@ class DriveSettings(Settings):
     """Base of the settings of every law that turns a torque into a voltage."""
 
     K_m: float = quantity(0.061, unit="Nm/A", gt=0, help="motor constant")
-    amp_per_volt: float = quantity(0.2, unit="A/V", gt=0, help="gain of the motor driver")
+    amp_per_volt: float = quantity(0.2, unit="A/V", safer="larger", gt=0, help="gain of the motor driver")
 
     @property
     def torque_per_volt(self) -> float:

@@ -14,9 +14,11 @@ from rtctl.idiom import Settings, quantity, state, tick
 
 
 class LimitSettings(Settings):
-    high: float = quantity(10.0, unit="V", help="highest output")
-    low: float | None = quantity(None, unit="V", help="lowest output; minus the highest if absent")
-    slew: float | None = quantity(None, unit="V/s", gt=0, help="fastest change; unlimited if absent")
+    high: float = quantity(10.0, unit="V", safer="smaller", help="highest output")
+    low: float | None = quantity(
+        None, unit="V", safer="larger", absent="high", help="lowest output; minus the highest if absent"
+    )
+    slew: float | None = quantity(None, unit="V/s", gt=0, safer="smaller", help="fastest change; unlimited if absent")
 
 
 class LimitParams(NamedTuple):

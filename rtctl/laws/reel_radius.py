@@ -76,7 +76,7 @@ REEL_RADIUS_STATE = state(
     T2=float,
     drive=float,  # V above the tension
     direction=float,  # of the capstan: -1 motor 2 pulls, 1 motor 1 pulls
-    ticks=int,  # in this phase
+    ticks=int,  # periods in this phase
     still=int,  # ticks at rest
     run=int,  # runs finished
     velocity=VELOCITY_STATE,  # of the capstan
@@ -121,14 +121,15 @@ def build(settings: ReelRadiusSettings, dt: float) -> ReelRadiusParams:
 
 
 @tick
-def step(p, s, phi_c, n1_counts, n2_counts):
+def step(p, s, phi_c, n1_counts, n2_counts, passed=1):
     """Advance one tick; returns 1 when done (then look at s.failed), else 0. Write s.u1 and s.u2, V.
 
-    `phi_c` is the capstan angle in rad, the counts are those of the reel sensors, rising in either direction.
+    `phi_c` is the capstan angle in rad, the counts are those of the reel sensors, rising in either direction. `passed`
+    is the number of periods since the tick before; the time-out counts them.
     """
     middle = 0.5 * (s.velocity.x + phi_c)  # an edge came somewhere within the tick
     v = velocity.step(p.velocity, s.velocity, phi_c)
-    s.ticks += 1
+    s.ticks += passed
     s.T1 = _towards(s.T1, p.tension * s.R1 if s.R1 > 0.0 else p.T_max, p.slew)
     s.T2 = _towards(s.T2, p.tension * s.R2 if s.R2 > 0.0 else p.T_max, p.slew)
     s.drive = _towards(s.drive, p.u_step if s.phase == PULL else 0.0, p.slew)

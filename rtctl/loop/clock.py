@@ -7,6 +7,7 @@ from numba.core import cgutils
 from rtctl.loop.memory import intrinsic
 
 CLOCK_MONOTONIC = 1
+CLOCK_BOOTTIME = 7  # CLOCK_MONOTONIC and the time that the computer was suspended
 TIMER_ABSTIME = 1
 SECOND = 1_000_000_000
 
@@ -15,20 +16,33 @@ _TIMESPEC = ir.LiteralStructType([_I64, _I64])
 _POINTER = _TIMESPEC.as_pointer()
 
 
+def _read(builder, which):
+    """Code that reads a clock, ns."""
+    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(_I32, [_I32, _POINTER]), "clock_gettime")
+    spec = cgutils.alloca_once(builder, _TIMESPEC)
+    builder.call(function, [ir.Constant(_I32, which), spec])
+    seconds = builder.load(cgutils.gep_inbounds(builder, spec, 0, 0))
+    return builder.add(
+        builder.mul(seconds, ir.Constant(_I64, SECOND)), builder.load(cgutils.gep_inbounds(builder, spec, 0, 1))
+    )
+
+
 @intrinsic
 def now(typing_context):
     """Time in ns: clock_gettime(CLOCK_MONOTONIC), a vDSO call without a system call."""
 
     def codegen(context, builder, signature, args):
-        function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(_I32, [_I32, _POINTER]), "clock_gettime"
-        )
-        spec = cgutils.alloca_once(builder, _TIMESPEC)
-        builder.call(function, [ir.Constant(_I32, CLOCK_MONOTONIC), spec])
-        seconds = builder.load(cgutils.gep_inbounds(builder, spec, 0, 0))
-        return builder.add(
-            builder.mul(seconds, ir.Constant(_I64, SECOND)), builder.load(cgutils.gep_inbounds(builder, spec, 0, 1))
-        )
+        return _read(builder, CLOCK_MONOTONIC)
+
+    return types.int64(), codegen
+
+
+@intrinsic
+def boot(typing_context):
+    """Time in ns as `now`, with the time in it that the computer was suspended: clock_gettime(CLOCK_BOOTTIME)."""
+
+    def codegen(context, builder, signature, args):
+        return _read(builder, CLOCK_BOOTTIME)
 
     return types.int64(), codegen
 

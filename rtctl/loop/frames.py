@@ -8,7 +8,7 @@ import numpy as np
 from rtctl.idiom import tick
 
 MAGIC = 0x4C544352  # "RCTL"
-VERSION = 2
+VERSION = 3
 HELLO = -1  # sequence number of the frame with which a loop wakes a plant that waits for it
 AO_CHANNELS, COUNTERS, AI_CHANNELS, TRUTHS = 2, 2, 16, 8
 
@@ -35,6 +35,7 @@ INPUTS = np.dtype(
         ("counter_codes", "<u4", (COUNTERS,)),
         ("ai_codes", "<i4", (AI_CHANNELS,)),
         ("lost_counts", "<i8"),  # by the quadrature converters, since the start
+        ("watchdog", "<i8"),  # times that the board has taken its outputs to zero by itself
         ("truth", "<f8", (TRUTHS,)),  # what only an emulator knows; NaN on a real machine
     ]
 )

@@ -21,8 +21,9 @@ import numba
 import numpy as np
 
 from rtctl import __version__
-from rtctl.config.cache import cache_folder
+from rtctl.config.cache import cache_folder, check, made
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text as write_file
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import excitation, reference
 from rtctl.loop import faults, frames, runner, shm_link
@@ -39,7 +40,7 @@ import numpy as np
 from numba import njit
 
 from rtctl.idiom import tick as compiled
-from rtctl.loop import clock, faults, histogram, mailbox, ring
+from rtctl.loop import clock, faults, histogram, mailbox, ring, safety
 from rtctl.loop.memory import borrowed
 from rtctl.machines import {machine} as machine
 {imports}
@@ -75,7 +76,7 @@ def source(machine: Machine, link: str) -> str:
         header(machine, title, uses).replace(f"import {link}_link", f"import {link}_link as link"),
         function(
             "tick",
-            "p, s, t, c, rx, tx, y, m, k, fresh, late",
+            "p, s, t, c, rx, tx, y, m, k, fresh, late, passed, gone",
             "One tick of the loop.",
             (*timed(loop.stages), *extras(machine)),
         ),
@@ -84,7 +85,7 @@ def source(machine: Machine, link: str) -> str:
         function("sample", "p, s, rx", "What the board reads now.", plant.sample),
     ]
     parts += [copied(f) for f in (runner.post, runner.send, runner.account, runner.stages, runner.note_late)]
-    parts += [copied(f) for f in (runner.answer, runner.virtual)]
+    parts += [copied(f) for f in (runner.answer, runner.behind, runner.guard, runner.virtual)]
     parts += [copied(f, "entry") for f in (runner.run_real, runner.run_lockstep, runner.run_fused)]
     parts += [copied(f, "entry") for f in (runner.plant_real, runner.plant_lockstep)]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
@@ -162,10 +163,7 @@ def write_text(kind: str, text: str, made_of: str | None = None) -> Path:
     path = cache_folder() / f"{kind}_{name}.py"
     if not path.exists():
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            draft = path.with_suffix(f".{os.getpid()}.tmp")
-            draft.write_text(text)
-            draft.replace(path)
+            write_file(made(path.parent) / path.name, text)
         except OSError as error:
             raise UserError(f"{path.parent}: cannot write the generated tick ({error}); set RTCTL_CACHE_DIR") from error
     return path
@@ -183,6 +181,7 @@ def load(path: Path) -> ModuleType:
     name = f"rtctl_generated_{path.stem}"
     if name in sys.modules:
         return sys.modules[name]
+    check(path.parent / "__pycache__")  # numba's machine code lies there
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

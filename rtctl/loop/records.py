@@ -41,11 +41,22 @@ STATUS = state(
     # written by the supervisor
     stop=int,  # 1: end at once, outputs to zero
     hold=int,  # virtual time waits before this tick until the supervisor moves it; 0 for never
+    heartbeat_ns=int,  # clock at the supervisor's latest turn; 0 where there is none
+    commander_ns=int,  # clock at the latest word of a commander
     supervisor_lost=int,  # written by the loop's watch on the supervisor's pipe
 )
 
 PLANT_STATUS = state(
-    pid=int, ready=int, ended=int, tick=int, stop=int, catch_ups=int, skipped=int, frames=int, ticks=HISTOGRAM
+    pid=int,
+    ready=int,
+    ended=int,
+    tick=int,
+    stop=int,
+    catch_ups=int,
+    skipped=int,
+    frames=int,
+    ticks=HISTOGRAM,
+    watchdog=int,  # times that the outputs were taken to zero because none came
 )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.loop import generate, mailbox
+from rtctl.loop import generate, mailbox, safety
 from rtctl.loop.records import MARKS
 from rtctl.machines import Machine
 
@@ -35,20 +35,27 @@ def source(machine: Machine) -> str:
     stages = tuple((name, taken if name == "read" else lines) for name, lines in machine.diagram.stages)
     traced = tuple(lines for lines in generate.extras(machine) if lines[0] == "traced state")
     body = generate.function(
-        "tick", "p, s, t, c, rx, tx, y, m, k, fresh, late", "One tick on a recorded row.", (*stages, *traced)
+        "tick",
+        "p, s, t, c, rx, tx, y, m, k, fresh, late, passed, gone",
+        "One tick on a recorded row.",
+        (*stages, *traced),
     )
     head = generate.header(machine, f"The tick of {machine.kind} on a recording.", machine.diagram.uses)
     return "\n\n".join([head.strip("\n") + "\n", body + "\n", generate.copied(run, "entry")])
 
 
-def run(recorded, rows, p, s, tables, c, tx, y, m, late_ns):
+def run(recorded, rows, p, s, tables, c, tx, y, m, late_ns, period):
     """Tick by tick over the recorded rows (n,); what comes of it goes to `rows` (n,)."""
     for k in range(len(recorded)):
         r = recorded[k]
         y[0].tick, y[0].t, y[0].period, y[0].lateness = r.tick, r.t, r.period, r.lateness
         fresh = 1 if r.link_age == 0.0 else 0
         late = 1 if np.round(r.lateness * 1e9) > late_ns else 0
-        tick(p[0], s[0], tables[c[0].table], c[0], r, tx[0], y[0], m[0], r.tick, fresh, late)
+        passed = 1 + int(np.round(r.lateness * 1e9)) // period
+        gone = (
+            int(r.trip) if r.trip == safety.COMMANDER or r.trip == safety.SUPERVISOR else 0
+        )  # what the loop had found
+        tick(p[0], s[0], tables[c[0].table], c[0], r, tx[0], y[0], m[0], r.tick, fresh, late, passed, gone)
         rows[k] = y[0]
 
 
@@ -65,7 +72,8 @@ class Replay:
         self.c = np.zeros(1, mailbox.COMMAND)
         self._y, self._m, self._tx = np.zeros(1, self.row), np.zeros(1, MARKS), generate.new_frames()["tx"]
         self._tables = np.zeros(2, generate.tables_dtype(machine))
-        self._late_ns = int(machine.config.loop.late * round(1e9 / machine.rate))
+        self._period = round(1e9 / machine.rate)
+        self._late_ns = int(machine.config.loop.late * self._period)
         generate.fill_tables(self._tables[0], (machine.reference, machine.excitation))
         self.use(machine)
 
@@ -77,6 +85,7 @@ class Replay:
         """Rows (n,) that come of the recorded rows (n,), which follow those of the call before."""
         rows = np.zeros(len(recorded), self.row)
         self._run(
-            recorded, rows, self.p, self.s, self._tables, self.c, self._tx, self._y, self._m, self._late_ns
+            recorded, rows, self.p, self.s, self._tables, self.c, self._tx, self._y, self._m,
+            self._late_ns, self._period,
         )  # fmt: skip
         return rows

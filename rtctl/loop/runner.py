@@ -5,10 +5,10 @@ What stands here is the loop as it runs; `tick`, `start`, `advance`, `sample` an
 
 from typing import Any
 
-from rtctl.loop import clock, faults, histogram, mailbox, ring
+from rtctl.loop import clock, faults, histogram, mailbox, ring, safety
 from rtctl.loop.memory import borrowed
 
-tick: Any = None  # the generated tick: tick(p, s, t, c, rx, tx, y, m, k, fresh, late)
+tick: Any = None  # the generated tick: tick(p, s, t, c, rx, tx, y, m, k, fresh, late, passed, gone)
 start: Any = None  # the generated plant: start(p, s), advance(p, s, tx), sample(p, s, rx)
 advance: Any = None
 sample: Any = None
@@ -53,6 +53,7 @@ def run_real(
     wake = clock.now() + period
     st.first_ns = wake
     before = wake
+    awake = clock.boot() - clock.now()  # grows by the time that the computer is suspended
     m[0].on = 1
     for k in range(most):
         if st.stop != 0:
@@ -62,10 +63,14 @@ def run_real(
         woke = clock.now()
         while woke < due:  # short spin, and sleeps cut short by a signal
             woke = clock.now()
-        lateness = woke - wake
+        suspended = clock.boot() - woke - awake
+        if suspended < period:  # two reads of a clock apart
+            suspended = 0
+        awake += suspended
+        lateness = woke - wake + suspended
         skipped = lateness // period  # a late tick is counted and never made up for
         late = 1 if lateness > late_ns else 0
-        if ahead != 0:
+        if ahead != 0 and skipped == 0:  # outputs that waited through a missed period are old
             send(st, out, c[0], f[0], tx, held, k, woke)
         fresh = link.receive_newest(inp, rx, rx_staged)
         begun = clock.now()
@@ -74,16 +79,17 @@ def run_real(
             fresh = faults.receive(c[0], f[0], rx, fresh, k)
         y[0].tick = k
         y[0].t = (woke - st.first_ns) * 1e-9
-        y[0].period = (woke - before) * 1e-9
+        y[0].period = (woke - before + suspended) * 1e-9
         y[0].lateness = lateness * 1e-9
         was = st.state
-        tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late)
-        tx[0].inputs_t_ns = rx[0].t_ns
+        gone = safety.gone(p[0].safety, woke, st.commander_ns, st.heartbeat_ns)
+        tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late, 1 + skipped, gone)
+        tx[0].inputs_t_ns, tx[0].state = rx[0].t_ns, s[0].safety.state
         wrote = clock.now()
         ring.put(ring_[0], rows, y)
         account(st, s[0].safety, k, rx[0].lost_counts)
         ticked = clock.now()
-        if ahead == 0 or (st.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
+        if ahead == 0 or skipped > 0 or (st.state != was and (was == 1 or was == 2)):  # a trip does not wait
             send(st, out, c[0], f[0], tx, held, k, ticked)
         done = clock.now()
         if fresh > 0:
@@ -98,7 +104,7 @@ def run_real(
         if late != 0:
             note_late(st, k, lateness)
         before = woke
-        wake += (skipped + 1) * period
+        wake += ((lateness - suspended) // period + 1) * period
         if done > wake:
             st.overruns += 1
         if st.supervisor_lost != 0:
@@ -147,11 +153,18 @@ def run_lockstep(
     for k in range(first, first + most):
         if st.stop != 0 or st.supervisor_lost != 0:
             break
-        if link.receive(inp, rx, rx_staged) == 0:
+        mailbox.take(box, staged, p, c)
+        skipped = behind(c[0], k, period)
+        for _ in range(skipped):  # the machine goes on while the loop stands still
+            if link.receive(inp, rx, rx_staged) == 0:
+                st.failed = 1
+                break
+            post(st, out, held, clock.now())
+        if st.failed != 0 or link.receive(inp, rx, rx_staged) == 0:
             st.failed = 1
             break
         st.link_frames += 1
-        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, m, f, tx, rx, held, period, late_ns, ahead, k)
+        virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, late_ns, ahead, k, skipped)
         post(st, out, held, clock.now())
 
 
@@ -192,15 +205,28 @@ def run_fused(
     for k in range(first, first + most):
         if st.stop != 0 or st.supervisor_lost != 0:
             break
-        virtual(st, box, tables, ring_, rows, p, s, c, staged, y, m, f, tx, rx, held, period, late_ns, ahead, k)
+        mailbox.take(box, staged, p, c)
+        skipped = behind(c[0], k, period)
+        for _ in range(skipped):  # the machine goes on while the loop stands still
+            advance(pp[0], ps[0], held[0])
+            sample(pp[0], ps[0], rx[0])
+        virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, late_ns, ahead, k, skipped)
         advance(pp[0], ps[0], held[0])
         sample(pp[0], ps[0], rx[0])
 
 
-def virtual(st, box, tables, ring_, rows, p, s, c, staged, y, m, f, tx, rx, held, period, late_ns, ahead, k):
-    """One tick on the virtual clock; `held` then has the outputs that act until the next."""
-    mailbox.take(box, staged, p, c)
-    if ahead != 0:
+def behind(c, k, period):
+    """Whole periods that pass before tick `k` because a fault has the loop stand still."""
+    return faults.lateness(c, k) // period if c.faulty != 0 else 0
+
+
+def virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, late_ns, ahead, k, skipped):
+    """One tick on the virtual clock, before which `skipped` periods passed without one.
+
+    `held` then has the outputs that act until the next.
+    """
+    st.missed += skipped
+    if ahead != 0 and skipped == 0:
         faults.transmit(c[0], f[0], tx, held, k)
     fresh, late, lateness = 1, 0, 0
     if c[0].faulty != 0:
@@ -210,15 +236,18 @@ def virtual(st, box, tables, ring_, rows, p, s, c, staged, y, m, f, tx, rx, held
             late = 1
             note_late(st, k, lateness)
     y[0].tick = k
-    y[0].t = k * (period * 1e-9)
-    y[0].period = period * 1e-9
+    y[0].t = (k + st.missed) * (period * 1e-9)
+    y[0].period = (1 + skipped) * period * 1e-9
     y[0].lateness = lateness * 1e-9
     was = st.state
     m[0].on = 1 if k % 16 == 0 else 0  # reading the clock would cost a fused tick a tenth of its time
     begun = clock.now() if m[0].on != 0 else 0
-    tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late)
+    tick(p[0], s[0], tables[c[0].table], c[0], rx[0], tx[0], y[0], m[0], k, fresh, late, 1 + skipped, 0)
+    tx[0].state = s[0].safety.state
     wrote = clock.now() if m[0].on != 0 else 0
-    if ahead == 0 or (s[0].safety.state != was and (was == 1 or was == 2)):  # a trip does not wait for a tick
+    if (
+        ahead == 0 or skipped > 0 or (s[0].safety.state != was and (was == 1 or was == 2))
+    ):  # a trip does not wait for a tick
         faults.transmit(c[0], f[0], tx, held, k)
     ring.put(ring_[0], rows, y)
     account(st, s[0].safety, k, rx[0].lost_counts)
@@ -283,9 +312,7 @@ def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind, h
         woke = clock.now()
         if link.receive_newest(inp, tx, tx_staged) > 0:
             st.frames += 1
-        if woke - tx[0].inputs_t_ns > hold:
-            tx[0].ao_codes[:] = 0
-            tx[0].dio_lines = 0
+        guard(st, tx[0], rx[0], woke - tx[0].inputs_t_ns > hold)
         periods = 1 + (woke - wake) // period  # a machine does not stop because its emulator was late
         if periods > 1:
             st.catch_ups += 1
@@ -299,6 +326,18 @@ def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind, h
         answer(st, rx, tx, out, clock.now())
         wake += periods * period
         histogram.add(st.ticks, clock.now() - woke)
+
+
+def guard(st, tx, rx, old):
+    """The board's watchdog: outputs that are too `old` are off; that they were on is counted and told to the loop."""
+    if not old:
+        return
+    if tx.state == safety.ARMED or tx.state == safety.RUNNING:
+        st.watchdog += 1
+        rx.watchdog += 1
+    tx.ao_codes[:] = 0
+    tx.dio_lines = 0
+    tx.state = 0
 
 
 def plant_lockstep(status, p, s, tx, tx_staged, rx, out, inp):

@@ -14,14 +14,15 @@ from typing import NamedTuple
 
 from pydantic import Field
 
-from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.idiom import Settings, guard, quantity, state, tick
 
 IDLE, ARMED, RUNNING, TRIPPED = range(4)
 STATES = ("idle", "armed", "running", "tripped")
 
 (
     NONE, LINK, FROZEN, FOLLOWING, TENSION, CURRENT, NOT_A_NUMBER, MISSED, COMMANDER, START_UP, SUPERVISOR, SENSORS,
-) = range(12)  # fmt: skip
+    WATCHDOG,
+) = range(13)  # fmt: skip
 TRIPS = {
     NONE: ("none", "no trip"),
     LINK: ("link_lost", "the plant or board has sent nothing for too long: is it running, is the cable in?"),
@@ -30,38 +31,83 @@ TRIPS = {
     TENSION: ("tension", "the estimated tape tension is out of range: torn, folded or jammed tape"),
     CURRENT: ("current_time", "the drive has been asked for more than its continuous current for too long"),
     NOT_A_NUMBER: ("not_a_number", "a signal or the law's output is not a number"),
-    MISSED: ("missed_ticks", "too many ticks in a row came late: the machine cannot hold this rate"),
+    MISSED: (
+        "missed_ticks",
+        "too many ticks in a row came late or not at all: the loop stood still, or cannot hold this rate",
+    ),
     COMMANDER: ("commander_lost", "nobody has talked to the command socket for too long, and the config requires it"),
     START_UP: ("start_up", "the start-up routine did not find the reel radii"),
-    SUPERVISOR: ("supervisor_lost", "the supervisor has died"),
+    SUPERVISOR: ("supervisor_lost", "the supervisor has died or hangs: nobody could take a disarm"),
     SENSORS: (
         "sensors_disagree",
         "two sensors of one motion disagree: dead encoder, missed counts, slip, torn tape, or reels of other radii",
+    ),
+    WATCHDOG: (
+        "board_watchdog",
+        "the board took its outputs to zero by itself: nothing came from the loop for longer than safety.link_timeout",
     ),
 }
 
 
 class SafetySettings(Settings):
-    link_timeout: float = quantity(0.05, unit="s", gt=0, help="longest time without a frame from plant or board")
-    frozen_time: float = quantity(0.2, unit="s", ge=0, help="longest effort without a count; 0 switches it off")
-    frozen_effort: float = quantity(1.0, unit="V", gt=0, help="command above which something should move")
-    following_error: float = quantity(0.0, unit="", ge=0, help="largest error, rad or m; 0 switches it off")
-    tension_min: float = quantity(-1e9, unit="N", help="lowest estimated tension while running")
-    tension_max: float = quantity(1e9, unit="N", help="highest estimated tension while running")
-    tension_time: float = quantity(0.05, unit="s", ge=0, help="how long the tension may be out of range")
-    current: float = quantity(1.0, unit="A", gt=0, help="continuous current of a drive")
-    current_time: float = quantity(2.0, unit="s", ge=0, help="how long it may be exceeded; 0 switches it off")
-    missed_ticks: int = Field(default=10, ge=0, description="late ticks in a row that trip; 0 switches it off")
-    require_commander: bool = Field(default=False, description="trip where nobody commands, or sends a ping")
-    commander_timeout: float = quantity(1.0, unit="s", gt=0, help="how long the commander may be silent")
-    disagreement: float = quantity(
-        0.0, unit="m", ge=0, help="most that two sensors of one motion may come apart after arming; 0 switches it off"
+    link_timeout: float = quantity(
+        0.05, unit="s", safer="smaller", gt=0, help="longest time without a frame from plant or board"
     )
-    ramp: float = quantity(0.0, unit="s", ge=0, help="time in which a trip takes the outputs to zero; 0 is at once")
+    frozen_time: float = quantity(
+        0.2, unit="s", safer="smaller", off=0.0, ge=0, help="longest effort without a count; 0 switches it off"
+    )
+    frozen_effort: float = quantity(
+        1.0, unit="V", safer="smaller", gt=0, help="command above which something should move"
+    )
+    following_error: float = quantity(
+        0.0, unit="", safer="smaller", off=0.0, ge=0, help="largest error, rad or m; 0 switches it off"
+    )
+    tension_min: float = quantity(-1e9, unit="N", safer="larger", help="lowest estimated tension while running")
+    tension_max: float = quantity(1e9, unit="N", safer="smaller", help="highest estimated tension while running")
+    tension_time: float = quantity(
+        0.05, unit="s", safer="smaller", ge=0, help="how long the tension may be out of range"
+    )
+    current: float = quantity(1.0, unit="A", safer="smaller", gt=0, help="continuous current of a drive")
+    current_time: float = quantity(
+        2.0, unit="s", safer="smaller", off=0.0, ge=0, help="how long it may be exceeded; 0 switches it off"
+    )
+    missed_ticks: int = Field(
+        default=10,
+        ge=0,
+        json_schema_extra=guard("smaller", 0),
+        description="late ticks in a row that trip; 0 switches it off",
+    )
+    require_commander: bool = Field(
+        default=False, json_schema_extra=guard("larger"), description="trip where nobody commands, or sends a ping"
+    )
+    commander_timeout: float = quantity(
+        1.0, unit="s", safer="smaller", gt=0, help="how long the commander may be silent"
+    )
+    supervisor_timeout: float = quantity(
+        2.0,
+        unit="s",
+        safer="smaller",
+        off=0.0,
+        ge=0,
+        help="how long the supervisor, which takes disarm, may be silent; 0 switches it off",
+    )
+    disagreement: float = quantity(
+        0.0,
+        unit="m",
+        safer="smaller",
+        off=0.0,
+        ge=0,
+        help="most that two sensors of one motion may come apart after arming; 0 switches it off",
+    )
+    ramp: float = quantity(
+        0.0, unit="s", safer="smaller", ge=0, help="time in which a trip takes the outputs to zero; 0 is at once"
+    )
 
 
 class SafetyParams(NamedTuple):
-    link: int  # ticks
+    """Times are in periods of the loop, counted by the clock whether a tick ran in a period or not."""
+
+    link: int
     frozen: int
     frozen_effort: float
     following: float
@@ -72,7 +118,9 @@ class SafetyParams(NamedTuple):
     current_time: int
     missed: int
     disagreement: float  # m
-    fade: float  # share of the output that a trip takes away each tick
+    fade: float  # share of the output that a trip takes away each period
+    commander: int  # ns that the commander may be silent; 0 where none is required
+    supervisor: int  # ns that the supervisor may be silent; 0 for ever
 
 
 SAFETY_STATE = state(
@@ -82,8 +130,9 @@ SAFETY_STATE = state(
     arm=int,  # requests seen
     disarm=int,
     reset=int,
-    armed_for=int,  # ticks in `armed`
-    silent=int,  # ticks without a frame
+    passed=int,  # periods since the tick before
+    armed_for=int,  # periods in `armed`
+    silent=int,  # periods without a frame
     still=int,
     over=int,
     slack=int,
@@ -93,11 +142,12 @@ SAFETY_STATE = state(
     hold=(float, 2),  # outputs of the last tick before the trip, V
     gate=float,  # share of them that is still written: 1, falling to 0 after a trip
     on=int,  # 1 in the tick in which the outputs come on
+    watchdog=int,  # times that the board had taken its outputs to zero by itself
 )
 
 
 def build(settings: SafetySettings, dt: float) -> SafetyParams:
-    """Limits in ticks of `dt` s. Raises ValueError where the tension range is empty."""
+    """Limits in periods of `dt` s. Raises ValueError where the tension range is empty."""
     if settings.tension_min >= settings.tension_max:
         raise ValueError(f"tension_min {settings.tension_min:g} N is not below tension_max {settings.tension_max:g} N")
     return SafetyParams(
@@ -113,6 +163,8 @@ def build(settings: SafetySettings, dt: float) -> SafetyParams:
         missed=settings.missed_ticks,
         disagreement=settings.disagreement,
         fade=1.0 if settings.ramp <= dt else dt / settings.ramp,
+        commander=round(settings.commander_timeout * 1e9) if settings.require_commander else 0,
+        supervisor=round(settings.supervisor_timeout * 1e9),
     )
 
 
@@ -126,9 +178,13 @@ def trip(s, cause, k):
 
 
 @tick
-def command(s, c):
-    """Take requests: arm leads from idle to armed, disarm to idle, reset from tripped to idle. Sets s.on."""
+def command(s, c, passed):
+    """Take requests: arm leads from idle to armed, disarm to idle, reset from tripped to idle. Sets s.on.
+
+    `passed` is the number of periods since the tick before, by the clock: 1 where none was missed.
+    """
     s.on = 0
+    s.passed = passed
     if c.reset != s.reset:
         s.reset = c.reset
         if s.state == TRIPPED:
@@ -143,6 +199,7 @@ def command(s, c):
         if s.state == IDLE:
             s.state = ARMED
             s.on = 1
+            s.passed = 1  # what was missed while the outputs were off is not held against it
             s.armed_for = 0
             s.gate = 1.0
             s.hold[:] = 0.0  # a trip in this very tick has nothing to fade
@@ -152,20 +209,42 @@ def command(s, c):
             s.slack = 0
             s.late = 0
     if s.state == ARMED:
-        s.armed_for += 1
+        s.armed_for += s.passed
 
 
 @tick
-def check_timing(p, s, c, fresh, late, k):
-    """Link, lateness and commander, at the start of tick `k`: `fresh` frames came, `late` is 1 where it woke late."""
-    s.silent = 0 if fresh > 0 else s.silent + 1
-    s.late = s.late + 1 if late != 0 else 0
+def check_timing(p, s, c, fresh, late, gone, watchdog, k):
+    """Link, lateness, commander and board, at the start of tick `k`.
+
+    `fresh` frames came, `late` is 1 where it woke late, `gone` is the cause (COMMANDER, SUPERVISOR) of who has been
+    silent for too long, or 0. `watchdog` counts how often the board has taken its outputs to zero by itself.
+    """
+    s.silent = 0 if fresh > 0 else s.silent + s.passed
+    s.late = s.late + s.passed if late != 0 else 0
     if s.silent > p.link:
         trip(s, LINK, k)
     if p.missed > 0 and s.late >= p.missed:
         trip(s, MISSED, k)
     if c.commander_lost != 0:
         trip(s, COMMANDER, k)
+    if gone != 0:
+        trip(s, gone, k)
+    if watchdog != s.watchdog:
+        s.watchdog = watchdog
+        trip(s, WATCHDOG, k)
+
+
+@tick
+def gone(p, now, commander, supervisor):
+    """Cause of who has been silent for too long at `now`: COMMANDER, SUPERVISOR, or 0. Times in ns of one clock.
+
+    `commander` and `supervisor` are when they were last heard; 0 where nobody writes that down.
+    """
+    if p.commander > 0 and commander > 0 and now - commander > p.commander:
+        return COMMANDER
+    if p.supervisor > 0 and supervisor > 0 and now - supervisor > p.supervisor:
+        return SUPERVISOR
+    return 0
 
 
 @tick
@@ -186,11 +265,11 @@ def check_motion(p, s, error, counts, effort, amperes, k):
     if p.following > 0.0 and abs(error) > p.following:
         trip(s, FOLLOWING, k)
     if s.silent == 0:  # an old sample says nothing of the encoder: a silent link is no frozen one
-        s.still = s.still + 1 if counts == s.counts and abs(effort) > p.frozen_effort else 0
+        s.still = s.still + s.passed if counts == s.counts and abs(effort) > p.frozen_effort else 0
         s.counts = counts
     if p.frozen > 0 and s.still > p.frozen:
         trip(s, FROZEN, k)
-    s.over = s.over + 1 if amperes > p.current else 0
+    s.over = s.over + s.passed if amperes > p.current else 0
     if p.current_time > 0 and s.over > p.current_time:
         trip(s, CURRENT, k)
 
@@ -206,7 +285,7 @@ def check_number(s, u, k):
 def check_tension(p, s, T1, T2, k):
     """Estimated tensions in N, while running."""
     out = min(T1, T2) < p.tension_min or max(T1, T2) > p.tension_max
-    s.slack = s.slack + 1 if out and s.state == RUNNING else 0
+    s.slack = s.slack + s.passed if out and s.state == RUNNING else 0
     if s.slack > p.tension:
         trip(s, TENSION, k)
 
@@ -224,6 +303,6 @@ def gate(p, s, u, channel):
 
 @tick
 def fade(p, s):
-    """After a trip, one tick's share less of the outputs. Call once a tick, before `gate`."""
+    """After a trip, the share of the periods that have passed less of the outputs. Call once a tick, before `gate`."""
     if s.state == TRIPPED:
-        s.gate = max(s.gate - p.fade, 0.0)
+        s.gate = max(s.gate - p.fade * s.passed, 0.0)

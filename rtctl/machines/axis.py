@@ -75,7 +75,9 @@ class AxisConfig(MachineSettings):
     output: AnalogOutputSettings = AnalogOutputSettings(channel=0)
     encoder: LinearScaleSettings = LinearScaleSettings(pitch=1e-6)
     radius: float = quantity(1.0, unit="m", gt=0, help="metres per radian, for reports in rad")
-    amp_per_volt: float = quantity(0.5, unit="A/V", gt=0, help="gain of the drive, for the current limit")
+    amp_per_volt: float = quantity(
+        0.5, unit="A/V", safer="larger", gt=0, help="gain of the drive, for the current limit"
+    )
     law: AxisLawSettings
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
@@ -166,6 +168,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
         (
             "read",
             (
+                "y.watchdog = rx.watchdog",
                 "y.x_counts = daq_stc.counter_position(s.encoder, rx.counter_codes[0])",
                 "y.x = linear_scale.metres(p.encoder, y.x_counts)",
             ),

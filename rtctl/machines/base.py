@@ -136,6 +136,9 @@ class MachineSettings(Settings):
     commands: CommandSettings = CommandSettings()
     metrics: MetricsSettings = MetricsSettings()
     faults: list[FaultSettings] = Field(default=[], description="faults to inject; `rtctl fault list` explains them")
+    live: dict[str, Any] = Field(
+        default={}, description="bounds of changes while the machine runs, wider than the values above: path: value"
+    )
     own: dict[str, str] = Field(
         default={}, description="texts of the own files that the config names; filled in when it is read, and recorded"
     )
@@ -148,12 +151,13 @@ COMMON_COLUMNS = (
     Column("lateness", "s", "how late the tick woke"),
     Column("state", "", "0 idle, 1 armed, 2 running, 3 tripped"),
     Column("trip", "", "cause of the trip, 0 for none"),
-    Column("link_age", "ticks", "ticks since plant or board last sent a frame"),
+    Column("link_age", "ticks", "periods since plant or board last sent a frame"),
     Column("order", "", "number of the newest order that the tick had taken in; see orders.jsonl"),
+    Column("watchdog", "", "times that the board has taken its outputs to zero by itself"),
 )
 STATE_LINES = (
-    "safety.command(s.safety, c)",
-    "safety.check_timing(p.safety, s.safety, c, fresh, late, k)",
+    "safety.command(s.safety, c, passed)",
+    "safety.check_timing(p.safety, s.safety, c, fresh, late, gone, y.watchdog, k)",
 )
 TRACE_LINES = (
     "y.state = s.safety.state",

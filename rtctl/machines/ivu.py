@@ -63,6 +63,7 @@ class IvuParams(NamedTuple):
     R1: float
     R2: float
     grow: float  # d_tape R_c / pi: R^2 grows by this per rad of capstan
+    core: float  # m, radius of a reel without tape
     trail_speed: float
     hand_over: float
     settle: int  # ticks from arming to running
@@ -110,7 +111,7 @@ def _set_radii(m, R1, R2, phi):
 def prepare(p, s, phi, n1_counts, n2_counts, k):
     """While armed: measure the radii if asked to, tighten the tape, then run from where the capstan stands."""
     if p.machine.measure != 0 and s.machine.prepared == 0:
-        if reel_radius.step(p.reel_radius, s.reel_radius, phi, n1_counts, n2_counts) == 0:
+        if reel_radius.step(p.reel_radius, s.reel_radius, phi, n1_counts, n2_counts, s.safety.passed) == 0:
             reference.hold(0, s.reference, phi)
             shaper.reset(p.shaper, s.shaper, phi)
             return
@@ -129,9 +130,19 @@ def prepare(p, s, phi, n1_counts, n2_counts, k):
 
 @tick
 def follow_radii(p, m, phi):
-    """Radii now: the area of paper on a reel grows with the tape that it wound, R^2 = R_0^2 + d_tape x / pi."""
-    m.R1 = np.sqrt(max(m.R1_0 * m.R1_0 + p.grow * (phi - m.phi_0), 1e-6))
-    m.R2 = np.sqrt(max(m.R2_0 * m.R2_0 - p.grow * (phi - m.phi_0), 1e-6))
+    """Radii now: the area of paper on a reel grows with the tape that it wound, R^2 = R_0^2 + d_tape x / pi.
+
+    A reel that has no paper left has the radius of its core.
+    """
+    m.R1 = _grown(m.R1_0, p.grow * (phi - m.phi_0), p.core)
+    m.R2 = _grown(m.R2_0, -p.grow * (phi - m.phi_0), p.core)
+
+
+@tick
+def _grown(R_0, area, core):
+    """Radius in m of a reel of `R_0` m whose paper has grown by `area` pi m^2, and at least that of the `core`."""
+    least = min(core, R_0)
+    return np.sqrt(max(R_0 * R_0 + area, least * least))
 
 
 @tick
@@ -146,7 +157,11 @@ def play(t, s, c, k):
 
 @tick
 def tape_apart(p, s, phi, speed, n1_counts, n2_counts, R1, R2):
-    """How far, in m, the tape by a reel's sensor is from the tape by the capstan, over a stretch in one direction."""
+    """How far, in m, the tape by the reels' sensors is from the tape by the capstan, over a stretch in one direction.
+
+    One reel winds what the other pays out, so tape that stretches moves one ahead of the capstan and the other behind
+    it by as much. The sum of both has no stretch in it, and all of what one sensor missed.
+    """
     m = s.machine
     tape = abs(phi - m.phi_1) * p.machine.R_c
     direction = 1 if speed > SLOW else (-1 if speed < -SLOW else 0)
@@ -156,7 +171,7 @@ def tape_apart(p, s, phi, speed, n1_counts, n2_counts, R1, R2):
         return 0.0
     apart1 = (n1_counts - m.n1) * p.reel1.radians_per_count * R1 - tape
     apart2 = (n2_counts - m.n2) * p.reel2.radians_per_count * R2 - tape
-    return max(abs(apart1), abs(apart2))
+    return apart1 + apart2
 
 
 COLUMNS = (
@@ -189,6 +204,7 @@ STAGES = (
     (
         "read",
         (
+            "y.watchdog = rx.watchdog",
             "y.capstan_counts = daq_stc.counter_position(s.capstan, rx.counter_codes[0])",
             "y.capstan = ls7084.radians(p.capstan, y.capstan_counts)",
             "y.reel1_counts = optical_sensor.count("
@@ -365,6 +381,7 @@ def _machine_params(config: IvuConfig, dt: float) -> IvuParams:
         R1=r.R1,
         R2=r.R2,
         grow=r.d_tape * config.R_c / np.pi,
+        core=r.measure.R_min,
         trail_speed=config.law.friction.speed,
         hand_over=config.law.friction.hand_over,
         settle=round(config.law.tension.ramp / dt) + round(0.1 / dt),

@@ -11,16 +11,49 @@ import linecache
 import re
 import sys
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from rtctl.config.files import write_text
+
 OWN = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_]\w*)")
 MOST_BYTES = 1 << 18
+_trusted: set[str] = set()  # sha256 of the texts that this process may run
 
 
 class OwnError(ValueError):
     """What is wrong with a file of the user's own: a sentence that names file and line and says what would be right."""
+
+
+class ForeignError(OwnError):
+    """Code that came with data and that the user has not given by path."""
+
+
+def trust(texts: Iterable[str]) -> None:
+    """Let this process run these texts: read from files that the user named, or sent by a process of the same user."""
+    _trusted.update(_sha256(text) for text in texts)
+
+
+def is_trusted(text: str) -> bool:
+    """Whether this process may run a text."""
+    return _sha256(text) in _trusted
+
+
+def give(paths: Iterable[Path]) -> None:
+    """Read own files that the user names on the command line, and trust them. Raises UserError."""
+    from rtctl.config.errors import UserError
+
+    for path in paths:
+        try:
+            read(str(path), Path())
+        except OwnError as error:
+            raise UserError(f"--own {error}") from None
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 class Source(NamedTuple):
@@ -79,9 +112,11 @@ def read(file: str, folder: Path) -> str:
     if len(raw) > MOST_BYTES:
         raise OwnError(f"{file}: is bigger than 256 KiB; a law is one short file")
     try:
-        return raw.decode("utf-8-sig")
+        text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise OwnError(f"{file}:{raw.count(10, 0, error.start) + 1}: not UTF-8 text; save it as UTF-8") from None
+    trust([text])
+    return text
 
 
 def refuse_plant(config: Any, what: str) -> None:
@@ -99,7 +134,7 @@ def keep(texts: dict[str, str], folder: Path) -> None:
     for file, text in texts.items():
         path = folder / "own" / Path(file).name
         path.parent.mkdir(exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_text(path, text)
 
 
 def _missing(file: str, path: Path) -> str:
@@ -114,6 +149,11 @@ def _missing(file: str, path: Path) -> str:
 def load(source: Source) -> ModuleType:
     """The module of a text, run once in each process. Raises OwnError with the line where it cannot be run."""
     name = source.module
+    if not is_trusted(source.text):
+        raise ForeignError(
+            f"{source.file}: its text came with the data, and rtctl runs no code that comes with data; read it and "
+            f"give the file by path: --own {source.file} (sha256 {_sha256(source.text)[:16]}...)"
+        )
     if name in sys.modules:
         return sys.modules[name]
     try:

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, create_model
 
 from rtctl.own import law, plant, term
-from rtctl.own.files import OwnError, Source, is_own, read, split
+from rtctl.own.files import OwnError, Source, is_own, is_trusted, read, split
 from rtctl.own.parts import Parts, own
 
 Key = tuple[Any, ...]
@@ -94,6 +94,8 @@ def _source(kind: str, texts: dict[str, str], folder: Path | None) -> Source:
         if folder is None:
             raise OwnError(f"{file}: its text is not in the config's `own`, and nobody knows the config's folder")
         texts[file] = read(file, folder)
+    elif folder is not None and not is_trusted(texts[file]) and read(file, folder) != texts[file]:
+        raise OwnError(f"{file}: the file and the text in the config's `own` differ; remove `own` to run the file")
     return Source(file, name, texts[file])
 
 

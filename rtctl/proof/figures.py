@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rtctl.config.files import replaced
 from rtctl.proof.score import NOTHING_MISSING, wilson
 
 Json = dict[str, Any]
@@ -27,7 +28,8 @@ def reliability(R: Json, path: Path) -> None:
     axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel="confidence given to a name", ylabel="share of names that were right",
              title=f"Reliability of {R['calibration']['names']} names")  # fmt: skip
     axes.legend(loc="upper left", frameon=False, fontsize=8)
-    figure.savefig(path, dpi=110)
+    with replaced(path, "wb") as file:
+        figure.savefig(file, format="png", dpi=110)
 
 
 def confusion(R: Json, path: Path) -> None:
@@ -48,7 +50,8 @@ def confusion(R: Json, path: Path) -> None:
     axes.set_xticks(range(len(answers)), answers, rotation=90, fontsize=7)
     axes.set_yticks(range(len(truths)), truths, fontsize=7)
     axes.set(xlabel="answer", ylabel="truth")
-    figure.savefig(path, dpi=110)
+    with replaced(path, "wb") as file:
+        figure.savefig(file, format="png", dpi=110)
 
 
 def _frame(i: int, j: int) -> Any:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text
 from rtctl.proof import draw, plants, seal, solver
 from rtctl.proof.effects import TABLE
 from rtctl.proof.machine import NQ, NU, NY
@@ -290,7 +291,7 @@ def write_case(folder: Path, seed: int, i: int, which: tuple[str, ...], heldout:
                 write_bundle(folder / f"{name}-heldout", other, second)
                 break
     (folder / DRAFT).mkdir(exist_ok=True)
-    (folder / DRAFT / f"{name}.json").write_text(json.dumps(answer), "utf-8")
+    write_text(folder / DRAFT / f"{name}.json", json.dumps(answer))
     return name, answer
 
 
@@ -343,5 +344,5 @@ def _begin(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
             raise UserError(f"{folder} holds cases of an interrupted run with {begun}; name another folder")
         return {path.stem: json.loads(path.read_text("utf-8")) for path in sorted(draft.glob("case-*.json"))}
     draft.mkdir(parents=True)
-    (draft / "order.json").write_text(json.dumps(order), "utf-8")
+    write_text(draft / "order.json", json.dumps(order))
     return {}

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text
 from rtctl.proof import report, seal
 
 SCORES, REPORT, RESULT = "scores.json", "report.md", "diagnosis.json"
@@ -63,8 +64,8 @@ def diagnose_all(
         out = Path(folder) / outcome.name / "diagnosis"
         out.mkdir(exist_ok=True)
         if outcome.code:  # a failure of the tool is written down, not raised
-            (out / FAILED).write_text(json.dumps({"error": outcome.message}) + "\n", "utf-8")
-        (out / "seconds.json").write_text(json.dumps(outcome.seconds) + "\n", "utf-8")
+            write_text(out / FAILED, json.dumps({"error": outcome.message}) + "\n")
+        write_text(out / "seconds.json", json.dumps(outcome.seconds) + "\n")
         done += 1
         if progress:
             progress(done, len(every))
@@ -86,8 +87,8 @@ def score_all(folder: Path | str) -> dict[str, Any]:
         if isinstance(took, float):
             seconds[bundle.name] = took
     result = score(answers, diagnoses, seconds=seconds)
-    (folder / SCORES).write_text(json.dumps(result, sort_keys=True, indent=1) + "\n", "utf-8")
-    (folder / REPORT).write_text(report.markdown(result, f"Concealed cases, {answers.get('mix')}"), "utf-8")
+    write_text(folder / SCORES, json.dumps(result, sort_keys=True, indent=1) + "\n")
+    write_text(folder / REPORT, report.markdown(result, f"Concealed cases, {answers.get('mix')}"))
     figures.reliability(result, folder / "reliability.png")
     figures.confusion(result, folder / "confusion.png")
     return result

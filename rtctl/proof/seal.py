@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text
 
 ANSWERS, SEAL = "answers.json", "seal.json"
 
@@ -25,9 +26,9 @@ def close_seal(folder: Path | str, answers: dict[str, Any]) -> str:
     folder = Path(folder)
     salt = secrets.token_hex(16)
     sha = digest(answers, salt)
-    (folder / ANSWERS).write_text(json.dumps(answers, sort_keys=True, indent=1, allow_nan=False) + "\n", "utf-8")
+    write_text(folder / ANSWERS, json.dumps(answers, sort_keys=True, indent=1, allow_nan=False) + "\n")
     seal = {"format": 1, "sha256": sha, "salt": salt, "cases": len(answers["cases"])}
-    (folder / SEAL).write_text(json.dumps(seal, indent=1) + "\n", "utf-8")
+    write_text(folder / SEAL, json.dumps(seal, indent=1) + "\n")
     return sha
 
 

@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from rtctl.config.files import replaced
 from rtctl.trace.plot import BLUE, GREEN, GREY, INK, ORANGE, RED, envelope
 
 __all__ = [
@@ -80,6 +81,6 @@ def save(figure: Figure, folder: Path, number: str) -> Path:
     buffer = BytesIO()
     figure.savefig(buffer)
     path = folder / f"figure_{number.replace('.', '_')}.png"
-    with Image.open(buffer) as image:  # few colours are enough for lines, and half the bytes
-        image.convert("RGB").quantize(PALETTE).save(path, optimize=True)
+    with Image.open(buffer) as image, replaced(path, "wb") as file:  # few colours do for lines, and halve the bytes
+        image.convert("RGB").quantize(PALETTE).save(file, format="png", optimize=True)
     return path

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
+from rtctl.config.files import write_text
 from rtctl.reproduce.rows import Row
 from rtctl.reproduce.run import FOLDER, Result
 
@@ -68,7 +69,7 @@ ERRATA = (  # errata of the thesis without a number: section, its words, what is
 def write(results: Sequence[Result], out: Path) -> Path:
     """Write the page into the folder `out` and return its path. Raises OSError where that cannot be."""
     path = out / PAGE
-    path.write_text(text(results), encoding="utf-8")
+    write_text(path, text(results))
     return path
 
 

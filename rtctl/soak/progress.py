@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.files import replaced
 from rtctl.soak.checker import Checker, Violation
 from rtctl.soak.events import Day
 from rtctl.soak.rig import Fused
-from rtctl.trace.bundle import replace
 
 PROGRESS = "progress.npz"
 SHARED = ("status", "mailbox", "ring")
@@ -58,11 +58,9 @@ def save(folder: Path, rig: Fused, day: Day, wall_s: float) -> None:
     }
     records: dict[str, Any] = {name: np.frombuffer(a.tobytes(), np.uint8) for name, a in _arrays(rig).items()}
     records["last"] = np.frombuffer(b"" if checker.last is None else checker.last.tobytes(), np.uint8)
-    part = folder / (PROGRESS + ".tmp")
     try:
-        with part.open("wb") as file:
+        with replaced(folder / PROGRESS, "wb", sync=True) as file:
             np.savez(file, progress=np.frombuffer(json.dumps(text).encode(), np.uint8), **records)
-        replace(part, folder / PROGRESS)
     except OSError as error:
         raise UserError(f"{folder / PROGRESS}: cannot be written: {error.strerror}; --resume needs it") from error
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text
 from rtctl.soak import progress, ranges, report
 from rtctl.soak.events import Day
 from rtctl.soak.memory import Memory
@@ -83,7 +84,7 @@ def _play(
     found = report.summary(day, wall, memory.most, mode, out)
     found["complete"] = rig.tick >= total
     try:
-        (out / report.SUMMARY).write_text(report.as_text(found))
+        write_text(out / report.SUMMARY, report.as_text(found))
     except OSError as error:
         raise UserError(f"{out / report.SUMMARY}: cannot be written: {error.strerror}") from None
     return found

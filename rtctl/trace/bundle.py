@@ -7,7 +7,6 @@ A long recording is in parts: `part-0001`, `part-0002` and so on are bundles, an
 """
 
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from rtctl.config import files
 from rtctl.config.errors import UserError, nearest
 from rtctl.trace.columns import columns_of
 
@@ -57,6 +57,8 @@ def load_bundle(folder: Path | str) -> Bundle:
 def part_folders(folder: Path) -> list[Path]:
     """The parts of a long recording, in order; none where it is in one piece."""
     found = [part for part in folder.glob("part-*") if part.is_dir() and part.name[5:].isdecimal()]
+    for part in found:
+        files.inside(part, folder)
     return sorted(found, key=lambda part: int(part.name[5:]))
 
 
@@ -66,6 +68,7 @@ def index(folder: Path) -> dict[str, Any]:
 
 
 def _entry(part: Path) -> dict[str, Any] | None:
+    files.inside(part / PARQUET, part)
     try:
         found = pq.read_metadata(part / PARQUET)
     except (pa.ArrowException, OSError):
@@ -81,8 +84,9 @@ def _entry(part: Path) -> dict[str, Any] | None:
 
 def recordings(folder: Path) -> list[Path]:
     """The Parquet files of a finished bundle: its own, or those of its parts."""
-    if (folder / PARQUET).is_file():
-        return [folder / PARQUET]
+    path = files.inside(folder / PARQUET, folder)
+    if path.is_file():
+        return [path]
     parts = part_folders(folder)
     if (folder / ARROWS).exists() or any((part / ARROWS).exists() for part in parts):
         raise UserError(f"{folder} holds a recording that was not finished; run: rtctl trace repair {folder}")
@@ -95,7 +99,7 @@ def recordings(folder: Path) -> list[Path]:
             f"{folder / CASE} lists other parts than are there ({', '.join(there[:20]) or 'none'}); "
             f"run: rtctl trace repair {folder}"
         )
-    return [folder / name / PARQUET for name in there]
+    return [files.inside(folder / name / PARQUET, folder) for name in there]
 
 
 def _table(paths: list[Path]) -> pa.Table:
@@ -114,7 +118,7 @@ def _table(paths: list[Path]) -> pa.Table:
 
 def load_case(folder: Path) -> dict[str, Any]:
     """Read case.json. Raises UserError where it is missing, is not JSON or is of a later format."""
-    path = folder / CASE
+    path = files.inside(folder / CASE, folder)
     try:
         case = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -137,17 +141,8 @@ def load_case(folder: Path) -> dict[str, Any]:
 def save_case(folder: Path, case: dict[str, Any]) -> Path:
     """Write case.json: the old one or the new one is there at any moment, never half of either."""
     path = Path(folder) / CASE
-    text = as_json(case, indent=1) + "\n"
-    part = path.with_name(CASE + ".tmp")
-    try:
-        with part.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
-    return replace(part, path)
+    files.write_text(path, as_json(case, indent=1) + "\n", sync=True)
+    return path
 
 
 def as_json(case: dict[str, Any], indent: int | None = None) -> str:
@@ -160,23 +155,17 @@ def write_parquet(folder: Path, batches: Iterable[pa.RecordBatch], schema: pa.Sc
 
     Raises OSError where the disk does not take it, or does not give back as many rows as it was given (or `expect`).
     """
-    part = folder / (PARQUET + ".tmp")
     rows = 0
-    try:
-        with pq.ParquetWriter(part, schema, compression="zstd") as writer:
+    with files.replaced(folder / PARQUET, "wb", sync=True) as file:
+        with pq.ParquetWriter(file, schema, compression="zstd") as writer:
             for table in _groups(batches, schema):
                 writer.write_table(table, row_group_size=ROW_GROUP)
                 rows += table.num_rows
-        with part.open("rb") as file:
-            os.fsync(file.fileno())
-        found = pq.read_metadata(part).num_rows
+        file.seek(0)
+        found = pq.read_metadata(file).num_rows
         wanted = rows if expect is None else expect
         if found != wanted:
             raise OSError(f"{folder / PARQUET} would hold {found} rows where {wanted} were recorded")
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-    replace(part, folder / PARQUET)
     return rows
 
 
@@ -191,17 +180,6 @@ def _groups(batches: Iterable[pa.RecordBatch], schema: pa.Schema) -> Iterable[pa
             waiting, rows = [], 0
     if waiting:
         yield pa.Table.from_batches(waiting, schema)
-
-
-def replace(part: Path, path: Path) -> Path:
-    """Rename and make the rename last."""
-    part.replace(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
-    return path
 
 
 def _numbers(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:

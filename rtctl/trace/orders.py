@@ -5,12 +5,14 @@ Every row of a recording carries the number of the newest order that its tick ha
 """
 
 import json
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import inside, open_stream
 
 ORDERS = "orders.jsonl"
 
@@ -30,7 +32,9 @@ class Journal:
 
     def open(self, folder: Path) -> None:
         """Keep the journal in this folder from now on. Raises OSError."""
-        self._file = (folder / ORDERS).open("ab", buffering=0)  # a line is with the operating system at once
+        self._file = os.fdopen(
+            open_stream(folder / ORDERS, os.O_APPEND), "ab", buffering=0
+        )  # no line waits in a buffer
         self._file.write("".join(self._early).encode())
         self._early = []
 
@@ -85,7 +89,7 @@ def restore(record: Any, fields: dict[str, Any]) -> None:
 
 def orders(folder: Path) -> dict[int, Order]:
     """Orders of a recording by their number; none where it has no journal. A torn last line is left out."""
-    path = folder / ORDERS
+    path = inside(folder / ORDERS, folder)
     if not path.exists():
         return {}
     out = {}

@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import replaced
 from rtctl.trace.bundle import Bundle
 
 BUCKETS = 1500  # about the pixels of a panel's width
@@ -126,7 +127,8 @@ def save(figure: Figure, path: Path, option: str = "--plot ") -> None:
     if not path.parent.is_dir():
         raise UserError(f"{option}{path}: cannot be written (there is no folder {path.parent})")
     try:
-        figure.savefig(path)
+        with replaced(path, "wb") as file:
+            figure.savefig(file, format=path.suffix.removeprefix(".").lower())
     except OSError as error:
         raise UserError(f"{option}{path}: cannot be written ({error.strerror or error})") from None
 

@@ -4,6 +4,7 @@ All batches that are whole are kept, and no row that was not recorded is made up
 recorder was given. Doing it again changes nothing.
 """
 
+import contextlib
 import json
 import os
 from pathlib import Path
@@ -14,6 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.files import inside
 from rtctl.trace.bundle import ARROWS, CASE, FORMAT, PARQUET, index, load_case, part_folders, save_case, write_parquet
 from rtctl.trace.losses import Losses
 from rtctl.trace.stream import StreamReader, lock
@@ -51,8 +53,8 @@ def repair(folder: Path | str) -> RepairReport:
 
 def _piece(folder: Path) -> RepairReport:
     """A recording in one piece, or one part."""
-    stream = folder / ARROWS
-    rows = _rows_in(folder / PARQUET)
+    stream = inside(folder / ARROWS, folder)
+    rows = _rows_in(inside(folder / PARQUET, folder))
     if stream.is_file():
         report = _from_stream(folder, rows)
         stream.unlink()
@@ -61,7 +63,9 @@ def _piece(folder: Path) -> RepairReport:
     else:
         raise UserError(f"{folder} holds neither {ARROWS} nor a readable {PARQUET}; there is nothing to repair")
     for name in (CASE, PARQUET):
-        (folder / (name + ".tmp")).unlink(missing_ok=True)
+        for left in (folder / f"{name}.tmp", *folder.glob(f".{name}.*.tmp")):  # of a recorder that was killed
+            with contextlib.suppress(OSError):
+                left.unlink(missing_ok=True)
     return report
 
 

@@ -4,7 +4,9 @@ A recording from the first tick on holds all that went into the law: what was re
 woke, and, in the journal beside it, what it was told. So the same law writes the same voltages, to the bit.
 """
 
-from collections.abc import Mapping
+import hashlib
+import shlex
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,11 +19,12 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_paths
 from rtctl.loop import generate
 from rtctl.loop.replay import Replay, read_columns, written_columns
-from rtctl.own.files import OwnError
+from rtctl.own.files import ForeignError, OwnError, give
 from rtctl.sources import sources_hash
 from rtctl.trace.bundle import Bundle, load_bundle
 from rtctl.trace.orders import orders, restore
 
+ABSENT = {"watchdog": 0.0}  # what a recording means that was made before there was this column
 GIVEN = ("tick", "t", "period", "lateness")  # of a row, beside what was read
 
 
@@ -56,13 +59,17 @@ class Replayed(NamedTuple):
         return not self.differences
 
 
-def replay(folder: Path | str, changed: Mapping[str, Any] | None = None) -> Replayed:
+def replay(folder: Path | str, changed: Mapping[str, Any] | None = None, own: Iterable[Path | str] = ()) -> Replayed:
     """Replay the bundle in `folder`, with settings `changed` by their dotted path.
+
+    `own` are files of the user's own by path, where the recording was made with some: their text has to be the text in
+    the bundle, which itself is never run.
 
     Raises UserError for a bundle that is none or whose settings do not fit, NoAnswer for one that does not hold what a
     replay needs.
     """
     bundle = load_bundle(folder)
+    give(map(Path, own))
     config, changed = _config(bundle), dict(changed or {})
     config = set_paths(config, changed)
     machine = _machine(config)
@@ -94,9 +101,24 @@ def _config(bundle: Bundle) -> Any:
         model, given = machines.widened(given)
         return model.model_validate(given)
     except OwnError as error:
+        if isinstance(error.__cause__, ForeignError):
+            raise UserError(_foreign(bundle, given)) from None
         raise UserError(f"{bundle.folder}/case.json, config: {error}") from error
     except ValidationError as error:
         raise UserError(f"{bundle.folder}/case.json, config: {sentences(error, model, given)}") from error
+
+
+def _foreign(bundle: Bundle, given: dict[str, Any]) -> str:
+    """What to type where the recording was made with code, and the code was not given."""
+    told = given.get("own")
+    texts = {name: text for name, text in (told if isinstance(told, dict) else {}).items() if isinstance(text, str)}
+    words = " ".join(f"--own {shlex.quote(name)}" for name in texts)
+    sums = ", ".join(f"{name} {hashlib.sha256(text.encode()).hexdigest()}" for name, text in texts.items())
+    return (
+        f"{bundle.folder} was recorded with code of its owner, and rtctl runs no code that comes with data. Read it "
+        f"and give the files by path: rtctl replay {shlex.quote(str(bundle.folder))} {words}; their sha256 has to be "
+        f"that of the texts in case.json: {sums}"
+    )
 
 
 def _machine(config: Any) -> machines.Machine:
@@ -109,7 +131,7 @@ def _machine(config: Any) -> machines.Machine:
 def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
     """Recorded rows (n,) up to the first that is missing, and why there are no more."""
     row = generate.row_dtype(machine)
-    lacking = [name for name in row.names or () if name not in bundle.columns]
+    lacking = [name for name in row.names or () if name not in bundle.columns and name not in ABSENT]
     lacking = [name for name in lacking if name in (*GIVEN, *read_columns(machine), "order", "link_age")]
     if lacking:
         raise NoAnswer(f"{bundle.folder}: column '{lacking[0]}' is missing; a replay needs all that the law has read")
@@ -123,7 +145,7 @@ def _rows(bundle: Bundle, machine: machines.Machine) -> tuple[np.ndarray, str]:
     count = int(gaps[0]) + 1 if len(gaps) else len(ticks)
     rows = np.zeros(count, row)
     for name in row.names or ():
-        rows[name] = bundle.columns[name][:count] if name in bundle.columns else np.nan
+        rows[name] = bundle.columns[name][:count] if name in bundle.columns else ABSENT.get(name, np.nan)
     return rows, f"rows behind tick {ticks[count - 1]} are missing" if len(gaps) else ""
 
 

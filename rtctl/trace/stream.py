@@ -17,6 +17,7 @@ import numpy as np
 import pyarrow as pa
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import open_stream
 from rtctl.trace.columns import Column, record_batch, schema
 
 END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
@@ -37,7 +38,7 @@ class StreamWriter:
         self.rows = 0  # written
         self.bytes = 0  # written
         self.failed = False
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        self._file = open_stream(path)
         try:
             lock(self._file, path)
             with contextlib.suppress(OSError):  # not a regular file

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from rtctl import machines
+from rtctl.config.bounds import Bounds
 from rtctl.config.errors import UserError
 from rtctl.config.load import set_paths
 from rtctl.daemon.reload import differences, mixed, reload
@@ -16,6 +17,7 @@ class Supervisor:
 
     def __init__(self, config: Any):
         self.config, self.machine, self.link = config, machines.build(config), "shm"
+        self.bounds = Bounds(config)
         self.commands = self
         self.changes: list[tuple[str, Any]] = []
         self.taken = 0
@@ -28,10 +30,11 @@ class Supervisor:
 
 @pytest.fixture
 def supervised(config: Callable[..., Any]) -> Callable[..., tuple[Supervisor, Any]]:
-    """`supervised("ivu", {...})` is a supervisor and the settings that its file has by now."""
+    """`supervised("ivu", {...})` is a supervisor and the settings that its file has by now; the last argument are
+    settings that it had at the start."""
 
-    def make(kind: str, values: dict[str, Any]) -> tuple[Supervisor, Any]:
-        settings = config(kind)
+    def make(kind: str, values: dict[str, Any], start: dict[str, Any] | None = None) -> tuple[Supervisor, Any]:
+        settings = config(kind, set=start)
         return Supervisor(settings), set_paths(settings, values)
 
     return make
@@ -82,7 +85,8 @@ def test_a_second_reload_finds_only_what_is_still_refused(supervised: Callable[.
 
 def test_values_that_need_each_other_go_together(supervised: Callable[..., Any]) -> None:
     """Each by itself would have the lower limit above the upper one."""
-    supervisor, fresh = supervised("ivu", {"safety.tension_max": 20.0, "safety.tension_min": 10.0})
+    live = {"live": {"safety.tension_max": 20.0}}
+    supervisor, fresh = supervised("ivu", {**live, "safety.tension_max": 20.0, "safety.tension_min": 10.0}, live)
     taken, refused = reload(supervisor, fresh)
     assert sorted(taken) == ["safety.tension_max", "safety.tension_min"] and refused == []
 

@@ -200,3 +200,21 @@ def test_practice_cases_are_read_without_a_warning(shared, name):
     assert case.warnings == ()
     assert case.controller_known
     assert set(case.parameters) <= set(believed(case))
+
+
+def test_an_estimate_of_the_program_has_no_tolerance(case_of):
+    case = read_case(case_of("axis", parameters={"F_c": 0.2}), "bundle")
+    assert case.estimated == ("M", "F_v", "k")
+    assert [case.tolerance(name) for name in ("M", "F_v", "k")] == [math.inf] * 3
+    assert case.tolerance("F_c") == 0.15
+    known = read_case(case_of("axis", parameters={"M": 2.0, "F_v": 1.0}, drive={"newton_per_volt": 3.0}), "bundle")
+    assert known.estimated == ()
+    assert known.tolerance("F_v") == 0.15
+    assert read_case(case_of("axis", parameters={"M": 2.0}, drive={}), "bundle").estimated == ("K",)
+
+
+@pytest.mark.parametrize("plant", ["ivu", "ldu", "axis"])
+def test_a_plant_of_the_users_own_is_refused(case_of, plant):
+    said = refused(case_of(plant, config={"machine": plant, "plant": {"kind": "./my_plant.py:Plant"}}))
+    assert "./my_plant.py:Plant" in said
+    assert "rtctl replay" in said

@@ -6,7 +6,7 @@ import pytest
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.kernel import OPEN
 from rtctl.diagnose.model import FITTED, Model, free_parameters, owner_model, plant_params
-from rtctl.diagnose.record import Record
+from rtctl.diagnose.record import Record, check
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants import axis, ivu, ldu
 from rtctl.plants.physics import TERMS
@@ -92,3 +92,16 @@ def test_a_mass_spring_damper_of_which_nobody_says_anything_is_guessed_from_its_
 
 def test_an_axis_whose_mass_is_said_is_not_guessed(plain):
     assert owner_model(plain.record.case, plain.record).base == owner_model(plain.record.case).base
+
+
+@pytest.mark.parametrize(("given", "wanted"), [({}, {"M": 0.5}), ({"M": 2.0}, {"M": 2.0, "K": 4.0})])
+def test_what_the_case_does_not_say_is_estimated_from_the_record(given, wanted):
+    case = read_case({"plant": "axis", "sample_rate": 1000.0, "parameters": given, "controller": {"kind": "none"}}, ".")
+    t = np.arange(4000) / 1000.0
+    u = np.sin(2 * np.pi * 3 * t) + np.sin(2 * np.pi * 7 * t)
+    x = -2.0 * (np.sin(2 * np.pi * 3 * t) / (6 * np.pi) ** 2 + np.sin(2 * np.pi * 7 * t) / (14 * np.pi) ** 2)
+    record = check({"t": t, "ref": 0 * t, "w": 0 * t, "u": u, "x": x}, case)
+    base = owner_model(record.case, record).base
+    for name, value in wanted.items():
+        assert base[name] == pytest.approx(value, rel=0.03)
+    assert any("estimated from the recording" in warning for warning in record.case.warnings)

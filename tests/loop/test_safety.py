@@ -22,8 +22,10 @@ from rtctl.loop.safety import (
     NONE,
     NOT_A_NUMBER,
     RUNNING,
+    SUPERVISOR,
     TENSION,
     TRIPPED,
+    WATCHDOG,
     SafetySettings,
 )
 
@@ -34,7 +36,8 @@ SETTINGS = SafetySettings(
 )  # fmt: skip
 P = safety.build(SETTINGS, DT)
 GOOD: dict[str, Any] = {
-    "fresh": 1, "late": 0, "lost": 0, "error": 0.0, "effort": 0.5, "amperes": 0.2, "T1": 1.0, "T2": 1.0, "moves": True,
+    "fresh": 1, "late": 0, "passed": 1, "gone": 0, "watchdog": 0, "lost": 0, "error": 0.0, "effort": 0.5,
+    "amperes": 0.2, "T1": 1.0, "T2": 1.0, "moves": True,
 }  # fmt: skip
 
 
@@ -56,8 +59,8 @@ class Machine:
         self.c["reset"] += reset
         self.c["commander_lost"] = x["lost"]
         self.counts += bool(x["moves"])
-        safety.command(self.s, self.c)
-        safety.check_timing(self.p, self.s, self.c, x["fresh"], x["late"], self.k)
+        safety.command(self.s, self.c, x["passed"])
+        safety.check_timing(self.p, self.s, self.c, x["fresh"], x["late"], x["gone"], x["watchdog"], self.k)
         safety.check_motion(self.p, self.s, x["error"], self.counts, x["effort"], x["amperes"], self.k)
         safety.check_tension(self.p, self.s, x["T1"], x["T2"], self.k)
         safety.fade(self.p, self.s)
@@ -90,6 +93,8 @@ CAUSES = [
     (NOT_A_NUMBER, {"amperes": np.nan}, 1),
     (MISSED, {"late": 1}, 7),
     (COMMANDER, {"lost": 1}, 1),
+    (COMMANDER, {"gone": COMMANDER}, 1),
+    (SUPERVISOR, {"gone": SUPERVISOR}, 1),
 ]
 UNTIL = [c for c in CAUSES if c[2] > 1]
 FINE = [{"effort": 0.9, "moves": False}, {"error": 0.5}, {"T1": 8.0, "T2": 0.0}, {"amperes": 1.0}]
@@ -240,6 +245,57 @@ def test_whatever_happens_outputs_are_on_only_while_armed_or_running(events: lis
         assert (machine.s["trip"] != NONE) == (now == TRIPPED)
         assert not (was == TRIPPED and now != TRIPPED and not event.get("reset"))
         assert not (was == IDLE and now != IDLE and not event.get("arm"))
+
+
+TIMED = [c for c in CAUSES if c[2] > 2]
+
+
+@pytest.mark.parametrize(("cause", "signals", "ticks"), TIMED)
+def test_limits_count_periods_of_the_clock_and_not_ticks(cause: int, signals: dict, ticks: int) -> None:
+    """Half of the ticks do not run: the limit is reached after as many periods, in half of the ticks."""
+    machine = Machine()
+    assert machine.trips_after(**{**signals, "passed": 2}) == (ticks + 1) // 2
+    assert machine.s["trip"] == cause
+
+
+@pytest.mark.parametrize(("cause", "signals", "ticks"), TIMED)
+def test_one_stall_as_long_as_the_limit_trips_in_its_tick(cause: int, signals: dict, ticks: int) -> None:
+    assert Machine().trips_after(**{**signals, "passed": 1000}) == 1
+
+
+def test_a_stall_below_the_limit_is_no_trip_and_one_while_off_is_not_held_against_it() -> None:
+    machine = Machine()
+    assert machine.tick(late=1, passed=6) == 3.0
+    machine = Machine(state=IDLE)
+    assert machine.tick(arm=1, late=1, passed=1000) == 3.0 and machine.s["armed_for"] == 1
+
+
+def test_a_ramp_counts_periods_too() -> None:
+    machine = Machine(safety.build(SETTINGS.model_copy(update={"ramp": 0.01}), DT))
+    machine.tick(u=4.0)
+    assert machine.tick(error=9.0) == pytest.approx(3.6)
+    assert machine.tick(passed=4) == pytest.approx(2.0)
+
+
+def test_the_boards_watchdog_trips_each_time_that_its_count_moves_while_on() -> None:
+    machine = Machine(state=IDLE)
+    machine.tick(watchdog=3)
+    machine.tick(watchdog=3, arm=1)
+    assert machine.tick(watchdog=3) == 3.0
+    assert machine.tick(watchdog=4) == 0.0 and machine.s["trip"] == WATCHDOG
+    machine.tick(watchdog=5, reset=1, arm=1)
+    assert machine.s["state"] == TRIPPED  # it acted in the very tick of arming
+
+
+def test_silence_of_commander_and_supervisor_is_told_apart() -> None:
+    p = safety.build(SafetySettings(require_commander=True, commander_timeout=1.0, supervisor_timeout=2.0), DT)
+    at = 10**12
+    assert safety.gone(p, at, at - 10**9, at - 2 * 10**9) == NONE
+    assert safety.gone(p, at, at - 10**9 - 1, at) == COMMANDER
+    assert safety.gone(p, at, at, at - 2 * 10**9 - 1) == SUPERVISOR
+    assert safety.gone(p, at, 0, 0) == NONE  # a loop without a supervisor
+    free = safety.build(SafetySettings(supervisor_timeout=0.0), DT)
+    assert safety.gone(free, at, 1, 1) == NONE
 
 
 def test_every_cause_has_a_code_and_a_sentence() -> None:

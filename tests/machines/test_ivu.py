@@ -201,3 +201,17 @@ def test_the_ripple_of_the_drivers_hardly_moves_the_tape():
     rippled = fused.run(fused.config("ivu", "steps", plant__driver__ripple=True), 3.0)
     change = np.abs(plain["truth_capstan"] - rippled["truth_capstan"]).max()
     assert 0.0 < change < 5e-3
+
+
+@pytest.mark.parametrize(("R1", "R2"), [(0.020, 0.020), (0.020, 0.040), (0.040, 0.020), (0.030, 0.030), (0.022, 0.022)])
+@pytest.mark.parametrize("plant_set", ["identified", "simulation"])
+def test_sensors_of_a_healthy_machine_agree_at_any_radii(R1, R2, plant_set):
+    """Wound past the end of the paper of either reel, where its core's radius stays, and with a tape that stretches."""
+    steps = [
+        {"at": 0.2, "to": 80.0, "ramp": 4.0}, {"at": 21.0, "to": -80.0, "ramp": 4.0},
+        {"at": 62.0, "to": 0.0, "ramp": 4.0}, {"at": 83.0, "to": 1.0}, {"at": 86.0, "to": -1.0},
+    ]  # fmt: skip
+    run = fused.run(fused.config("ivu", reference__steps=steps, plant__set=plant_set, **radii(R1, R2)), 90.0)
+    assert run["trip"].max() == 0
+    for name in ("R1", "R2"):
+        np.testing.assert_allclose(run[name], run["truth_" + name], rtol=5e-3)

@@ -1,5 +1,6 @@
 import math
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from rtctl.config.errors import UserError
 from rtctl.config.load import load_settings
 from rtctl.machines.axis import AxisConfig
 from rtctl.machines.wiring import TERMINALS
+from rtctl.plants import fmu_file
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed")
 sys.path.insert(0, str(Path(__file__).parent))
@@ -90,6 +92,8 @@ def test_a_wrong_map_is_one_message(tmp_path, changes, words):
     [
         ({"kind": "ModelExchange"}, "for model exchange only; export it for co-simulation"),
         ({"platform": "win64"}, "no library for linux64, only win64"),
+        ({"platform": "x86_64-windows", "version": 3}, "no library for x86_64-linux, only x86_64-windows"),
+        ({"platform": "darwin64"}, "no library for linux64, only darwin64"),
         ({"version": 3, "inner": 3e-4}, r"plant.fmu.ticks: .* steps by 0.0003 s and 0.001 s is no multiple of it"),
     ],
 )
@@ -106,6 +110,64 @@ def test_what_is_no_fmu_is_refused(tmp_path):
     (tmp_path / "text.fmu").write_text("not a zip")
     with pytest.raises(UserError, match="it is no FMU"):
         plan(given(tmp_path / "text.fmu"), *AXIS, 1e-3)
+
+
+def packed(path, names, description=None):
+    """An archive with these further files, {name: content}."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("modelDescription.xml", carriage.description(2) if description is None else description)
+        for name, content in names.items():
+            file.writestr(name, content)
+    return path
+
+
+LINUX = {"binaries/linux64/carriage.so": b""}
+LINK = zipfile.ZipInfo("resources/link")
+LINK.external_attr = 0o120777 << 16
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        ({"sources/carriage.c": b""}, "no library for linux64, only C sources; compile them into it"),
+        ({"binaries/linux64/other.so": b""}, "binaries/linux64 holds other.so, not carriage.so"),
+        ({"../../evil": b"", **LINUX}, "the path '../../evil', which leads out of its folder; nothing is unpacked"),
+        ({"/etc/evil": b"", **LINUX}, "the path '/etc/evil', which leads out"),
+        ({LINK: b"/etc/passwd", **LINUX}, "the link 'resources/link'; an FMU holds plain files"),
+    ],
+)
+def test_an_archive_is_checked_before_it_is_unpacked(tmp_path, names, words):
+    with pytest.raises(UserError, match=words):
+        plan(given(packed(tmp_path / "c.fmu", names)), *AXIS, 1e-3)
+
+
+def test_an_archive_that_unpacks_to_gigabytes_is_refused_by_its_directory(tmp_path, monkeypatch):
+    monkeypatch.setattr(fmu_file, "UNPACKED_LIMIT", 1 << 20)
+    path = packed(tmp_path / "c.fmu", {"resources/zeros": bytes(2 << 20), **LINUX})
+    with pytest.raises(UserError, match=r"its files are .* GiB when unpacked"):
+        plan(given(path), *AXIS, 1e-3)
+
+
+def test_an_archive_with_a_damaged_or_locked_file_is_refused(tmp_path):
+    path = packed(tmp_path / "c.fmu", LINUX)
+    whole = path.read_bytes()
+    at = whole.index(b"<?xml") if b"<?xml" in whole else 60
+    path.write_bytes(whole[:at] + b"\xff" * 20 + whole[at + 20 :])
+    with pytest.raises(UserError, match=r"the file is damaged .*; export it again|is not valid"):
+        plan(given(path), *AXIS, 1e-3)
+    locked = bytearray(whole)
+    directory = whole.index(b"PK\x01\x02")
+    locked[directory + 8] |= 1
+    path.write_bytes(locked)
+    with pytest.raises(UserError, match=r"modelDescription.xml in it is encrypted; export it without a password"):
+        plan(given(path), *AXIS, 1e-3)
+
+
+@pytest.mark.parametrize("missing", ["fmi2DoStep", "fmi3GetFloat64"])
+def test_a_library_without_a_function_that_is_called_names_it(library, tmp_path, missing):
+    built = carriage.library(tmp_path, without=missing)
+    with pytest.raises(UserError, match=f"its library lacks {missing}; export it again for co-simulation"):
+        Fmu(given(carriage.pack(tmp_path / "c.fmu", built, int(missing[3]))), *AXIS, 1e-3)
 
 
 def test_a_library_that_does_not_load_is_refused_and_leaves_nothing_behind(tmp_path, monkeypatch):

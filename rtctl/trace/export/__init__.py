@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 
 from rtctl.config.errors import UserError, nearest
+from rtctl.config.files import replaced_path
 from rtctl.trace.export.source import ALL, Selection, Source
 
 __all__ = ["ALL", "FORMATS", "Exported", "Format", "Selection", "export", "format_of"]
@@ -69,15 +70,12 @@ def export(folder: Path | str, to: str, out: Path | str | None = None, selection
         raise UserError(f"{path} is a part of the bundle; choose another name")
     if not path.parent.is_dir():
         raise UserError(f"{path}: cannot be written (there is no folder {path.parent})")
-    part = path.with_name(f".{path.stem}.tmp{form.suffix}")  # some packages look at how the name ends
     try:
-        writer.write(source, part)
-        part.replace(path)
+        with replaced_path(path, form.suffix) as part:  # some packages look at how the name ends
+            writer.write(source, part)
     except (pa.ArrowException, OSError) as error:
         why = getattr(error, "strerror", None) or str(error).splitlines()[0]
         raise UserError(f"{path}: cannot be written ({why})") from None
-    finally:
-        part.unlink(missing_ok=True)
     return Exported(path, to, source.rows, tuple(column.name for column in source.columns), path.stat().st_size)
 
 

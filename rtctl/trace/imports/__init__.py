@@ -1,9 +1,11 @@
 """Recordings of other programs as bundles: readers, one file here for each kind, and what makes a bundle of them."""
 
 import importlib
+import zipfile
 from pathlib import Path
 
 from rtctl.config.errors import UserError, nearest
+from rtctl.trace.imports.packed import packing, read_packed
 from rtctl.trace.imports.table import Table
 
 __all__ = ["READERS", "Table", "read"]
@@ -14,9 +16,41 @@ READERS = {  # how the name ends -> module here
     ".txt": "csv_file",
     ".mat": "mat_file",
     ".npz": "npz_file",
+    ".npy": "npz_file",
     ".parquet": "parquet_file",
+    ".feather": "parquet_file",
+    ".arrow": "parquet_file",
     ".mcap": "mcap_file",
+    ".json": "json_file",
+    ".jsonl": "json_file",
+    ".ndjson": "json_file",
+    ".mf4": "mf4_file",
+    ".mdf": "mf4_file",
+    ".tdms": "tdms_file",
+    ".h5": "hdf5_file",
+    ".hdf5": "hdf5_file",
 }
+PACKAGES = {  # package that a reader needs -> what installs it
+    "mcap": "mcap",
+    "asammdf": "'rtctl[mf4]'",
+    "nptdms": "'rtctl[tdms]'",
+    "h5py": "'rtctl[hdf5]'",
+    "zstandard": "zstandard",
+    "lz4": "lz4",
+}
+MAGIC = {  # first bytes -> module here
+    b"PAR1": "parquet_file",
+    b"ARROW1": "parquet_file",
+    b"\x89MCAP0\r\n": "mcap_file",
+    b"MDF     ": "mf4_file",
+    b"UnFinMF ": "mf4_file",
+    b"TDSm": "tdms_file",
+    b"\x89HDF\r\n\x1a\n": "hdf5_file",
+    b"MATLAB ": "mat_file",
+    b"\x93NUMPY": "npz_file",
+}
+TEXT = ("csv_file", "json_file")
+HEAD = 4096  # bytes from which the kind is seen
 
 
 def read(path: Path | str) -> Table:
@@ -24,20 +58,70 @@ def read(path: Path | str) -> Table:
     path = Path(path)
     if path.is_dir():
         raise UserError(f"{path} is a folder; give the file in it, one of {', '.join(READERS)}")
-    suffix = path.suffix.lower()
-    if suffix not in READERS:
-        near = nearest(suffix, READERS)
-        hint = f"is it a {near}?" if near else "if it is one of these, name it so"
-        raise UserError(f"{path}: cannot import '{suffix}'; what can be is {', '.join(READERS)}; {hint}")
     if not path.is_file():
-        raise UserError(f"{path}: no such file")
+        raise UserError(f"{path}: no such file" if not path.exists() else f"{path} is no plain file")
     try:
-        return importlib.import_module(f"rtctl.trace.imports.{READERS[suffix]}").read(path)
+        return _read(path, 0)
     except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] != "mcap":
+        package = (error.name or "").partition(".")[0]
+        if package not in PACKAGES:
             raise
-        raise UserError(f"{path} needs the package mcap: pip install mcap") from None
+        raise UserError(f"{path} needs the package {package}: pip install {PACKAGES[package]}") from None
     except UnicodeDecodeError as error:
         raise UserError(f"{path} holds text that is not UTF-8: {error.object[:20]!r}") from None
     except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror or error})") from None
+        raise UserError(f"{path}: cannot be read ({error.strerror or 'damaged or of another kind'})") from None
+    except MemoryError:
+        raise UserError(f"{path}: there is not enough memory for it; write a shorter part or fewer columns") from None
+
+
+def _read(path: Path, depth: int) -> Table:
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    if packing(head):
+        if depth:
+            raise UserError(f"{path} is packed more than once; unpack it first")
+        return read_packed(path, lambda inner: _read(inner, depth + 1))
+    suffix = path.suffix.lower()
+    by_name, by_content = READERS.get(suffix), _content(path, head)
+    if by_content is None and by_name is None:
+        near = nearest(suffix, READERS)
+        hint = f"is it a {near}?" if near else "if it is one of these, name it so"
+        raise UserError(f"{path}: cannot import '{suffix}'; what can be is {', '.join(READERS)}; {hint}")
+    kind = by_content or by_name
+    if by_name == "mat_file" and kind == "hdf5_file":
+        kind = by_name
+    table = importlib.import_module(f"rtctl.trace.imports.{kind}").read(path)
+    if by_name is not None and kind != by_name and not (by_name in TEXT and kind in TEXT):
+        name = str(kind).removesuffix("_file")
+        table = table._replace(notes=(f"{path.name} is read as {name}, which it is by its content", *table.notes))
+    return table
+
+
+def _content(path: Path, head: bytes) -> str | None:
+    """Module that reads a file with these first bytes; None where they say nothing."""
+    for magic, module in MAGIC.items():
+        if head.startswith(magic):
+            return module
+    if head[512:].startswith(b"\x89HDF\r\n\x1a\n"):
+        return "hdf5_file"
+    if head.startswith(b"PK\x03\x04"):
+        return _zip(path)
+    text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
+    if text.startswith((b'{"', b"{\n", b"{\r", b'[{"', b"[[")) and path.suffix.lower() not in (".txt", ".tsv"):
+        return "json_file"
+    return None
+
+
+def _zip(path: Path) -> str:
+    """Module for a zip of arrays. Raises UserError for another one."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, ValueError, EOFError):
+        return "npz_file"
+    if path.suffix.lower() == ".npz" or any(name.endswith(".npy") for name in names):
+        return "npz_file"
+    if any(name.startswith("xl/") for name in names):
+        raise UserError(f"{path} is a workbook of a spreadsheet; save the sheet as csv")
+    raise UserError(f"{path} is a zip archive with {', '.join(names[:5])}; unpack it and give the file")

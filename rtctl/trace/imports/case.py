@@ -5,7 +5,8 @@ from typing import Any
 
 from rtctl.config.errors import UserError
 from rtctl.config.units import to_si
-from rtctl.diagnose.case import PARAMETERS, read_case
+from rtctl.diagnose.case import OTHER_NAMES, PARAMETERS, read_case
+from rtctl.diagnose.quantities import Quantities, quantities
 from rtctl.trace.bundle import CASE, FORMAT, as_json
 from rtctl.trace.imports.plan import Plan
 from rtctl.trace.imports.table import Table
@@ -26,13 +27,16 @@ def case_of(table: Table, plan: Plan, units: dict[str, str], rate: float | None,
         sensors.setdefault("unit", position["x"])
     if plan.plant == "axis" and units.get("u", "V") != "V":
         drive.setdefault("unit", units["u"])
+    axis = quantities(sensors.get("unit"), drive.get("unit"))
     controller = given.pop("controller", None)
     law = {"controller": controller} if controller else {"controller": {"kind": "unknown"}, "controller_known": False}
     return {
         "format": FORMAT,
         "plant": plan.plant,
         "sample_rate": rate,
-        "parameters": {name: _parameter(plan.plant or "", name, value) for name, value in plan.parameters.items()},
+        "parameters": {
+            name: _parameter(plan.plant or "", name, value, axis) for name, value in plan.parameters.items()
+        },
         **({"sensors": sensors} if sensors else {}),
         **({"drive": drive} if drive else {}),
         **law,
@@ -55,11 +59,13 @@ def checked(case: dict[str, Any], folder: Path) -> list[str]:
         raise UserError("--case: NaN and infinity are nothing that case.json can hold; write null there") from None
 
 
-def _parameter(plant: str, name: str, value: float | str) -> float:
+def _parameter(plant: str, name: str, value: float | str, axis: Quantities) -> float:
     """A parameter in SI. A name that the model does not have is told of by the case's own check."""
     field = PARAMETERS[plant].model_fields.get(name)
     extra = field.json_schema_extra if field else None
     unit = extra.get("unit") if isinstance(extra, dict) else ""
+    if plant == "axis":
+        unit = axis.of(OTHER_NAMES[plant].get(name, name))
     try:
         return float(to_si(value, str(unit or "")))
     except (TypeError, ValueError) as error:

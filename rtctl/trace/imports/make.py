@@ -12,20 +12,26 @@ from rtctl.config.units import convert
 from rtctl.machines import axis, ivu_plant, ldu_plant
 from rtctl.machines.base import Column
 from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
+from rtctl.trace.clock import even_rows, increasing
 from rtctl.trace.imports.case import case_of, checked
+from rtctl.trace.imports.counters import per_turn, unwrapped
 from rtctl.trace.imports.plan import ColumnPlan, Plan
 from rtctl.trace.imports.table import Table
+from rtctl.trace.imports.times import is_date
 from rtctl.trace.part import refuse_taken
 
 OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of one recording alike
     "m": ("m", "rad", "V"),
     "m/s": ("m/s", "rad/s", "V/s"),
-    "V": ("V", "A"),
+    "V": ("V", "A", "N", "Nm"),
 }
 TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
-UNEVEN = 0.5  # share of a period by which one row may be off the others' distance
-RATE_OFF = 0.01
 COUNTS = "_counts"
+SLOWEST = 100.0  # s from row to row: beyond it a time without unit is asked about
+SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
+    ("ns", "us", "\u00b5s", "\u03bcs", "ms", "nm", "um", "\u00b5m", "\u03bcm", "mm", "cm", "km", "deg", "rad", "mrad",
+     "rev", "rpm", "Hz", "uV", "mV", "V", "kV", "uA", "mA", "A", "mN", "N", "kN", "mNm", "Nm")
+)  # fmt: skip
 
 
 class Imported(NamedTuple):
@@ -46,7 +52,8 @@ def make_bundle(table: Table, plan: Plan, folder: Path | str) -> Imported:
         raise UserError("--plant: say what kind of machine it is: axis, ivu or ldu")
     known = known_columns(plan.plant)
     columns, units, notes = _signals(table, _wanted(table, plan, known), plan, known)
-    t, rate = _clock(table, plan, columns)
+    t, rate, more = _clock(table, plan, columns)
+    notes += more
     columns = {"t": t, **{name: values for name, values in columns.items() if name != "t"}}
     units = {"t": "s", **units}
     if "w" not in columns:
@@ -75,14 +82,17 @@ def known_columns(plant: str) -> dict[str, Column]:
 def _wanted(table: Table, plan: Plan, known: dict[str, Column]) -> dict[str, ColumnPlan]:
     """Our columns and theirs: as the plan says, or those that have our names already where it names none."""
     named = {name: given for name, given in plan.columns.items() if given.column}
-    if not named:
-        named = {name: ColumnPlan(column=name) for name in table.columns if name in known}
+    if not set(named) - {"t"}:
+        named = {**{name: ColumnPlan(column=name) for name in table.columns if name in known}, **named}
     if "t" not in named and "t" in table.columns:
         named["t"] = ColumnPlan(column="t")
     elif "t" not in named and table.clock and plan.rate is None:
         named["t"] = ColumnPlan(column=table.clock)
     if not set(named) - {"t"}:
         there = ", ".join(list(table.columns)[:20])
+        if not there:
+            left = "; ".join(f"{name} is {why}" for name, why in list(table.left.items())[:10])
+            raise UserError(f"{table.path} has no column of numbers; {left or 'it is empty'}")
         raise UserError(f"{table.path} has {there}; say which is which, e.g. --map 'u=vir,x=qm'")
     for name, given in plan.columns.items():
         if not given.column:
@@ -101,17 +111,26 @@ def _signals(
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     assumed = []
+    notes: list[str] = list(table.notes)
     for name, given in wanted.items():
-        values = table.numbers(given.column, name)
         theirs = given.unit if given.unit is not None else table.units.get(given.column)
+        if name == "t":
+            if theirs is None and not is_date(table.has(given.column, "t")):
+                assumed.append("t in s")
+            columns[name], units[name] = _times(table, given.column, theirs), "s"
+            continue
+        values = table.numbers(given.column, name)
         ours = known[name].unit if name in known else theirs or ""
         if theirs is None:
+            _ask_suffix(table, name, given.column, ours, plan.plant == "axis")
             assumed += [f"{name} in {ours}"] if ours not in ("", "counts", "ticks") else []
         elif name in known:
             factor, ours = _factor(table, name, given.column, theirs, ours, plan.plant == "axis")
             values = values if factor == 1.0 else values * factor
         if name.endswith(COUNTS):
             _whole(table, given.column, values)
+            values, wrapped = unwrapped(name, values, per_turn(plan.case))
+            notes += [wrapped] if wrapped else []
         columns[name], units[name] = values, ours
     lengths = {name: len(values) for name, values in columns.items()}
     first = next(iter(columns))
@@ -123,7 +142,44 @@ def _signals(
             )
     if not lengths[first]:
         raise UserError(f"{table.path} holds no rows")
-    return columns, units, [f"no unit is given: {', '.join(assumed)} assumed"] if assumed else []
+    if assumed:
+        notes.append(f"no unit is given: {', '.join(assumed)} assumed")
+    return columns, units, notes
+
+
+def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
+    """Times (n,) in s."""
+    if is_date(table.has(column, "t")):
+        return table.times(column, 1.0)
+    if theirs is not None:
+        return table.times(column, _factor(table, "t", column, theirs, "s", False)[0])
+    _ask_suffix(table, "t", column, "s", False)
+    t = table.times(column, 1.0)
+    step = float(np.median(np.abs(np.diff(t)))) if len(t) > 1 else 0.0
+    if step > SLOWEST:
+        raise UserError(
+            f"{table.path}: column '{column}' (t) has no unit, and its rows would be {step:.6g} s apart; --unit t=ns, "
+            "us or ms says what it counts, --unit t=s that it is so"
+        )
+    return t
+
+
+def _ask_suffix(table: Table, name: str, column: str, ours: str, axis: bool) -> None:
+    """Refuse a name such as `pos_mm` that ends in another unit of the same dimension, where no unit is given."""
+    base, mark, unit = column.rpartition("_")
+    if not (base and mark and unit in SUFFIXES):
+        return
+    choices = OTHER_UNITS.get(ours, (ours,)) if axis else (ours,)
+    for choice in choices:
+        try:
+            if convert(1.0, unit, choice) == 1.0 and choice == ours:
+                return
+        except ValueError:
+            continue
+        raise UserError(
+            f"{table.path}: column '{column}' ({name}) has no unit, and its name ends in {unit}; "
+            f"--unit {name}={unit} if it is, --unit {name}={ours} if it is not"
+        )
 
 
 def _factor(table: Table, name: str, column: str, theirs: str, ours: str, axis: bool) -> tuple[float, str]:
@@ -151,45 +207,24 @@ def _whole(table: Table, column: str, values: np.ndarray) -> None:
         )
 
 
-def _clock(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None]:
-    """Times (n,) s and the rate, None where they are uneven and may be."""
+def _clock(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None, list[str]]:
+    """Times (n,) s, the rate (None where they are uneven and may be), and notes."""
     n = len(next(iter(columns.values())))
     if "t" not in columns:
         if plan.rate is None:
             raise UserError(
                 f"{table.path}: which column is the time? --map t=NAME says it, or --rate 1000 where none is"
             )
-        return np.arange(n) / plan.rate, plan.rate
+        return np.arange(n) / plan.rate, plan.rate, []
     t = columns["t"]
     if n < 2:
         raise UserError(f"{table.path} holds one row; a recording has two or more")
-    d = np.diff(t)
-    back = np.flatnonzero(d <= 0)
-    if len(back):
-        k = int(back[0]) + 1
-        raise UserError(
-            f"{table.path}: time, {table.where(k)}: {t[k]:.9g} s after {t[k - 1]:.9g} s; time should increase"
-        )
+
+    def row(k: int) -> str:
+        return f"{table.path}: time, {table.where(k)}"
+
     if plan.uneven:
-        return t, None
-    usual = float(np.median(d))
-    off = np.flatnonzero(np.abs(d - usual) > UNEVEN * usual)
-    if len(off):
-        k = int(off[0]) + 1
-        more = f", as at {len(off) - 1} more places" if len(off) > 1 else ""
-        raise UserError(
-            f"{table.path}: time, {table.where(k)}: {d[k - 1]:.6g} s after the row before where {usual:.6g} s is usual"
-            f"{more}; --uneven keeps such a clock, else lay the rows on an even one first"
-        )
-    rate = _tidy((n - 1) / float(t[-1] - t[0]))
-    if plan.rate is not None and abs(rate / plan.rate - 1) > RATE_OFF:
-        raise UserError(
-            f"{table.path}: time runs at {rate:g} rows a second where --rate says {plan.rate:g}; one is wrong"
-        )
-    return t, plan.rate or rate
-
-
-def _tidy(rate: float) -> float:
-    """1000 and not 999.99998: a millionth is less than any clock here is good for."""
-    short = float(f"{rate:.5g}")
-    return short if abs(short / rate - 1) < 1e-6 else rate
+        increasing(t, row)
+        return t, None, []
+    clock = even_rows(t, plan.rate, row)
+    return clock.t, clock.rate, [clock.note] if clock.note else []

@@ -1,67 +1,96 @@
-"""MATLAB's files: version 5 by scipy, version 7.3, which is HDF5, by h5py where it is installed.
+"""MATLAB's files: versions 4 and 5 by scipy, version 7.3, which is HDF5, by h5py where it is installed.
 
-A field of a struct is `s.x`, a column of a matrix `y.1`. Units are those of a struct `units` beside the signals, as
-`rtctl trace export --to mat` writes it.
+A field of a struct is `s.x`, an element of a struct array or a cell `s.1`, a column of a matrix `y.1`. Units are those
+of a struct `units` beside the signals, as `rtctl trace export --to mat` writes it, or of a text `Unit` beside the data.
 """
 
+import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
+from scipy.io.matlab import MatlabFunction, MatlabOpaque
 
 from rtctl.config.errors import UserError
-from rtctl.trace.imports.table import Table, flat
+from rtctl.trace.imports.mat_size import check_size
+from rtctl.trace.imports.nested import Refused, columns_of
+from rtctl.trace.imports.table import Table
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
+OBJECT = (
+    "a MATLAB object of class {}, which only MATLAB reads; save numbers there: "
+    "seconds(t - t(1)) of a datetime, timetable2table and table2struct(T, 'ToScalar', true) of a table"
+)
 
 
 def read(path: Path) -> Table:
     """The columns of a file. Raises UserError, OSError."""
     if _is_hdf5(path):
-        return Table(path, dict(flat(_hdf5(path))), {})
+        from rtctl.trace.imports.hdf5_file import matlab_tree
+
+        return table_of(path, matlab_tree(path))
     try:
-        found = loadmat(path, simplify_cells=True)
-    except OSError:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of variables of one name
+            check_size(path)
+            found = loadmat(path, simplify_cells=True)
+    except (OSError, UserError):
         raise
-    except Exception as error:  # whatever a damaged file makes of the reader
-        raise UserError(f"{path} cannot be read as a MATLAB file: {error}") from None
-    units = found.get("units")
-    told = {k: v for k, v in units.items() if isinstance(v, str)} if isinstance(units, dict) else {}
+    except Exception:  # whatever a damaged file makes of the reader
+        raise UserError(
+            f"{path} cannot be read as a MATLAB file: it is damaged, cut off or of another kind; save it again"
+        ) from None
+    return table_of(path, {k: v for k, v in _plain(found).items() if not k.startswith("__")})
+
+
+def table_of(path: Path, found: Mapping[str, Any]) -> Table:
+    """Table of the variables; `columns` and `case_json` of our own export are the names and no signals."""
     names = found.get("columns")
-    own = {k: v for k, v in names.items() if isinstance(v, str)} if isinstance(names, dict) else {}
-    columns = {own.get(name, name): values for name, values in flat(found)}
-    return Table(path, columns, {own.get(name, name): unit for name, unit in told.items()})
+    own = {k: v for k, v in names.items() if isinstance(v, str)} if isinstance(names, Mapping) else {}
+    rest = {key: value for key, value in found.items() if not (own and key in ("columns", "help", "case_json"))}
+    tree = columns_of(rest)
+    return Table(
+        path,
+        {own.get(name, name): values for name, values in tree.columns.items()},
+        {own.get(name, name): unit for name, unit in tree.units.items()},
+        notes=tree.notes(),
+        left=tree.left,
+    )
+
+
+def object_of(kind: str) -> Refused:
+    """A variable of a class of MATLAB."""
+    return Refused(OBJECT.format(kind))
+
+
+def _plain(value: Any) -> Any:
+    """Objects that scipy does not understand, by their class; all else as it is."""
+    if isinstance(value, MatlabOpaque):
+        found = np.asarray(value).ravel()[0]
+        return object_of(_text(found["s2"]))
+    if isinstance(value, MatlabFunction):
+        return Refused("a function")
+    if isinstance(value, Mapping):
+        out: dict[str, Any] = {}
+        for key, item in value.items():
+            if isinstance(item, MatlabOpaque):
+                key = _text(np.asarray(item).ravel()[0]["s0"]) or key  # scipy calls every such variable None
+            out[str(key)] = _plain(item)
+        return out
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        return [_plain(item) for item in value.ravel(order="F")]
+    return value
+
+
+def _text(value: Any) -> str:
+    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
 def _is_hdf5(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(520)
     return head.startswith(HDF5) or head[512:520] == HDF5  # MATLAB puts a text of its own in front
-
-
-def _hdf5(path: Path) -> dict[str, Any]:
-    try:
-        import h5py
-    except ModuleNotFoundError:
-        raise UserError(
-            f"{path} is of version 7.3 (HDF5), which needs the package h5py: pip install 'rtctl[hdf5]'; "
-            "or save it with -v7 in MATLAB"
-        ) from None
-    try:
-        with h5py.File(path) as file:
-            return _group(h5py, file)
-    except (OSError, RuntimeError, KeyError) as error:
-        raise UserError(f"{path} cannot be read as HDF5: {error}") from None
-
-
-def _group(h5py: Any, group: Any) -> dict[str, Any]:
-    out: dict[str, Any] = {}
-    for name, item in group.items():
-        if name.startswith("#"):
-            continue
-        if isinstance(item, h5py.Group):
-            out[name] = _group(h5py, item)
-        elif item.attrs.get("MATLAB_class", b"") != b"char" and item.dtype.kind in "fiub":
-            out[name] = np.asarray(item[()]).T  # MATLAB counts along columns
-    return out

@@ -1,70 +1,141 @@
 """MCAP with JSON messages. With one topic a column is a field, `ref`, with several it is `/topic/ref`.
 
-Where no field is the time, the log time is, in seconds from the first message on: the column `log_time`.
+Where no field is the time, the log time is, in seconds from the first message on: the column `log_time`. A file that is
+cut off gives the messages that are whole.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.reader import make_reader
+from mcap.records import Channel, Message, Schema
 
 from rtctl.config.errors import UserError
+from rtctl.trace.imports.mcap_records import Cut, records
+from rtctl.trace.imports.messages import Messages
+from rtctl.trace.imports.nested import notes_of, unit_text
 from rtctl.trace.imports.table import Table
 
 TIME = "log_time"
+DECODERS = {"cdr": "mcap-ros2-support", "ros1": "mcap-ros1-support", "protobuf": "mcap-protobuf-support"}
+
+
+class _Topic:
+    """JSON messages of one topic."""
+
+    def __init__(self, path: Path, topic: str, schema: Schema | None) -> None:
+        self.rows, self.times = Messages(path, f"messages of {topic}"), []  # type: ignore[var-annotated]
+        self.units = dict(_units(schema.data if schema else b"{}"))
 
 
 def read(path: Path) -> Table:
     """The columns of all JSON topics. Raises UserError, OSError."""
-    rows: dict[str, list[dict[str, float]]] = {}
-    times: dict[str, list[int]] = {}
-    units: dict[str, dict[str, str]] = {}
-    others = set()
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    topics: dict[str, _Topic] = {}
+    others: dict[int, int] = {}
+    cut: Cut | None = None
     try:
         with path.open("rb") as file:
-            for schema, channel, message in make_reader(file).iter_messages():
-                if channel.message_encoding != "json":
-                    others.add(channel.message_encoding or "unknown")
-                    continue
-                if channel.topic not in rows:
-                    rows[channel.topic], times[channel.topic] = [], []
-                    units[channel.topic] = _units(schema.data if schema else b"{}")
-                rows[channel.topic].append(dict(_numbers(json.loads(message.data))))
-                times[channel.topic].append(message.log_time)
-    except OSError:
+            for record in records(path, file):
+                if isinstance(record, Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, Channel):
+                    channels[record.id] = record
+                elif isinstance(record, Cut):
+                    cut = record
+                elif record.channel_id in channels:
+                    channel = channels[record.channel_id]
+                    if channel.message_encoding != "json":
+                        others[channel.id] = others.get(channel.id, 0) + 1
+                        continue
+                    if channel.topic not in topics:
+                        topics[channel.topic] = _Topic(path, channel.topic, schemas.get(channel.schema_id))
+                    _add(path, channel.topic, topics[channel.topic], record)
+    except (OSError, UserError):
         raise
-    except Exception as error:  # whatever a damaged file makes of the reader
-        raise UserError(f"{path} cannot be read as MCAP with JSON: {error}") from None
-    if not rows:
-        raise UserError(f"{path} has no JSON messages" + (f"; it has {', '.join(sorted(others))}" if others else ""))
-    columns: dict[str, np.ndarray] = {}
-    told: dict[str, str] = {}
-    for topic, messages in rows.items():
-        before = "" if len(rows) == 1 else f"{topic}/"
-        for name in dict.fromkeys(name for message in messages for name in message):
-            columns[before + name] = np.array([message.get(name, np.nan) for message in messages], np.float64)
-            if name in units[topic]:
-                told[before + name] = units[topic][name]
-        columns[before + TIME] = (np.array(times[topic], np.int64) - times[topic][0]) / 1e9
-        told[before + TIME] = "s"
-    return Table(path, columns, told, clock=TIME if len(rows) == 1 else "")
+    except Exception:  # whatever a damaged file makes of the reader
+        raise UserError(f"{path} cannot be read as MCAP: it is damaged") from None
+    left = {channels[k].topic: _other(channels[k], schemas, count) for k, count in others.items()}
+    whole = sum(len(topic.times) for topic in topics.values())
+    if not topics:
+        raise UserError(_nothing(path, channels, others, left, cut))
+    notes = [f"the file is cut off or damaged at byte {cut.byte}: {whole} messages are whole and taken"] if cut else []
+    return _table(path, topics, notes, left)
 
 
-def _numbers(message: Any, before: str = "") -> Iterator[tuple[str, float]]:
-    for name, value in message.items() if isinstance(message, dict) else ():
-        if isinstance(value, dict):
-            yield from _numbers(value, f"{before}{name}.")
-        elif isinstance(value, int | float):
-            yield before + name, float(value)
-
-
-def _units(schema: bytes) -> dict[str, str]:
-    """Unit of each property, as `rtctl trace export --to mcap` writes them."""
+def _add(path: Path, name: str, topic: _Topic, message: Message) -> None:
     try:
-        found = json.loads(schema)["properties"]
-        return {name: p["unit"] for name, p in found.items() if p.get("unit") and isinstance(p["unit"], str)}
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return {}
+        topic.rows.add(json.loads(message.data))
+    except (ValueError, RecursionError):
+        raise UserError(f"{path}: message {len(topic.times) + 1} of {name} is no JSON: {message.data[:30]!r}") from None
+    topic.times.append(message.log_time)
+
+
+def _table(path: Path, topics: dict[str, _Topic], notes: list[str], left: dict[str, str]) -> Table:
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    words: dict[str, str] = {}
+    for name, topic in topics.items():
+        before = "" if len(topics) == 1 else f"{name}/"
+        found, gaps, texts = topic.rows.columns()
+        notes += gaps
+        words |= {before + key: why for key, why in texts.items()}
+        times = np.array(topic.times, np.uint64)
+        order = np.argsort(times, kind="stable")
+        for key, values in found.items():
+            columns[before + key] = values[order]
+            if key in topic.units:
+                units[before + key] = topic.units[key]
+        columns[before + TIME] = (times[order] - times[order][0]).astype(np.int64) / 1e9
+        units[before + TIME] = "s"
+        stamps = [before + key for key, values in found.items() if values.dtype.kind == "m"]
+        if stamps:
+            notes.append(f"{', '.join(stamps)} is a time too, of the sender: --map t={stamps[0]} takes it as the clock")
+    return Table(
+        path, columns, units, clock=TIME if len(topics) == 1 else "", where=lambda row: f"message {row + 1}",
+        notes=(*notes, *notes_of(left)), left={**words, **left},
+    )  # fmt: skip
+
+
+def _other(channel: Channel, schemas: dict[int, Schema], count: int) -> str:
+    """What the messages of a channel are."""
+    schema = schemas.get(channel.schema_id)
+    named = f", schema {schema.name} ({schema.encoding or 'no encoding'})" if schema else ""
+    return f"{count} messages in {channel.message_encoding or 'an unknown encoding'}{named}"
+
+
+def _nothing(
+    path: Path, channels: dict[int, Channel], others: dict[int, int], left: dict[str, str], cut: Cut | None
+) -> str:
+    cause = f"; it is cut off or damaged at byte {cut.byte}" if cut else ""
+    if not left:
+        return f"{path} has no whole message{cause}"
+    told = "; ".join(f"{topic}: {what}" for topic, what in list(left.items())[:5])
+    kinds = sorted({channels[k].message_encoding for k in others})
+    tools = ", ".join(sorted({DECODERS[kind] for kind in kinds if kind in DECODERS}))
+    way = f"decode them with {tools} (pip)" if tools else "decode them"
+    return f"{path} has no JSON messages, which can be read{cause}; it has {told}; {way} and write csv, parquet or JSON"
+
+
+def _units(schema: bytes) -> list[tuple[str, str]]:
+    """Unit of each property, as `rtctl trace export --to mcap` writes them; nested ones as `a.x`."""
+    try:
+        return _nested(json.loads(schema), "", 0)
+    except (ValueError, RecursionError):
+        return []
+
+
+def _nested(schema: Any, before: str, depth: int) -> list[tuple[str, str]]:
+    found = []
+    properties = schema.get("properties") if isinstance(schema, Mapping) and depth < 16 else None
+    for name, item in properties.items() if isinstance(properties, Mapping) else ():
+        if not isinstance(item, Mapping):
+            continue
+        unit = item.get("unit") or item.get("units")
+        if isinstance(unit, str):
+            found.append((f"{before}{name}", unit_text(unit)))
+        found += _nested(item, f"{before}{name}.", depth + 1)
+    return found

@@ -1,12 +1,14 @@
 """What a reader makes of a file: columns by the names they have there, and how to speak of a row."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rtctl.config.errors import UserError, nearest
+from rtctl.trace.imports.times import is_date, seconds
 
 
 def row_number(row: int) -> str:
@@ -20,23 +22,50 @@ class Table(NamedTuple):
     units: dict[str, str]  # where the file names them
     clock: str = ""  # column that is the time, in s, where nothing else is
     where: Callable[[int], str] = row_number
+    notes: tuple[str, ...] = ()  # sentences for people: what the reader assumed or passed over
+    left: Mapping[str, str] = MappingProxyType({})  # what is in the file and no column -> why
 
     def has(self, name: str, use: str) -> np.ndarray:
         """The column; `use` says what it is wanted for. Raises UserError with the nearest name."""
         if name in self.columns:
             return self.columns[name]
+        if name in self.left:
+            raise UserError(f"{self.path}: '{name}' (wanted as {use}) is no column: {self.left[name]}")
         near = nearest(name, self.columns)
         there = list(self.columns)[:20]
         hint = f"is it '{near}'?" if near else f"it has {', '.join(there) or 'none'}"
         raise UserError(f"{self.path} has no column '{name}' (wanted as {use}); {hint}")
 
+    def times(self, name: str, factor: float) -> np.ndarray:
+        """The column as times (n,) in s; `factor` is the unit of its numbers in s.
+
+        Columns keep the type of the file: time stamps (datetime64), durations (timedelta64), integers, doubles.
+        Raises UserError that names the first row without a time.
+        """
+        values = self.has(name, "t")
+        if is_date(values):
+            gone = np.flatnonzero(np.isnat(values))
+            if len(gone):
+                raise UserError(
+                    f"{self.path}: column '{name}', {self.where(int(gone[0]))}: empty; every row needs a time"
+                )
+        elif values.dtype.kind not in "iu":
+            values = self.numbers(name, "t")
+        return seconds(values, factor)
+
     def numbers(self, name: str, use: str) -> np.ndarray:
         """The column as doubles (n,), each finite. Raises UserError that names the first row that is not."""
         values = self.has(name, use)
+        if is_date(values):
+            raise UserError(
+                f"{self.path}: column '{name}' (wanted as {use}) holds dates or durations; only t can be one: "
+                f"--map t={name}"
+            )
         if values.dtype.kind not in "fiub":
-            row = next((k for k, cell in enumerate(values) if not _is_number(cell)), None)
+            row = next((k for k, cell in enumerate(values) if not is_number(cell)), None)
             if row is not None:
-                raise UserError(f"{self.path}: column '{name}', {self.where(row)}: {values[row]!r:.40} is not a number")
+                what = "empty" if values[row] is None else f"{values[row]!r:.40} is not a number"
+                raise UserError(f"{self.path}: column '{name}', {self.where(row)}: {what}")
         found = values.astype(np.float64)
         bad = np.flatnonzero(~np.isfinite(found))
         if len(bad):
@@ -49,30 +78,8 @@ class Table(NamedTuple):
         return found
 
 
-def flat(found: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, np.ndarray]]:
-    """Arrays of nested names as columns: `s.x` for a field, `y.1` and `y.2` for the columns of a matrix.
-
-    Numbers that stand alone and text are left out.
-    """
-    for key, value in found.items():
-        name = f"{before}{key}"
-        if isinstance(value, Mapping):
-            yield from flat(value, f"{name}.")
-            continue
-        if not isinstance(value, np.ndarray) or value.size < 2 or value.dtype.kind not in "fiubV":
-            continue
-        if value.dtype.names:
-            yield from flat({field: value[field] for field in value.dtype.names}, f"{name}.")
-            continue
-        value = np.squeeze(value)
-        if value.ndim == 1:
-            yield name, value
-        elif value.ndim == 2:
-            tall = value if value.shape[0] >= value.shape[1] else value.T
-            yield from ((f"{name}.{k + 1}", tall[:, k]) for k in range(tall.shape[1]))
-
-
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether a cell is a number or text of one."""
     try:
         float(value)
     except (TypeError, ValueError):

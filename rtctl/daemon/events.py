@@ -1,0 +1,35 @@
+"""Trips in the log: cause, tick, and the machine's signals in that tick. The loop itself never logs."""
+
+from typing import Any
+
+import numpy as np
+import structlog
+
+from rtctl.loop import safety
+from rtctl.machines.base import COMMON_COLUMNS
+
+log = structlog.get_logger()
+COMMON = {column.name for column in COMMON_COLUMNS} - {"watchdog", "lateness"}
+
+
+class Trips:
+    """Looks for trips in the rows of a run, fed in their order."""
+
+    def __init__(self) -> None:
+        self._last = 0.0
+
+    def feed(self, rows: np.ndarray) -> None:
+        """Log each trip among the rows (n,), once."""
+        causes = rows["trip"]
+        before = np.concatenate([[self._last], causes[:-1]])
+        self._last = float(causes[-1])
+        for k in np.flatnonzero((causes != before) & (causes != safety.NONE)):
+            row = rows[k]
+            code, why = safety.TRIPS[int(row["trip"])]
+            log.error("trip", cause=code, tick=int(row["tick"]), t=round(float(row["t"]), 6), why=why, **values(row))
+
+
+def values(row: Any) -> dict[str, float]:
+    """The machine's own signals of a row, without what only an emulator knows, to five digits."""
+    names = [n for n in row.dtype.names if n not in COMMON and not n.startswith("truth_")]
+    return {name: float(f"{float(row[name]):.5g}") for name in names}

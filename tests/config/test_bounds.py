@@ -1,0 +1,66 @@
+"""What a running machine may be given: never less safe than its config at the start, or its section `live`."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from rtctl.config.bounds import Bounds, guarded
+from rtctl.config.errors import UserError
+from rtctl.config.load import set_path, set_paths
+
+WORSE = [
+    ("safety.following_error", 1e9), ("safety.following_error", 0), ("safety.missed_ticks", 0),
+    ("safety.missed_ticks", 11), ("safety.link_timeout", "1 min"), ("safety.tension_max", 9.0),
+    ("safety.tension_min", -3.0), ("safety.current_time", 0), ("safety.disagreement", "6 mm"), ("safety.ramp", 1.0),
+    ("safety.supervisor_timeout", 0), ("law.limit.high", 1000.0), ("law.limit.low", -11.0),
+    ("law.tension.amp_per_volt", 0.02),
+]  # fmt: skip
+BETTER = [
+    ("safety.following_error", 0.1), ("safety.missed_ticks", 3), ("safety.tension_min", 0.0), ("law.limit.high", 3.0),
+    ("law.limit.low", -3.0), ("safety.require_commander", True), ("law.position.gain", 1e3),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("path", "value"), WORSE)
+def test_less_safe_than_at_the_start_is_refused_and_the_way_out_is_told(
+    config: Callable[..., Any], path: str, value: Any
+) -> None:
+    start = config("ivu")
+    sentence = Bounds(start).crossed(set_path(start, path, value))[path]
+    assert path in sentence and "live: {" in sentence and "restart" in sentence
+
+
+@pytest.mark.parametrize(("path", "value"), BETTER)
+def test_safer_is_taken_and_the_way_back_is_open(config: Callable[..., Any], path: str, value: Any) -> None:
+    start = config("ivu")
+    bounds = Bounds(start)
+    assert bounds.crossed(set_path(start, path, value)) == {}
+    assert bounds.crossed(start) == {}
+
+
+def test_a_required_commander_stays_required(config: Callable[..., Any]) -> None:
+    start = config("ivu", set={"safety.require_commander": True})
+    assert Bounds(start).crossed(set_path(start, "safety.require_commander", False))
+
+
+def test_the_section_live_widens_one_bound_and_no_other(config: Callable[..., Any]) -> None:
+    start = config("ivu", set={"live": {"safety.following_error": 1.0}})
+    bounds = Bounds(start)
+    assert bounds.crossed(set_path(start, "safety.following_error", 1.0)) == {}
+    beyond = set_paths(start, {"safety.following_error": 1.1, "safety.missed_ticks": 20})
+    assert set(bounds.crossed(beyond)) == {"safety.following_error", "safety.missed_ticks"}
+
+
+@pytest.mark.parametrize("path", ["law.position.gain", "safety.following_eror"])
+def test_live_names_settings_that_have_a_bound(config: Callable[..., Any], path: str) -> None:
+    with pytest.raises(UserError, match=r"live: .* has no bound"):
+        Bounds(config("ivu", set={"live": {path: 1.0}}))
+
+
+@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
+def test_every_limit_of_safety_says_its_safer_direction(config: Callable[..., Any], kind: str) -> None:
+    settings = config(kind)
+    said = {g.path for g in guarded(settings)}
+    assert {f"safety.{name}" for name in type(settings.safety).model_fields} <= said
+    assert {"law.limit.high", "law.limit.low", "law.limit.slew"} <= said
