@@ -1,0 +1,178 @@
+"""Form of a text file with a line for each row: what parts the cells, where names and units stand, where rows begin.
+
+The rows decide: separator, number of cells and numeric columns are those of the last lines of the file's head. The
+first line that looks like them is the first row; names and units stand before it, whatever stands before those.
+"""
+
+import csv
+import re
+from typing import NamedTuple
+
+from rtctl.config.errors import UserError
+from rtctl.config.units import convert
+
+SEPARATORS = (";", "\t", "|", ",", " ")  # a space is any white space
+COMMENTS = ("#", "%", "//", "!")
+NUMBER = re.compile(r"[-+]?(?:\d[\d.,' \u00a0\u2009\u202f]*|[.,]\d+)(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
+DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ].*)?|\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?")
+UNIT_WORDS = {
+    "second": "s", "seconds": "s", "sec": "s", "volt": "V", "volts": "V", "ampere": "A", "amps": "A", "meter": "m",
+    "metre": "m", "degree": "deg", "degrees": "deg", "radian": "rad", "newton": "N", "hertz": "Hz",
+}  # fmt: skip
+NO_UNIT = ("", "-", "1", "none", "sequence", "unitless", "dimensionless")
+SAMPLE = 200  # lines of the head from which separator and numeric columns are seen
+MOSTLY = 0.8  # share of the lines in which a column of numbers holds one
+
+
+class Options(NamedTuple):
+    """What the owner says of a text file; None and 0 are left to the file."""
+
+    separator: str | None = None
+    decimal: str | None = None  # "." or ","
+    names_line: int | None = None  # line of the names, 1 the first; 0: there are none
+    units_line: int | None = None
+    skip: int = 0  # lines at the top
+    encoding: str | None = None
+
+
+class Form(NamedTuple):
+    separator: str
+    width: int  # cells a row
+    first: int  # line of the first row, 0 the first of the file
+    names: list[str] | None
+    units: dict[int, str]  # column -> unit, where a line of units is given
+    passed: int  # lines with something in them, before names and rows, that say nothing here
+
+
+def cells(line: str, separator: str) -> list[str]:
+    """Cells of a line, without quotes and outer white space."""
+    if separator == " ":
+        return line.split()
+    try:
+        found = next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        found = line.split(separator)
+    return [cell.strip() for cell in found]
+
+
+def is_value(cell: str) -> bool:
+    """Whether a cell holds a number, as somebody writes it, or a date."""
+    return bool(NUMBER.fullmatch(cell) or DATE.fullmatch(cell))
+
+
+def form_of(path: object, lines: list[str], options: Options) -> Form:
+    """Form of the file whose first lines are `lines`. Raises UserError."""
+    start = options.skip
+    separator = options.separator
+    if len(lines) > start and re.fullmatch(r"sep=.", lines[start].strip("\r\n\ufeff\"' ")):
+        separator = separator or lines[start].strip("\r\n\ufeff\"' ")[4]
+        start += 1
+    full = [k for k in range(start, len(lines)) if lines[k].strip()]
+    if not full:
+        raise UserError(f"{path} holds no line of names or numbers")
+    body = [k for k in full if not _is_comment(lines[k])][-SAMPLE:] or full[-1:]
+    body = body[len(body) // 2 :]
+    separator = separator or _separator([lines[k] for k in body])
+    rows = [cells(lines[k], separator) for k in body]
+    width = _usual([len(row) for row in rows])
+    rows = [row for row in rows if len(row) == width]
+    numeric = [k for k in range(width) if sum(is_value(row[k]) for row in rows) >= MOSTLY * len(rows)]
+    names_line = options.names_line - 1 if options.names_line else None
+    if names_line is not None and names_line >= len(lines):
+        raise UserError(f"{path}: there is no line {options.names_line} for the names; the file has {len(lines)} lines")
+    after = max(names_line if names_line is not None else -1, (options.units_line or 0) - 1)
+    first = _first_row(lines, full, separator, width, numeric, after)
+    names, units, used = _names(lines, [k for k in full if k < first], separator, width, names_line, options)
+    passed = sum(1 for k in full if k < first and k not in used and not _is_comment(lines[k]))
+    return Form(separator, width, first, names, units, passed)
+
+
+def _separator(lines: list[str]) -> str:
+    """The separator by which most lines have equally many cells, and most of these hold numbers."""
+    best, chosen = (-1.0, -1.0), ","
+    for separator in SEPARATORS:
+        rows = [cells(line, separator) for line in lines]
+        width = _usual([len(row) for row in rows])
+        if width < 2:
+            continue
+        alike = [row for row in rows if len(row) == width]
+        found = [cell for row in alike for cell in row if cell]
+        numbers = sum(map(is_value, found)) / max(len(found), 1)
+        score = (round(numbers * len(alike) / len(rows), 2), float(separator != " "))
+        if score > best:
+            best, chosen = score, separator
+    return chosen
+
+
+def _usual(widths: list[int]) -> int:
+    return max(set(widths), key=lambda width: (widths.count(width), width))
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip("\ufeff \t").startswith(COMMENTS)
+
+
+def _first_row(lines: list[str], full: list[int], separator: str, width: int, numeric: list[int], after: int) -> int:
+    for k in full:
+        row = cells(lines[k], separator)
+        if k <= after or len(row) != width:
+            continue
+        if all(is_value(row[n]) or not row[n] for n in numeric) and (not numeric or any(row[n] for n in numeric)):
+            if numeric or k > full[0]:
+                return k
+    return full[min(1, len(full) - 1)]
+
+
+def _names(
+    lines: list[str], before: list[int], separator: str, width: int, names_line: int | None, options: Options
+) -> tuple[list[str] | None, dict[int, str], set[int]]:
+    """Names, units by column, and the lines that they stand in."""
+    if options.names_line == 0:
+        return None, {}, set()
+    fitting = [k for k in before if len(_heading(lines[k], separator, width)) == width]
+    units: dict[int, str] = {}
+    used: set[int] = set()
+    units_line = options.units_line - 1 if options.units_line else None
+    if units_line is None and names_line is None and len(fitting) > 1:
+        last = _heading(lines[fitting[-1]], separator, width)
+        if fitting[-1] - fitting[-2] <= 2 and all(unit_of(cell) is not None or is_value(cell) for cell in last):
+            units_line = fitting[-1]
+    if units_line is not None:
+        found = _heading(lines[units_line], separator, width)
+        units = {k: unit for k, cell in enumerate(found) if (unit := unit_of(cell)) is not None}
+        used.add(units_line)
+    if names_line is None:
+        left = [k for k in fitting if k not in used]
+        names_line = left[-1] if left else None
+    if names_line is None:
+        return None, units, used
+    used.add(names_line)
+    return _heading(lines[names_line], separator, width), units, used
+
+
+def _heading(line: str, separator: str, width: int) -> list[str]:
+    """Cells of a line of names, without the mark of a comment; one that rows have more, empty at the end, is added."""
+    line = line.lstrip("\ufeff")
+    bare = line.lstrip()
+    if mark := next((mark for mark in COMMENTS if bare.startswith(mark)), ""):
+        bare = bare[len(mark) :].lstrip("#%/! ") if separator != "\t" else bare[len(mark) :]
+    found = cells(bare.strip("\r\n") if mark else line.strip("\r\n"), separator)
+    if len(found) == width - 1:
+        found.append("")
+    if len(found) == width + 1 and not found[-1]:
+        found.pop()
+    return found
+
+
+def unit_of(cell: str) -> str | None:
+    """Unit that a cell of a line of units holds: `(ms)`, `[V]`, `mm`, `second`; "" for none; None where it is no unit."""
+    bare = cell.strip().strip("()[]").strip()
+    if bare.casefold() in NO_UNIT:
+        return ""
+    if bare.casefold() in UNIT_WORDS:
+        return UNIT_WORDS[bare.casefold()]
+    try:
+        convert(1.0, bare, bare)
+    except ValueError:
+        return None
+    return bare
