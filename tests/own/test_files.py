@@ -2,10 +2,11 @@ import sys
 
 import pytest
 
-from rtctl.own.files import OwnError, Source, is_own, keep, load, read, split
+from rtctl.own.files import OwnError, Source, is_own, keep, load, read, split, trust
 
 
 def source(text, file="./try.py"):
+    trust([text])
     return Source(file, "Try", text)
 
 

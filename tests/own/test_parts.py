@@ -4,11 +4,12 @@ import pytest
 from own_lines import line
 
 from rtctl.own import law as own_law
-from rtctl.own.files import OwnError, Source
+from rtctl.own.files import OwnError, Source, trust
 from rtctl.own.parts import builtin, camel, own, upper
 
 
 def parts(text, name="Try"):
+    trust([text])
     return own(Source("./try.py", name, text), own_law.FUNCTIONS, own_law.RESULT)
 
 

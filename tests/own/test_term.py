@@ -8,12 +8,17 @@ from rtctl_config import TEMPLATES
 from rtctl.config.errors import UserError
 from rtctl.diagnose import kernel
 from rtctl.diagnose.hypotheses import Size, parts_of
-from rtctl.own.files import OwnError, Source
+from rtctl.own.files import OwnError, Source, trust
 from rtctl.own.term import own_term, register, register_file, sizes, texts
 from rtctl.plants.physics import TERMS
 
 SPEC = "./my_term.py:MyTerm"
 TEXT = (TEMPLATES / "my_term.py").read_text()
+
+
+def source(text=TEXT):
+    trust([text])
+    return Source("./my_term.py", "MyTerm", text)
 
 
 def test_it_is_a_term_like_any_other_once_it_is_registered(tmp_path):
@@ -26,7 +31,7 @@ def test_it_is_a_term_like_any_other_once_it_is_registered(tmp_path):
 
 
 def test_what_it_calls_typical_is_what_a_fit_begins_with():
-    register([Source("./my_term.py", "MyTerm", TEXT)])
+    register([source()])
     assert sizes(SPEC) == {"c": (1e-6, 1e-3)} and sizes("friction.viscous") == {}
     (part,) = parts_of(SPEC)
     assert isinstance(part, Size) and (part.name, part.measure) == ("c", "one")
@@ -35,9 +40,9 @@ def test_what_it_calls_typical_is_what_a_fit_begins_with():
 
 def test_the_kernel_of_the_fits_holds_it():
     before = kernel.source("axis")
-    register([Source("./my_term.py", "MyTerm", TEXT)])
+    register([source()])
     after = kernel.source("axis")
-    module = Source("./my_term.py", "MyTerm", TEXT).module
+    module = source().module
     assert module not in before
     assert f"import {module}" in after.splitlines()
     assert f"{module}.drag(t.q[k].__my_term_py_MyTerm, " in after
@@ -46,7 +51,7 @@ def test_the_kernel_of_the_fits_holds_it():
 
 def test_a_range_that_is_none():
     with pytest.raises(OwnError, match=r"MY_TERM\.typical: c: \(0, 1\) should be a setting's lowest and highest size"):
-        own_term(Source("./my_term.py", "MyTerm", TEXT.replace("(1e-6, 1e-3)", "(0.0, 1.0)")))
+        own_term(source(TEXT.replace("(1e-6, 1e-3)", "(0.0, 1.0)")))
 
 
 def test_a_mistake_on_the_command_line():

@@ -24,9 +24,9 @@ def drawn(monkeypatch):
     """The figures that were saved, to ask what is on them."""
     figures, save = [], plot.Figure.savefig
 
-    def keep(figure, path):
+    def keep(figure, *to, **options):
         figures.append(figure)
-        save(figure, path)
+        save(figure, *to, **options)
 
     monkeypatch.setattr(plot.Figure, "savefig", keep)
     return figures
