@@ -14,10 +14,13 @@ from rtctl.config.errors import UserError
 
 
 class MachineLock:
-    """Held while a daemon runs. Raises UserError where another one does, or where the file cannot be had."""
+    """Held while a daemon runs; `sockets` is the folder of its sockets, for people.
 
-    def __init__(self, path: Path, name: str):
-        self._path, self._name, self._fd = path, name, -1
+    Raises UserError where another daemon holds it, or where the file cannot be had.
+    """
+
+    def __init__(self, path: Path, name: str, sockets: Path | None = None):
+        self._path, self._name, self._sockets, self._fd = path, name, sockets, -1
 
     def __enter__(self) -> "MachineLock":
         while True:
@@ -31,7 +34,7 @@ class MachineLock:
                 raise
             self._close()  # its last holder has removed it between our opening and locking it: take the next
         os.ftruncate(self._fd, 0)
-        os.write(self._fd, f"{os.getpid()}\n".encode())
+        os.write(self._fd, (f"{os.getpid()}\n" + (f"{self._sockets}\n" if self._sockets else "")).encode())
         return self
 
     def __exit__(self, *_: Any) -> None:
@@ -56,10 +59,14 @@ class MachineLock:
         try:
             fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            pid = os.read(self._fd, 32).decode(errors="replace").strip() or "unknown"
+            pid, _, sockets = os.read(self._fd, 4096).decode(errors="replace").strip().partition("\n")
+            pid = pid or "unknown"
+            if pid.isdecimal() and not Path("/proc", pid).exists():
+                pid += ", in another container"
+            where = f", its sockets are in {sockets}" if sockets else ""
             raise UserError(
-                f"'{self._name}' is run by another daemon (pid {pid}); stop it with `rtctl stop --name {self._name}`, "
-                "or give this config another `name`"
+                f"'{self._name}' is run by another daemon (pid {pid}{where}); "
+                f"stop it with `rtctl stop --name {self._name}`, or give this config another `name`"
             ) from None
         except OSError as error:
             raise UserError(

@@ -21,7 +21,7 @@ import zmq
 from rtctl import machines
 from rtctl.config.bounds import Bounds
 from rtctl.config.errors import UserError
-from rtctl.daemon import keys
+from rtctl.daemon import keys, shared_memory
 from rtctl.daemon.answers import Answers
 from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
@@ -39,7 +39,6 @@ from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop import generate, safety
 from rtctl.loop.histogram import account
 from rtctl.loop.mailbox import Mailbox
-from rtctl.loop.memory import Segment
 from rtctl.loop.records import STAGES, layout
 from rtctl.loop.ring import Reader
 from rtctl.own import files as own_files
@@ -50,12 +49,6 @@ from rtctl.trace.rotation import Rotation
 log = structlog.get_logger()
 TURN_MS = 10  # between two turns of the supervisor on the wall clock
 FOREVER = 1e9  # s that a loop waits for a plant of ours, which may have to compile; if it dies we hear of it
-SHM = Path("/dev/shm")
-
-
-def segment_path(name: str) -> Path:
-    """Where the shared memory of a machine of this name lies, for this user."""
-    return SHM / f"rtctl-{os.getuid()}-{name}"
 
 
 class Supervisor(Answers):
@@ -106,10 +99,13 @@ class Supervisor(Answers):
 
     def _open(self, stack: contextlib.ExitStack) -> None:
         config, made = self.config, self.made
-        stack.enter_context(MachineLock(runtime_dir() / f"{config.name}.lock", config.name))
+        stack.enter_context(MachineLock(shared_memory.lock_path(config.name), config.name, runtime_dir()))
+        if aside := shared_memory.put_aside(config.name):
+            self.say(f"{config.name}: the last rows of a killed run are kept in {aside}")
         rows = max(int(config.record.seconds * self.machine.rate), 1000)
-        self.segment = Segment.create(segment_path(config.name), layout(made.params, made.tables, made.row, rows))
-        stack.callback(self.segment.unlink)  # a crash leaves it, with the last seconds of the trace
+        path = shared_memory.segment_path(config.name)
+        self.segment = shared_memory.create(path, layout(made.params, made.tables, made.row, rows))
+        stack.callback(shared_memory.remove, path)  # a crash leaves it, with the last seconds of the trace
         self.status = self.segment["status"][0]
         self.mailbox = Mailbox(self.segment)
         self.reader = Reader(self.segment)
@@ -145,6 +141,7 @@ class Supervisor(Answers):
         self.rows_out = RowsOut(default_endpoint(config.name, "rows"), config.name, made.row, context)
         stack.callback(self.rows_out.close)
         self.case = describe(self.machine, made)
+        shared_memory.describe(self.segment, made.columns, self.case, self.out)
         self.captures = Captures(self.machine.rate, made.columns, made.row, self.case)
         stack.callback(self.captures.close)
         if self.out is not None:

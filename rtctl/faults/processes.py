@@ -14,7 +14,8 @@ from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.config.isolated import python
 from rtctl.config.load import to_yaml
-from rtctl.daemon.supervisor import Supervisor, segment_path
+from rtctl.daemon.shared_memory import remove, segment_path
+from rtctl.daemon.supervisor import Supervisor
 from rtctl.faults.cases import Stand
 from rtctl.faults.drives import again
 from rtctl.faults.play import same
@@ -187,7 +188,7 @@ def _left(config: Any) -> Any:
     while not segment["status"][0]["ended"] and time.monotonic() < deadline:
         time.sleep(0.01)
     ticks = int(segment["ring"][0]["head"])
-    segment.unlink()
+    remove(where)
     return segment["rows"][:ticks].copy() if segment["status"][0]["ended"] and ticks <= rows else None
 
 

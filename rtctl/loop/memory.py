@@ -48,7 +48,8 @@ class Segment:
     """Named arrays of records in one shared file.
 
     `Segment.create(path, {"status": (STATUS, 1), ...})` makes it, zeroed; `Segment.open(path, same layout)` maps it in
-    another process. Raises FileNotFoundError where there is none, ValueError where its size does not fit the layout.
+    another process. `create` raises FileExistsError where a file is there, OSError where the memory cannot be had.
+    `open` raises FileNotFoundError where there is none, ValueError where its size does not fit the layout.
     """
 
     def __init__(self, path: Path, layout: dict[str, tuple[np.dtype, int]], buffer: mmap.mmap):
@@ -64,11 +65,13 @@ class Segment:
     def create(cls, path: Path, layout: dict[str, tuple[np.dtype, int]]) -> "Segment":
         size = _size(layout)
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.unlink(missing_ok=True)
-        fd = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o600)
+        fd = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
         try:
-            os.ftruncate(fd, size)
+            os.posix_fallocate(fd, 0, size)  # a full file system is an error here, not SIGBUS in the middle of a tick
             return cls(path, layout, mmap.mmap(fd, size))
+        except BaseException:
+            path.unlink()
+            raise
         finally:
             os.close(fd)
 

@@ -17,7 +17,7 @@ from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client
 from rtctl.daemon.server import default_endpoint
 from rtctl.daemon.session import Session
-from rtctl.daemon.supervisor import segment_path
+from rtctl.daemon.shared_memory import segment_path
 from rtctl.loop import generate
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout

@@ -19,7 +19,8 @@ import zmq
 
 from rtctl.daemon.server import CommandServer, runtime_dir
 from rtctl.daemon.session import Session
-from rtctl.daemon.supervisor import Supervisor, segment_path
+from rtctl.daemon.shared_memory import segment_path, shared_folder
+from rtctl.daemon.supervisor import Supervisor
 from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop.memory import Segment
 from rtctl.loop.records import STATUS
@@ -48,7 +49,7 @@ def wait_for(what: Callable[[], Any], seconds: float = 60.0) -> Any:
 
 def left(config: Any) -> list[Path]:
     """All that a machine has in shared memory and in the folder of sockets."""
-    return [p for p in [segment_path(config.name), *runtime_dir().glob(f"{config.name}.*")] if p.exists()]
+    return [*shared_folder().glob(f"{config.name}.*"), *runtime_dir().glob(f"{config.name}.*")]
 
 
 def gone(pid: int) -> bool:
@@ -117,7 +118,7 @@ def test_two_machines_of_other_names_have_nothing_in_common(
     first, second = config(), config()
     with Supervisor(first, None, 50) as supervisor:
         assert Session(second, tmp_path / "second", 0.1).run()["ticks"] == 50
-        assert left(second) == [] and len(left(first)) == 5
+        assert left(second) == [] and len(left(first)) == 6
         for _ in supervisor.run():
             pass
         assert supervisor.snapshot()["ticks"] == 50

@@ -16,7 +16,8 @@ from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client, CommandError
 from rtctl.daemon.server import default_endpoint
 from rtctl.daemon.session import Session
-from rtctl.daemon.supervisor import Supervisor, segment_path
+from rtctl.daemon.shared_memory import segment_path
+from rtctl.daemon.supervisor import Supervisor
 from rtctl.trace.bundle import load_bundle
 
 # a busy machine is no reason to trip
@@ -89,7 +90,10 @@ def live(runtime: Path, config: Callable[..., Any], tmp_path: Path) -> Iterator[
 def test_a_second_daemon_of_that_name_is_refused_with_the_pid(live: Callable[..., Live], tmp_path: Path) -> None:
     first = live()
     with (
-        pytest.raises(UserError, match=rf"is run by another daemon \(pid {os.getpid()}\); stop it with `rtctl stop"),
+        pytest.raises(
+            UserError,
+            match=rf"is run by another daemon \(pid {os.getpid()}, its sockets are in .*\); stop it with `rtctl stop",
+        ),
         Supervisor(first.of.config, tmp_path / "second"),
     ):
         pass

@@ -36,12 +36,12 @@ def test_an_open_map_outlives_its_file(tmp_path: Path) -> None:
         Segment.open(tmp_path / "s", LAYOUT)
 
 
-def test_a_segment_left_behind_is_replaced_and_not_written_into(tmp_path: Path) -> None:
-    old = Segment.create(tmp_path / "s", LAYOUT)
-    old["first"][0] = 9
-    new = Segment.create(tmp_path / "s", LAYOUT)
-    new["first"][0] = 1
-    assert old["first"][0] == 9 and Segment.open(tmp_path / "s", LAYOUT)["first"][0] == 1
+def test_a_segment_that_is_there_is_never_replaced(tmp_path: Path) -> None:
+    live = Segment.create(tmp_path / "s", LAYOUT)
+    with pytest.raises(FileExistsError):
+        Segment.create(tmp_path / "s", LAYOUT)
+    live["first"][0] = 9
+    assert Segment.open(tmp_path / "s", LAYOUT)["first"][0] == 9
 
 
 def test_a_layout_of_another_size_is_refused_with_both_sizes(tmp_path: Path) -> None:

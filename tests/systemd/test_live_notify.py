@@ -16,7 +16,7 @@ import yaml
 
 from rtctl.daemon.client import Client
 from rtctl.daemon.server import default_endpoint
-from rtctl.daemon.supervisor import segment_path
+from rtctl.daemon.shared_memory import segment_path
 
 CONFIG = Path(__file__).parents[2] / "configs" / "ivu.yaml"
 WATCHDOG = 200_000  # us

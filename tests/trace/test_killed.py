@@ -16,7 +16,7 @@ from feeder import FINISHING, feed
 from trace_rows import ROW, is_truth
 
 from rtctl.config.errors import NoAnswer
-from rtctl.daemon.supervisor import segment_path
+from rtctl.daemon.shared_memory import segment_path
 from rtctl.loop import fused
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.repair import repair
