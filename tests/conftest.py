@@ -121,10 +121,13 @@ def runtime() -> Iterator[Path]:
 
         reel_unit()
     folder = Path(tempfile.mkdtemp(prefix="rt-", dir="/tmp"))
+    memory = Path(tempfile.mkdtemp(prefix="rt-", dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else "/tmp"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
+        patch.setenv("RTCTL_SHM_DIR", str(memory))  # segments of killed daemons would stay otherwise
         yield folder
-    shutil.rmtree(folder, ignore_errors=True)
+    for made in (folder, memory):
+        shutil.rmtree(made, ignore_errors=True)
 
 
 @pytest.fixture(scope="session")
