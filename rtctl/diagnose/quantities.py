@@ -32,11 +32,11 @@ def quantities(x_unit: str | None, u_unit: str | None = "V") -> Quantities:
     u = u_unit or "V"
     if x_unit in TURNS:
         force = "Nm"
-        units = ("rad", "rad/s", force, "kg m^2", "Nm/rad", "Nms/rad")
+        units = ("rad", "rad/s", force, "kg m^2", "Nm/rad", "Nm*s/rad")
         body = "the rotor"
     else:
         force = "N"
-        units = ("m", "m/s", force, "kg", "N/m", "Ns/m")
+        units = ("m", "m/s", force, "kg", "N/m", "N*s/m")
         body = "the carriage"
     return Quantities(x_unit in TURNS, *units, "" if u == force else f"{force}/{u}", body)
 

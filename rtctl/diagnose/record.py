@@ -103,7 +103,7 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
     """The Record of these columns, by the same rules as `load_record`."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
-    if case.estimated:
+    if case.estimated and case.reaches.parameter_tolerance is not None:  # null: the owner says that nothing is known
         names = ", ".join(case.estimated)
         warnings.append(
             f"{path.parent / 'case.json'}: parameters does not say {case.estimated[0]}; {names} estimated from the "

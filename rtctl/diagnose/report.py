@@ -41,8 +41,8 @@ PICTURES: dict[str, tuple[Draw, str]] = {
               "below is what the sensor resolves."),
     "evidence": (figures.evidence_bars, "What each hypothesis explains of the error beyond noise. Left of the dashed "
                  "line is chance; brackets join what was found with its look-alikes."),
-    "parameters": (figures.parameters, "Fitted parameters over the nominal values: the owner's, or where case.json has "
-                   "none, estimated from the recording. A wrong value is not missing physics."),
+    "parameters": (figures.parameters, "Fitted parameters over the nominal values: the owner's, or where case.json"
+                   " gives none, estimated from the recording. A wrong value is not missing physics."),
     "spectra": (figures.spectra, "Error by frequency, and missing force by order of the shaft, before and after."),
     "coverage": (figures.coverage, "Each effect at each node: a dot could be tested, a cross could not."),
 }  # fmt: skip

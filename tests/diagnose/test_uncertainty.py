@@ -5,6 +5,7 @@ import pytest
 
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.quantities import quantities
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis, Space
 from rtctl.diagnose.uncertainty import (
     FORM,
@@ -95,8 +96,9 @@ def test_a_parameter_is_told_in_its_own_unit_with_ends_around_it():
     assert m.value == pytest.approx(95.0 * np.exp(0.05))
     assert (m.low, m.high) == pytest.approx((m.value * np.exp(-0.01645), m.value * np.exp(0.01645)))
     assert m.unit == "kg"
-    assert plant_unit("axis", "F_v") == "N*s/m"
-    assert plant_unit("axis", "nothing") == ""
+    assert plant_unit(Model("axis", {}), "F_v") == "N*s/m"
+    assert plant_unit(Model("axis", {}, units=quantities("rad", "A")), "F_v") == "Nm*s/rad"
+    assert plant_unit(Model("axis", {}), "nothing") == ""
 
 
 def effects(hypothesis, x, spread=0.1, before=()):
