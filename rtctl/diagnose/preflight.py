@@ -302,7 +302,8 @@ def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str,
         if m.turns < TURNS.get(name, HALF):
             cannot.append(f"{name}:{node}")
     if shaft.turns and m.turns < 1.0:
-        findings.append(f"{shaft.name} turns {m.turns:.2f} of a turn only; what repeats each turn is hard to see.")
+        called = "rotor" if shaft.name == "carriage" else shaft.name  # a carriage that turns is a rotary axis
+        findings.append(f"{called} turns {m.turns:.2f} of a turn only; what repeats each turn is hard to see.")
     blind = unsigned(record) or counts_up(record)
     if blind:
         what = "speed" if record.shows_speed else "rate of the position"

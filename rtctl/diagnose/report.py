@@ -102,7 +102,8 @@ def alt_text(d: Diagnosis, name: str, caption: str) -> str:
         return f"{caption} The error {words.falls(d)}."
     if name == "evidence" and d.evidence:
         best = max(d.evidence, key=lambda e: e.gain)
-        return f"{caption} The most, {numbers.percent(best.gain)}: {' and '.join(map(words.entry_noun, best.names))}."
+        names = " and ".join(words.entry_noun(name, d.owner.units.rotary) for name in best.names)
+        return f"{caption} The most, {numbers.percent(best.gain)}: {names}."
     return caption
 
 
