@@ -40,12 +40,28 @@ def import_(
         typer.Option("--case", metavar="KEY=VALUE", help="Further key of case.json, e.g. drive.newton_per_volt=35.15."),
     ] = None,
     uneven: Annotated[bool, typer.Option("--uneven", help="The rows are at uneven times, and stay so.")] = False,
+    names_line: Annotated[
+        int | None, typer.Option("--names-line", metavar="N", help="Text: line of the names, 1 the first; 0 for none.")
+    ] = None,
+    units_line: Annotated[
+        int | None, typer.Option("--units-line", metavar="N", help="Text: line of the units; 0 for none.")
+    ] = None,
+    skip: Annotated[
+        int | None, typer.Option("--skip", metavar="N", help="Text: lines at the top to pass over.")
+    ] = None,
+    separator: Annotated[
+        str | None, typer.Option("--separator", metavar="SIGN", help="Text: between two cells; tab and space too.")
+    ] = None,
+    decimal: Annotated[str | None, typer.Option("--decimal", metavar="SIGN", help="Text: decimal sign, . or ,")] = None,
+    encoding: Annotated[
+        str | None, typer.Option("--encoding", metavar="NAME", help="Text: of its characters, e.g. utf-16 or cp1252.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Make a bundle of a recording from elsewhere, in SI units, so that plot, compare and diagnose work on it.
 
-    Units are those of --unit, else those that the file names (a csv in brackets behind a column's name), else SI.
-    Without --map, columns that have our names already are taken.
+    Units are those of --unit, else those that the file names, else SI. Without --map, columns that have our names
+    already are taken. Of a file of text the names, units, separator and decimal sign are seen from the file.
 
     Examples:
 
@@ -60,8 +76,12 @@ def import_(
     from rtctl.trace.imports.plan import Plan, load_plan, with_options
 
     plan = load_plan(map_file) if map_file is not None else Plan()
-    plan = with_options(plan, plant, map_ or [], unit or [], rate, parameter or [], case or [], uneven)
-    made = make_bundle(read(file), plan, out)
+    text = {
+        "names_line": names_line, "units_line": units_line, "skip": skip, "separator": separator, "decimal": decimal,
+        "encoding": encoding,
+    }  # fmt: skip
+    plan = with_options(plan, plant, map_ or [], unit or [], rate, parameter or [], case or [], uneven, text)
+    made = make_bundle(read(file, plan.text), plan, out)
     lacks = _diagnosable(out)
     if json:
         common.print_json({**made._asdict(), "folder": str(made.folder), "notes": list(made.notes), "lacks": lacks})

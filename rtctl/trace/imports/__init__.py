@@ -7,6 +7,7 @@ from pathlib import Path
 from rtctl.config.errors import UserError, nearest
 from rtctl.trace.imports.packed import packing, read_packed
 from rtctl.trace.imports.table import Table
+from rtctl.trace.imports.text_form import TextPlan
 
 __all__ = ["READERS", "Table", "read"]
 
@@ -53,15 +54,18 @@ TEXT = ("csv_file", "json_file")
 HEAD = 4096  # bytes from which the kind is seen
 
 
-def read(path: Path | str) -> Table:
-    """All columns of a file, into memory. Raises UserError where it cannot be read, or its kind is not known."""
+def read(path: Path | str, text: TextPlan | None = None) -> Table:
+    """All columns of a file, into memory; `text` is what its owner says of a file of text.
+
+    Raises UserError where it cannot be read, or its kind is not known.
+    """
     path = Path(path)
     if path.is_dir():
         raise UserError(f"{path} is a folder; give the file in it, one of {', '.join(READERS)}")
     if not path.is_file():
         raise UserError(f"{path}: no such file" if not path.exists() else f"{path} is no plain file")
     try:
-        return _read(path, 0)
+        return _read(path, text or TextPlan(), 0)
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in PACKAGES:
@@ -75,13 +79,13 @@ def read(path: Path | str) -> Table:
         raise UserError(f"{path}: there is not enough memory for it; write a shorter part or fewer columns") from None
 
 
-def _read(path: Path, depth: int) -> Table:
+def _read(path: Path, text: TextPlan, depth: int) -> Table:
     with path.open("rb") as file:
         head = file.read(HEAD)
     if packing(head):
         if depth:
             raise UserError(f"{path} is packed more than once; unpack it first")
-        return read_packed(path, lambda inner: _read(inner, depth + 1))
+        return read_packed(path, lambda inner: _read(inner, text, depth + 1))
     suffix = path.suffix.lower()
     by_name, by_content = READERS.get(suffix), _content(path, head)
     if by_content is None and by_name is None:
@@ -91,7 +95,14 @@ def _read(path: Path, depth: int) -> Table:
     kind = by_content or by_name
     if by_name == "mat_file" and kind == "hdf5_file":
         kind = by_name
-    table = importlib.import_module(f"rtctl.trace.imports.{kind}").read(path)
+    module = importlib.import_module(f"rtctl.trace.imports.{kind}")
+    if kind == "csv_file":
+        table = module.read(path, text)
+    elif text.model_fields_set:
+        option = sorted(text.model_fields_set)[0].replace("_", "-")
+        raise UserError(f"{path} is read as {str(kind).removesuffix('_file')}, and --{option} is of files of text")
+    else:
+        table = module.read(path)
     if by_name is not None and kind != by_name and not (by_name in TEXT and kind in TEXT):
         name = str(kind).removesuffix("_file")
         table = table._replace(notes=(f"{path.name} is read as {name}, which it is by its content", *table.notes))

@@ -5,98 +5,115 @@ that of the whole file (numerals.py). What the owner says goes first.
 """
 
 import codecs
-import gzip
 import io
 import itertools
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 
 from rtctl.config.errors import UserError
 from rtctl.trace.imports import numerals
+from rtctl.trace.imports.limits import refuse_large
 from rtctl.trace.imports.names import named
 from rtctl.trace.imports.table import Table
-from rtctl.trace.imports.text_form import COMMENTS, Form, Options, cells, form_of
+from rtctl.trace.imports.text_form import Form, TextPlan, cells, form_of, is_comment
 
-HEAD = 65_536  # characters from which the form of the file is seen
-MOST = 2 << 30  # bytes of text; beyond it is cut into parts by its owner
+HEAD = 1 << 16  # characters from which the form of the file is seen
+TAKES = 4  # bytes of memory for each byte of text, about: the text twice, its cells, and their numbers
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 NAN = ["", "nan", "NaN", "NAN", "-nan", "null", "NULL", "N/A", "n/a"]
 
 
-def read(path: Path, options: Options | None = None) -> Table:
+def read(path: Path, plan: TextPlan | None = None) -> Table:
     """The columns of a text file. Raises UserError, OSError."""
-    options = options or Options()
-    text, encoding = _text(path, options.encoding)
-    form = form_of(path, text[:HEAD].splitlines(), options)
-    lines = text.split("\n") if form.separator == " " or "\r" in text[:HEAD] else None
-    if lines is not None:
-        lines = text.splitlines()
-    body = _body(text, lines, form)
-    columns = _columns(path, body, text, form, options.decimal)
+    plan = plan or TextPlan()
+    text, note = _text(path, plan.encoding)
+    head = text[:HEAD]
+    form = form_of(path, (head if len(head) == len(text) else head[: head.rfind("\n") + 1] or head).split("\n"), plan)
+    found = _columns(path, text, form, plan.decimal)
     names, units, notes = _heads(path, form)
-    if encoding not in ("utf-8", "utf-8-sig", "utf-16"):
-        notes.append(f"the text is not UTF-8; it was read as {encoding}")
-    found = {name: columns[k] for k, name in enumerate(names) if name is not None and k in columns}
-    return Table(path, found, units, where=lambda row: f"line {_line(text, form, row)}", notes=tuple(notes))
+    columns = {name: values for name, values in zip(names, found, strict=True) if name is not None}
+    notes = [*notes, note] if note else notes
+    return Table(path, columns, units, where=lambda row: f"line {_line(text, form, row)}", notes=tuple(notes))
 
 
 def _text(path: Path, given: str | None) -> tuple[str, str]:
-    """The file's text and its encoding. Raises UserError."""
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        packed = file.read(2) == b"\x1f\x8b"
-        file.seek(0)
-        try:
-            raw = (gzip.GzipFile(fileobj=file) if packed else file).read(MOST + 1)
-        except (EOFError, gzip.BadGzipFile) as error:
-            raise UserError(f"{path}: the gzip file is damaged or cut off ({error}); fetch it again") from None
-    if size > MOST or len(raw) > MOST:
-        raise UserError(f"{path}: more than {MOST >> 30} GiB of text; cut it into parts, or use Parquet")
+    """The file's text, its lines ended by a line feed alone, and what was assumed of it. Raises UserError."""
+    refuse_large(path, TAKES * path.stat().st_size, "its text and numbers")
+    raw = path.read_bytes()
     if not raw.strip():
         raise UserError(f"{path} is empty")
     encoding = given or next((name for mark, name in MARKS if raw.startswith(mark)), None)
     if encoding is None and b"\0" in raw[:HEAD]:
-        raise UserError(f"{path} is not text; if it is UTF-16 without a mark, --encoding utf-16-le or utf-16-be says so")
+        raise UserError(
+            f"{path} is not text; if it is UTF-16 without a mark, --encoding utf-16-le or utf-16-be says so"
+        )
+    note = ""
     try:
-        return raw.decode(encoding or "utf-8"), encoding or "utf-8"
+        text = raw.decode(encoding or "utf-8")
     except LookupError:
         raise UserError(f"--encoding {given}: no such encoding; utf-8, utf-16, latin-1 and cp1252 are some") from None
-    except UnicodeDecodeError as error:
+    except UnicodeError as error:
         if encoding is not None:
-            line = raw.count(b"\n", 0, error.start) + 1
-            raise UserError(f"{path}:{line}: is not {encoding}; --encoding names another") from None
-        return raw.decode("cp1252", errors="replace"), "cp1252"  # what spreadsheets write on some machines
+            line = raw.count(b"\n", 0, getattr(error, "start", 0)) + 1
+            raise UserError(f"{path}:{line}: this is not {encoding}; --encoding names another") from None
+        text, note = raw.decode("cp1252", errors="replace"), "the text is not UTF-8; it was read as cp1252"
+    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n"), note
 
 
-def _body(text: str, lines: list[str] | None, form: Form) -> bytes:
+def _columns(path: Path, text: str, form: Form, decimal: str | None) -> list[np.ndarray]:
+    """Values (n,) of each column. Raises UserError."""
+    body = _body(text, form)
+    careful = decimal == "," or (b'"' in body if form.separator == "," else b"," in body)
+    columns = _cells(path, body, text, form, careful)
+    full = pc.is_valid(columns[0])
+    for column in columns[1:]:
+        full = pc.or_(full, pc.is_valid(column))
+    if not pc.all(full).as_py():  # rows of separators alone, as spreadsheets write them below the last one
+        columns = [column.filter(full) for column in columns]
+    if decimal is None:
+        decimal = "."
+        if careful or (form.separator != "," and _may_group(body, form)):
+            texts = columns if careful else _cells(path, body, text, form, True)
+            decimal = numerals.decimal_sign(path, texts, lambda cell: f"line {_line_with(text, form, cell)}")
+    return [_values(column, decimal) for column in columns]
+
+
+def _body(text: str, form: Form) -> bytes:
     """The rows, as UTF-8 with one separator between the cells."""
-    if lines is not None:
-        rows = lines[form.first :]
-        if form.separator == " ":
-            rows = [" ".join(line.split()) for line in rows]
-        return "\n".join(rows).encode()
     at = 0
     for _ in range(form.first):
-        at = text.index("\n", at) + 1
-    return text[at:].encode()
+        at = text.find("\n", at) + 1
+        if not at:
+            return b""
+    if form.separator != " ":
+        return text[at:].encode()
+    return "\n".join(" ".join(line.split()) for line in text[at:].split("\n")).encode()
 
 
-def _columns(path: Path, body: bytes, text: str, form: Form, decimal: str | None) -> dict[int, np.ndarray]:
-    """Cells by column. Raises UserError."""
-    plain = (decimal or ".") == "." and b"," not in body.replace(b",", b"", 0) if form.separator != "," else False
-    quoted = form.separator == "," and b'"' in body
-    careful = decimal is not None or quoted or (form.separator != "," and not plain)
+def _may_group(body: bytes, form: Form) -> bool:
+    """Whether a file without commas has dots, and its first rows none that can only be a decimal point."""
+    point = re.compile(numerals.DECIDES["."])
+    lines = itertools.islice((line for line in body.split(b"\n", 2000) if b"." in line), 1000)
+    found = (cell for line in lines for cell in cells(line.decode("utf-8", "replace"), form.separator))
+    return b"." in body and not any(point.match(cell) for cell in found)
+
+
+def _cells(path: Path, body: bytes, text: str, form: Form, as_text: bool) -> list[pa.ChunkedArray]:
+    """The columns as Arrow reads them, or as the texts that they are. Raises UserError."""
     names = [str(k) for k in range(form.width)]
-    types = {name: pa.string() for name in names} if careful else None
+    if not body.strip():
+        return [pa.chunked_array([pa.array([], pa.float64())]) for _ in names]
     strange: list[str] = []
 
     def odd(row: Any) -> str:
-        if row.text.lstrip().startswith(COMMENTS) or not row.text.strip(form.separator + " \r"):
+        if is_comment(row.text) or not row.text.strip(form.separator + " \t"):
             return "skip"
         strange.append(row.text)
         return "error"
@@ -106,57 +123,53 @@ def _columns(path: Path, body: bytes, text: str, form: Form, decimal: str | None
             io.BytesIO(body),
             pa_csv.ReadOptions(use_threads=False, column_names=names),
             pa_csv.ParseOptions(delimiter=form.separator, invalid_row_handler=odd),
-            pa_csv.ConvertOptions(column_types=types, null_values=NAN, strings_can_be_null=True, quoted_strings_can_be_null=True),
-        )
+            pa_csv.ConvertOptions(
+                column_types={name: pa.string() for name in names} if as_text else None,
+                null_values=NAN, strings_can_be_null=True, quoted_strings_can_be_null=True,
+            ),
+        )  # fmt: skip
     except pa.ArrowException as error:
         if strange:
             have = len(cells(strange[0], form.separator))
             raise UserError(
-                f"{path}: line {_line_of(text, strange[0])} has {have} cells and the rows {form.width}; mend that line, "
-                "or leave it out"
+                f"{path}: line {_line_of(text, strange[0], form)} has {have} cells and the rows have {form.width}; "
+                "mend that line, or leave it out"
             ) from None
         raise UserError(f"{path}: the rows cannot be read: {str(error).splitlines()[0]}") from None
-    columns = {k: table.column(k) for k in range(form.width)}
-    if careful:
-        return _converted(path, columns, text, form, decimal)
-    return {k: _values(column) for k, column in columns.items()}
+    return list(table.columns)
 
 
-def _converted(
-    path: Path, columns: dict[int, pa.ChunkedArray], text: str, form: Form, decimal: str | None
-) -> dict[int, np.ndarray]:
-    """Columns of texts as numbers or dates, by one decimal sign."""
-    texts = {k: np.asarray(column.to_numpy(), dtype=object) for k, column in columns.items()}
-    if decimal is None:
-        some = (str(cell).strip() for column in texts.values() for cell in column if cell is not None)
-        decimal, _ = numerals.decimal_sign(path, some, lambda cell: f"line {_line_with(text, form, cell)}")
-    out = {}
-    for k, column in texts.items():
-        values, wrong = numerals.numbers(column, decimal)
-        if wrong is None:
-            out[k] = values
-            continue
+def _values(column: pa.ChunkedArray, decimal: str) -> np.ndarray:
+    """Numbers (n,), else dates or durations, else the texts as they are."""
+    kind = column.type
+    if pa.types.is_null(kind):
+        return np.full(len(column), np.nan)
+    if pa.types.is_time(kind):  # of the day: a duration since midnight
+        return column.cast(pa.int64() if kind.bit_width == 64 else pa.int32()).to_numpy().astype(f"m8[{kind.unit}]")
+    if not pa.types.is_string(kind):
+        return column.to_numpy()
+    found = numerals.numbers(column, decimal)
+    if found is not None:
+        return found.to_numpy()
+    for texts in (column, pc.replace_substring_regex(column, r"^([^,]*:\d\d),(\d+)", r"\1.\2")):
         try:
-            out[k] = columns[k].cast(pa.timestamp("ns")).to_numpy()
+            return pc.utf8_trim_whitespace(texts).cast(pa.timestamp("ns")).to_numpy()
         except pa.ArrowException:
-            out[k] = column
-    return out
-
-
-def _values(column: pa.ChunkedArray) -> np.ndarray:
-    return np.full(len(column), np.nan) if pa.types.is_null(column.type) else column.to_numpy()
+            continue
+    return np.asarray(column.to_numpy(), dtype=object)
 
 
 def _heads(path: Path, form: Form) -> tuple[list[str | None], dict[str, str], list[str]]:
     """Names (None: a column without one that is left out), units by name, and sentences. Raises UserError."""
-    notes = [f"{form.passed} lines before the names were passed over"] if form.passed else []
+    lines = "1 line" if form.passed == 1 else f"{form.passed} lines"
+    notes = [f"{lines} before the names {'was' if form.passed == 1 else 'were'} passed over"] if form.passed else []
     if form.names is None:
-        return [str(k + 1) for k in range(form.width)], {}, notes
+        return [str(k + 1) for k in range(form.width)], {str(k + 1): unit for k, unit in form.units.items()}, notes
     names: list[str | None] = []
     units: dict[str, str] = {}
     for k, text in enumerate(form.names):
         name, unit = named(text, k)
-        last = k == form.width - 1 and not text.strip()
+        last = k == form.width - 1 and not text.strip()  # a separator ends each line
         names.append(None if last and form.width > 1 else name)
         unit = form.units.get(k, unit)
         if unit is not None:
@@ -170,8 +183,8 @@ def _heads(path: Path, form: Form) -> tuple[list[str | None], dict[str, str], li
 
 def _rows(text: str, form: Form) -> Iterator[tuple[int, str]]:
     """Line number, as an editor counts, and text of each row."""
-    for number, line in enumerate(text.splitlines(), 1):
-        if number > form.first and line.strip() and not line.lstrip().startswith(COMMENTS):
+    for number, line in enumerate(text.split("\n"), 1):
+        if number > form.first and line.strip(form.separator + ' \t"') and not is_comment(line):
             yield number, line
 
 
@@ -179,9 +192,10 @@ def _line(text: str, form: Form, row: int) -> int:
     return next(itertools.islice((number for number, _ in _rows(text, form)), row, None), row)
 
 
-def _line_of(text: str, wanted: str) -> int:
-    wanted = wanted.strip()
-    return next((n for n, line in enumerate(text.splitlines(), 1) if line.strip() == wanted), 0)
+def _line_of(text: str, wanted: str, form: Form) -> int:
+    """The line that Arrow refused, which white space may part."""
+    whole = wanted.split()
+    return next((n for n, line in _rows(text, form) if line.split() == whole), 0)
 
 
 def _line_with(text: str, form: Form, cell: str) -> int:

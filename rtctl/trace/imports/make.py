@@ -194,8 +194,10 @@ def _factor(table: Table, name: str, column: str, theirs: str, ours: str, axis: 
         except ValueError as error:
             first = first or error
     wanted = ours or "a number without unit"
-    raise UserError(f"{table.path}: column '{column}' ({name}) is in '{theirs}', which is not {wanted}; "
-                    f"--unit {name}=... says what it is") from first  # fmt: skip
+    given = f"in '{theirs}'" if theirs else "a mere number by the file"
+    raise UserError(
+        f"{table.path}: column '{column}' ({name}) is {given}, which is not {wanted}; --unit {name}=... says what it is"
+    ) from first
 
 
 def _whole(table: Table, column: str, values: np.ndarray) -> None:

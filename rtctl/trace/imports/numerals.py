@@ -5,10 +5,11 @@ cannot; where nothing else decides, it is refused.
 """
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from rtctl.config.errors import UserError
 
@@ -16,74 +17,84 @@ SPACES = " '\u2019\u00a0\u2009\u202f"  # further signs between thousands
 EXPONENT = r"(?:[eEdD][-+]?\d+)?"
 
 
-def _decides(sign: str, other: str) -> re.Pattern[str]:
-    """Cells in which `sign` can only be the decimal sign."""
+def _decides(sign: str, other: str) -> str:
+    """Pattern of cells in which `sign` can only be the decimal sign."""
     s, o = re.escape(sign), re.escape(other)
-    return re.compile(
-        rf"[-+]?(?:\d*{s}(?:\d{{0,2}}|\d{{4,}})|0\d*{s}\d+|\d{{4,}}{s}\d+|{s}\d+|\d{{1,3}}(?:[{o}{SPACES}]\d{{3}})+{s}\d+)"
-        rf"{EXPONENT}|[-+]?\d+{s}\d+[eEdD][-+]?\d+"
+    group = f"[{o}{SPACES}]"
+    return (
+        rf"^(?:[-+]?(?:\d*{s}(?:\d{{0,2}}|\d{{4,}})|0\d*{s}\d+|\d{{4,}}{s}\d+|\d{{1,3}}(?:{group}\d{{3}})+{s}\d+)"
+        rf"{EXPONENT}|[-+]?\d+{s}\d+[eEdD][-+]?\d+)$"
     )
 
 
-DECIDES = {".": _decides(".", ","), ",": _decides(",", ".")}
-GROUPED = re.compile(r"[-+]?\d{1,3}(?P<sign>[.,])\d{3}(?:(?P=sign)\d{3})*")
-TWICE = re.compile(r"[-+]?\d{1,3}(?:(?P<sign>[.,])\d{3}){2,}")
+def _grouped(sign: str, least: int) -> str:
+    """Pattern of cells that `sign` may group, `least` times or more."""
+    return rf"^[-+]?\d{{1,3}}(?:{re.escape(sign)}\d{{3}}){{{least},}}$"
 
 
-def decimal_sign(path: Path, texts: Iterable[str], where: Callable[[str], str]) -> tuple[str, str | None]:
-    """Decimal sign of a file by all its cells, and a sentence on what was assumed.
+OTHER = {".": ",", ",": "."}
+DECIDES = {sign: _decides(sign, other) for sign, other in OTHER.items()}
+GROUPED = {sign: _grouped(sign, 1) for sign in OTHER}
+TWICE = {sign: _grouped(sign, 2) for sign in OTHER}
+
+
+def decimal_sign(path: Path, columns: Sequence[pa.ChunkedArray], where: Callable[[str], str]) -> str:
+    """Decimal sign of a file by all cells of its columns of texts.
 
     `where(text)` names the first row with that cell. Raises UserError where the cells contradict each other, or leave
     the sign open.
     """
+    bare = [pc.utf8_trim_whitespace(column) for column in columns]
     found: dict[str, str] = {}
-    open_: dict[str, str] = {}
-    for text in texts:
-        for sign in ".,":
-            if sign not in found and DECIDES[sign].fullmatch(text):
-                found[sign] = text
-        if match := GROUPED.fullmatch(text):
-            if TWICE.fullmatch(text):  # 1.234.567 groups by the dot
-                found.setdefault("," if match["sign"] == "." else ".", text)
-            open_.setdefault(match["sign"], text)
-        if len(found) == 2:
-            one, two = found["."], found[","]
-            raise UserError(
-                f"{path}: '{one}' ({where(one)}) has a decimal point and '{two}' ({where(two)}) a decimal comma; "
-                "write one of them throughout"
-            )
-    if found:
-        return next(iter(found)), None
-    if open_:
-        sign, text = next(iter(open_.items()))
-        if len(open_) == 2:
-            return ",", None  # never both decimal
+    for sign, other in OTHER.items():
+        text = _first(bare, DECIDES[sign]) or _first(bare, TWICE[other])  # 1.234.567 groups by the dot
+        if text:
+            found[sign] = text
+    if len(found) == 2:
+        one, two = found["."], found[","]
         raise UserError(
-            f"{path}: '{text}' ({where(text)}) is {text.replace(sign, '')} or {text.replace(sign, '.')}: nothing in the "
-            f"file says whether '{sign}' groups thousands; --decimal {sign} if it is the decimal sign, "
-            f"--decimal {'.' if sign == ',' else ','} if it groups"
+            f"{path}: '{one}' ({where(one)}) has a decimal point and '{two}' ({where(two)}) a decimal comma; "
+            "write one of them throughout"
         )
-    return ".", None
+    if found:
+        return next(iter(found))
+    for sign, other in OTHER.items():
+        if text := _first(bare, GROUPED[sign]):
+            raise UserError(
+                f"{path}: '{text}' ({where(text)}) is {text.replace(sign, '')} or {text.replace(sign, '.')}: nothing "
+                f"in the file says whether '{sign}' groups thousands; --decimal '{sign}' if it is the decimal sign, "
+                f"--decimal '{other}' if it groups"
+            )
+    return "."
 
 
-def numbers(cells: np.ndarray, decimal: str) -> tuple[np.ndarray, int | None]:
-    """Doubles (n,) of texts (n,), empty ones nan, and the first row that is no number (None: all are)."""
-    other = "," if decimal == "." else "."
-    grouped = re.compile(
-        rf"[-+]?\d{{1,3}}([{re.escape(other)}{SPACES}])\d{{3}}(?:\1\d{{3}})*(?:{re.escape(decimal)}\d*)?{EXPONENT}"
-    )
-    out = np.full(len(cells), np.nan)
-    for k, cell in enumerate(cells):
-        text = "" if cell is None else str(cell).strip()
-        if not text:
-            continue
-        if grouped.fullmatch(text):
-            for sign in (other, *SPACES):
-                text = text.replace(sign, "")
-        elif other in text:
-            return out, k
-        try:
-            out[k] = float(text.replace(decimal, ".").replace("D", "e").replace("d", "e"))
-        except ValueError:
-            return out, k
-    return out, None
+def _first(columns: Sequence[pa.ChunkedArray], pattern: str) -> str:
+    """The first cell that matches; empty where none does."""
+    for column in columns:
+        row = pc.index(pc.match_substring_regex(column, pattern), True).as_py()
+        if row >= 0:
+            return str(column[row].as_py())
+    return ""
+
+
+def numbers(column: pa.ChunkedArray, decimal: str) -> pa.ChunkedArray | None:
+    """Doubles of a column of texts, null where a cell is empty; None where some cell is no number."""
+    other = OTHER[decimal]
+    bare = pc.utf8_trim_whitespace(column)
+    for sign in (other, *SPACES):
+        s = re.escape(sign)
+        is_grouped = pc.match_substring_regex(
+            bare, rf"^[-+]?\d{{1,3}}(?:{s}\d{{3}})+(?:{re.escape(decimal)}\d*)?{EXPONENT}$"
+        )
+        if pc.any(is_grouped).as_py():
+            bare = pc.if_else(is_grouped, pc.replace_substring(bare, sign, ""), bare)
+    if pc.any(pc.match_substring(bare, other)).as_py():
+        return None
+    bare = pc.replace_substring_regex(bare, r"^\+", "")
+    bare = pc.replace_substring_regex(bare, r"^(-?[\d.,]+)[dD]([-+]?\d+)$", r"\1e\2")  # as Fortran writes them
+    bare = pc.replace_substring(bare, decimal, ".") if decimal != "." else bare
+    bare = pc.if_else(pc.equal(bare, ""), None, bare)
+    try:
+        return bare.cast(pa.float64())
+    except pa.ArrowException:
+        return None

@@ -7,10 +7,13 @@ columns:
   x: {column: qm, unit: mm}
 parameters: {M: 95 kg}
 case: {drive: {newton_per_volt: 35.15}}     # further keys of case.json
+text: {decimal: ",", names_line: 3}          # of a file of text, where it is not seen from the file
 """
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError
@@ -19,6 +22,7 @@ from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError
 from rtctl.config.yaml_file import load_yaml, parse
 from rtctl.idiom import Settings, quantity
+from rtctl.trace.imports.text_form import TextPlan
 
 
 class ColumnPlan(Settings):
@@ -40,6 +44,7 @@ class Plan(Settings):
     )
     parameters: dict[str, float | str] = Field(default={}, description="of the plant's model, SI or with a unit")
     case: dict[str, Any] = Field(default={}, description="further keys of case.json, such as drive and sensors")
+    text: TextPlan = Field(default=TextPlan(), description="of a file of text: where what stands in it, and how")
 
 
 def load_plan(path: Path | str) -> Plan:
@@ -85,24 +90,26 @@ def with_options(
     parameters: Sequence[str],
     case: Sequence[str],
     uneven: bool,
+    text: Mapping[str, Any] = MappingProxyType({}),
 ) -> Plan:
     """The plan with what the command line says on top. Raises UserError."""
     columns = dict(plan.columns)
     mapped: dict[str, str] = {}
     for option in maps:
-        for pair in option.split(","):
+        for pair in re.split(r",(?=[^,=]*=)", option):  # `u=Torque, Request` is one column
             name, theirs = _pair("--map", pair, "x=qm")
             if mapped.setdefault(name, theirs) != theirs:
                 raise UserError(f"--map: {name} cannot be both {mapped[name]} and {theirs}; name one column for it")
             columns[name] = ColumnPlan(column=theirs, unit=columns[name].unit if name in columns else None)
-    for text in units:
-        name, unit = _pair("--unit", text, "x=mm")
+    for option in units:
+        name, unit = _pair("--unit", option, "x=mm")
         columns[name] = ColumnPlan(column=columns[name].column if name in columns else "", unit=unit)
     update: dict[str, Any] = {
         "columns": {name: given.model_dump() for name, given in columns.items()},
         "parameters": {**plan.parameters, **_values("--parameter", parameters, "M=95")},
         "case": _nested(plan.case, case),
         "uneven": plan.uneven or uneven,
+        "text": {**plan.text.model_dump(exclude_unset=True), **{k: v for k, v in text.items() if v is not None}},
     }
     update |= {"plant": plant} if plant is not None else {}
     update |= {"rate": _number(rate)} if rate is not None else {}
@@ -110,7 +117,13 @@ def with_options(
     try:
         return Plan.model_validate(data)
     except ValidationError as error:
-        raise UserError(sentences(error, Plan, data, lambda at: f"--{at[0]}" if at else "import")) from None
+        raise UserError(sentences(error, Plan, data, _option)) from None
+
+
+def _option(at: tuple) -> str:
+    """The option that a key of the plan is given by."""
+    names = [str(part) for part in at if part != "text"]
+    return f"--{names[0].replace('_', '-')}" if names else "import"
 
 
 def _pair(option: str, text: str, example: str) -> tuple[str, str]:

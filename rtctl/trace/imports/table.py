@@ -34,6 +34,8 @@ class Table(NamedTuple):
         near = nearest(name, self.columns)
         there = list(self.columns)[:20]
         hint = f"is it '{near}'?" if near else f"it has {', '.join(there) or 'none'}"
+        if "," in name:
+            hint += "; several are given as ours=theirs,ours=theirs"
         raise UserError(f"{self.path} has no column '{name}' (wanted as {use}); {hint}")
 
     def times(self, name: str, factor: float) -> np.ndarray:

@@ -6,14 +6,20 @@ first line that looks like them is the first row; names and units stand before i
 
 import csv
 import re
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from pydantic import Field, field_validator
 
 from rtctl.config.errors import UserError
 from rtctl.config.units import convert
+from rtctl.idiom import Settings
 
 SEPARATORS = (";", "\t", "|", ",", " ")  # a space is any white space
 COMMENTS = ("#", "%", "//", "!")
-NUMBER = re.compile(r"[-+]?(?:\d[\d.,' \u00a0\u2009\u202f]*|[.,]\d+)(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
+NUMBER = re.compile(
+    r"[-+]?(?:\d[\d.,' \u2019\u00a0\u2009\u202f]*|[.,]\d+)(?:[eEdD][-+]?\d+)?|[-+]?(?:nan|inf(?:inity)?)", re.IGNORECASE
+)
 DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[T ].*)?|\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?")
 UNIT_WORDS = {
     "second": "s", "seconds": "s", "sec": "s", "volt": "V", "volts": "V", "ampere": "A", "amps": "A", "meter": "m",
@@ -21,18 +27,28 @@ UNIT_WORDS = {
 }  # fmt: skip
 NO_UNIT = ("", "-", "1", "none", "sequence", "unitless", "dimensionless")
 SAMPLE = 200  # lines of the head from which separator and numeric columns are seen
-MOSTLY = 0.8  # share of the lines in which a column of numbers holds one
+MOSTLY = 0.5  # share of the lines, those at the top aside, above which a column with numbers is one of numbers
 
 
-class Options(NamedTuple):
-    """What the owner says of a text file; None and 0 are left to the file."""
+class TextPlan(Settings):
+    """What the owner says of a text file; what is absent is seen from the file."""
 
-    separator: str | None = None
-    decimal: str | None = None  # "." or ","
-    names_line: int | None = None  # line of the names, 1 the first; 0: there are none
-    units_line: int | None = None
-    skip: int = 0  # lines at the top
-    encoding: str | None = None
+    separator: str | None = Field(
+        default=None, description="between two cells: a sign, `tab`, or `space` for any white space"
+    )
+    decimal: Literal[".", ","] | None = Field(default=None, description="decimal sign")
+    names_line: int | None = Field(default=None, ge=0, description="line of the names, 1 the first; 0: there are none")
+    units_line: int | None = Field(default=None, ge=0, description="line of the units; 0: there are none")
+    skip: int = Field(default=0, ge=0, description="lines at the top that are passed over")
+    encoding: str | None = Field(default=None, description="of the characters, such as utf-16 or cp1252")
+
+    @field_validator("separator")
+    @classmethod
+    def _one_sign(cls, given: str | None) -> str | None:
+        sign = {"tab": "\t", "\\t": "\t", "space": " "}.get(given or "", given)
+        if sign is not None and (len(sign) != 1 or sign.isalnum() or sign in '\n\r".'):
+            raise ValueError("should be one sign, such as ; or |, or tab, or space")
+        return sign
 
 
 class Form(NamedTuple):
@@ -60,30 +76,30 @@ def is_value(cell: str) -> bool:
     return bool(NUMBER.fullmatch(cell) or DATE.fullmatch(cell))
 
 
-def form_of(path: object, lines: list[str], options: Options) -> Form:
+def form_of(path: object, lines: list[str], plan: TextPlan) -> Form:
     """Form of the file whose first lines are `lines`. Raises UserError."""
-    start = options.skip
-    separator = options.separator
+    start = plan.skip
+    separator = plan.separator
     if len(lines) > start and re.fullmatch(r"sep=.", lines[start].strip("\r\n\ufeff\"' ")):
         separator = separator or lines[start].strip("\r\n\ufeff\"' ")[4]
         start += 1
     full = [k for k in range(start, len(lines)) if lines[k].strip()]
     if not full:
         raise UserError(f"{path} holds no line of names or numbers")
-    body = [k for k in full if not _is_comment(lines[k])][-SAMPLE:] or full[-1:]
-    body = body[len(body) // 2 :]
+    body = [k for k in full if not is_comment(lines[k])][-SAMPLE:] or full[-1:]
+    body = body[len(body) // 2 :]  # what stands before the rows is no measure
     separator = separator or _separator([lines[k] for k in body])
     rows = [cells(lines[k], separator) for k in body]
-    width = _usual([len(row) for row in rows])
+    width = _usual([len(row) for row in rows], [len(cells(lines[k], separator)) for k in full])
     rows = [row for row in rows if len(row) == width]
-    numeric = [k for k in range(width) if sum(is_value(row[k]) for row in rows) >= MOSTLY * len(rows)]
-    names_line = options.names_line - 1 if options.names_line else None
+    numeric = [k for k in range(width) if sum(is_value(row[k]) for row in rows) > MOSTLY * len(rows)]
+    names_line = plan.names_line - 1 if plan.names_line else None
     if names_line is not None and names_line >= len(lines):
-        raise UserError(f"{path}: there is no line {options.names_line} for the names; the file has {len(lines)} lines")
-    after = max(names_line if names_line is not None else -1, (options.units_line or 0) - 1)
+        raise UserError(f"{path}: there is no line {plan.names_line} for the names; the file has {len(lines)} lines")
+    after = max(names_line if names_line is not None else -1, (plan.units_line or 0) - 1)
     first = _first_row(lines, full, separator, width, numeric, after)
-    names, units, used = _names(lines, [k for k in full if k < first], separator, width, names_line, options)
-    passed = sum(1 for k in full if k < first and k not in used and not _is_comment(lines[k]))
+    names, units, used = _names(lines, [k for k in full if k < first], separator, width, names_line, plan)
+    passed = sum(1 for k in full if k < first and k not in used and not is_comment(lines[k]))
     return Form(separator, width, first, names, units, passed)
 
 
@@ -104,36 +120,38 @@ def _separator(lines: list[str]) -> str:
     return chosen
 
 
-def _usual(widths: list[int]) -> int:
-    return max(set(widths), key=lambda width: (widths.count(width), width))
+def _usual(widths: list[int], others: Sequence[int] = ()) -> int:
+    """The commonest width; of two alike the one that is commoner among the others."""
+    return max(set(widths), key=lambda width: (widths.count(width), others.count(width), width))
 
 
-def _is_comment(line: str) -> bool:
+def is_comment(line: str) -> bool:
+    """Whether a line says nothing but what a person reads."""
     return line.lstrip("\ufeff \t").startswith(COMMENTS)
 
 
 def _first_row(lines: list[str], full: list[int], separator: str, width: int, numeric: list[int], after: int) -> int:
     for k in full:
         row = cells(lines[k], separator)
-        if k <= after or len(row) != width:
+        if k <= after or len(row) != width or is_comment(lines[k]):
             continue
-        if all(is_value(row[n]) or not row[n] for n in numeric) and (not numeric or any(row[n] for n in numeric)):
-            if numeric or k > full[0]:
-                return k
-    return full[min(1, len(full) - 1)]
+        filled = all(is_value(row[n]) or not row[n] for n in numeric) and any(row[n] for n in numeric)
+        if filled or (not numeric and k > full[0]):
+            return k
+    return len(lines)  # names and nothing below them
 
 
 def _names(
-    lines: list[str], before: list[int], separator: str, width: int, names_line: int | None, options: Options
+    lines: list[str], before: list[int], separator: str, width: int, names_line: int | None, plan: TextPlan
 ) -> tuple[list[str] | None, dict[int, str], set[int]]:
     """Names, units by column, and the lines that they stand in."""
-    if options.names_line == 0:
+    if plan.names_line == 0:
         return None, {}, set()
     fitting = [k for k in before if len(_heading(lines[k], separator, width)) == width]
     units: dict[int, str] = {}
     used: set[int] = set()
-    units_line = options.units_line - 1 if options.units_line else None
-    if units_line is None and names_line is None and len(fitting) > 1:
+    units_line = plan.units_line - 1 if plan.units_line else None
+    if plan.units_line is None and len(fitting) > 1 and fitting[-1] != names_line:
         last = _heading(lines[fitting[-1]], separator, width)
         if fitting[-1] - fitting[-2] <= 2 and all(unit_of(cell) is not None or is_value(cell) for cell in last):
             units_line = fitting[-1]
@@ -143,6 +161,7 @@ def _names(
         used.add(units_line)
     if names_line is None:
         left = [k for k in fitting if k not in used]
+        left = [k for k in left if not is_comment(lines[k])] or left  # else the last comment that has as many cells
         names_line = left[-1] if left else None
     if names_line is None:
         return None, units, used
@@ -157,7 +176,7 @@ def _heading(line: str, separator: str, width: int) -> list[str]:
     if mark := next((mark for mark in COMMENTS if bare.startswith(mark)), ""):
         bare = bare[len(mark) :].lstrip("#%/! ") if separator != "\t" else bare[len(mark) :]
     found = cells(bare.strip("\r\n") if mark else line.strip("\r\n"), separator)
-    if len(found) == width - 1:
+    if 1 < len(found) == width - 1:
         found.append("")
     if len(found) == width + 1 and not found[-1]:
         found.pop()
@@ -165,7 +184,7 @@ def _heading(line: str, separator: str, width: int) -> list[str]:
 
 
 def unit_of(cell: str) -> str | None:
-    """Unit that a cell of a line of units holds: `(ms)`, `[V]`, `mm`, `second`; "" for none; None where it is no unit."""
+    """Unit that a cell of a line of units holds: `(ms)`, `[V]`, `mm`, `second`; "": none; None: it is no unit."""
     bare = cell.strip().strip("()[]").strip()
     if bare.casefold() in NO_UNIT:
         return ""

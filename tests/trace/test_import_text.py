@@ -1,0 +1,281 @@
+"""Import of text: what stands where, decimal signs, dates, units in names and in rows, encodings, options."""
+
+import gzip
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtctl.cli.main import main
+from rtctl.config.errors import UserError
+from rtctl.trace.bundle import load_bundle
+from rtctl.trace.imports import read
+from rtctl.trace.imports.make import make_bundle
+from rtctl.trace.imports.plan import ColumnPlan, Plan, with_options
+from rtctl.trace.imports.text_form import TextPlan
+
+FAILING = Path("../shared/failing")
+needs_failing = pytest.mark.skipif(not FAILING.is_dir(), reason="the recordings that failed are not here")
+
+
+def columns(tmp_path, content, name="a.csv", **plan):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read(path, TextPlan(**plan))
+
+
+def values(table):
+    return {name: column.tolist() for name, column in table.columns.items()}
+
+
+TIME_U = {"time": [0, 1, 2], "u": [0.5, 1.5, 2.5]}
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "# by a logger, 2026\n# time, u\n0,0.5\n1,1.5\n2,2.5\n",
+        "#time,u\n0,0.5\n1,1.5\n2,2.5\n# end\n",
+        "time u\n0   0.5\n 1\t1.5\n2 2.5\n",
+        "% time u\n0.0e0 5.0e-1\n1.0e0 1.5e0\n2e0 2.5e0\n",
+        "time|u\n0|0.5\n1|1.5\n2|2.5\n",
+        "sep=;\ntime;u\n0;0,5\n1;1,5\n2;2,5\n",
+        "\ufeffsep=;\r\ntime;u\r\n0;0,5\r\n1;1,5\r\n2;2,5\r\n",
+        "time,u\n0,0.5,\n1,1.5,\n2,2.5,\n",
+        "time,u,\n0,0.5,\n1,1.5,\n2,2.5,\n",
+        "Model,DPO2024\nPoint Format,Y,\n\nLabel,,\ntime,u\n0,0.5\n1,1.5\n2,2.5\n",
+        "time;u\n0;0.5\n1;1.5\n2;2.5\n;\n;\n",
+        "time\tu\n+0\t+0.5\n+1\t+1.5\n+2\t+2.5\n",
+        'time,u\n"0","0,5"\n"1","1,5"\n"2","2,5"\n',
+        "time,u\r0,0.5\r1,1.5\r2,2.5\r",
+        "time u\n0 0.5D+00\n1 0.15D+01\n2 0.25d1\n",
+    ],
+)
+def test_where_names_and_rows_stand(tmp_path, content):
+    assert values(columns(tmp_path, content)) == TIME_U
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("t;x\n0;0,998\n1;1.000,5\n2;1.001\n", [0.998, 1000.5, 1001]),
+        ("t;x\n0;998\n1;1.000\n2;1.001,25\n", [998, 1000, 1001.25]),  # what decides stands last
+        ("t;x\n0;1.234.567\n1;1.000\n2;7\n", [1234567, 1000, 7]),
+        ("t\tx\n0\t1,980\n1\t1,981.5\n2\t12\n", [1980, 1981.5, 12]),
+        ("t;x\n0;1 234,5\n1;1'234,5\n2;1\u202f234,5\n", [1234.5, 1234.5, 1234.5]),
+        ("t;x\n0;1.000\n1;1.001\n2;0.999\n", [1, 1.001, 0.999]),
+        ("t;x\n0;1,5e-3\n1;2,5E+2\n2;-3\n", [1.5e-3, 250, -3]),
+        ('t,x\n0,"1,980"\n1,"1,981.5"\n2,12\n', [1980, 1981.5, 12]),
+    ],
+)
+def test_one_decimal_sign_for_the_whole_file(tmp_path, content, expected):
+    assert values(columns(tmp_path, content))["x"] == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["1,980", "1.980", "-12,000"])
+def test_what_is_ambiguous_is_refused_and_decided_by_the_owner(tmp_path, text):
+    content = f"t;x\n0;{text}\n1;{text}\n"
+    sign = "," if "," in text else "."
+    with pytest.raises(UserError, match=rf"a.csv: '{text}' \(line 2\) is .* nothing in the file says .*--decimal"):
+        columns(tmp_path, content)
+    decimal = columns(tmp_path, content, decimal=sign).columns["x"][0]
+    grouped = columns(tmp_path, content, decimal="." if sign == "," else ",").columns["x"][0]
+    assert (decimal, grouped) == (float(text.replace(",", ".")), float(text.replace(sign, "")))
+
+
+def test_decimal_signs_that_contradict_each_other(tmp_path):
+    with pytest.raises(UserError, match=r"'0\.5' \(line 3\) has a decimal point and '0,25' \(line 2\) a decimal comma"):
+        columns(tmp_path, "t;x\n0;0,25\n1;0.5\n")
+
+
+@pytest.mark.parametrize(
+    ("content", "step"),
+    [
+        ("time,u\n2026-11-26 10:00:00.000,1\n2026-11-26 10:00:00.001,2\n", 1e-3),
+        ("time,u\n2026-11-26T10:00:00,1\n2026-11-26T10:00:01,2\n", 1.0),
+        ("time,u\n2026-11-26T10:00:00.000Z,1\n2026-11-26T10:00:00.250Z,2\n", 0.25),
+        ("time;u\n2026-11-26 10:00:00,000;1,5\n2026-11-26 10:00:00,002;2,5\n", 2e-3),
+        ("time,u\n10:00:00,1\n10:00:02,2\n", 2.0),
+        ("time,u\n1700000000000000000,1\n1700000000000001000,2\n", None),
+    ],
+)
+def test_dates_become_seconds(tmp_path, content, step):
+    table = columns(tmp_path, content)
+    found = table.times("time", 1.0 if step else 1e-9)
+    assert np.diff(found) == pytest.approx([step or 1e-6], rel=1e-12)
+    if step:
+        with pytest.raises(UserError, match="holds dates or durations; only t can be one"):
+            table.numbers("time", "x")
+
+
+@pytest.mark.parametrize(
+    ("content", "units"),
+    [
+        ("Zeit t / s;Weg x / mm\n0;0,5\n1;1,5\n", {"Zeit t / s": "s", "Weg x / mm": "mm"}),
+        ("Time,Channel A\n(ms),(mV)\n\n0,1.5\n1,2.5\n", {"Time": "ms", "Channel A": "mV"}),
+        ("x-axis,1\nsecond,Volt\n0,1.5\n1,2.5\n", {"x-axis": "s", "1": "V"}),
+        ("t,x [mm],y\n0,1.5,2\n1,2.5,3\n", {"x": "mm"}),
+        ("t in ms,x\n0,1.5\n1,2.5\n", {"t in ms": "ms"}),
+    ],
+)
+def test_units_of_the_file(tmp_path, content, units):
+    assert columns(tmp_path, content).units == units
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "ours"),
+    [("time_ms", "ms", "t"), ("pos_mm", "mm", "x"), ("u_mV", "mV", "u"), ("angle_deg", "deg", "x")],
+)
+def test_a_unit_at_the_end_of_a_name_is_asked_about(tmp_path, name, unit, ours):
+    header = ",".join(name if column == ours else column for column in ("t", "u", "x"))
+    table = columns(tmp_path, f"{header}\n0,0.5,0\n1,1.5,1\n2,2.5,2\n")
+    plan = Plan(plant="axis", columns={c: ColumnPlan(column=name if c == ours else c) for c in "tux"})
+    with pytest.raises(UserError, match=rf"column '{name}' \({ours}\) has no unit, .*--unit {ours}={unit} if it is"):
+        make_bundle(table, plan, tmp_path / "b")
+    assert not (tmp_path / "b").exists()
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-8-sig", "cp1252"])
+def test_encodings(tmp_path, encoding):
+    text = "time [s];x [\u00b5m]\n0;0,5\n1;1,5\n"
+    given = {"encoding": encoding} if encoding == "utf-16-le" else {}
+    table = columns(tmp_path, text.encode(encoding), **given)
+    assert values(table) == {"time": [0, 1], "x": [0.5, 1.5]} and table.units == {"time": "s", "x": "\u00b5m"}
+    if encoding == "utf-16-le":
+        with pytest.raises(UserError, match="if it is UTF-16 without a mark, --encoding utf-16-le"):
+            columns(tmp_path, text.encode(encoding))
+
+
+def test_packed_text(tmp_path):
+    assert values(columns(tmp_path, gzip.compress(b"time,u\n0,0.5\n1,1.5\n2,2.5\n"), "a.csv.gz")) == TIME_U
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (
+            "# scope\n\ntime,u,x\n0,1,2\n1,1,2\n\n2,1,2,9\n3,1,2\n",
+            r"a.csv: line 7 has 4 cells and the rows have 3; mend",
+        ),
+        ("time,u\n\n# c\n0,1\n1,oops\n2,3\n3,4\n4,5\n5,6\n", r"a.csv: column 'u', line 5: 'oops' is not a number"),
+        ("time,u,u\n0,1,2\n1,2,3\n", "two columns are called 'u'"),
+        ("\n\n", "is empty"),
+        (b"a,b\n\0\1\2\3,1\n", "is not text"),
+    ],
+)
+def test_what_cannot_be_read_names_the_line_of_the_editor(tmp_path, content, words):
+    with pytest.raises(UserError, match=words):
+        columns(tmp_path, content).numbers("u", "u")
+
+
+def test_the_owner_says_where_things_stand(tmp_path):
+    content = "1,2\nout,7\ntime,u\nms,V\n0,0.5\n1,1.5\n2,2.5\n"
+    assert values(columns(tmp_path, content, skip=2)) == TIME_U
+    named = columns(tmp_path, content, names_line=3, units_line=4)
+    assert values(named) == TIME_U and named.units == {"time": "ms", "u": "V"}
+    assert values(columns(tmp_path, "0:1:2\n3:4:5\n", separator=":", names_line=0)) == {
+        "1": [0, 3], "2": [1, 4], "3": [2, 5]
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"decimal": "x"}, "--decimal"),
+        ({"separator": "ab"}, "--separator.*one sign"),
+        ({"names_line": -1}, "--names-line"),
+        ({"names_line": 40}, "there is no line 40 for the names; the file has 3"),
+        ({"encoding": "klingon"}, "--encoding klingon: no such encoding"),
+        ({"encoding": "ascii"}, "a.csv:1: this is not ascii"),
+    ],
+)
+def test_options_that_cannot_be(tmp_path, options, words):
+    (tmp_path / "a.csv").write_text("t,\u00b5\n0,1\n1,2")
+    with pytest.raises(UserError, match=words):
+        read(tmp_path / "a.csv", with_options(Plan(), None, [], [], None, [], [], False, options).text)
+
+
+def test_options_of_text_for_another_file(tmp_path):
+    np.savez(tmp_path / "a.npz", x=np.arange(3.0))
+    with pytest.raises(UserError, match=r"a.npz is read as npz, and --decimal is of files of text"):
+        read(tmp_path / "a.npz", TextPlan(decimal=","))
+
+
+@pytest.mark.parametrize(
+    ("maps", "found"),
+    [
+        (["u=Torque, Request", "x=pos"], {"u": "Torque, Request", "x": "pos"}),
+        (["u=Torque, Request,x=pos,t=a, b, c"], {"u": "Torque, Request", "x": "pos", "t": "a, b, c"}),
+    ],
+)
+def test_a_name_with_a_comma(maps, found):
+    plan = with_options(Plan(), "axis", maps, [], None, [], [], False)
+    assert {name: column.column for name, column in plan.columns.items()} == found
+
+
+def test_a_comma_that_begins_no_pair_is_told(tmp_path):
+    with pytest.raises(UserError, match=r"no column 'vir,q'.*several are given as ours=theirs,ours=theirs"):
+        columns(tmp_path, "t,vir,qm\n0,1,2\n1,2,3\n").has("vir,q", "u")
+
+
+def case(folder, options, rows=60, rate=1000.0, x=(0.0, 0.017098)):
+    return pytest.param(folder, options, rows, rate, x, id=folder)
+
+
+U, TUX = "--map t=time,u=u,x=x", "--map t=TIME,u=CH1,x=CH2 --unit x=m"
+
+
+@needs_failing
+@pytest.mark.parametrize(
+    ("file", "options", "rows", "rate", "x"),
+    [
+        case("csv_commented_header/klipper.csv", "--map t=time,u=accel_x,x=accel_y"),
+        case("csv_commented_header/savetxt.txt", U),
+        case("csv_commented_header/space.txt", U),
+        case("csv_commented_header/pipe.csv", U),
+        case("csv_epoch_ns/epoch_ns_1M.csv", U, rate=1e6),
+        case("csv_epoch_ns/epoch_ns.csv", U, rate=1e4),
+        case("csv_grouped_thousands/de_group.csv", "--map t=Zeit,u=u,x=x", x=(0.98, 1.039)),
+        case("csv_grouped_thousands/en_group.txt", U, x=(1.98, 2.039)),
+        case("csv_iso_timestamps/iso.csv", U),
+        case("csv_iso_timestamps/isoT.csv", U),
+        case("csv_iso_timestamps/iso_s.csv", U, rate=1.0),
+        case("csv_preamble/tek.csv", TUX),
+        case("csv_preamble/oneblank.csv", U),
+        case("csv_preamble/sepbom.csv", U, rows=3, x=(0.0002, 0.0004)),
+        case("csv_preamble/trailing.csv", U),
+        case("csv_units_in_name/slash.csv", "--map 't=Zeit t / s,u=Spannung U / V,x=Weg x / mm'"),
+        case("csv_units_row/pico.csv", "--map 't=Time,u=Channel A,x=Channel B' --unit x=mm"),
+        case("csv_units_row/keysight.csv", "--map t=x-axis,u=1,x=2"),
+        case("csv_utf16/utf16.csv", U),
+        case("map_comma/commahead.csv", "--map t=time --map 'u=Torque, Request' --map x=pos", x=(0.0, 1.7098e-5)),
+    ],
+)
+def test_recordings_that_failed(tmp_path, file, options, rows, rate, x):
+    assert (
+        main(["import", str(FAILING / file), "--plant", "axis", *shlex.split(options), "-o", str(tmp_path / "b")]) == 0
+    )
+    found = load_bundle(tmp_path / "b")
+    assert found.case["sample_rate"] == pytest.approx(rate, rel=1e-9)
+    assert len(found.columns["x"]) == rows
+    assert (found.columns["x"][0], found.columns["x"][-1]) == pytest.approx(x, rel=1e-3, abs=1e-12)
+
+
+@needs_failing
+@pytest.mark.parametrize(
+    ("file", "options", "words"),
+    [
+        ("csv_iso_timestamps/posdate.csv", U, "holds dates or durations; only t can be one"),
+        ("csv_units_in_name/suffix.csv", "--map t=time_ms,u=u_mV,x=x_mm", "--unit t=ms if it is"),
+        ("csv_preamble/rowno.csv", U, "line 8 has 4 cells and the rows have 3"),
+        ("csv_preamble/tds.csv", "--map t=4,u=5,x=5", "line 4 has 3 cells"),
+        ("csv_units_row/rigol.csv", "--map t=X,u=CH1,x=CH2", r"column 'X' \(t\) is a mere number.*--unit t="),
+    ],
+)
+def test_recordings_that_are_refused(tmp_path, capsys, file, options, words):
+    assert (
+        main(["import", str(FAILING / file), "--plant", "axis", *shlex.split(options), "-o", str(tmp_path / "b")]) == 2
+    )
+    assert re.search(words, capsys.readouterr().err) and not (tmp_path / "b").exists()
