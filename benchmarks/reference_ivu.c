@@ -148,7 +148,7 @@ static double tape_apart(double phi, double speed, int64_t n1, int64_t n2, doubl
     }
     double apart1 = (n1 - loop.n1) * p.reel1_radians_per_count * R1 - tape;
     double apart2 = (n2 - loop.n2) * p.reel2_radians_per_count * R2 - tape;
-    return apart1 + apart2;
+    return lower(fabs(apart1 + apart2), higher(fabs(apart1), fabs(apart2)));
 }
 
 static void tick(int64_t k)

@@ -48,7 +48,7 @@ def shrunk(problem: Problem, fitted: Fit) -> Shrunk:
             kept.add(f"{h.name}.{name}")
             continue
         value = h.values(fitted.space.parts(fitted.x)[index])[name] - h.coordinates[at].offset
-        unit = parameter_unit(fitted.model.kind, h, name)
+        unit = parameter_unit(fitted.model, h, name)
         size, half = (nice(x, unit) if unit else f"{x:.2g}" for x in (value, Z90 * sigma))
         reasons.append(
             f"{h.term} at {h.node}, {name}: the record says {size} +- {half} (90 %), and a free run on rows that no "

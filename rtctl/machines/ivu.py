@@ -160,7 +160,8 @@ def tape_apart(p, s, phi, speed, n1_counts, n2_counts, R1, R2):
     """How far, in m, the tape by the reels' sensors is from the tape by the capstan, over a stretch in one direction.
 
     One reel winds what the other pays out, so tape that stretches moves one ahead of the capstan and the other behind
-    it by as much. The sum of both has no stretch in it, and all of what one sensor missed.
+    it by as much: of two differences with opposite signs only their sum is no stretch. What one sensor missed, or both,
+    is in full in what is returned.
     """
     m = s.machine
     tape = abs(phi - m.phi_1) * p.machine.R_c
@@ -171,7 +172,7 @@ def tape_apart(p, s, phi, speed, n1_counts, n2_counts, R1, R2):
         return 0.0
     apart1 = (n1_counts - m.n1) * p.reel1.radians_per_count * R1 - tape
     apart2 = (n2_counts - m.n2) * p.reel2.radians_per_count * R2 - tape
-    return apart1 + apart2
+    return min(abs(apart1 + apart2), max(abs(apart1), abs(apart2)))
 
 
 COLUMNS = (

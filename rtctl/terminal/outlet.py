@@ -16,7 +16,7 @@ class Outlet:
         """Write, or drop where nobody is there."""
         try:
             return len(text) if self.gone else int(self._stream.write(text))
-        except OSError:
+        except (OSError, ValueError):  # ValueError: it was closed here
             self._lose()
             return len(text)
 
@@ -24,7 +24,7 @@ class Outlet:
         try:
             if not self.gone:
                 self._stream.flush()
-        except OSError:
+        except (OSError, ValueError):  # ValueError: it was closed here
             self._lose()
 
     def _lose(self) -> None:

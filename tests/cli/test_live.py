@@ -140,8 +140,10 @@ def test_get_and_set(rtctl):
     assert rtctl("set", "law.position.tau_d", "180 ms").code == 0
     assert json.loads(rtctl("get", "law.position", "--json").out)["value"]["tau_d"] == 0.18
     assert "gain: 25.0\n" in rtctl("get", "law.position").out
-    assert rtctl("set", "safety.tension_min", "-3").code == 0
-    assert rtctl("get", "safety.tension_min").out == "-3.0\n"
+    assert rtctl("set", "safety.tension_max", "7").code == 0
+    assert rtctl("get", "safety.tension_max").out == "7.0\n"
+    told = rtctl("set", "safety.tension_max", "1000")
+    assert told.code == 2 and "safety.tension_max cannot become 1000 N while the machine runs" in told.err
     assert rtctl("set", "law.gain_schedule.mode", "off").code == 0
     assert rtctl("get", "law.gain_schedule.mode").out == "off\n"
 

@@ -16,7 +16,10 @@ class Machine:
     """As much of a supervisor as is asked here; `lost` is what the loop was told last."""
 
     def __init__(self) -> None:
-        self.config = SimpleNamespace(safety=SimpleNamespace(require_commander=True, commander_timeout=1.0))
+        self.config = SimpleNamespace(
+            safety=SimpleNamespace(require_commander=True, commander_timeout=1.0),
+            loop=SimpleNamespace(mode="fused"),  # on the wall clock the loop itself looks at the time
+        )
         self.status = {"tick": 0, "state": 0}
         self.command: dict[str, int] = {"disarm": 0}
         self.segment = {"mailbox": [{"command": self.command, "count": 0}]}
