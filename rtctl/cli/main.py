@@ -85,7 +85,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     2 for the user's mistake, 3 for data that carry no answer, 1 for a run that tripped and for ours, 130 for Ctrl-C.
     """
-    isolate()
+    if arguments is None:  # this process is the program; whoever calls with arguments keeps their own path
+        isolate()
     try:
         code = app(arguments, prog_name="rtctl", standalone_mode=False) or 0
         sys.stdout.flush()  # here, where a full disk has words; at the end of the interpreter it has none

@@ -87,6 +87,7 @@ class BoardPlant:
         """Outputs were on and no new ones came: count it, and tell the loop with the next sample."""
         self._status["watchdog"][0] += 1
         self.end.rx["watchdog"] += 1
+        self.end.rx["watchdog_seq"] = self.end.tx["seq"]
 
 
 def zero(config: Any) -> str | None:

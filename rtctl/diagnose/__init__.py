@@ -2,15 +2,17 @@
 
 `chain` is the whole of it, stage by stage. What the other files are for:
 
-    the recording     record, columns, case, law; rest (rows that tell something), scales, stretches, tacho
+    the recording     record, columns, case, law, quantities (units, nouns)
+                      rest (rows that tell something), scales, stretches, tacho
     the simulation    model, kernel, simulate; solver (is it to be trusted?), measure (how far is it off?)
     the errors        problem (what they weigh), white (the same, made white), edges, jitter, hiss
     a fit             space (what may move), fit
     the stages        preflight, base (the owner's parameters), hints, find, verdict, predict, locate, stands
     what is asked     hypotheses, yardstick (sizes to begin with), forms (richer ones), scan (closer looks), turn
     the search        screen, name (grows models), rework, rivals, rubbing, beyond, faint
-    the judgement     decide, chances, anylaw, plausible; uncertainty (intervals), heldout (prediction)
-    the answer        diagnosis, words, phrases, numbers, figures, report, missing; export and carry (as a config)
+    the judgement     decide, chances, anylaw, plausible; uncertainty (intervals), heldout and release (prediction)
+    the answer        diagnosis, words, phrases, numbers, figures, report, missing
+                      shrink (to what predicts), export and carry (as a config)
     what comes next   experiment, motions, ordinary (which one to run); repair (record, diagnose, run it, again)
     many, concealed   folder; conceal, seal
 """

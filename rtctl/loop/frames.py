@@ -36,6 +36,7 @@ INPUTS = np.dtype(
         ("ai_codes", "<i4", (AI_CHANNELS,)),
         ("lost_counts", "<i8"),  # by the quadrature converters, since the start
         ("watchdog", "<i8"),  # times that the board has taken its outputs to zero by itself
+        ("watchdog_seq", "<i8"),  # the outputs that it did that to, latest
         ("truth", "<f8", (TRUTHS,)),  # what only an emulator knows; NaN on a real machine
     ]
 )

@@ -77,6 +77,8 @@ def run_real(
         mailbox.take(box, staged, p, c)
         if c[0].faulty != 0:
             fresh = faults.receive(c[0], f[0], rx, fresh, k)
+        if tx[0].seq - rx[0].outputs_seq > p[0].safety.link:  # it answers outputs of long ago: what a cut cable kept
+            fresh = 0
         y[0].tick = k
         y[0].t = (woke - st.first_ns) * 1e-9
         y[0].period = (woke - before + suspended) * 1e-9
@@ -335,6 +337,7 @@ def guard(st, tx, rx, old):
     if tx.state == safety.ARMED or tx.state == safety.RUNNING:
         st.watchdog += 1
         rx.watchdog += 1
+        rx.watchdog_seq = tx.seq
     tx.ao_codes[:] = 0
     tx.dio_lines = 0
     tx.state = 0

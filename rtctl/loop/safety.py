@@ -142,7 +142,10 @@ SAFETY_STATE = state(
     hold=(float, 2),  # outputs of the last tick before the trip, V
     gate=float,  # share of them that is still written: 1, falling to 0 after a trip
     on=int,  # 1 in the tick in which the outputs come on
-    watchdog=int,  # times that the board had taken its outputs to zero by itself
+    board=int,  # times that the board says it has taken outputs to zero by itself
+    off_seq=int,  # number of the latest outputs that were off
+    watchdog=int,  # of those times, the ones that were outputs of this arming
+    watchdog_seen=int,
 )
 
 
@@ -217,7 +220,7 @@ def check_timing(p, s, c, fresh, late, gone, watchdog, k):
     """Link, lateness, commander and board, at the start of tick `k`.
 
     `fresh` frames came, `late` is 1 where it woke late, `gone` is the cause (COMMANDER, SUPERVISOR) of who has been
-    silent for too long, or 0. `watchdog` counts how often the board has taken its outputs to zero by itself.
+    silent for too long, or 0. `watchdog` is the count of `board_watchdog`.
     """
     s.silent = 0 if fresh > 0 else s.silent + s.passed
     s.late = s.late + s.passed if late != 0 else 0
@@ -229,9 +232,24 @@ def check_timing(p, s, c, fresh, late, gone, watchdog, k):
         trip(s, COMMANDER, k)
     if gone != 0:
         trip(s, gone, k)
-    if watchdog != s.watchdog:
-        s.watchdog = watchdog
+    if watchdog != s.watchdog_seen:
+        s.watchdog_seen = watchdog
         trip(s, WATCHDOG, k)
+
+
+@tick
+def board_watchdog(s, rx, tx):
+    """Times that the board has taken outputs to zero by itself that were on since the latest arming.
+
+    Its word of older ones may come late, out of a cable that was cut, and is not held against a new start.
+    """
+    if s.state != ARMED and s.state != RUNNING:
+        s.off_seq = tx.seq
+    if rx.watchdog != s.board:
+        s.board = rx.watchdog
+        if rx.watchdog_seq > s.off_seq:
+            s.watchdog += 1
+    return s.watchdog
 
 
 @tick

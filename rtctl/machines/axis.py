@@ -168,7 +168,7 @@ def diagram(config: AxisConfig, dt: float) -> Diagram:
         (
             "read",
             (
-                "y.watchdog = rx.watchdog",
+                "y.watchdog = safety.board_watchdog(s.safety, rx, tx)",
                 "y.x_counts = daq_stc.counter_position(s.encoder, rx.counter_codes[0])",
                 "y.x = linear_scale.metres(p.encoder, y.x_counts)",
             ),

@@ -205,7 +205,7 @@ STAGES = (
     (
         "read",
         (
-            "y.watchdog = rx.watchdog",
+            "y.watchdog = safety.board_watchdog(s.safety, rx, tx)",
             "y.capstan_counts = daq_stc.counter_position(s.capstan, rx.counter_codes[0])",
             "y.capstan = ls7084.radians(p.capstan, y.capstan_counts)",
             "y.reel1_counts = optical_sensor.count("

@@ -227,7 +227,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
         (
             "read",
             (
-                "y.watchdog = rx.watchdog",
+                "y.watchdog = safety.board_watchdog(s.safety, rx, tx)",
                 "y.encoder_counts = daq_stc.counter_position(s.encoder, rx.counter_codes[0])",
                 "y.scale_counts = daq_stc.counter_position(s.scale, rx.counter_codes[1])",
                 "y.scale = linear_scale.metres(p.scale, y.scale_counts)",

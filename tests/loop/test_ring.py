@@ -38,7 +38,9 @@ class Two:
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 3 * CAPACITY), st.one_of(st.none(), st.integers(0, 2 * CAPACITY)))))
 def test_rows_written_are_rows_read_and_rows_lost(tmp_path_factory, turns: list) -> None:
-    two = Two(tmp_path_factory.getbasetemp() / "ring")
+    path = tmp_path_factory.getbasetemp() / "ring"
+    path.unlink(missing_ok=True)  # of the example before
+    two = Two(path)
     seen: list[int] = []
     gaps: list[int] = []
     for count, most in [*turns, (0, None)]:

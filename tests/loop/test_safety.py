@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.loop import safety
+from rtctl.loop import frames, safety
 from rtctl.loop.mailbox import COMMAND
 from rtctl.loop.safety import (
     ARMED,
@@ -275,6 +275,17 @@ def test_a_ramp_counts_periods_too() -> None:
     machine.tick(u=4.0)
     assert machine.tick(error=9.0) == pytest.approx(3.6)
     assert machine.tick(passed=4) == pytest.approx(2.0)
+
+
+def test_what_the_board_did_before_the_arming_is_not_held_against_it() -> None:
+    s, rx, tx = np.zeros(1, safety.SAFETY_STATE)[0], np.zeros(1, frames.INPUTS)[0], np.zeros(1, frames.OUTPUTS)[0]
+    s["state"], tx["seq"] = safety.TRIPPED, 70
+    assert safety.board_watchdog(s, rx, tx) == 0
+    s["state"], tx["seq"] = safety.ARMED, 71
+    rx["watchdog"], rx["watchdog_seq"] = 1, 68  # the word of it comes late, out of a cable that was cut
+    assert safety.board_watchdog(s, rx, tx) == 0
+    rx["watchdog"], rx["watchdog_seq"] = 2, 71
+    assert [safety.board_watchdog(s, rx, tx) for _ in range(2)] == [1, 1]
 
 
 def test_the_boards_watchdog_trips_each_time_that_its_count_moves_while_on() -> None:
