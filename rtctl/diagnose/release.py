@@ -115,19 +115,20 @@ def by_state(
 
 def by_forces(problem: Problem, fitted: Fit, free: Simulator, rows: slice, usual: np.ndarray) -> float:
     """Rms change of the free run, in the sensor's unit, by the forces that the observer needed in other rows to keep
-    the model on track: median over stretches of the recording."""
+    the model on track: median over stretches of the recording. What they are in the mean of all is no random force."""
     sim = problem.sim
     push = sim.everything(fitted.model, TRACK)[2]
     begin = rows.start or 0
     count = len(usual)
     first = problem.rows.start or 0
+    usually = push[first:begin].mean() if begin > first else 0.0
     starts = np.linspace(first, max(begin - count, first), PLACES).astype(int)
     gain = sim.case.drive.amp_per_volt[0] if sim.record.plant == "ldu" else 1.0
     sizes = []
     for start in starts:
         extra = np.zeros(len(sim.seen))
         there = push[start : start + count]
-        extra[begin : begin + len(there)] = there - there.mean()
+        extra[begin : begin + len(there)] = there - usually
         other = free.commanded(free.volts + np.outer(extra, np.array(SHARE[sim.record.plant]) / gain))
         sizes.append(rms(np.nan_to_num(other.run(fitted.model)[rows, 0] - usual)))
     return float(np.median(sizes))
