@@ -3,10 +3,13 @@
 Source: prometheus_client's custom collectors; the names follow Prometheus' rules (base units, `_total`).
 """
 
+import threading
 from collections.abc import Callable, Iterator, Mapping
+from socketserver import ThreadingMixIn
 from typing import TYPE_CHECKING, Any
+from wsgiref.simple_server import WSGIRequestHandler, WSGIServer
 
-from prometheus_client import CollectorRegistry, start_http_server
+from prometheus_client import CollectorRegistry, make_wsgi_app
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
@@ -19,6 +22,8 @@ if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
 ADDRESS = "127.0.0.1"
+PLACES = 8  # connections at a time; Prometheus needs one
+PATIENCE = 5.0  # s for a request to come
 COUNTS = {  # field of the status record -> what it counts
     "tick": ("ticks", "ticks of the loop"),
     "missed": ("missed_ticks", "periods that went by without a tick"),
@@ -77,14 +82,43 @@ def _buckets(histogram: Any) -> tuple[list[tuple[str, float]], float]:
     return [*pairs, ("+Inf", float(histogram["count"]))], total(histogram) * 1e-9
 
 
+class _Request(WSGIRequestHandler):
+    timeout = PATIENCE
+
+    def log_message(self, *_: Any) -> None:
+        """Every scrape is no news."""
+
+
+class _Server(ThreadingMixIn, WSGIServer):
+    """A thread for each connection, and no more than PLACES: who only connects takes nothing from the daemon."""
+
+    daemon_threads = True
+
+    def __init__(self, *arguments: Any):
+        self._places = threading.BoundedSemaphore(PLACES)
+        super().__init__(*arguments)
+
+    def verify_request(self, *_: Any) -> bool:
+        return self._places.acquire(blocking=False)
+
+    def process_request_thread(self, *arguments: Any) -> None:
+        try:
+            super().process_request_thread(*arguments)
+        finally:
+            self._places.release()
+
+
 def serve(supervisor: "Supervisor", port: int) -> Callable[[], None]:
     """Answer GET /metrics on loopback; returns what ends it. Raises UserError where the port is taken."""
     registry = CollectorRegistry()
     registry.register(MachineCollector(supervisor.config.name, supervisor.status, supervisor.rows_counted))
     try:
-        server, thread = start_http_server(port, addr=ADDRESS, registry=registry)
+        server = _Server((ADDRESS, port), _Request)
     except OSError as error:
         raise UserError(f"metrics.port {port}: {error.strerror}; choose a free one") from error
+    server.set_app(make_wsgi_app(registry))
+    thread = threading.Thread(target=server.serve_forever, args=(0.1,), name="metrics", daemon=True)
+    thread.start()
 
     def close() -> None:
         server.shutdown()

@@ -14,6 +14,7 @@ import msgpack
 import numpy as np
 import zmq
 
+from rtctl.daemon.doors import Door
 from rtctl.daemon.server import bind, release
 from rtctl.daemon.telemetry import LONGEST_TOPIC
 
@@ -24,12 +25,12 @@ MOST_ROWS = 8192  # in one message; of a run on virtual time that makes more, th
 class RowsOut:
     """Publishes rows of dtype `row` under `topic`, while somebody listens."""
 
-    def __init__(self, endpoint: str, topic: str, row: np.dtype, context: zmq.Context):
+    def __init__(self, endpoint: str, topic: str, row: np.dtype, context: zmq.Context, door: Door | None = None):
         self.socket = context.socket(zmq.XPUB)
         self.socket.linger = 0
         self.socket.maxmsgsize = LONGEST_TOPIC
         self.socket.sndhwm = MESSAGES_WAITING
-        self.endpoint = bind(self.socket, endpoint)
+        self.endpoint = bind(self.socket, endpoint, door=door)
         path = Path(self.endpoint.removeprefix("ipc://"))
         path.chmod(path.stat().st_mode | stat.S_IRGRP | stat.S_IWGRP)  # who may enter the folder may listen
         self._topic = topic.encode()

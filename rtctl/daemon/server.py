@@ -13,7 +13,7 @@ import struct
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, TypeVar
 
 import structlog
 import zmq
@@ -21,6 +21,7 @@ import zmq
 from rtctl import __version__
 from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client
+from rtctl.daemon.doors import Door, listen_ipc, listen_tcp
 from rtctl.daemon.keys import ServerCurve, apply_server, refuse_open, require_curve
 from rtctl.daemon.protocol import VERSIONS, Args, ProtocolError, decode_request, encode_error, encode_result
 
@@ -30,6 +31,7 @@ TEMPORARY_DIR = Path("/tmp")
 MAX_SOCKET_PATH = 107  # bytes; sockaddr_un holds 108 with the closing zero
 MAX_FRAME = 1024 * 1024  # larger than a message may be, so that one somewhat too large is told so; beyond, cut off
 WAITING = 100  # messages a peer may have waiting in either direction
+T = TypeVar("T")
 MACHINE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 
 
@@ -53,6 +55,7 @@ class CommandServer:
         context: zmq.Context,
         curve: ServerCurve | None = None,
         heard: Callable[[], None] = lambda: None,
+        door: Door | None = None,
     ):
         self._heard = heard
         self.accepted = 0
@@ -63,7 +66,7 @@ class CommandServer:
         self.socket.rcvhwm = self.socket.sndhwm = WAITING
         self.socket.maxmsgsize = MAX_FRAME
         self.socket.router_mandatory = False  # a reply to a client that is gone or full is dropped, never waited for
-        self.endpoint = bind(self.socket, endpoint, curve)
+        self.endpoint = bind(self.socket, endpoint, curve, door)
 
     def process(self, max_messages: int = 16) -> int:
         """Answer at most `max_messages` that wait, without blocking. Returns how many there were."""
@@ -152,8 +155,8 @@ def find_endpoint(machine_name: str, which: Literal["command", "telemetry", "row
     return f"ipc://{service}" if service.exists() and not Path(own.removeprefix("ipc://")).exists() else own
 
 
-def bind(socket: zmq.Socket, endpoint: str, curve: ServerCurve | None = None) -> str:
-    """Bind and return the endpoint as bound (a tcp port `*` filled in).
+def bind(socket: zmq.Socket, endpoint: str, curve: ServerCurve | None = None, door: Door | None = None) -> str:
+    """Bind and return the endpoint as bound (a tcp port `*` filled in). With a `door`, others connect there.
 
     Raises UserError, with the socket closed, for a bad address, one in use, or one open to the network without keys.
     """
@@ -162,13 +165,16 @@ def bind(socket: zmq.Socket, endpoint: str, curve: ServerCurve | None = None) ->
             apply_server(socket, curve.keys, curve.authorized)
         elif require_curve(endpoint):
             raise refuse_open(endpoint)
+        if door is not None:
+            return _bind_behind(socket, endpoint, door)
         socket.ipv6 = "[" in endpoint
         if endpoint.startswith("ipc://"):
-            _bind_ipc(socket, Path(endpoint.removeprefix("ipc://")))
+            path = Path(endpoint.removeprefix("ipc://"))
+            _bind_ipc(path, lambda: socket.bind(f"ipc://{path}"))
         else:
             socket.bind(endpoint)
         return socket.getsockopt_string(zmq.LAST_ENDPOINT)
-    except zmq.ZMQError as error:
+    except (OSError, zmq.ZMQError) as error:
         socket.close(linger=0)
         raise _bind_error(endpoint, error, curve) from None
     except BaseException:
@@ -183,9 +189,29 @@ def release(socket: zmq.Socket, endpoint: str) -> None:
         Path(endpoint.removeprefix("ipc://")).unlink(missing_ok=True)
 
 
-def _bind_ipc(socket: zmq.Socket, path: Path) -> None:
-    """libzmq removes whatever lies at `path` before it binds, be it a live daemon's socket or a person's file. So look
-    first, with the folder locked against another daemon that looks at the same time."""
+def _bind_behind(socket: zmq.Socket, endpoint: str, door: Door) -> str:
+    """Bind at the inner end of a door, and listen at its outer end; returns that endpoint."""
+    _check_path(door.inner)
+    if endpoint.startswith("ipc://"):
+        path, bound = Path(endpoint.removeprefix("ipc://")), endpoint
+        listener = _bind_ipc(path, lambda: listen_ipc(path))
+    else:
+        try:
+            listener, bound = listen_tcp(endpoint)
+        except ValueError:
+            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL)) from None
+    try:
+        socket.bind(f"ipc://{door.inner}")
+        door.serve(listener)
+    except BaseException:
+        listener.close()
+        raise
+    return bound
+
+
+def _bind_ipc(path: Path, binds: Callable[[], T]) -> T:
+    """What `binds` makes at `path`. It removes whatever lies there, be it a live daemon's socket or a person's file. So
+    look first, with the folder locked against another daemon that looks at the same time."""
     _check_path(path)
     try:
         folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
@@ -196,7 +222,7 @@ def _bind_ipc(socket: zmq.Socket, path: Path) -> None:
         pid = _listener(path)
         if pid is not None:
             raise UserError(f"ipc://{path} is in use by another daemon (pid {pid}); stop it, or use another name")
-        socket.bind(f"ipc://{path}")
+        return binds()
     finally:
         os.close(folder)
 
@@ -220,7 +246,7 @@ def _listener(path: Path) -> int | None:
     return struct.unpack("3i", peer)[0]
 
 
-def _bind_error(endpoint: str, error: zmq.ZMQError, curve: ServerCurve | None) -> UserError:
+def _bind_error(endpoint: str, error: OSError | zmq.ZMQError, curve: ServerCurve | None) -> UserError:
     if error.errno != errno.EADDRINUSE:
         return UserError(f"cannot bind {endpoint}: {error.strerror}; expected ipc:///PATH or tcp://ADDRESS:PORT")
     try:

@@ -27,6 +27,7 @@ from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
 from rtctl.daemon.children import ChildProcess
 from rtctl.daemon.commands import Commands
+from rtctl.daemon.doors import COMMANDERS, VIEWERS, Doors, raise_limit
 from rtctl.daemon.events import Trips
 from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
@@ -114,6 +115,9 @@ class Supervisor(Answers):
         stack.callback(self.journal.close)
         if self.armed_at_start:
             self.order(_arm_and_play)  # there before the first tick, so that a virtual run repeats to the bit
+        raise_limit()
+        self.doors = Doors(runtime_dir(), config.name)
+        stack.callback(self.doors.close)
         context = zmq.Context()
         stack.callback(context.destroy, linger=100)
         self.faults = Faults(self)
@@ -125,6 +129,7 @@ class Supervisor(Answers):
             context,
             curve,
             self.commands.heard,
+            self.doors.door("command", "control", COMMANDERS, replaces=True),
         )
         stack.callback(self.server.close)
         self._signals = [c.name for c in made.columns if c.name not in ("t",)]
@@ -136,9 +141,11 @@ class Supervisor(Answers):
             context,
             max_rows_per_message=per_message,
             curve=curve,
+            door=self.doors.door("telemetry", "viewers", VIEWERS),
         )
         stack.callback(self.telemetry.close)
-        self.rows_out = RowsOut(default_endpoint(config.name, "rows"), config.name, made.row, context)
+        rows_at = default_endpoint(config.name, "rows")
+        self.rows_out = RowsOut(rows_at, config.name, made.row, context, self.doors.door("rows", "viewers", VIEWERS))
         stack.callback(self.rows_out.close)
         self.case = describe(self.machine, made)
         shared_memory.describe(self.segment, made.columns, self.case, self.out)
@@ -227,6 +234,7 @@ class Supervisor(Answers):
         self._beat()
         over = bool(self.status["ended"]) or not self.loop.running()
         self._drain()
+        self.doors.look()
         self.faults.act()
         self.server.process()
         self.commands.watch_commander()

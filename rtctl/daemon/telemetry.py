@@ -17,6 +17,7 @@ import msgpack
 import numpy as np
 import zmq
 
+from rtctl.daemon.doors import Door
 from rtctl.daemon.keys import ServerCurve
 from rtctl.daemon.server import bind, release
 
@@ -41,6 +42,7 @@ class Telemetry:
         max_rows_per_message: int = 50,
         batch: bool = True,
         curve: ServerCurve | None = None,
+        door: Door | None = None,
     ):
         if max_rows_per_message < 1:
             raise ValueError(f"max_rows_per_message is {max_rows_per_message}; at least 1 row must go out")
@@ -57,7 +59,7 @@ class Telemetry:
         self.socket.linger = 0
         self.socket.maxmsgsize = LONGEST_TOPIC
         self.socket.sndhwm = MESSAGES_WAITING * (1 if batch else max_rows_per_message)
-        self.endpoint = bind(self.socket, endpoint, curve)
+        self.endpoint = bind(self.socket, endpoint, curve, door)
         if self.endpoint.startswith("ipc://"):  # a group that may enter the folder may listen, if not command
             path = Path(self.endpoint.removeprefix("ipc://"))
             path.chmod(path.stat().st_mode | stat.S_IRGRP | stat.S_IWGRP)

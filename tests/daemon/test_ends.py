@@ -101,7 +101,7 @@ def test_children_end_with_their_supervisor_and_the_last_seconds_can_be_read(
     made = generate.generate(machines.build(settings), link)
     shape = layout(made.params, made.tables, made.row, 1000)
     try:
-        wait_for(path.exists, 60)
+        wait_for(lambda: path.exists() and path.stat().st_size, 60)
         segment = Segment.open(path, shape)
         wait_for(lambda: segment["status"][0]["tick"] > 600, 60)
         status = Client(default_endpoint(settings.name, "command"), timeout=20.0).call
@@ -132,7 +132,7 @@ def test_a_name_whose_daemon_was_killed_is_free_again(
     settings = config(mode="real", set=QUIET)
     killed = process(settings, tmp_path / "first", None)
     path = segment_path(settings.name)
-    wait_for(path.exists, 60)
+    wait_for(lambda: path.exists() and path.stat().st_size, 60)
     wait_for(lambda: (tmp_path / "first" / "case.json").exists(), 60)
     killed.send_signal(signal.SIGKILL)
     killed.wait()

@@ -1,6 +1,7 @@
 """Prometheus: what is counted is what the machine counted, and nobody but this machine may ask."""
 
 import socket
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,20 @@ def test_it_tells_what_the_machine_counts(runtime: Path, config: Callable[..., A
         machine.finish()
     with pytest.raises(OSError, match="refused"):
         read(port)
+
+
+def test_who_only_connects_takes_a_place_and_no_more(runtime: Path, config: Callable[..., Any]) -> None:
+    port = free_port()
+    before = threading.active_count()
+    with Supervisor(config(set={"metrics.port": port}), None, TICKS) as machine:
+        held = [socket.create_connection((metrics.ADDRESS, port)) for _ in range(3 * metrics.PLACES)]
+        for each in held[metrics.PLACES :]:
+            assert each.recv(1) == b""  # closed at once
+        assert threading.active_count() - before <= metrics.PLACES + 10
+        for each in held:
+            each.close()
+        for _ in machine.run():
+            pass
 
 
 def test_a_port_that_is_taken_is_named(runtime: Path, config: Callable[..., Any]) -> None:

@@ -84,6 +84,7 @@ def test_what_a_compiled_tick_cannot_live_with_is_not_asked_for(name: str) -> No
 def test_the_loop_may_become_fifo_and_lock_its_memory() -> None:
     settings = unit("rtctl@.service")
     assert settings["LimitRTPRIO"] == ["99"] and settings["LimitMEMLOCK"] == ["infinity"]
+    assert settings["LimitNOFILE"] == ["65536"]
     assert "RestrictRealtime" not in settings and "PrivateDevices" not in settings
     assert "/dev/cpu_dma_latency rw" in settings["DeviceAllow"]
 
