@@ -62,7 +62,7 @@ class Bounds:
         out = {}
         for new in guarded(config):
             most = self._most.get(new.path)
-            if most is not None and new.risk > most.risk:
+            if most is not None and not new.risk <= most.risk:  # not a number is beyond any bound
                 side = "more" if new.safer == "smaller" else "less"
                 off = " and 0 switches it off" if new.risk == math.inf and new.value is not None else ""
                 out[new.path] = (

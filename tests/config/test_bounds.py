@@ -1,5 +1,7 @@
 """What a running machine may be given: never less safe than its config at the start, or its section `live`."""
 
+import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -7,7 +9,7 @@ import pytest
 
 from rtctl.config.bounds import Bounds, guarded
 from rtctl.config.errors import UserError
-from rtctl.config.load import set_path, set_paths
+from rtctl.config.load import get_path, set_path, set_paths
 
 WORSE = [
     ("safety.following_error", 1e9), ("safety.following_error", 0), ("safety.missed_ticks", 0),
@@ -29,6 +31,26 @@ def test_less_safe_than_at_the_start_is_refused_and_the_way_out_is_told(
     start = config("ivu")
     sentence = Bounds(start).crossed(set_path(start, path, value))[path]
     assert path in sentence and "live: {" in sentence and "restart" in sentence
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize("path", ["safety.following_error", "law.limit.high", "safety.tension_max"])
+def test_what_is_no_number_crosses_every_bound(config: Callable[..., Any], path: str, value: float) -> None:
+    start = config("ivu")
+    section, name = path.rpartition(".")[::2]
+    parent = get_path(start, section).model_copy(update={name: value})  # past the checks of the settings
+    outer, inner = section.rpartition(".")[::2]
+    changed = parent if not outer else get_path(start, outer).model_copy(update={inner: parent})
+    root = start.model_copy(update={(outer or section): changed})
+    assert path in Bounds(start).crossed(root)
+    with pytest.raises(UserError, match=re.escape(path)):
+        set_path(start, path, value)
+
+
+@pytest.mark.parametrize("value", ["much", "5 kg", [1], True])
+def test_what_is_no_quantity_is_refused(config: Callable[..., Any], value: Any) -> None:
+    with pytest.raises(UserError, match=r"safety\.following_error"):
+        set_path(config("ivu"), "safety.following_error", value)
 
 
 @pytest.mark.parametrize(("path", "value"), BETTER)

@@ -1,0 +1,55 @@
+"""A terminal that is closed ends the run: disarmed, recorded to its end. And a run that lost something says so."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtctl.trace.bundle import load_bundle
+
+RUN = [sys.executable, "-m", "rtctl.cli.main", "run", "ivu", "--no-plot"]
+
+
+@pytest.mark.realtime
+def test_a_closed_terminal_disarms_and_ends_the_recording(runtime: Path, tmp_path: Path) -> None:
+    master, slave = pty.openpty()
+    out = tmp_path / "run"
+    sets = ["--set", f"name=hup{os.getpid()}", "--set", "loop.realtime=off", "--set", "safety.missed_ticks=0"]
+    run = subprocess.Popen(
+        [*RUN, "--mode", "real", "--link", "shm", "--out", str(out), *sets, "--set", "safety.link_timeout=10"],
+        stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
+        preexec_fn=lambda: __import__("fcntl").ioctl(0, __import__("termios").TIOCSCTTY, 0),
+    )  # fmt: skip
+    os.close(slave)
+    shown, deadline = b"", time.monotonic() + 240
+    os.set_blocking(master, False)
+    while b"running" not in shown:
+        assert run.poll() is None and time.monotonic() < deadline, shown.decode(errors="replace")
+        try:
+            shown += os.read(master, 65536)
+        except BlockingIOError:
+            time.sleep(0.02)
+    os.close(master)  # the kernel sends SIGHUP to the session, and writing fails from now on
+    run.wait(60)
+    assert run.returncode == 129
+    trace = load_bundle(out)
+    ticks = trace.columns["tick"]
+    assert not trace.case["run"]["trip"] and (trace.columns["state"] == 2).any()
+    assert trace.case["run"]["ticks"] == len(ticks) == ticks[-1] + 1  # to the very last, which sends zero
+
+
+def test_what_was_missed_is_told_beside_the_steps_and_is_the_exit_code_if_asked(tmp_path: Path) -> None:
+    fault = "faults=[{fault: loop.stall, at: 0.5, lasts: 2 ms, size: 0.006}]"
+    words = [*RUN, "--mode", "fused", "--for", "1s", "--set", fault, "--set", f"name=loss{os.getpid()}"]
+    plain = subprocess.run([*words, "--out", tmp_path / "a"], capture_output=True, text=True, check=False)
+    assert plain.returncode == 0 and "0 rows were lost and 3 ticks missed" in " ".join(plain.stderr.split())
+    strict = subprocess.run(
+        [*words, "--out", tmp_path / "b", "--json", "--fail-on-loss"], capture_output=True, text=True, check=False
+    )
+    assert strict.returncode == 1 and json.loads(strict.stdout)["missed"] == 3
