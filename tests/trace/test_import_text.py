@@ -98,6 +98,10 @@ def test_decimal_signs_that_contradict_each_other(tmp_path):
         ("time,u\n2026-11-26T10:00:00.000Z,1\n2026-11-26T10:00:00.250Z,2\n", 0.25),
         ("time;u\n2026-11-26 10:00:00,000;1,5\n2026-11-26 10:00:00,002;2,5\n", 2e-3),
         ("time,u\n10:00:00,1\n10:00:02,2\n", 2.0),
+        ("time;u\n10:00:00,000;1,5\n10:00:00,250;2,5\n", 0.25),
+        ("time;u\n26.11.2026 10:00:00,000;1,5\n26.11.2026 10:00:00,250;2,5\n", 0.25),
+        ("time;u\n26.11.2026 10:00:00;1\n26.11.2026 10:00:03;2\n", 3.0),
+        ("time;u\n2026-11-26T10:00:00,5Z;1,5\n2026-11-26T10:00:01,0Z;2,5\n", 0.5),
         ("time,u\n1700000000000000000,1\n1700000000000001000,2\n", None),
     ],
 )
@@ -279,3 +283,26 @@ def test_recordings_that_are_refused(tmp_path, capsys, file, options, words):
         main(["import", str(FAILING / file), "--plant", "axis", *shlex.split(options), "-o", str(tmp_path / "b")]) == 2
     )
     assert re.search(words, capsys.readouterr().err) and not (tmp_path / "b").exists()
+
+
+@needs_failing
+@pytest.mark.parametrize(
+    ("file", "options", "rows", "said"),
+    [
+        ("mcap_truncated/trunc.mcap", "", 2140, "cut off or damaged at byte 214650: 2140 messages are whole and taken"),
+        (
+            "mat_struct_array/swt2.mat",
+            "--map t=ScopeData.time,u=ScopeData.signals.1.values,x=ScopeData.signals.2.values", 600, "600 rows at 1000",
+        ),
+        (
+            "mat_struct_array/v73_structarr.mat",
+            "--map t=ScopeData.time,u=ScopeData.signals.1.values,x=ScopeData.signals.2.values", 600, "600 rows at 1000",
+        ),
+        ("mat_struct_array/cell.mat", "--map t=data.1,u=data.2,x=data.3", 600, "600 rows at 1000"),
+    ],
+)  # fmt: skip
+def test_other_files_that_failed(tmp_path, capsys, file, options, rows, said):
+    assert (
+        main(["import", str(FAILING / file), "--plant", "axis", *shlex.split(options), "-o", str(tmp_path / "b")]) == 0
+    )
+    assert said in capsys.readouterr().out and len(load_bundle(tmp_path / "b").columns["x"]) == rows

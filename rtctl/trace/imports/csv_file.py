@@ -151,12 +151,21 @@ def _values(column: pa.ChunkedArray, decimal: str) -> np.ndarray:
     found = numerals.numbers(column, decimal)
     if found is not None:
         return found.to_numpy()
-    for texts in (column, pc.replace_substring_regex(column, r"^([^,]*:\d\d),(\d+)", r"\1.\2")):
+    return np.asarray(column.to_numpy(), dtype=object) if (dates := _dates(column)) is None else dates
+
+
+def _dates(column: pa.ChunkedArray) -> np.ndarray | None:
+    """Dates (ISO 8601, or 26.11.2026) and times of day (n,) of a column of texts; None where they are none."""
+    texts = pc.utf8_trim_whitespace(column)
+    texts = pc.replace_substring_regex(texts, r"^([^,]*:\d\d),(\d+)", r"\1.\2")
+    texts = pc.replace_substring_regex(texts, r"^(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1")
+    texts = pc.replace_substring_regex(texts, r"^(\d\d:\d\d)", r"1970-01-01 \1")
+    for kind in (pa.timestamp("ns"), pa.timestamp("ns", "UTC")):
         try:
-            return pc.utf8_trim_whitespace(texts).cast(pa.timestamp("ns")).to_numpy()
+            return texts.cast(kind).cast(pa.int64()).to_numpy().astype("M8[ns]")
         except pa.ArrowException:
             continue
-    return np.asarray(column.to_numpy(), dtype=object)
+    return None
 
 
 def _heads(path: Path, form: Form) -> tuple[list[str | None], dict[str, str], list[str]]:
