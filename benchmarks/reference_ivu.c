@@ -130,7 +130,7 @@ static void switch_on(double phi)
 
 static double grown(double R_0, double area)
 {
-    double least = lower(p.machine_core, R_0);
+    double least = R_0 > 0.0 ? lower(p.machine_core, R_0) : p.machine_core;
     return sqrt(higher(R_0 * R_0 + area, least * least));
 }
 

@@ -90,14 +90,21 @@ def keeps(value: Any) -> bool:
     return hasattr(value, "cache_info")
 
 
+MADE_BY_TOOLS = {"build", "dist", "rtctl.egg-info", ".hypothesis", ".pytest_cache", ".mypy_cache", ".ruff_cache"}
+
+
 @pytest.fixture(scope="session", autouse=True)
 def nothing_is_written_elsewhere() -> Iterator[None]:
-    """No home and no folder of rtctl's is made for an account that the tests run as, root or nobody."""
+    """No home and no folder of rtctl's is made for an account that the tests run as, root or nobody, and nothing beside
+    the sources."""
     homes = {Path(pwd.getpwuid(os.getuid()).pw_dir), Path(pwd.getpwnam("nobody").pw_dir)}
     places = [home / name for home in homes for name in ("", ".cache/rtctl", ".config/rtctl", ".local/share/rtctl")]
     missing = [place for place in places if not place.exists()]
+    root = Path(__file__).parents[1]
+    there = {path.name for path in root.iterdir()} | MADE_BY_TOOLS
     yield
     made = [str(place) for place in missing if place.exists()]
+    made += [str(path) for path in root.iterdir() if path.name not in there]
     assert not made, f"a test, or a process that it started, made {', '.join(made)}"
 
 

@@ -13,6 +13,7 @@ when its standard input does, after what is under way, and one second at most.
 import contextlib
 import json
 import selectors
+import signal
 import socket
 import sys
 import time
@@ -178,6 +179,8 @@ class Hall:
 
 
 def main(orders: str) -> None:
+    for meant_for_the_daemon in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        signal.signal(meant_for_the_daemon, signal.SIG_IGN)
     hall = Hall([Door(**order) for order in json.loads(orders)])
     hall.selector.register(sys.stdin, selectors.EVENT_READ, None)
     while hall.turn(None):

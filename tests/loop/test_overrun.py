@@ -79,4 +79,5 @@ def test_late_is_counted_beyond_its_share_only(loop: Callable[..., Any]) -> None
 def test_without_a_plant_outputs_end_at_zero(loop: Callable[..., Any], bench: Callable[..., Any]) -> None:
     rows, status = loop(100_000, ticks=10)
     assert status["ended"] == 1 and status["link_frames"] == 0
-    assert (rows["link_age"] == np.arange(1, 11)).all() and not rows["state"].any()
+    assert (np.diff(rows["link_age"]) >= 1).all()  # periods by the clock, those that went by without a tick too
+    assert rows["link_age"][0] >= 1 and not rows["state"].any()

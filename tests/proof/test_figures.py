@@ -32,16 +32,16 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     return kept
 
 
-def test_reliability_has_a_point_and_its_count_for_each_bin(drawn: list[Figure]) -> None:
-    figures.reliability(SCORES, Path("reliability.png"))
+def test_reliability_has_a_point_and_its_count_for_each_bin(drawn: list[Figure], tmp_path: Path) -> None:
+    figures.reliability(SCORES, tmp_path / "reliability.png")
     (axes,) = drawn[0].axes
     points = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "o"]
     assert points == [[[0.75, 0.5]], [[0.97, 1.0]]]
     assert [text.get_text().strip() for text in axes.texts] == ["4", "26"]
 
 
-def test_confusion_has_single_truths_in_rows_and_their_cases_in_cells(drawn: list[Figure]) -> None:
-    figures.confusion(SCORES, Path("confusion.png"))
+def test_confusion_has_single_truths_in_rows_and_their_cases_in_cells(drawn: list[Figure], tmp_path: Path) -> None:
+    figures.confusion(SCORES, tmp_path / "confusion.png")
     (axes,) = drawn[0].axes
     truths = [label.get_text() for label in axes.get_yticklabels()]
     answers = [label.get_text() for label in axes.get_xticklabels()]
