@@ -66,6 +66,7 @@ def test_where_names_and_rows_stand(tmp_path, content):
         ("t\tx\n0\t1,980\n1\t1,981.5\n2\t12\n", [1980, 1981.5, 12]),
         ("t;x\n0;1 234,5\n1;1'234,5\n2;1\u202f234,5\n", [1234.5, 1234.5, 1234.5]),
         ("t;x\n0;1.000\n1;1.001\n2;0.999\n", [1, 1.001, 0.999]),
+        ("t;x\n0;\u22121,5\n1;-1,5\n2;+1,5\n", [-1.5, -1.5, 1.5]),
         ("t;x\n0;1,5e-3\n1;2,5E+2\n2;-3\n", [1.5e-3, 250, -3]),
         ('t,x\n0,"1,980"\n1,"1,981.5"\n2,12\n', [1980, 1981.5, 12]),
     ],
@@ -141,6 +142,23 @@ def test_a_unit_at_the_end_of_a_name_is_asked_about(tmp_path, name, unit, ours):
     assert not (tmp_path / "b").exists()
 
 
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        (("1700000000000", "1700000000001", "1700000000002"), r"begins at 1.7e\+12 s; --unit t=ns, us, ms"),
+        (("46352.41666667", "46352.41666668", "46352.41666669"), r"rows would be 1.*e-08 s apart; .* d \(days\)"),
+        (("0", "1000", "2000"), "rows would be 1000 s apart"),
+    ],
+)
+def test_a_time_that_cannot_be_in_seconds_is_asked_about(tmp_path, times, words):
+    table = columns(tmp_path, "t,u,x\n" + "".join(f"{t},1,2\n" for t in times))
+    with pytest.raises(UserError, match=words):
+        make_bundle(table, Plan(plant="axis"), tmp_path / "b")
+    unit = "d" if "." in times[0] else "ms"
+    made = make_bundle(table, Plan(plant="axis", columns={"t": {"unit": unit}}, uneven=True), tmp_path / "b")
+    assert made.rows == 3
+
+
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-8-sig", "cp1252"])
 def test_encodings(tmp_path, encoding):
     text = "time [s];x [\u00b5m]\n0;0,5\n1;1,5\n"
@@ -165,6 +183,12 @@ def test_packed_text(tmp_path):
         ),
         ("time,u\n\n# c\n0,1\n1,oops\n2,3\n3,4\n4,5\n5,6\n", r"a.csv: column 'u', line 5: 'oops' is not a number"),
         ("time,u,u\n0,1,2\n1,2,3\n", "two columns are called 'u'"),
+        (
+            "time,u\n0,1,2\n1,2,3\n",
+            r"line 1 has 2 names and the rows have 3 cells; mend one of them, or --names-line 0",
+        ),
+        ("# c\ntime,u\n0,0,0,5\n1,0,1,5\n", r"line 2 has 2 names .* 4 cells; is a comma both decimal sign and sep"),
+        ("time,u,x,v\n0,1,2\n1,2,3\n", "line 1 has 4 names and the rows have 3 cells"),
         ("\n\n", "is empty"),
         (b"a,b\n\0\1\2\3,1\n", "is not text"),
     ],

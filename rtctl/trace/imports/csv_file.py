@@ -64,7 +64,8 @@ def _text(path: Path, given: str | None) -> tuple[str, str]:
             line = raw.count(b"\n", 0, getattr(error, "start", 0)) + 1
             raise UserError(f"{path}:{line}: this is not {encoding}; --encoding names another") from None
         text, note = raw.decode("cp1252", errors="replace"), "the text is not UTF-8; it was read as cp1252"
-    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n"), note
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    return text.replace("\u2212", "-"), note  # the minus of typesetters
 
 
 def _columns(path: Path, text: str, form: Form, decimal: str | None) -> list[np.ndarray]:

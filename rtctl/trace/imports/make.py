@@ -27,7 +27,8 @@ OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of
 }
 TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
 COUNTS = "_counts"
-SLOWEST = 100.0  # s from row to row: beyond it a time without unit is asked about
+SLOWEST, FASTEST = 100.0, 1e-7  # s from row to row: beyond them a time without unit is asked about
+LATEST = 1e11  # s since 1970, which is the year 5138: what is later counts milliseconds or less
 SUFFIXES = frozenset(  # units at the end of a name, `time_ms`; u_in and x_min are an input and a least value
     ("ns", "us", "\u00b5s", "\u03bcs", "ms", "nm", "um", "\u00b5m", "\u03bcm", "mm", "cm", "km", "deg", "rad", "mrad",
      "rev", "rpm", "Hz", "uV", "mV", "V", "kV", "uA", "mA", "A", "mN", "N", "kN", "mNm", "Nm")
@@ -156,10 +157,12 @@ def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
     _ask_suffix(table, "t", column, "s", False)
     t = table.times(column, 1.0)
     step = float(np.median(np.abs(np.diff(t)))) if len(t) > 1 else 0.0
-    if step > SLOWEST:
+    begin = abs(float(table.columns[column][0])) if len(t) else 0.0  # of integers, which are counted from the first
+    if step > SLOWEST or 0.0 < step < FASTEST or begin > LATEST:
+        what = f"it begins at {begin:.6g} s" if begin > LATEST else f"its rows would be {step:.6g} s apart"
         raise UserError(
-            f"{table.path}: column '{column}' (t) has no unit, and its rows would be {step:.6g} s apart; --unit t=ns, "
-            "us or ms says what it counts, --unit t=s that it is so"
+            f"{table.path}: column '{column}' (t) has no unit, and {what}; --unit t=ns, us, ms or d (days) says what "
+            "it counts, --unit t=s that it is so"
         )
     return t
 

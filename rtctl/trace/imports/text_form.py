@@ -98,9 +98,23 @@ def form_of(path: object, lines: list[str], plan: TextPlan) -> Form:
         raise UserError(f"{path}: there is no line {plan.names_line} for the names; the file has {len(lines)} lines")
     after = max(names_line if names_line is not None else -1, (plan.units_line or 0) - 1)
     first = _first_row(lines, full, separator, width, numeric, after)
-    names, units, used = _names(lines, [k for k in full if k < first], separator, width, names_line, plan)
+    ended = all(not row[-1] for row in rows)  # a separator stands at the end of each row
+    names, units, used = _names(lines, [k for k in full if k < first], separator, width, ended, names_line, plan)
+    if names is None and plan.names_line is None:
+        _refuse_other_names(path, lines, first, separator, width)
     passed = sum(1 for k in full if k < first and k not in used and not is_comment(lines[k]))
     return Form(separator, width, first, names, units, passed)
+
+
+def _refuse_other_names(path: object, lines: list[str], first: int, separator: str, width: int) -> None:
+    """Raise UserError where the line above the first row has names, and another number of them than rows have cells."""
+    found = cells(lines[first - 1], separator) if 0 < first < len(lines) and not is_comment(lines[first - 1]) else []
+    if len(found) > 1 and all(cell and not is_value(cell) and unit_of(cell) is None for cell in found):
+        signs = "; is a comma both decimal sign and separator?" if separator == "," and width % len(found) == 0 else ""
+        raise UserError(
+            f"{path}: line {first} has {len(found)} names and the rows have {width} cells{signs}; mend one of them, or "
+            "--names-line 0 takes the columns by their numbers"
+        )
 
 
 def _separator(lines: list[str]) -> str:
@@ -142,21 +156,21 @@ def _first_row(lines: list[str], full: list[int], separator: str, width: int, nu
 
 
 def _names(
-    lines: list[str], before: list[int], separator: str, width: int, names_line: int | None, plan: TextPlan
+    lines: list[str], before: list[int], separator: str, width: int, ended: bool, names_line: int | None, plan: TextPlan
 ) -> tuple[list[str] | None, dict[int, str], set[int]]:
     """Names, units by column, and the lines that they stand in."""
     if plan.names_line == 0:
         return None, {}, set()
-    fitting = [k for k in before if len(_heading(lines[k], separator, width)) == width]
+    fitting = [k for k in before if len(_heading(lines[k], separator, width, ended)) == width]
     units: dict[int, str] = {}
     used: set[int] = set()
     units_line = plan.units_line - 1 if plan.units_line else None
     if plan.units_line is None and len(fitting) > 1 and fitting[-1] != names_line:
-        last = _heading(lines[fitting[-1]], separator, width)
+        last = _heading(lines[fitting[-1]], separator, width, ended)
         if fitting[-1] - fitting[-2] <= 2 and all(unit_of(cell) is not None or is_value(cell) for cell in last):
             units_line = fitting[-1]
     if units_line is not None:
-        found = _heading(lines[units_line], separator, width)
+        found = _heading(lines[units_line], separator, width, ended)
         units = {k: unit for k, cell in enumerate(found) if (unit := unit_of(cell)) is not None}
         used.add(units_line)
     if names_line is None:
@@ -166,17 +180,17 @@ def _names(
     if names_line is None:
         return None, units, used
     used.add(names_line)
-    return _heading(lines[names_line], separator, width), units, used
+    return _heading(lines[names_line], separator, width, ended), units, used
 
 
-def _heading(line: str, separator: str, width: int) -> list[str]:
-    """Cells of a line of names, without the mark of a comment; one that rows have more, empty at the end, is added."""
+def _heading(line: str, separator: str, width: int, ended: bool) -> list[str]:
+    """Cells of a line of names, without the mark of a comment; an empty one at the end is added or left out."""
     line = line.lstrip("\ufeff")
     bare = line.lstrip()
     if mark := next((mark for mark in COMMENTS if bare.startswith(mark)), ""):
         bare = bare[len(mark) :].lstrip("#%/! ") if separator != "\t" else bare[len(mark) :]
     found = cells(bare.strip("\r\n") if mark else line.strip("\r\n"), separator)
-    if 1 < len(found) == width - 1:
+    if ended and len(found) == width - 1:
         found.append("")
     if len(found) == width + 1 and not found[-1]:
         found.pop()
