@@ -43,9 +43,14 @@ class Session:
         self.supervisor.service = from_environment(rate=config.loop.rate)
         self.bundle: Path | None = None
         self.steps: list[dict[str, Any]] = []
+        self.result: dict[str, Any] | None = None  # there once the recording is finished
 
     def run(self, update: Callable[[Supervisor], None] = lambda _: None) -> dict[str, Any]:
-        """Run to the end; `update` is called at every turn. Returns what `rtctl run --json` prints."""
+        """Run to the end; `update` is called at every turn. Returns what `rtctl run --json` prints.
+
+        Raises RunFailed where the loop's process died, UserError where a process reported an error. The recording is
+        finished and `result` is there then, too.
+        """
         supervisor = self.supervisor
         supervisor.armed_at_start = self.arm
         with _signals(supervisor), supervisor:
@@ -62,7 +67,7 @@ class Session:
                 ) from error
             result = supervisor.snapshot()  # now that all rows are on disk
         self.steps = self._metrics()
-        return {
+        self.result = {
             **result,
             "steps": self.steps,
             "tripped": result["trip"]["code"] if result["trip"] else None,
@@ -70,6 +75,9 @@ class Session:
             "lost_rows": lost_rows(result["rows"]),
             "bundle": str(self.bundle) if self.bundle else None,
         }
+        if supervisor.failure is not None:
+            raise supervisor.failure
+        return self.result
 
     def _rows(self) -> int:
         """Rows in the bundle: none where the run ended before its first tick."""

@@ -21,7 +21,7 @@ import zmq
 from rtctl import machines
 from rtctl.config.bounds import Bounds
 from rtctl.config.errors import UserError
-from rtctl.daemon import keys, shared_memory
+from rtctl.daemon import ending, keys, shared_memory
 from rtctl.daemon.answers import Answers
 from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
@@ -77,6 +77,7 @@ class Supervisor(Answers):
         self._trips = Trips()
         self.changes: list[dict[str, Any]] = []
         self.recorder: Recorder | None = None
+        self.failure: Exception | None = None  # why the run ended by itself, once it has
         self._ended = False
         self._stack = contextlib.ExitStack()
         self._last_telemetry = 0.0
@@ -231,7 +232,7 @@ class Supervisor(Answers):
         self.server.process()
         self.commands.watch_commander()
         if not self._ended:
-            self._hear()
+            self._fail(ending.reported(self._hear))
         if self.service.listens:
             self._tell_service()
         if self.hung_up:
@@ -239,14 +240,20 @@ class Supervisor(Answers):
         if over and not self._ended:
             self._ended = True
             self._drain()
-            if self.loop.process.poll() not in (None, 0) and not self.status["ended"]:
-                raise RuntimeError(f"the loop's process died:\n{self.loop.last_words()}")
+            self._fail(ending.failure(self.loop, self.status, self._hear))
         if self.plant is not None and not self._ended and not self.plant.running() and not self._plant_died:
             self._plant_died = True
             log.warning("plant ended", last_words=self.plant.last_words())
             if self.config.driver.kind != "emulated":
                 self._board_off()
         return not self._ended
+
+    def _fail(self, why: Exception | None) -> None:
+        """The run ends by itself: its rows are taken in to the last, and whoever runs it raises `failure` then."""
+        if why is not None and self.failure is None:
+            self.failure = why
+            self.status["stop"] = 1
+            log.error("the run failed", why=str(why), tick=int(self.status["tick"]))
 
     def _beat(self) -> None:
         """Tell the loop that there is somebody to take a disarm."""
