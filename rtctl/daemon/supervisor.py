@@ -102,7 +102,8 @@ class Supervisor(Answers):
         config, made = self.config, self.made
         stack.enter_context(MachineLock(shared_memory.lock_path(config.name), config.name, runtime_dir()))
         if aside := shared_memory.put_aside(config.name):
-            self.say(f"{config.name}: the last rows of a killed run are kept in {aside}")
+            way_on = f"`rtctl trace recover {config.name}` joins them to its recording"
+            self.say(f"{config.name}: the last rows of a killed run are kept in {aside}; {way_on}")
         rows = max(int(config.record.seconds * self.machine.rate), 1000)
         path = shared_memory.segment_path(config.name)
         self.segment = shared_memory.create(path, layout(made.params, made.tables, made.row, rows))
@@ -142,7 +143,6 @@ class Supervisor(Answers):
         self.rows_out = RowsOut(default_endpoint(config.name, "rows"), config.name, made.row, context)
         stack.callback(self.rows_out.close)
         self.case = describe(self.machine, made)
-        shared_memory.describe(self.segment, made.columns, self.case, self.out)
         self.captures = Captures(self.machine.rate, made.columns, made.row, self.case)
         stack.callback(self.captures.close)
         if self.out is not None:
@@ -155,6 +155,8 @@ class Supervisor(Answers):
                 own_files.keep(config.own, self.out)
             except OSError as error:
                 raise UserError(f"{self.out}: cannot record here: {error.strerror}") from error
+        case = self.case if self.recorder is None else self.recorder.case
+        shared_memory.describe(self.segment, made.columns, case, self.out)
         if config.metrics.port is not None:
             from rtctl.daemon import metrics  # here: few want it, and it takes its time to load
 
