@@ -35,8 +35,8 @@ def run(
 ) -> None:
     """Run a machine under control, on a bench or against its emulated twin.
 
-    Exit code 1 where it tripped or its loop died, 129 where its terminal was closed: outputs are zero and the
-    recording is whole then.
+    Exit code 1 where it tripped, its loop died, or its recording stopped or was moved, 129 where its terminal was
+    closed: outputs are zero and the recording is whole then.
 
     Examples:
 
@@ -85,6 +85,8 @@ def run(
         console.report(result)
     if failure is not None:
         raise failure
+    if result["rows"].get("error"):
+        raise typer.Exit(1)
     if result["tripped"] or (fail_on_loss and (result["lost_rows"] or result["missed"])):
         raise typer.Exit(1)
 

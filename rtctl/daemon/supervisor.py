@@ -27,7 +27,7 @@ from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
 from rtctl.daemon.children import ChildProcess
 from rtctl.daemon.commands import Commands
-from rtctl.daemon.events import Trips
+from rtctl.daemon.events import Recording, Trips
 from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
 from rtctl.daemon.notify import Service
@@ -74,7 +74,7 @@ class Supervisor(Answers):
         self.reread: Callable[[], Any] | None = None  # gives the settings as the config file has them now
         self.terminal_gone = False  # so is this: the terminal was closed, and with it whoever watched
         self.service = Service()
-        self._trips = Trips()
+        self._trips, self._recording = Trips(), Recording(say)
         self.changes: list[dict[str, Any]] = []
         self.recorder: Recorder | None = None
         self.failure: Exception | None = None  # why the run ended by itself, once it has
@@ -230,6 +230,7 @@ class Supervisor(Answers):
         self._beat()
         over = bool(self.status["ended"]) or not self.loop.running()
         self._drain()
+        self._recording.look(None if self.recorder is None else self.recorder.trouble)
         self.faults.act()
         self.server.process()
         self.commands.watch_commander()
@@ -366,11 +367,16 @@ class Supervisor(Answers):
             time.sleep(0.002)
 
     def finish(self) -> Path | None:
-        """Close the recording; returns the bundle's folder. Raises OSError where the disk does not take it."""
+        """Close the recording; returns the bundle's folder, which may have been renamed. Raises OSError."""
         if self.recorder is None:
             return None
         timing = {stage: account(self.status[field]) for stage, field in STAGES.items()}
-        return self.recorder.finish({"run": self.snapshot(), "timing": timing, "changes": self.changes})
+        folder = self.recorder.finish({"run": self.snapshot(), "timing": timing, "changes": self.changes})
+        self._recording.look(self.recorder.trouble)
+        if self.recorder.trouble:
+            self.journal.follow(folder)
+            own_files.keep(self.config.own, folder)
+        return folder
 
     def _stop_children(self) -> None:
         self.segment["plant_status"][0]["stop"] = 1
