@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "Bundle", "Client", "Diagnosis", "NoAnswer", "Run", "RunFailed", "UserError", "change", "compare", "connect", "diagnosis",
-    "load_bundle", "load_config", "record", "replay", "run", "run_campaign", "steps",
+    "Bundle", "Client", "Diagnosis", "NoAnswer", "Run", "RunFailed", "UserError", "change", "compare", "connect",
+    "diagnosis", "load_bundle", "load_config", "record", "replay", "run", "run_campaign", "steps",
 ]  # fmt: skip
 
 _WHERE = {  # name -> module and name there
