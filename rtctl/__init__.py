@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rtctl.api import change, connect, load_config, record, run, run_campaign, steps
-    from rtctl.config.errors import NoAnswer, UserError
+    from rtctl.config.errors import NoAnswer, RunFailed, UserError
     from rtctl.daemon.client import Client
     from rtctl.diagnose.chain import diagnose as diagnosis
     from rtctl.diagnose.diagnosis import Diagnosis
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "Bundle", "Client", "Diagnosis", "NoAnswer", "Run", "UserError", "change", "compare", "connect", "diagnosis",
-    "load_bundle", "load_config", "record", "replay", "run", "run_campaign", "steps",
+    "Bundle", "Client", "Diagnosis", "NoAnswer", "Run", "RunFailed", "UserError", "change", "compare", "connect",
+    "diagnosis", "load_bundle", "load_config", "record", "replay", "run", "run_campaign", "steps",
 ]  # fmt: skip
 
 _WHERE = {  # name -> module and name there
@@ -41,6 +41,7 @@ _WHERE = {  # name -> module and name there
     "Diagnosis": "rtctl.diagnose.diagnosis:Diagnosis",
     "NoAnswer": "rtctl.config.errors:NoAnswer",
     "Run": "rtctl.loop.fused:Run",
+    "RunFailed": "rtctl.config.errors:RunFailed",
     "UserError": "rtctl.config.errors:UserError",
     "change": "rtctl.api:change",
     "compare": "rtctl.trace.compare:compare",

@@ -47,11 +47,12 @@ def run(config: Any, seconds: float) -> fused.Run:
 def record(config: Any, seconds: float, folder: str | Path) -> Bundle:
     """Run a config in its own mode for `seconds` and record it, as `rtctl run` does. Returns the bundle in `folder`.
 
-    Raises UserError where it cannot run and where `folder` holds a recording.
+    Raises UserError where it cannot run and where `folder` holds a recording, RunFailed where its loop was killed or
+    its recording stopped or was moved.
     """
-    from rtctl.daemon.session import Session
+    from rtctl.daemon.session import Session, whole
 
-    result = Session(config, Path(folder), seconds).run()
+    result = whole(Session(config, Path(folder), seconds).run())
     if result["bundle"] is None:
         raise UserError(f"{folder}: the run ended before its first tick")
     return load_bundle(folder)

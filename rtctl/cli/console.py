@@ -102,7 +102,7 @@ class RunConsole:
             console.print("ended by Ctrl-C or SIGTERM, outputs at zero")
         rows = result["rows"]
         if rows.get("error"):
-            console.print(Text(f"recording stopped: {rows['error']}", "red"))
+            console.print(Text(f"recording: {rows['error']}", "red"))
         for what in ("bundle", "plot"):
             if result.get(what):
                 console.print(f"{what:7}{result[what]}", highlight=False, markup=False, soft_wrap=True)

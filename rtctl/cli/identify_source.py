@@ -65,11 +65,10 @@ def play(config: Any, experiments: list[Any], out: Path | None, say: Callable[[s
             except ValueError as error:
                 raise UserError(f"{config.name}: {error}") from error
             continue
-        from rtctl.daemon.session import Session
+        from rtctl.daemon.session import Session, whole
 
         bundle = folder / f"{i + 1:02}"
-        if Session(one, bundle, seconds, arm=True, say=lambda _: None).run()["interrupted"]:
-            raise KeyboardInterrupt
+        whole(Session(one, bundle, seconds, arm=True, say=lambda _: None).run())
         found.append(load_bundle(bundle))
     return found
 

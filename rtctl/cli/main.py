@@ -11,7 +11,7 @@ import typer
 
 from rtctl.cli.failures import words
 from rtctl.cli.lazy import LazyGroup
-from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.errors import NoAnswer, RunFailed, UserError
 from rtctl.config.isolated import isolate
 
 # Name of each command, in the order of `rtctl --help`, and its module here. Modules import nothing heavy.
@@ -91,7 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(arguments, prog_name="rtctl", standalone_mode=False) or 0
         sys.stdout.flush()  # here, where a full disk has words; at the end of the interpreter it has none
         return code
-    except (UserError, NoAnswer) as error:
+    except (UserError, NoAnswer, RunFailed) as error:
         return _fail(str(error), error.exit_code)
     except USAGE_ERROR as error:
         return _fail(_usage(error), 2) if str(error) else 2  # empty: typer has shown the help instead

@@ -35,7 +35,8 @@ def run(
 ) -> None:
     """Run a machine under control, on a bench or against its emulated twin.
 
-    Exit code 1 where it tripped, 129 where its terminal was closed: outputs are zero and the recording is whole then.
+    Exit code 1 where it tripped, its loop died, or its recording stopped or was moved, 129 where its terminal was
+    closed: outputs are zero and the recording is whole then.
 
     Examples:
 
@@ -47,6 +48,7 @@ def run(
     """
     import structlog
 
+    from rtctl.config.errors import RunFailed, UserError
     from rtctl.config.yaml_file import told
     from rtctl.daemon.session import Session
 
@@ -61,9 +63,14 @@ def run(
     structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # standard output is the JSON's
     console.say(told(config))
     session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
+    failure = None
     try:
         with console.live():
             result = session.run(console.update)
+    except (RunFailed, UserError) as error:
+        if session.result is None:
+            raise
+        failure, result = error, session.result
     except KeyboardInterrupt:
         if not session.supervisor.terminal_gone:
             raise
@@ -76,6 +83,10 @@ def run(
         common.print_json(result)
     else:
         console.report(result)
+    if failure is not None:
+        raise failure
+    if result["rows"].get("error"):
+        raise typer.Exit(1)
     if result["tripped"] or (fail_on_loss and (result["lost_rows"] or result["missed"])):
         raise typer.Exit(1)
 

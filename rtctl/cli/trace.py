@@ -141,6 +141,45 @@ def repair(bundle: BundleArgument) -> None:
 
 
 @app.command()
+def recover(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The machine's `name`, as its config has it.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="FOLDER",
+            help="Where the recording lies now, if it was moved; else a new folder for rows without a recording, "
+            "NAME-recovered-DATE-TIME if not given.",
+        ),
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Join the rows that a killed daemon left in shared memory to its recording, which is repaired first.
+
+    Shared memory is of one user and is lost when the computer restarts. What is recovered is removed from there.
+
+    Examples:
+
+      rtctl trace recover ivu
+
+      sudo -u rtctl rtctl trace recover ivu -o /var/lib/rtctl/rescued
+    """
+    from rtctl.config.errors import UserError
+    from rtctl.daemon.recover import recover as take
+
+    done, troubles = take(name, out)
+    if json:
+        found = [{key: str(v) if isinstance(v, Path) else v for key, v in each._asdict().items()} for each in done]
+        common.print_json({"recovered": found, "troubles": troubles})
+    else:
+        for each in done:
+            typer.echo(each)
+    if troubles:
+        raise UserError("\n".join(troubles))
+
+
+@app.command()
 def export(
     bundle: BundleArgument,
     to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="csv, mat, parquet, mcap, mf4 or tdms.")],

@@ -16,6 +16,12 @@ class NoAnswer(Exception):  # noqa: N818
     exit_code = 3
 
 
+class RunFailed(Exception):  # noqa: N818
+    """A run that ended by itself; its recording is whole. Exit code 1."""
+
+    exit_code = 1
+
+
 def nearest(word: str, choices: Iterable[str]) -> str | None:
     """The choice that `word` was probably meant to be, or None. Upper and lower case count as nearly the same."""
     names = list(choices)

@@ -27,6 +27,7 @@ class Answers:
     server: Any
     faults: Any
     lacks: list[str]
+    failure: Exception | None
     last_row: Any = None
 
     def snapshot(self) -> dict[str, Any]:
@@ -41,6 +42,7 @@ class Answers:
             "pid": os.getpid(),
             "state": safety.STATES[int(s["state"])],
             "trip": None if not s["trip"] else {"code": trip[0], "why": trip[1], "tick": int(s["trip_tick"])},
+            "failure": str(self.failure) if self.failure else None,
             "ticks": int(s["tick"]),
             "rate_hz": self.machine.rate,
             "measured_rate_hz": self._measured_rate(),

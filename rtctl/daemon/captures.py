@@ -109,8 +109,10 @@ class Captures:
             "bundle": str(recorder.folder),
         }
         try:
-            recorder.finish()
+            entry["bundle"] = str(recorder.finish())
             entry["rows"] = recorder.stats().rows_written
+            if recorder.trouble:
+                entry["error"] = recorder.trouble
         except OSError as error:
             entry["error"] = f"{recorder.folder}: {error}; what is there can be had with `rtctl trace repair`"
         self._done[identity] = entry

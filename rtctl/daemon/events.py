@@ -1,5 +1,6 @@
-"""Trips in the log: cause, tick, and the machine's signals in that tick. The loop itself never logs."""
+"""Trips and troubles of the recording in the log. A trip has its cause, its tick and the machine's signals then."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,20 @@ from rtctl.machines.base import COMMON_COLUMNS
 
 log = structlog.get_logger()
 COMMON = {column.name for column in COMMON_COLUMNS} - {"watchdog", "lateness"}
+
+
+class Recording:
+    """Looks for trouble of the recorder: a disk that takes no more, a folder that was renamed or deleted."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self._say, self._told = say, ""
+
+    def look(self, trouble: str | None) -> None:
+        """Log and say what is new, once."""
+        if trouble and trouble != self._told:
+            self._told = trouble
+            log.error("recording", trouble=trouble)
+            self._say(f"recording: {trouble}")
 
 
 class Trips:

@@ -10,7 +10,7 @@ from typing import Any
 
 import structlog
 
-from rtctl.config.errors import UserError
+from rtctl.config.errors import RunFailed, UserError
 from rtctl.daemon.notify import from_environment
 from rtctl.daemon.supervisor import Supervisor
 
@@ -43,9 +43,14 @@ class Session:
         self.supervisor.service = from_environment(rate=config.loop.rate)
         self.bundle: Path | None = None
         self.steps: list[dict[str, Any]] = []
+        self.result: dict[str, Any] | None = None  # there once the recording is finished
 
     def run(self, update: Callable[[Supervisor], None] = lambda _: None) -> dict[str, Any]:
-        """Run to the end; `update` is called at every turn. Returns what `rtctl run --json` prints."""
+        """Run to the end; `update` is called at every turn. Returns what `rtctl run --json` prints.
+
+        Raises RunFailed where the loop's process died, UserError where a process reported an error. The recording is
+        finished and `result` is there then, too.
+        """
         supervisor = self.supervisor
         supervisor.armed_at_start = self.arm
         with _signals(supervisor), supervisor:
@@ -55,14 +60,10 @@ class Session:
             try:
                 self.bundle = supervisor.finish()
             except OSError as error:
-                where = supervisor.out
-                raise UserError(
-                    f"{where}: the disk did not take the recording ({error.strerror}); make room, then "
-                    f"`rtctl trace repair {where}`"
-                ) from error
+                raise UserError(_not_taken(supervisor, error)) from error
             result = supervisor.snapshot()  # now that all rows are on disk
         self.steps = self._metrics()
-        return {
+        self.result = {
             **result,
             "steps": self.steps,
             "tripped": result["trip"]["code"] if result["trip"] else None,
@@ -70,6 +71,9 @@ class Session:
             "lost_rows": lost_rows(result["rows"]),
             "bundle": str(self.bundle) if self.bundle else None,
         }
+        if supervisor.failure is not None:
+            raise supervisor.failure
+        return self.result
 
     def _rows(self) -> int:
         """Rows in the bundle: none where the run ended before its first tick."""
@@ -100,6 +104,27 @@ class Session:
         path = self.bundle / "run.png"
         plot_run(load_bundle(self.bundle), self.steps, path)
         return str(path)
+
+
+def _not_taken(supervisor: Supervisor, error: OSError) -> str:
+    """Sentence about a recording that the disk did not take at the end."""
+    where = supervisor.out if supervisor.recorder is None else supervisor.recorder.folder
+    way_on = f"make room, then `rtctl trace repair {where}`"
+    if where is not None and not where.exists():
+        way_on = "its folder was deleted meanwhile and the rows could not be rescued: they are lost"
+    return f"{where}: the disk did not take the recording ({error.strerror or error}); {way_on}"
+
+
+def whole(result: dict[str, Any]) -> dict[str, Any]:
+    """Result of a run, for a program that goes on with its recording.
+
+    Raises KeyboardInterrupt where it was interrupted, RunFailed where the recording stopped or was moved.
+    """
+    if result["interrupted"]:
+        raise KeyboardInterrupt
+    if error := result["rows"].get("error"):
+        raise RunFailed(f"recording: {error}")
+    return result
 
 
 def lost_rows(rows: dict[str, Any]) -> int:

@@ -101,10 +101,11 @@ def remove(path: Path) -> None:
     path.with_suffix(ABOUT).unlink(missing_ok=True)
 
 
-def put_aside(name: str) -> Path | None:
+def put_aside(name: str, most: int | None = KEPT) -> Path | None:
     """Rename the segment of a killed daemon, with the machine's lock held. Returns the new path, None without one.
 
-    At most KEPT segments of a machine are kept. A segment without description is removed: nothing can read it.
+    At most `most` segments of a machine are kept, None for all. A segment without description is removed: nothing can
+    read it.
     """
     path = segment_path(name)
     if not path.exists():
@@ -117,7 +118,7 @@ def put_aside(name: str) -> Path | None:
     target = path.with_name(f"{name}@{when}-{path.stat().st_ino}{SEGMENT}")
     path.with_suffix(ABOUT).rename(target.with_suffix(ABOUT))
     path.rename(target)
-    for old in kept(name)[:-KEPT]:
+    for old in [] if most is None else kept(name)[:-most]:
         remove(old)
     return target
 
@@ -125,6 +126,11 @@ def put_aside(name: str) -> Path | None:
 def kept(name: str) -> list[Path]:
     """Segments of earlier daemons of this name, oldest first. No machine's name holds an @."""
     return sorted(shared_folder().glob(f"{name}@*{SEGMENT}"), key=lambda path: (path.stat().st_mtime, path.name))
+
+
+def names() -> list[str]:
+    """Machines of this user that have a segment here: they run, or were killed."""
+    return sorted({path.name.removesuffix(SEGMENT).partition("@")[0] for path in shared_folder().glob(f"*{SEGMENT}")})
 
 
 def _user(uid: int) -> str:

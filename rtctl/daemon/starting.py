@@ -71,12 +71,17 @@ def ended(child: Any) -> str:
     """How a child has ended, in words: its last ones, or the signal that killed it."""
     code, words = child.process.poll(), child.last_words()
     if code is not None and code < 0:
-        name = signal.Signals(-code).name
         memory = (
-            "; most likely the kernel ran out of memory (`dmesg` says so): close other programs, or shorten "
-            "record.seconds"
+            " (out of memory? see `dmesg`: close other programs, or shorten record.seconds)"
             if -code == signal.SIGKILL
             else ""
         )
-        return f"it was killed by {name}{memory}" + (f"; its last words: {words}" if words else "")
+        return f"killed by {_signal(-code)}{memory}" + (f"; its last words: {words}" if words else "")
     return words or f"exit code {code}, without a word"
+
+
+def _signal(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # a real-time signal
+        return f"signal {number}"

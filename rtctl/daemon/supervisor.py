@@ -21,14 +21,14 @@ import zmq
 from rtctl import machines
 from rtctl.config.bounds import Bounds
 from rtctl.config.errors import UserError
-from rtctl.daemon import keys, shared_memory
+from rtctl.daemon import ending, keys, shared_memory
 from rtctl.daemon.answers import Answers
 from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
 from rtctl.daemon.children import ChildProcess
 from rtctl.daemon.commands import Commands
 from rtctl.daemon.doors import COMMANDERS, VIEWERS, Doors, raise_limit
-from rtctl.daemon.events import Trips
+from rtctl.daemon.events import Recording, Trips
 from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
 from rtctl.daemon.notify import Service
@@ -75,9 +75,10 @@ class Supervisor(Answers):
         self.reread: Callable[[], Any] | None = None  # gives the settings as the config file has them now
         self.terminal_gone = False  # so is this: the terminal was closed, and with it whoever watched
         self.service = Service()
-        self._trips = Trips()
+        self._trips, self._recording = Trips(), Recording(say)
         self.changes: list[dict[str, Any]] = []
         self.recorder: Recorder | None = None
+        self.failure: Exception | None = None  # why the run ended by itself, once it has
         self._ended = False
         self._stack = contextlib.ExitStack()
         self._last_telemetry = 0.0
@@ -102,7 +103,8 @@ class Supervisor(Answers):
         config, made = self.config, self.made
         stack.enter_context(MachineLock(shared_memory.lock_path(config.name), config.name, runtime_dir()))
         if aside := shared_memory.put_aside(config.name):
-            self.say(f"{config.name}: the last rows of a killed run are kept in {aside}")
+            way_on = f"`rtctl trace recover {config.name}` joins them to its recording"
+            self.say(f"{config.name}: the last rows of a killed run are kept in {aside}; {way_on}")
         rows = max(int(config.record.seconds * self.machine.rate), 1000)
         path = shared_memory.segment_path(config.name)
         self.segment = shared_memory.create(path, layout(made.params, made.tables, made.row, rows))
@@ -148,7 +150,6 @@ class Supervisor(Answers):
         self.rows_out = RowsOut(rows_at, config.name, made.row, context, self.doors.door("rows", "viewers", VIEWERS))
         stack.callback(self.rows_out.close)
         self.case = describe(self.machine, made)
-        shared_memory.describe(self.segment, made.columns, self.case, self.out)
         self.captures = Captures(self.machine.rate, made.columns, made.row, self.case)
         stack.callback(self.captures.close)
         if self.out is not None:
@@ -161,6 +162,8 @@ class Supervisor(Answers):
                 own_files.keep(config.own, self.out)
             except OSError as error:
                 raise UserError(f"{self.out}: cannot record here: {error.strerror}") from error
+        case = self.case if self.recorder is None else self.recorder.case
+        shared_memory.describe(self.segment, made.columns, case, self.out)
         if config.metrics.port is not None:
             from rtctl.daemon import metrics  # here: few want it, and it takes its time to load
 
@@ -235,11 +238,12 @@ class Supervisor(Answers):
         over = bool(self.status["ended"]) or not self.loop.running()
         self._drain()
         self.doors.look()
+        self._recording.look(None if self.recorder is None else self.recorder.trouble)
         self.faults.act()
         self.server.process()
         self.commands.watch_commander()
         if not self._ended:
-            self._hear()
+            self._fail(ending.reported(self._hear))
         if self.service.listens:
             self._tell_service()
         if self.hung_up:
@@ -247,14 +251,20 @@ class Supervisor(Answers):
         if over and not self._ended:
             self._ended = True
             self._drain()
-            if self.loop.process.poll() not in (None, 0) and not self.status["ended"]:
-                raise RuntimeError(f"the loop's process died:\n{self.loop.last_words()}")
+            self._fail(ending.failure(self.loop, self.status, self._hear))
         if self.plant is not None and not self._ended and not self.plant.running() and not self._plant_died:
             self._plant_died = True
             log.warning("plant ended", last_words=self.plant.last_words())
             if self.config.driver.kind != "emulated":
                 self._board_off()
         return not self._ended
+
+    def _fail(self, why: Exception | None) -> None:
+        """The run ends by itself: its rows are taken in to the last, and whoever runs it raises `failure` then."""
+        if why is not None and self.failure is None:
+            self.failure = why
+            self.status["stop"] = 1
+            log.error("the run failed", why=str(why), tick=int(self.status["tick"]))
 
     def _beat(self) -> None:
         """Tell the loop that there is somebody to take a disarm."""
@@ -365,11 +375,16 @@ class Supervisor(Answers):
             time.sleep(0.002)
 
     def finish(self) -> Path | None:
-        """Close the recording; returns the bundle's folder. Raises OSError where the disk does not take it."""
+        """Close the recording; returns the bundle's folder, which may have been renamed. Raises OSError."""
         if self.recorder is None:
             return None
         timing = {stage: account(self.status[field]) for stage, field in STAGES.items()}
-        return self.recorder.finish({"run": self.snapshot(), "timing": timing, "changes": self.changes})
+        folder = self.recorder.finish({"run": self.snapshot(), "timing": timing, "changes": self.changes})
+        self._recording.look(self.recorder.trouble)
+        if self.recorder.trouble:
+            self.journal.follow(folder)
+            own_files.keep(self.config.own, folder)
+        return folder
 
     def _stop_children(self) -> None:
         self.segment["plant_status"][0]["stop"] = 1

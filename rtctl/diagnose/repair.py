@@ -126,13 +126,10 @@ def repair(
 
 
 def run(config: Any, bundle: Path, seconds: float, say: Say = lambda text: None) -> dict[str, Any]:
-    """One recording as `rtctl run` makes it. Raises UserError where the machine cannot be run."""
-    from rtctl.daemon.session import Session
+    """One recording as `rtctl run` makes it. Raises UserError where it cannot be run, RunFailed where it went wrong."""
+    from rtctl.daemon.session import Session, whole
 
-    result = Session(config, bundle, seconds, arm=True, say=say).run()
-    if result["interrupted"]:
-        raise KeyboardInterrupt
-    return result
+    return whole(Session(config, bundle, seconds, arm=True, say=say).run())
 
 
 def _played(config: Any, experiment: dict[str, Any], seconds: float) -> tuple[Any, float]:

@@ -108,7 +108,8 @@ class Processes:
         status, deadline = self._supervisor.status, time.monotonic() + PATIENCE
         status["hold"] = tick
         while int(status["tick"]) < tick:
-            self._supervisor.turn()
+            if not self._supervisor.turn():
+                raise self._supervisor.failure or RuntimeError(f"the loop ended at tick {int(status['tick'])}")
             if time.monotonic() > deadline:
                 raise TimeoutError(f"the loop stands at tick {int(status['tick'])}, on its way to {tick}")
             time.sleep(0.001)

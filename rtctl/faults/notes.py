@@ -79,7 +79,7 @@ NOTES = {
     "supervisor.kill": Note(
         "the out-of-memory killer",
         "the loop sees its pipe close, writes zeros and ends",
-        "`rtctl trace repair` for the recording; the last seconds are in /dev/shm/rtctl-UID, kept by the next start",
+        "`rtctl trace recover NAME` repairs the recording and joins the rows that only shared memory has",
     ),
     "recorder.stall": Note(
         "a disk that does not answer for a while",

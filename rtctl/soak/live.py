@@ -104,7 +104,9 @@ class Live:
         goal, seen, heard = self.tick + ticks, self.tick, time.monotonic()
         while self.tick < goal:
             if not self.supervisor.turn():
-                raise RuntimeError(f"the loop ended at tick {self.tick}, in the middle of the soak")
+                raise self.supervisor.failure or RuntimeError(
+                    f"the loop ended at tick {self.tick}, in the middle of the soak"
+                )
             if self.tick != seen:
                 seen, heard = self.tick, time.monotonic()
             elif time.monotonic() - heard > HANG:

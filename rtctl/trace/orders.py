@@ -13,6 +13,7 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.config.files import inside, open_stream
+from rtctl.trace import moved
 
 ORDERS = "orders.jsonl"
 
@@ -48,6 +49,13 @@ class Journal:
             self._file.write(line.encode())
         except OSError:
             self.close()
+
+    def follow(self, folder: Path) -> None:
+        """See that the journal lies in `folder`, where its recording is now. Raises OSError."""
+        if self._file is None or moved.in_place(self._file.fileno(), folder / ORDERS):
+            return
+        old, self._file = self._file, os.fdopen(moved.copied(self._file.fileno(), folder / ORDERS), "ab", buffering=0)
+        old.close()
 
     def close(self) -> None:
         """Nothing more will come."""

@@ -3,6 +3,7 @@
 At every moment in between, its folder holds all the rows in a form that `rtctl.trace.repair` understands.
 """
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from rtctl.config.errors import UserError
-from rtctl.trace.bundle import ARROWS, PARQUET, as_json, part_folders, save_case, write_parquet
+from rtctl.trace import moved
+from rtctl.trace.bundle import ARROWS, CASE, PARQUET, as_json, part_folders, save_case, write_parquet
 from rtctl.trace.columns import Column
 from rtctl.trace.losses import Losses
 from rtctl.trace.stream import StreamReader, StreamWriter
@@ -38,6 +40,44 @@ class Part:
     def write(self, rows: np.ndarray) -> int:
         """Append `rows` (structured array); they are with the operating system on return. Raises OSError once."""
         return self._writer.write(rows)
+
+    def look(self) -> str | None:
+        """Follow a folder that was renamed, rescue the rows of one that was deleted; a sentence about it, or None.
+
+        Raises OSError where the disk does not take the rescued rows.
+        """
+        if self._writer.is_at(self.folder / ARROWS):
+            return None
+        before, now = self.folder, self._writer.place()
+        if now is not None and now.name == ARROWS:
+            self.folder = now.parent
+            return f"{before} was renamed while it was recorded: the recording is now {self.folder}"
+        self.rescue(moved.beside(before))
+        return f"{before / ARROWS} was deleted while it was recorded: its rows are rescued into {self.folder}"
+
+    def follow(self, folder: Path) -> bool:
+        """See that the stream is in `folder`, which may have a new name; returns whether its rows had to be rescued.
+
+        Raises OSError.
+        """
+        if self._writer.is_at(folder / ARROWS):
+            self.folder = folder
+            return False
+        self.rescue(folder)
+        return True
+
+    def rescue(self, folder: Path) -> None:
+        """Copy the stream into `folder` and go on there. Raises OSError; the part stays as it is then."""
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            save_case(folder, {**self.case, "complete": False})
+            self._writer.move(folder / ARROWS)
+        except OSError:
+            with contextlib.suppress(OSError):
+                (folder / CASE).unlink(missing_ok=True)
+                folder.rmdir()  # not with somebody else's files in it
+            raise
+        self.folder = folder
 
     def close(self) -> None:
         """No more rows. Raises OSError where the disk does not take the end."""

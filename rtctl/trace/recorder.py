@@ -9,6 +9,7 @@ Memory is flat, however long it records: the queue is bounded, and so is the lis
 import contextlib
 import itertools
 import threading
+import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -25,6 +26,7 @@ from rtctl.trace.part import Part
 from rtctl.trace.rotation import Parts, Rotation
 
 ENOUGH = 1 << 20  # bytes that are written without waiting for more
+LOOK = 0.5  # s between two looks at whether the folder is still in its place
 
 
 class RecorderStats(NamedTuple):
@@ -34,7 +36,7 @@ class RecorderStats(NamedTuple):
     bytes_written: int
     bytes_queued: int
     gaps: list[list[int]]  # [first tick, count]
-    error: str | None  # what stopped the writing, if anything did
+    error: str | None  # what stopped the writing, or what became of the folder, if anything did
 
 
 class Recorder:
@@ -71,6 +73,8 @@ class Recorder:
         self._queued = 0  # bytes
         self._written = 0  # rows
         self._error: Exception | None = None
+        self._moves: list[str] = []  # sentences: the folder was renamed or deleted
+        self._looked = time.monotonic()
         self._closing = False
         self._finished: Path | None = None
         self._thread = threading.Thread(target=self._write_queue, name="recorder", daemon=True)
@@ -98,6 +102,11 @@ class Recorder:
         with self._changed:
             self._losses.add(first_tick, count)
 
+    @property
+    def trouble(self) -> str | None:
+        """What stopped the writing, or what became of the folder; None while all is well."""
+        return "; ".join([*([str(self._error)] if self._error else []), *self._moves]) or None
+
     def stats(self) -> RecorderStats:
         with self._changed:
             return RecorderStats(
@@ -107,7 +116,7 @@ class Recorder:
                 bytes_written=self._bundle.bytes,
                 bytes_queued=self._queued,
                 gaps=self._losses.gaps,
-                error=str(self._error) if self._error else None,
+                error=self.trouble,
             )
 
     def finish(self, extra: Mapping[str, Any] | None = None) -> Path:
@@ -121,11 +130,13 @@ class Recorder:
             self._closing = True
             self._changed.notify_all()
         self._thread.join()
+        self._look()  # raises where the rows of a deleted folder cannot be rescued: it is open still, for another try
         try:
             self._bundle.close()
         except OSError as error:
             self._error = self._error or error
-        self._bundle.finish(extra or {}, self._losses, self._error)
+        moves = {"recording_moved": self._moves} if self._moves else {}
+        self._bundle.finish({**(extra or {}), **moves}, self._losses, self._error)
         self._finished = self.folder
         return self.folder
 
@@ -144,6 +155,13 @@ class Recorder:
                     (self.folder / name).unlink(missing_ok=True)
                 self.folder.rmdir()  # not with somebody else's files in it
 
+    def _look(self) -> None:
+        """Follow the folder where it was renamed or deleted. Raises OSError where its rows cannot be rescued."""
+        self._looked = time.monotonic()
+        if told := self._bundle.look():
+            self.folder = self._bundle.folder
+            self._moves.append(told)
+
     def _lost(self, first_tick: int, end: int) -> Losses:
         with self._changed:
             return self._losses.between(first_tick, end)
@@ -160,6 +178,8 @@ class Recorder:
             rows = batch[0] if len(batch) == 1 else np.concatenate(batch)
             error: Exception | None = None
             try:
+                if time.monotonic() - self._looked >= LOOK:
+                    self._look()
                 self._bundle.write(rows)
             except Exception as failure:  # a full disk, mostly; whatever it is, the rows must be counted
                 error = failure

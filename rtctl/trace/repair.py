@@ -108,7 +108,7 @@ def _on_top(folder: Path, rows: int, notes: list[str]) -> bool:
         first_tick, last_tick = entry.get("tick", (None, None))
         if last is not None and first_tick is not None:
             losses.add(last + 1, first_tick - last - 1)
-        for tick, count in _gaps(part):
+        for tick, count in gaps(part):
             if first_tick is not None and first_tick <= tick < last_tick:
                 losses.add(tick, count)
         last = last_tick if last_tick is not None else last
@@ -121,11 +121,11 @@ def _discarded(case: dict[str, Any]) -> int:
     return told if isinstance(told, int) else 0
 
 
-def _gaps(case: dict[str, Any]) -> list[tuple[int, int]]:
+def gaps(case: dict[str, Any]) -> list[tuple[int, int]]:
     """[first tick, count] as the case of a part lists them."""
     losses = case.get("losses")
-    gaps = losses.get("gaps") if isinstance(losses, dict) else None
-    pairs = [gap for gap in gaps if isinstance(gap, list) and len(gap) == 2] if isinstance(gaps, list) else []
+    listed = losses.get("gaps") if isinstance(losses, dict) else None
+    pairs = [gap for gap in listed if isinstance(gap, list) and len(gap) == 2] if isinstance(listed, list) else []
     return [(tick, count) for tick, count in pairs if isinstance(tick, int) and isinstance(count, int)]
 
 

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rtctl.trace import moved
 from rtctl.trace.bundle import PART, index, load_case, save_case
 from rtctl.trace.columns import Column
 from rtctl.trace.losses import Losses
@@ -61,6 +62,9 @@ class Parts:
         self._bytes = float("inf") if rotation.megabytes is None else rotation.megabytes * MEGABYTE
         self._seconds = float("inf") if rotation.minutes is None else rotation.minutes * 60.0
         self._failed: list[_Full] = []
+        self._known: dict[str, tuple[int, int]] = {}  # first tick and rows of the parts that are full
+        self._looking = threading.Lock()  # the recorder's thread and that of the parts follow one folder
+        self._news: list[str] = []  # sentences that no `look` has told yet
         self._before = (0, 0)  # rows and bytes of the parts that are full
         self._number = 0
         self._lock = os.open(folder, os.O_RDONLY)
@@ -72,6 +76,7 @@ class Parts:
             self._unlock()
             raise
         self._first_tick = BEGINNING
+        self._began = 0  # first tick in it
         self._end = self._seconds  # t at which the part is full
         self._full: queue.SimpleQueue[_Full | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._make_bundles, name="parts", daemon=True)
@@ -92,11 +97,41 @@ class Parts:
             if self._part.rows and (self._part.bytes >= self._bytes or rows["t"][0] >= self._end):
                 self._rotate(int(rows["tick"][0]))
             if not self._part.rows:
+                self._began = int(rows["tick"][0])
                 self._end = float(rows["t"][0]) + self._seconds
             now = max(1, int(np.searchsorted(rows["t"], self._end)))
             written += self._part.write(rows[:now])
             rows = rows[now:]
         return written
+
+    def look(self) -> str | None:
+        """As a `Part` does. Parts that were full when the folder was deleted are lost; `finish` counts their rows."""
+        with self._looking:
+            self._look_on_top()
+            wanted = self.folder / self._part.folder.name
+            if self._part.follow(wanted) and not self._news:
+                self._news.append(f"{wanted} was taken away while it was recorded: its rows are rescued into it anew")
+            told, self._news = "; ".join(self._news) or None, []
+            return told
+
+    def _look_on_top(self) -> None:
+        """Follow the folder of all parts, or make another for the parts that come."""
+        if self._lock < 0 or moved.in_place(self._lock, self.folder):
+            return
+        before, now = self.folder, moved.place(self._lock)
+        if now is not None:
+            self.folder = now
+            self._news.append(f"{before} was renamed while it was recorded: the recording is now {now}")
+            return
+        folder = moved.beside(before)
+        folder.mkdir(parents=True)
+        save_case(folder, {**self.case, "complete": False, "parts": []})
+        guard = os.open(folder, os.O_RDONLY)
+        lock(guard, folder)
+        self._unlock()
+        self._lock, self.folder = guard, folder
+        gone = f"; {len(self._known)} full parts went with it" if self._known else ""
+        self._news.append(f"{before} was deleted while it was recorded: its rows are rescued into {folder}{gone}")
 
     def close(self) -> None:
         """No more rows. Raises OSError where the disk does not take the end."""
@@ -109,13 +144,20 @@ class Parts:
         or for another call.
         """
         if self._thread.is_alive():
+            self._known[self._part.folder.name] = (self._began, self._part.rows)
             self._full.put(_Full(self._part, self._lost(self._first_tick, END)))
             self._full.put(None)
             self._thread.join()
         again, self._failed = self._failed, []
         for full in again:  # somebody may have made room since
             self._make(full)
-        known = {**self.case, **extra, "rows": self.rows, **told(losses, error), **index(self.folder)}
+        found = index(self.folder)
+        there = {entry["folder"] for entry in found["parts"]} | {full.part.folder.name for full in self._failed}
+        gone = [part for name, part in self._known.items() if name not in there and part[1]]
+        for tick, count in gone:  # deleted meanwhile, to make room or with all of the folder
+            losses.add(tick, count)
+        rows = self.rows - sum(count for _, count in gone)
+        known = {**self.case, **extra, "rows": rows, **told(losses, error), **found}
         try:
             save_case(self.folder, {**known, "complete": known["complete"] and not self._failed})
             for entry in known["parts"]:
@@ -132,8 +174,11 @@ class Parts:
         self._lock = -1
 
     def _rotate(self, tick: int) -> None:
+        with self._looking:
+            self._look_on_top()  # else the next part would make a folder anew that was taken away
         part = self._next()  # first: where the disk is full, the part that is open stays what it is
         self._before = (self.rows, self.bytes)
+        self._known[self._part.folder.name] = (self._began, self._part.rows)
         self._full.put(_Full(self._part, self._lost(self._first_tick, tick)))
         self._part, self._first_tick = part, tick
 
@@ -147,6 +192,9 @@ class Parts:
 
     def _make(self, full: _Full) -> None:
         try:
+            with self._looking:
+                self._look_on_top()
+                full.part.follow(self.folder / full.part.folder.name)
             full.part.close()
             full.part.finish({}, full.losses, None)
         except Exception:  # a full disk, mostly; the stream stays, and `finish` tries again and tells

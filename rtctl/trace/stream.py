@@ -18,6 +18,7 @@ import pyarrow as pa
 
 from rtctl.config.errors import UserError
 from rtctl.config.files import open_stream
+from rtctl.trace import moved
 from rtctl.trace.columns import Column, record_batch, schema
 
 END_OF_STREAM = b"\xff\xff\xff\xff\x00\x00\x00\x00"
@@ -57,6 +58,25 @@ class StreamWriter:
         self._append(record_batch(rows, self.schema).serialize())
         self.rows += len(rows)
         return len(rows)
+
+    def is_at(self, path: Path) -> bool:
+        """Whether `path` still names the file. True for one that is closed."""
+        return self._file < 0 or moved.in_place(self._file, path)
+
+    def place(self) -> Path | None:
+        """Present path of the file; None where it was deleted, or is closed."""
+        return moved.place(self._file) if self._file >= 0 else None
+
+    def move(self, path: Path) -> None:
+        """Copy what was written into a new file at `path` and go on there. Raises OSError; the old file stays then."""
+        new = moved.copied(self._file, path)
+        try:
+            lock(new, path)
+        except BaseException:
+            os.close(new)
+            raise
+        self._shut()
+        self._file = new
 
     def close(self) -> None:
         """End the stream and bring it to the disk. Raises OSError only if no earlier call did. May be called again."""

@@ -1,10 +1,112 @@
-"""Trips in the log: each once, with its cause, its tick and the signals of the machine."""
+"""Trips in the log, and troubles of the recording: said and logged at once, and in the exit code of `rtctl run`."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 from structlog.testing import capture_logs
 
-from rtctl.daemon.events import Trips
+from rtctl.cli.console import RunConsole
+from rtctl.cli.main import main
+from rtctl.config.errors import RunFailed
+from rtctl.config.load import to_yaml
+from rtctl.daemon.events import Recording, Trips
+from rtctl.daemon.session import whole
+from rtctl.daemon.supervisor import Supervisor
 from rtctl.loop import safety
+from rtctl.trace import moved, recorder
+from rtctl.trace.bundle import load_bundle
+from rtctl.trace.orders import orders
+from rtctl.trace.stream import StreamWriter
+
+Run = Callable[[Callable[[Path], Any]], tuple[int, dict[str, Any], str]]
+
+
+@pytest.fixture
+def run(
+    runtime: Path,
+    config: Callable[..., Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> Run:
+    """`run(what)` is `rtctl run` of 60 s with `what(folder)` in the middle: exit code, JSON, standard error."""
+    monkeypatch.setattr(recorder, "LOOK", 0.0)
+    settings = config(set={"record.seconds": 2.0})
+    (tmp_path / "ivu.yaml").write_text(to_yaml(settings))
+
+    def play(what: Callable[[Path], Any]) -> tuple[int, dict[str, Any], str]:
+        done: list[bool] = []
+
+        def update(_: RunConsole, supervisor: Supervisor) -> None:
+            if not done and supervisor.status["tick"] > 2000:
+                done.append(True)
+                what(tmp_path / "bundle")
+
+        monkeypatch.setattr(RunConsole, "update", update)
+        words = ["run", str(tmp_path / "ivu.yaml"), "--for", "60s", "--out", str(tmp_path / "bundle"), "--json"]
+        code = main(words)
+        out, err = capfd.readouterr()
+        assert done
+        return code, json.loads(out or "{}"), err
+
+    return play
+
+
+def test_a_folder_that_is_renamed_in_a_run(run: Run, tmp_path: Path) -> None:
+    code, result, said = run(lambda folder: folder.rename(folder.with_name("other")))
+    assert code == 1 and result["bundle"] == str(tmp_path / "other")
+    assert f"recording: {tmp_path / 'bundle'} was renamed while it was recorded" in " ".join(said.split())
+    assert "the recording is now" in result["rows"]["error"] and result["rows"]["recorded"] == 30_000
+    assert len(load_bundle(tmp_path / "other").columns["tick"]) == 30_000 and not (tmp_path / "bundle").exists()
+    assert (tmp_path / "other" / "run.png").exists()
+
+
+def test_a_folder_that_is_deleted_in_a_run(run: Run, tmp_path: Path) -> None:
+    code, result, _ = run(shutil.rmtree)
+    rescued = tmp_path / "bundle-rescued"
+    assert code == 1 and result["bundle"] == str(rescued) and "was deleted" in result["rows"]["error"]
+    assert len(load_bundle(rescued).columns["tick"]) == 30_000 and len(orders(rescued)) == 1
+
+
+def test_a_disk_that_is_full_is_the_exit_code(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any) -> int:
+        raise OSError(28, "No space left on device")
+
+    code, result, said = run(lambda _: monkeypatch.setattr(StreamWriter, "write", full))
+    assert code == 1 and result["ticks"] == 30_000 and result["lost_rows"] > 0
+    assert "No space left" in result["rows"]["error"] and "recording: [Errno 28] No space left" in said
+
+
+def test_a_program_goes_on_with_a_whole_recording_only() -> None:
+    good = {"interrupted": False, "rows": {"error": None}}
+    assert whole(good) is good
+    with pytest.raises(RunFailed, match="recording: full"):
+        whole({**good, "rows": {"error": "full"}})
+    with pytest.raises(KeyboardInterrupt):
+        whole({**good, "interrupted": True})
+
+
+def test_rows_that_cannot_be_rescued_are_told_as_lost(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(moved, "copied", full)
+    code, _, said = run(shutil.rmtree)
+    assert code == 2 and "the rows could not be rescued: they are lost" in said.splitlines()[-1]
+
+
+def test_a_trouble_is_said_once() -> None:
+    said: list[str] = []
+    watch = Recording(said.append)
+    for trouble in (None, "full", "full", "full; moved", "full; moved"):
+        watch.look(trouble)
+    assert said == ["recording: full", "recording: full; moved"]
+
 
 ROW = np.dtype([("tick", "<i8"), ("t", float), ("trip", float), ("link_age", float), ("x", float), ("truth_x", float)])
 

@@ -236,8 +236,10 @@ def test_a_capture_has_the_rows_around_its_trigger(live: Callable[..., Live], tm
     assert all(np.array_equal(rows[n], trace[n][here], equal_nan=True) for n in trace)
 
 
-def test_the_loop_that_dies_is_an_error_with_its_last_words(live: Callable[..., Live]) -> None:
+def test_the_loop_that_dies_is_a_failure_and_its_recording_is_whole(live: Callable[..., Live]) -> None:
     machine = live()
     os.kill(machine.of.loop.pid, signal.SIGKILL)
     machine.thread.join(10)
-    assert isinstance(machine.error, RuntimeError) and "the loop's process died" in str(machine.error)
+    assert machine.error is None and "the loop's process died" in str(machine.of.failure)
+    folder = machine.of.finish()
+    assert folder is not None and load_bundle(folder).case["run"]["failure"] == str(machine.of.failure)

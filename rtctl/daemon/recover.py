@@ -1,0 +1,106 @@
+"""Recovery of the rows that a killed daemon left in shared memory: `rtctl trace recover NAME`.
+
+The segment of a dead daemon is moved aside under the machine's lock, so that the next start need not wait. A segment
+is removed once its rows are on the disk.
+"""
+
+import re
+from datetime import datetime
+from pathlib import Path
+from typing import NamedTuple
+
+from rtctl.config.errors import UserError, nearest
+from rtctl.daemon import leftover, shared_memory
+from rtctl.daemon.lock import MachineLock
+from rtctl.trace import join
+
+NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
+
+
+class Recovered(NamedTuple):
+    """What became of the rows of one segment."""
+
+    segment: Path  # removed
+    bundle: Path | None  # that the rows are in now; None where there was no row
+    rows: int  # that were recovered
+    ticks: tuple[int, int] | None  # first and last of them
+    lost: int  # rows that are in neither
+    alone: str | None  # why they make a bundle of their own
+
+    def __str__(self) -> str:
+        if self.ticks is None:
+            lacks = "it holds no row" if self.bundle is None else f"{self.bundle} lacks none of its rows"
+            return f"{self.segment}: {lacks}; removed"
+        own = f", a bundle of its own ({self.alone})" if self.alone else ""
+        lost = f"{self.lost} rows are lost" if self.lost else "none is lost"
+        return f"{self.bundle}: {self.rows} rows recovered, ticks {self.ticks[0]} to {self.ticks[1]}, {lost}{own}"
+
+
+def recover(name: str, out: Path | None = None) -> tuple[list[Recovered], list[str]]:
+    """Join the rows of all segments of a machine to their recordings. Returns those done, and what could not be done.
+
+    `out` is where the recording lies now, or a new folder for rows without one; NAME-recovered-DATE-TIME if not given.
+    Raises UserError where there is no segment, or none but that of a daemon that runs.
+    """
+    if not NAME.fullmatch(name):
+        raise UserError(f"'{name}' is no machine's name: letters, digits, '_' and '-', at most 40")
+    running: UserError | None = None
+    try:
+        with MachineLock(shared_memory.lock_path(name), name):
+            shared_memory.put_aside(name, most=None)
+    except UserError as error:
+        running = error
+    left = shared_memory.kept(name)
+    if not left:
+        raise running or _nothing(name)
+    done, troubles = [], []
+    for segment in left:
+        try:
+            done.append(_segment(name, segment, out))
+        except UserError as error:
+            troubles.append(f"{error}; {segment} is kept")
+        except OSError as error:
+            troubles.append(f"the disk did not take the rows of {segment}, which is kept: {error.strerror or error}")
+    return done, troubles
+
+
+def _segment(name: str, path: Path, out: Path | None) -> Recovered:
+    with leftover.opened(path) as left:
+        found = _bundle(left, out)
+        if not len(left.rows) and found is None:
+            done, why = None, None
+        elif found is not None:
+            done, why = join.join(found, left.rows, left.columns, left.case), None
+        else:
+            why = (
+                "the run was not recorded" if left.bundle is None else f"its recording is not at {left.bundle} any more"
+            )
+            done = join.alone(_free(name, path, out), left.rows, left.columns, left.case)
+        shared_memory.remove(path)  # all is on the disk
+    if done is None:
+        return Recovered(path, None, 0, None, 0, None)
+    ticks = None if done.first is None or done.last is None else (done.first, done.last)
+    return Recovered(path, done.folder, done.rows, ticks, done.lost, why)
+
+
+def _bundle(left: leftover.Leftover, out: Path | None) -> Path | None:
+    """Folder of the recording of the same run; None where it is gone."""
+    return next((place for place in (left.bundle, out) if place is not None and join.is_of(place, left.case)), None)
+
+
+def _free(name: str, path: Path, out: Path | None) -> Path:
+    """A folder that is not there yet, or is empty."""
+    when = datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y%m%d-%H%M%S")
+    base = out if out is not None else Path(f"{name}-recovered-{when}")
+    folder, number = base, 2
+    while folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        folder, number = base.with_name(f"{base.name}-{number}"), number + 1
+    return folder
+
+
+def _nothing(name: str) -> UserError:
+    others = [other for other in shared_memory.names() if other != name]
+    meant = nearest(name, others)
+    hint = f"; did you mean '{meant}'?" if meant else f"; there is {', '.join(others)}" if others else ""
+    where = shared_memory.shared_folder()
+    return UserError(f"no rows of a killed '{name}' are in {where}, the shared memory of this user{hint}")

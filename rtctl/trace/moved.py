@@ -1,0 +1,53 @@
+"""Open file whose name was taken away: where the file is now, and a copy of one that was deleted.
+
+A folder that is renamed, moved or deleted does not stop a write(2): without a look at the name, rows go on into a file
+that nobody finds.
+"""
+
+import os
+import shutil
+import stat
+from pathlib import Path
+
+
+def in_place(fd: int, path: Path) -> bool:
+    """Whether `path` still names the open file or folder. A pipe or a device is in place always."""
+    found = os.fstat(fd)
+    if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+        return True
+    try:
+        return os.path.samestat(found, path.lstat())
+    except OSError:
+        return False
+
+
+def place(fd: int) -> Path | None:
+    """Present path of an open file or folder; None where it was deleted or cannot be found."""
+    try:
+        path = Path(os.readlink(f"/proc/self/fd/{fd}"))  # noqa: PTH115
+    except OSError:
+        return None
+    return path if in_place(fd, path) else None
+
+
+def copied(fd: int, path: Path) -> int:
+    """Descriptor of a new file at `path` that holds all bytes of an open one, deleted or not. Raises OSError."""
+    new = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
+    try:
+        with Path(f"/proc/self/fd/{fd}").open("rb") as old, os.fdopen(os.dup(new), "wb") as file:
+            shutil.copyfileobj(old, file, 1 << 20)
+        os.fsync(new)
+    except BaseException:
+        os.close(new)
+        path.unlink(missing_ok=True)
+        raise
+    return new
+
+
+def beside(folder: Path) -> Path:
+    """Name of a folder beside one that was deleted, NAME-rescued, which is free."""
+    base = folder.with_name(f"{folder.name}-rescued")
+    found, number = base, 2
+    while os.path.lexists(found):
+        found, number = base.with_name(f"{base.name}-{number}"), number + 1
+    return found
