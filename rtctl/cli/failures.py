@@ -36,6 +36,7 @@ ADVICE = {
     errno.ESTALE: "the network file system has lost that file; open it again",
     errno.ENOTSUP: "that file system cannot do this; write elsewhere with -o",
 }
+NUMBA_SETTINGS = ".numba_config.yaml"
 
 
 def words(error: BaseException) -> str | None:
@@ -61,6 +62,8 @@ def _one(error: BaseException) -> str | None:
         return f"not enough memory; {ADVICE[errno.ENOMEM]}"
     if type(error).__name__ == "BrokenProcessPool":
         return "a worker process was killed, most likely by the kernel for want of memory; try --jobs 1, look at dmesg"
+    if type(error).__module__.partition(".")[0] == "yaml" and NUMBA_SETTINGS in str(error):
+        return f"{NUMBA_SETTINGS} in this folder is read by numba, and is no YAML; run rtctl in another folder"
     return None
 
 

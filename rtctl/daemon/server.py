@@ -20,6 +20,7 @@ import zmq
 
 from rtctl import __version__
 from rtctl.config.errors import UserError
+from rtctl.config.private import SOCKETS, check
 from rtctl.daemon.client import Client
 from rtctl.daemon.keys import ServerCurve, apply_server, refuse_open, require_curve
 from rtctl.daemon.protocol import VERSIONS, Args, ProtocolError, decode_request, encode_error, encode_result
@@ -126,7 +127,9 @@ def runtime_dir() -> Path:
     """
     given = os.environ.get("XDG_RUNTIME_DIR")
     if given:
-        return _made(Path(given) / "rtctl")
+        folder = _made(Path(given) / "rtctl")
+        check(folder, SOCKETS)
+        return folder
     if os.access(SYSTEM_DIR, os.W_OK | os.X_OK):
         return SYSTEM_DIR
     folder = _made(TEMPORARY_DIR / f"rtctl-{os.geteuid()}")
