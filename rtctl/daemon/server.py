@@ -20,6 +20,7 @@ import zmq
 
 from rtctl import __version__
 from rtctl.config.errors import UserError
+from rtctl.config.failures import words
 from rtctl.config.private import SOCKETS, check
 from rtctl.daemon.client import Client
 from rtctl.daemon.keys import ServerCurve, apply_server, refuse_open, require_curve
@@ -98,6 +99,8 @@ class CommandServer:
         except ProtocolError as error:
             return self._refuse(request.id, error.code, f"the result of '{request.op}' is {error.message}")
         except Exception as error:
+            if (said := words(error)) is not None:
+                return self._refuse(request.id, "refused", said)
             log.exception("command failed", op=request.op)
             return self._refuse(request.id, "internal", f"'{request.op}' failed: {type(error).__name__}: {error}")
         self.accepted += 1
