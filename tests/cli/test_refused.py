@@ -82,7 +82,7 @@ COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
     "check": lambda here, out: ["check", str(here / "axis.yaml")],
     "import": lambda here, out: [*IMPORT, str(here / "log.csv"), "-o", str(out / "made")],
     "new": lambda here, out: ["new", "law", "refused", "--into", str(out / "laws")],
-    "repair": lambda here, out: ["trace", "repair", str(here / "imported")],
+    "repair": lambda here, out: ["trace", "repair", str(here / "repaired")],
     "export": lambda here, out: ["trace", "export", str(here / "imported"), "--to", "csv", "-o", str(out / "x.csv")],
     "compare": lambda here, out: ["trace", "compare", str(here / "recorded"), str(here / "recorded")],
     "plot": lambda here, out: ["trace", "plot", str(here / "recorded"), "-o", str(out / "x.png")],
@@ -95,7 +95,7 @@ COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
 }
 RUN = ("run", "ivu", "--mode", "fused", "--for", "0.1s", "--no-plot")
 IMPORT = ("import", "--plant", "axis", "--parameter", "M=1")
-TRIED = {"run": 2, "campaign": 5, "reproduce": 2, "diagnose": 8}  # calls refused where a command takes long; else 24
+TRIED = {"run": 2, "campaign": 5, "reproduce": 2, "diagnose": 4}  # calls refused where a command takes long; else 24
 FILLED = {"run": 1, "campaign": 3, "reproduce": 1}  # sizes of a full disk, from small to large
 
 
@@ -106,6 +106,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "matrix.yaml").write_text(MATRIX)
     shutil.copy(Path(__file__).parents[2] / "configs" / "axis.yaml", folder)
     assert main([*IMPORT, str(log_of(folder)), "-o", str(folder / "imported")]) == 0
+    shutil.copytree(folder / "imported", folder / "repaired")
     record(load_config("ivu", {"name": "refused"}), 0.1, folder / "recorded")
     return folder
 
