@@ -14,10 +14,10 @@ What a script needs, under one name each. Every name is loaded when it is first 
 Of everything below these names, only what docs/ describes stays as it is from one version to the next.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # `python -m rtctl` would look for the module `typing` in the current folder
 if TYPE_CHECKING:
+    from typing import Any
+
     from rtctl.api import change, connect, load_config, record, run, run_campaign, steps
     from rtctl.config.errors import NoAnswer, RunFailed, UserError
     from rtctl.daemon.client import Client
@@ -57,7 +57,9 @@ _WHERE = {  # name -> module and name there
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
+    import importlib
+
     if name not in _WHERE:
         raise AttributeError(f"module 'rtctl' has no attribute '{name}'")
     module, _, there = _WHERE[name].partition(":")

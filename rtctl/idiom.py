@@ -21,8 +21,11 @@ from numba import njit, typeof
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
+from rtctl.config.cache import check_numba
 from rtctl.config.units import to_si
 from rtctl.step_cache import StepCache
+
+check_numba()  # once, before the first function is compiled or loaded
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": False}
 INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}

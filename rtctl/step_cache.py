@@ -15,8 +15,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from rtctl.config.cache import cache_folder, check, made
+from rtctl.config.cache import cache_folder
 from rtctl.config.files import replaced
+from rtctl.config.private import check, made
 from rtctl.sources import files, sources_hash
 
 

@@ -74,9 +74,10 @@ def _starting(kind: str, incomplete: str) -> list[str]:
 def words() -> dict[str, list[str]]:
     """Keys, faults and terms, from a file in the cache: the settings take half a second to import."""
     from rtctl import __version__
-    from rtctl.config.cache import cache_folder, made
+    from rtctl.config.cache import cache_folder
     from rtctl.config.errors import UserError
     from rtctl.config.files import write_text
+    from rtctl.config.private import made
 
     try:
         file = cache_folder() / f"completion-{__version__}.json"

@@ -3,15 +3,14 @@
 import contextlib
 import os
 import sys
-import traceback
 from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
 
-from rtctl.cli.failures import words
 from rtctl.cli.lazy import LazyGroup
 from rtctl.config.errors import NoAnswer, RunFailed, UserError
+from rtctl.config.failures import told
 from rtctl.config.isolated import isolate
 
 # Name of each command, in the order of `rtctl --help`, and its module here. Modules import nothing heavy.
@@ -101,12 +100,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return 130
     except Exception as error:
-        if (said := words(error)) is not None:
+        code, said = told(error)
+        if code == 2:
             _forget_output()
-            return _fail(said, 2)
-        if os.environ.get("RTCTL_TRACEBACK"):
-            traceback.print_exc()
-        return _fail(f"internal error: {error!r}; RTCTL_TRACEBACK=1 shows where", 1)
+        return _fail(said, code)
 
 
 def _forget_output() -> None:

@@ -5,13 +5,17 @@ folder has to be of this user, or of root to read from, and closed to others.
 """
 
 import os
-import stat
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
 import platformdirs
 
 from rtctl.config.errors import UserError
+from rtctl.config.private import COMPILED, check, made
+
+NUMBA = "NUMBA_CACHE_DIR"
+SETTINGS = ".numba_config.yaml"  # numba takes it from the current folder
 
 
 def cache_folder() -> Path:
@@ -23,13 +27,28 @@ def cache_folder() -> Path:
     return _checked(Path(given) if given else Path(platformdirs.user_cache_dir("rtctl")), os.geteuid())
 
 
-def made(folder: Path) -> Path:
-    """The folder, made where it is missing, of mode 0700. Raises OSError, UserError as `cache_folder`."""
-    missing = [p for p in (folder, *folder.parents) if not p.exists()]
-    for path in reversed(missing):
-        path.mkdir(mode=0o700, exist_ok=True)
-    check(folder)
-    return folder
+def check_compiled(folder: Path) -> None:
+    """Before numba loads machine code of the modules in `folder`. Raises UserError where others may have written it.
+
+    numba makes its folders with the umask of the user, hence the folder of machine code is made here.
+    """
+    with suppress(OSError):  # read-only: shared by its owner
+        made(folder / "__pycache__")
+    check(folder / "__pycache__")
+    check_numba()
+
+
+def check_numba() -> None:
+    """Where numba is told to take its settings and machine code from. Raises UserError where others may write there."""
+    if Path(SETTINGS).is_file():
+        raise UserError(
+            f"{Path(SETTINGS).absolute()} would say how numba compiles and whose machine code is run; run rtctl in "
+            "another folder, and give settings of numba as variables (NUMBA_...)"
+        )
+    given = os.environ.get(NUMBA)
+    if given:
+        for folder in (Path(given), *(path for path in Path(given).glob("*") if path.is_dir())):
+            check(folder, COMPILED)
 
 
 @lru_cache(maxsize=8)
@@ -39,33 +58,3 @@ def _checked(folder: Path, user: int) -> Path:
         raise UserError(f"{folder}: the home folder {home} does not exist; set RTCTL_CACHE_DIR to a folder of yours")
     check(folder)
     return folder
-
-
-def check(folder: Path) -> None:
-    """Raise UserError where somebody else could put code into a folder that rtctl loads from.
-
-    Root may own it, and any folder above it. A folder above that others may write needs the sticky bit.
-    """
-    folder = folder.absolute()
-    for path in (folder, *folder.parents):
-        try:
-            found = path.lstat()
-        except OSError:
-            continue  # not there yet
-        where = f"cache folder {folder}" if path == folder else f"{path}, above the cache folder {folder},"
-        if found.st_uid not in (os.geteuid(), 0):
-            raise UserError(
-                f"{where} belongs to user {found.st_uid}, not to this user ({os.geteuid()}), and what lies there would "
-                "be run; set RTCTL_CACHE_DIR to a folder of yours"
-            )
-        if stat.S_ISLNK(found.st_mode):
-            if path == folder:
-                check(folder.resolve())
-                return
-            continue
-        sticky = path != folder and found.st_mode & stat.S_ISVTX
-        if found.st_mode & 0o022 and not sticky:
-            raise UserError(
-                f"{where} may be written by others (mode {stat.S_IMODE(found.st_mode):04o}), and what lies there would "
-                f"be run; run: chmod go-w {path}, or set RTCTL_CACHE_DIR to a folder of yours"
-            )

@@ -41,9 +41,10 @@ def replaced(path: Path | str, mode: str = "w", sync: bool = False) -> Iterator[
             os.replace(name, path.name, src_dir_fd=folder, dst_dir_fd=folder)
             if sync:
                 os.fsync(folder)
-        except BaseException:
+        except BaseException as error:
             with suppress(OSError):
                 os.unlink(name, dir_fd=folder)
+            _name(error, path)
             raise
     finally:
         os.close(folder)
@@ -62,6 +63,9 @@ def replaced_path(path: Path | str, suffix: str | None = None) -> Iterator[Path]
         draft = private / f"draft{path.suffix if suffix is None else suffix}"
         yield draft
         draft.replace(path)
+    except OSError as error:
+        _name(error, path)
+        raise
     finally:
         shutil.rmtree(private, ignore_errors=True)
 
@@ -117,6 +121,12 @@ def _created(folder: int, name: str) -> tuple[str, int]:
     """Name and descriptor of a new file in an open folder."""
     draft = f".{name[:200]}.{secrets.token_hex(8)}.tmp"
     return draft, os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, MODE, dir_fd=folder)
+
+
+def _name(error: BaseException, path: Path) -> None:
+    """Let an error of a write, which knows a descriptor only, tell the file."""
+    if isinstance(error, OSError) and error.errno is not None and error.filename is None:
+        error.filename = str(path)
 
 
 def _replaceable(path: Path) -> None:

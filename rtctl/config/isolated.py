@@ -1,7 +1,7 @@
 """Python processes of rtctl that import nothing from the current folder, whatever lies there.
 
 The flag -P leaves the current folder out of the path of imports. A folder in PYTHONPATH, a user's site and an editable
-installation still count, which -I would leave out.
+installation still count, which -I would leave out. This module imports what the interpreter has loaded already.
 """
 
 import os
@@ -19,6 +19,7 @@ def isolate() -> None:
     `python -m` and `python -c` put the current folder first; a folder that PYTHONPATH or an installation names stays.
     """
     os.environ["PYTHONSAFEPATH"] = "1"
+    os.environ.setdefault("NUMBA_CACHE_DIR", "")  # else .numba_config.yaml of the current folder may name one
     sys.path[:] = [folder for folder in sys.path if folder]
     if not sys.flags.safe_path and sys.path and sys.path[0] == _here() and not _is_given(sys.path[0]):
         del sys.path[0]

@@ -28,14 +28,12 @@ class MachineLock:
             try:
                 self._take()
                 if self._in_place():
-                    break
+                    self._sign()
+                    return self
             except BaseException:
                 self._close()
                 raise
             self._close()  # its last holder has removed it between our opening and locking it: take the next
-        os.ftruncate(self._fd, 0)
-        os.write(self._fd, (f"{os.getpid()}\n" + (f"{self._sockets}\n" if self._sockets else "")).encode())
-        return self
 
     def __exit__(self, *_: Any) -> None:
         if self._in_place():  # removed while it is held, so that nothing is left that another user could not open
@@ -72,6 +70,11 @@ class MachineLock:
             raise UserError(
                 f"{self._path}: this file system locks no files ({error.strerror}); set XDG_RUNTIME_DIR to another"
             ) from None
+
+    def _sign(self) -> None:
+        """Write pid and sockets for people. Raises OSError where the disk is full."""
+        os.ftruncate(self._fd, 0)
+        os.write(self._fd, (f"{os.getpid()}\n" + (f"{self._sockets}\n" if self._sockets else "")).encode())
 
     def _in_place(self) -> bool:
         """Whether the file that we hold is still the one at its path."""

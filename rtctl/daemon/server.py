@@ -20,6 +20,8 @@ import zmq
 
 from rtctl import __version__
 from rtctl.config.errors import UserError
+from rtctl.config.failures import words
+from rtctl.config.private import SOCKETS, check
 from rtctl.daemon.client import Client
 from rtctl.daemon.doors import Door, listen_ipc, listen_tcp
 from rtctl.daemon.keys import ServerCurve, apply_server, refuse_open, require_curve
@@ -100,6 +102,8 @@ class CommandServer:
         except ProtocolError as error:
             return self._refuse(request.id, error.code, f"the result of '{request.op}' is {error.message}")
         except Exception as error:
+            if (said := words(error)) is not None:
+                return self._refuse(request.id, "refused", said)
             log.exception("command failed", op=request.op)
             return self._refuse(request.id, "internal", f"'{request.op}' failed: {type(error).__name__}: {error}")
         self.accepted += 1
@@ -129,7 +133,9 @@ def runtime_dir() -> Path:
     """
     given = os.environ.get("XDG_RUNTIME_DIR")
     if given:
-        return _made(Path(given) / "rtctl")
+        folder = _made(Path(given) / "rtctl")
+        check(folder, SOCKETS)
+        return folder
     if os.access(SYSTEM_DIR, os.W_OK | os.X_OK):
         return SYSTEM_DIR
     folder = _made(TEMPORARY_DIR / f"rtctl-{os.geteuid()}")

@@ -10,7 +10,6 @@ import os
 import signal
 import threading
 import time
-import traceback
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.failures import told
 from rtctl.config.files import replaced_path, write_text
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
 
@@ -94,9 +94,7 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
         except UserError:
             raise
         except Exception as error:  # a figure that fails must not take the verdict with it
-            if os.environ.get("RTCTL_TRACEBACK"):
-                traceback.print_exc()
-            faults.append(f"the report is not written: internal error: {error!r}; RTCTL_TRACEBACK=1 shows where")
+            faults.append(f"the report is not written: {told(error)[1]}")
     result = json.dumps(finite(as_json(d)), indent=1) + "\n"
     _put(folder / RESULT, lambda path: write_text(path, result))
     return faults
@@ -190,9 +188,8 @@ def one(task: Task, report: bool) -> Outcome:
     except (UserError, NoAnswer) as error:
         return Outcome(task.name, error.exit_code, time.monotonic() - began, message=_line(error))
     except Exception as error:
-        if os.environ.get("RTCTL_TRACEBACK"):
-            traceback.print_exc()
-        return Outcome(task.name, OURS, time.monotonic() - began, message=f"internal error: {error!r}")
+        code, message = told(error)
+        return Outcome(task.name, code, time.monotonic() - began, message=message)
 
 
 def _line(error: Exception) -> str:

@@ -21,9 +21,10 @@ import numba
 import numpy as np
 
 from rtctl import __version__
-from rtctl.config.cache import cache_folder, check, made
+from rtctl.config.cache import cache_folder, check_compiled
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text as write_file
+from rtctl.config.private import made
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import excitation, reference
 from rtctl.loop import faults, frames, runner, shm_link
@@ -181,7 +182,7 @@ def load(path: Path) -> ModuleType:
     name = f"rtctl_generated_{path.stem}"
     if name in sys.modules:
         return sys.modules[name]
-    check(path.parent / "__pycache__")  # numba's machine code lies there
+    check_compiled(path.parent)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -124,7 +124,7 @@ def load_case(folder: Path) -> dict[str, Any]:
     except FileNotFoundError:
         raise UserError(f"{path} is missing; it says what the owner believes of the machine") from None
     except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}") from None
+        raise UserError(f"{path} cannot be read: {error.strerror}") from error  # which may pass
     except UnicodeDecodeError as error:
         raise UserError(f"{path} is not text in UTF-8: byte {error.start}") from None
     except json.JSONDecodeError as error:

@@ -97,7 +97,8 @@ def _on_top(folder: Path, rows: int, notes: list[str]) -> bool:
         case = load_case(folder)
         if (case.get("parts"), case.get("rows")) == (found["parts"], rows):
             return False
-    except UserError:
+    except UserError as error:
+        _not_refused(error)
         newest = folder / found["parts"][-1]["folder"]  # it knows of all changes
         case = {**load_case(newest), "losses": {}}
         case.pop("part", None)
@@ -187,6 +188,7 @@ def _case(folder: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     try:
         return load_case(folder), ()
     except UserError as error:
+        _not_refused(error)
         notes = [str(error)]
     path = folder / CASE
     if path.exists():
@@ -200,6 +202,12 @@ def _case(folder: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     return case, tuple(notes)
 
 
+def _not_refused(error: UserError) -> None:
+    """Raise it where the computer refused to read a file, which may be whole (a right, a limit of open files)."""
+    if isinstance(error.__cause__, OSError):
+        raise error
+
+
 def _embedded(folder: Path) -> dict[str, Any] | None:
     """The case as the recorder put it into the recording."""
     text = (pq.read_schema(folder / PARQUET).metadata or {}).get(b"case")
@@ -207,7 +215,14 @@ def _embedded(folder: Path) -> dict[str, Any] | None:
 
 
 def _rows_in(parquet: Path) -> int | None:
+    """Rows of a Parquet file; None where there is none, or a damaged one. Raises OSError where it may not be read."""
     try:
         return pq.read_metadata(parquet).num_rows
-    except (OSError, pa.ArrowException):
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        if error.errno is not None:  # of the computer; that of a damaged file has none
+            raise
+        return None
+    except pa.ArrowException:
         return None

@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 import shutil
@@ -202,6 +203,30 @@ def test_no_room_for_the_result_leaves_everything(tmp_path, recording, small_dis
         repair(folder)
     assert (folder / "recording.arrows").read_bytes() == recording[0]
     assert repair(folder).rows == sum(SIZES)
+
+
+@pytest.mark.parametrize("name", ["case.json", "recording.parquet"])
+def test_a_file_that_cannot_be_read_now_is_not_taken_for_damaged(tmp_path, recording, monkeypatch, name):
+    """A limit of open files passes; the case and the rows of the recording are whole."""
+    folder = killed(tmp_path / "run", recording[0])
+    repair(folder)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    (folder / "recording.arrows").write_bytes(recording[0][: recording[2][1]])  # fewer rows
+
+    where, read = (Path, "read_text") if name == "case.json" else (repair_module.pq, "read_metadata")
+    original, calls = getattr(where, read), []
+
+    def refused(*given, **options):
+        calls.append(given)
+        if len(calls) == 1:
+            raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+        return original(*given, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(where, read, refused)
+        with pytest.raises((UserError, OSError), match="open files"):
+            repair(folder)
+    assert {path.name: path.read_bytes() for path in folder.iterdir() if path.name in before} == before
 
 
 def test_refuses_what_is_no_recording_or_still_runs(tmp_path):

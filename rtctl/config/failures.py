@@ -6,6 +6,7 @@ internal error.
 
 import errno
 import os
+import traceback
 from typing import Any
 
 # errno -> what to do. Everything here comes from the computer or from a path that the user gave.
@@ -36,6 +37,17 @@ ADVICE = {
     errno.ESTALE: "the network file system has lost that file; open it again",
     errno.ENOTSUP: "that file system cannot do this; write elsewhere with -o",
 }
+LOADING = "memory or open files may be limited (`ulimit -v`, `ulimit -n`), or a package be damaged: install it again"
+NUMBA_SETTINGS = ".numba_config.yaml"
+
+
+def told(error: BaseException) -> tuple[int, str]:
+    """Exit code and sentence of any exception: 2 for what the computer refuses, 1 for our mistake."""
+    if (said := words(error)) is not None:
+        return 2, said
+    if os.environ.get("RTCTL_TRACEBACK"):
+        traceback.print_exception(error)
+    return 1, f"internal error: {error!r}; RTCTL_TRACEBACK=1 shows where"
 
 
 def words(error: BaseException) -> str | None:
@@ -59,8 +71,13 @@ def _one(error: BaseException) -> str | None:
         return f"{place}{what[:1].lower()}{what[1:]}; {ADVICE[number]}"
     if isinstance(error, MemoryError):
         return f"not enough memory; {ADVICE[errno.ENOMEM]}"
+    if isinstance(error, ImportError | OSError) and "shared object" in str(error):
+        why = next(line for line in str(error).splitlines() if "shared object" in line)
+        return f"a library cannot be loaded: {why.strip().rstrip('.')}; {LOADING}"
     if type(error).__name__ == "BrokenProcessPool":
         return "a worker process was killed, most likely by the kernel for want of memory; try --jobs 1, look at dmesg"
+    if type(error).__module__.partition(".")[0] == "yaml" and NUMBA_SETTINGS in str(error):
+        return f"{NUMBA_SETTINGS} in this folder is read by numba, and is no YAML; run rtctl in another folder"
     return None
 
 
