@@ -205,10 +205,10 @@ STRIBECK = Term(
     act={"force": "{m}.dry[{i}] += {r} * friction.stribeck({p}, {m}.dry_base[{i}] / {r}, {r} * {m}.vm[{i}])"},
     nodes=SHAFTS,
     look_alikes={
-        "friction.presliding": "reverse within microns: a spring with hysteresis is presliding",
+        "friction.presliding": "reverse by a tiny way: a spring with hysteresis is presliding",
         "friction.coulomb": "constant speeds from crawl to full: Coulomb stays flat",
         "friction.load": "break away at three tensions: sticking is there without any tension",
-        "drive.deadband": "break away against a spring: sticking shows in force, the dead band in voltage only",
+        "drive.deadband": "break away against a spring: sticking shows in force, the dead band in the command only",
     },
     typical={"F_s": (1.1, 2.0), "v_s": (0.02, 0.3)},
     scale={"F_s": "dry", "v_s": "speed"},

@@ -195,8 +195,8 @@ CABLE_CHAIN = Term(
     nodes=CARRIAGES,
     look_alikes={
         "load.spring": "approach one place from both sides slowly: a spring pulls the same, a chain does not",
-        "friction.presliding": "reverse in mid-travel: bristles turn within microns, a chain in millimetres",
-        "friction.coulomb": "reverse and look at the first millimetres: Coulomb friction turns at once",
+        "friction.presliding": "reverse in mid-travel: bristles turn within a tiny way, a chain within a long one",
+        "friction.coulomb": "reverse and look at the first piece of the way: Coulomb friction turns at once",
     },
     typical={"k": (0.2, 1.0), "F_h": (0.1, 0.5), "z_h": (0.01, 0.1)},
     scale={"k": "force/travel", "F_h": "force", "z_h": "travel"},
@@ -219,7 +219,7 @@ IMBALANCE = Term(
     look_alikes={
         "ripple.cogging": "turn slowly by hand and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: imbalance stays, an eccentric reel follows the tension",
-        "ripple.encoder": "slow and fast turns: a reading error does not fade with the inertia, a torque does",
+        "ripple.encoder": "slow and fast turns: a reading error does not fade with the inertia, a force does",
         "load.bump": "one slow turn: imbalance is a sine over the whole turn, a bump is narrow",
     },
     typical={"A": (0.05, 0.3)},

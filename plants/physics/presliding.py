@@ -125,8 +125,8 @@ PRESLIDING = Term(
     act={"force": "presliding.replace({p}, {s}, {m}, {i}, {r})"},
     nodes=DRY,
     look_alikes={
-        "friction.stribeck": "reverse within microns: plain dry friction holds still, bristles move as a spring",
-        "transmission.backlash": "reverse with a small force: bristles push back from the first micron, a gap does not",
+        "friction.stribeck": "reverse by a tiny way: plain dry friction holds still, bristles move as a spring",
+        "transmission.backlash": "reverse with a small force: bristles push back at once, a gap does not",
         "tape.viscoelastic": "hold and wait: bristles stay where they are, a relaxing tape moves on",
         "timing.delay": "steps far below break-away: a delay does not let a stuck node move",
     },

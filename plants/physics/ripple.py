@@ -114,7 +114,7 @@ COGGING = Term(
     look_alikes={
         "load.imbalance": "turn slowly and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: cogging stays, an eccentric reel follows the tension",
-        "ripple.encoder": "slow and fast turns: a torque fades behind the inertia when it is fast, a reading error not",
+        "ripple.encoder": "slow and fast turns: a force fades behind the inertia when it is fast, a reading error not",
         "structure.resonance": "two constant speeds: cogging keeps its angle, a resonance its frequency",
         "load.bump": "several turns: a bump stands at one place, cogging everywhere",
     },
@@ -134,8 +134,8 @@ ENCODER = Term(
     look_alikes={
         "ripple.capstan": "on the LDU look at both sensors: a disc off centre does not move the carriage; on the IVU "
         "change the tape's tension: a capstan out of round pulls harder, a reading error stays",
-        "ripple.cogging": "slow and fast turns: a reading error does not fade with the inertia, a torque does",
-        "load.imbalance": "slow and fast turns: a reading error does not fade with the inertia, a torque does",
+        "ripple.cogging": "slow and fast turns: a reading error does not fade with the inertia, a force does",
+        "load.imbalance": "slow and fast turns: a reading error does not fade with the inertia, a force does",
         "guide.thickness": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
         "ripple.reel": "wind until the reel has another radius: a reel's wave in the capstan's angle moves with it",
         "timing.jitter": "two constant speeds: ripple stays on its angle, jitter has none and grows with speed",

@@ -15,6 +15,7 @@ NUMBER = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"  # how a quantity starts, 
 # Factors and small powers only: what converts a unit would also evaluate "m**9**9**9", for a very long time.
 NAME = r"[A-Za-z%\u00b0\u00b5\u03bc\u03a9\u2126]+"
 UNIT = re.compile(rf"(?:1(?=/))?(?:(?:^|[*/ \u00b7])\s*{NAME}(?:(?:\^|\*\*)-?\d(?!\d))?\s*){{0,8}}")
+ANGLES = ("rad",)  # SI units of a position that turns
 LONGEST = 64  # characters of a unit
 
 SPELLINGS = {

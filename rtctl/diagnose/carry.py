@@ -163,7 +163,7 @@ def _linear_law(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], li
         k_v = model.base["M"] * w / model.base["K"]
         gains = {"gain": digits(k_v * w / 4), "velocity_gain": digits(k_v)}
         changes["law.position"] = {"kind": "pi_velocity", **gains}
-        return changes, [_unknown(case) + f"; a cascade of {w / 4:.3g} rad/s stands in its place"]
+        return changes, [_unknown(case) + f"; a cascade of {w / (8 * np.pi):.3g} Hz stands in its place"]
     return changes, [_unknown(case)]
 
 

@@ -20,6 +20,7 @@ from rtctl.diagnose.model import Model
 from rtctl.diagnose.motions import MENU, Limits, Motion
 from rtctl.diagnose.numbers import nice
 from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.quantities import Quantities, of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SHARE, Simulator, resolution
 from rtctl.diagnose.words import at
@@ -57,7 +58,7 @@ class Experiment(NamedTuple):
     @property
     def why(self) -> str:
         """What it is for, in a sentence."""
-        names = called(self.rivals)
+        names = called(self.rivals, self.limits.units)
         told = " from ".join(names) if len(names) == 2 else f"{', '.join(names[:-1])} and {names[-1]} from each other"
         return f"It tells {told}: what they predict is {nice(self.distance[self.name])} times the noise apart."
 
@@ -138,11 +139,11 @@ def names_of(rivals: Sequence[Model]) -> tuple[str, ...]:
     return tuple(f"{n} ({plain[:i].count(n) + 1})" if plain.count(n) > 1 else n for i, n in enumerate(plain))
 
 
-def called(rivals: Sequence[str]) -> list[str]:
+def called(rivals: Sequence[str], units: Quantities) -> list[str]:
     """Rivals, each as `names_of` has it, as a person calls them: what they have in common is left out."""
     parts = [rival.split(" + ") for rival in rivals]
     common = set(parts[0]).intersection(*parts[1:])
-    names = [" with ".join(at(entry) for entry in part if entry not in common) or "no more" for part in parts]
+    names = [" with ".join(at(entry, units) for entry in part if entry not in common) or "no more" for part in parts]
     return names if len(set(names)) == len(names) else list(rivals)
 
 
@@ -159,6 +160,7 @@ def limits_of(sim: Simulator) -> Limits:
     return Limits(
         plant=record.plant,
         unit="rad" if record.plant == "ivu" else (sim.case.sensors.unit or "m"),
+        units=of_case(sim.case),
         dt=record.dt,
         low=low,
         high=high,
@@ -238,7 +240,8 @@ def respond(sim: Simulator, limits: Limits, model: Model) -> tuple[np.ndarray, s
         volts = sim.volts + volts_of(sim, push)
     most = float(np.abs(volts).max())
     if most > limits.command:
-        return out, f"it takes {nice(most, 'V')}, and {nice(limits.command, 'V')} are the most"
+        unit = limits.units.command
+        return out, f"it takes {nice(most, unit)}, and {nice(limits.command, unit)} are the most"
     x = out[:, 0] * to_position(sim)
     room = OVER * (limits.high - limits.low)
     if x.min() < limits.low - room or x.max() > limits.high + room:

@@ -154,7 +154,7 @@ def missing_force(d: Diagnosis, sim: Simulator) -> Figure:
             near = 8 * words.Sizes(name, node, {}, d.after).value("v_s")
             if np.isfinite(near):
                 ax.set_xlim(*np.clip((-near, near), *ax.get_xlim()))
-        at = words.node_words(node, d.owner.units.rotary)
+        at = words.node_words(node, d.owner.units)
         title = f"{words.noun(name)} at {at}" if name else f"what is left at {at}"
         label(ax, f"{along} of {at}, {shown}" if along != "time" else "time, s", f"{what}, {y_unit}", title)
         legend(ax, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.98))
@@ -177,7 +177,7 @@ def _curve(ax: Axes, d: Diagnosis, x: np.ndarray, y: np.ndarray, law: np.ndarray
 def polar_map(d: Diagnosis, sim: Simulator) -> Figure | None:
     """The same around the turn, for effects that repeat with an angle; None where there are none."""
     panels = [(n, node) for n, node, axis in subjects(d) if axis == "angle"]
-    if not panels or (d.record.plant == "axis" and d.record.case.sensors.unit != "rad"):
+    if not panels or (d.record.plant == "axis" and not d.owner.units.rotary):
         return None
     map_ = Missing(d, sim)
     figure, axes = new(4.2, 1, len(panels), subplot_kw={"projection": "polar"})
@@ -199,7 +199,7 @@ def polar_map(d: Diagnosis, sim: Simulator) -> Figure | None:
         ax.set_rlim(-radius, 0.75 * radius)
         ax.set_rticks([-radius / 2, 0, radius / 2], [f"{v:.2g}" for v in (-radius / 2, 0, radius / 2)])
         ax.spines["polar"].set_visible(False)
-        label(ax, title=f"{what} around {words.node_words(node, d.owner.units.rotary)}, {shown}")
+        label(ax, title=f"{what} around {words.node_words(node, d.owner.units)}, {shown}")
         legend(ax, loc="upper left", bbox_to_anchor=(1.02, 1.0))
     return figure
 
@@ -236,11 +236,11 @@ def spectra(d: Diagnosis, sim: Simulator) -> Figure:
     first = slice(d.fit_rows[0], None)
     unit, rate = words.main_unit(d), 1.0 / d.record.dt
     map_ = Missing(d, sim)
-    x, along = map_.ratio(node) * map_.x[first], f"order of {words.node_words(node, d.owner.units.rotary)}, per turn"
+    x, along = map_.ratio(node) * map_.x[first], f"order of {words.node_words(node, d.owner.units)}, per turn"
     if map_.slides(node):
         x, along = (
             x * 2 * np.pi / (float(np.ptp(x)) or 1.0),
-            f"waves along the way of {words.node_words(node, d.owner.units.rotary)}",
+            f"waves along the way of {words.node_words(node, d.owner.units)}",
         )
     thinned = slice(None, None, max(1, len(x) // 3000))
     size = min(len(x), max(256, int(4 * rate)))
@@ -282,9 +282,7 @@ def evidence_bars(d: Diagnosis, sim: Simulator | None = None) -> Figure:
     for row, bar in enumerate(top):
         color = AFTER if found == set(bar.names) else BEFORE if bar.fitted else SEEN
         ax.barh(row, 100 * bar.gain, color=color, height=0.7)
-    ax.set_yticks(
-        range(len(top)), [" + ".join(words.entry_noun(n, d.owner.units.rotary) for n in b.names) for b in top]
-    )
+    ax.set_yticks(range(len(top)), [" + ".join(words.entry_noun(n, d.owner.units) for n in b.names) for b in top])
     ax.tick_params(axis="y", labelsize=8.5)
     ax.invert_yaxis()
     ax.set_xlim(0, 118)
@@ -380,7 +378,7 @@ def coverage(d: Diagnosis, sim: Simulator | None = None) -> Figure:
     ax.set_yticks(range(len(names)), [words.noun(n) for n in names])
     ax.set_xticks(
         range(len(nodes)),
-        [words.node_words(n, d.owner.units.rotary).removeprefix("the ") for n in nodes],
+        [words.node_words(n, d.owner.units).removeprefix("the ") for n in nodes],
         rotation=30,
         ha="left",
     )

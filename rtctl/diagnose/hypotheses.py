@@ -213,11 +213,11 @@ def hypotheses(
             and (not only or name in only)
         ):
             for node in term.nodes.get(record.plant, ()):
-                slides = record.plant == "axis" and record.case.sensors.unit != "rad"
+                slides = record.plant == "axis" and not model.units.rotary
                 if (
                     (name, node) in TWICE
                     or (node == "sensor" and name in alone and not (slides and name == "guide.thickness"))
-                    or (record.case.sensors.unit != "rad" and name in TURNING.get(record.plant, ()))
+                    or (not model.units.rotary and name in TURNING.get(record.plant, ()))
                     or (name == FALLING and dry_with_terms(model, node) <= SLIGHT * measures.of("force", node))
                 ):
                     continue

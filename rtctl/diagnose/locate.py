@@ -12,13 +12,14 @@ from rtctl.diagnose.hints import ORDERS, observe, spectrum
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.name import Search
 from rtctl.diagnose.problem import Problem
+from rtctl.diagnose.quantities import of_main
 from rtctl.diagnose.simulate import Simulator, way
 from rtctl.diagnose.stands import MOSTLY, stands
 from rtctl.plants.physics import TERMS
 
 BINS = 24  # along an axis
 REPEATS = 0.35  # share of the missing force that must repeat along an axis, to be told
-UNITS = {"velocity": ("rad/s", "m/s"), "position": ("rad", "m"), "angle": ("rad", "m"), "command": ("V", "V")}
+UNITS = {"velocity": "speed", "position": "position", "angle": "position", "command": "command"}  # of Quantities
 
 
 def located(
@@ -77,7 +78,7 @@ def repeats(sim: Simulator, model: Model) -> str:
         shares[name] = float(count @ (mean - d.mean()) ** 2) / len(d) / total
     x = along(sim)["position"][start:]
     thin = max(1, len(x) // 8000)
-    if sim.record.plant != "axis" or sim.record.case.sensors.unit == "rad":
+    if of_main(sim.case).rotary:
         shares["angle"] = float(spectrum(x[::thin], push[start::thin], ORDERS).max(initial=0.0))
     best = max(shares, key=lambda name: shares[name])
     return best if shares[best] > REPEATS else ""
@@ -95,6 +96,5 @@ def where(sim: Simulator, problem: Problem, error: np.ndarray, axis: str) -> str
     if power.max() < 2.5 * np.median(power):
         return f"over all of the {axis}"
     k = int(np.argmax(power))
-    linear = sim.record.plant == "axis" and sim.record.case.sensors.unit != "rad"
-    unit = UNITS.get(name, ("s", "s"))[linear]
+    unit = getattr(of_main(sim.case), UNITS[name]) if name in UNITS else "s"
     return f"{name} {edges[k]:.3g} to {edges[k + 1]:.3g} {unit}"

@@ -7,6 +7,7 @@ from rtctl.diagnose import words
 from rtctl.diagnose.diagnosis import Diagnosis
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.quantities import DIMENSIONS, of_case
 from rtctl.diagnose.scales import spaced, speed
 from rtctl.diagnose.simulate import Simulator, gear, lever, per_unit, way
 from rtctl.plants.physics import TERMS
@@ -37,11 +38,15 @@ class Missing:
         self.out, self.push = observe(sim, d.before)
         after, push = observe(sim, d.after) if d.after.terms else (self.out, self.push)
         self.law, self.shift = self.push - push, after - self.out
-        self.x = way(record)
+        self.x, self.units = way(record), of_case(record.case)
 
     def slides(self, node: str) -> bool:
         """Whether the node moves in m and not in rad."""
-        return node in words.SLIDING.get(self.kind, ()) and self.d.record.case.sensors.unit != "rad"
+        return words.slides(self.kind, "", node, self.units)
+
+    def unit(self, quantity: str, node: str) -> str:
+        """Of a quantity at the node."""
+        return DIMENSIONS[quantity][self.slides(node)]
 
     def ratio(self, node: str) -> float:
         """Way of the node for one of the main sensor."""
@@ -56,7 +61,7 @@ class Missing:
         node = node.replace("drive", "motor") if self.kind != "axis" else "carriage"
         node = "motor" if (node, self.kind) == ("loop", "ldu") else node
         factor = lever(self.d.record, self.d.before.base) / self.ratio(node)
-        return factor * self.push, factor * self.law, "N" if self.slides(node) else "Nm"
+        return factor * self.push, factor * self.law, self.unit("force", node)
 
     def reading(self) -> tuple[np.ndarray, np.ndarray, str]:
         """Missing reading of the second sensor where there is one that knows direction."""
@@ -71,21 +76,22 @@ class Missing:
         if any(site.startswith("reading") for site in acts) and "scale_counts" in self.sim.channels:
             return *self.reading(), "missing way of the scale"
         y, law, unit = self.force(node)
-        return y, law, unit, f"missing {'force' if unit == 'N' else 'torque'}"
+        return y, law, unit, f"missing {'torque' if unit == DIMENSIONS['force'][0] else 'force'}"
 
     def abscissa(self, axis: str, node: str) -> tuple[np.ndarray, str, str]:
         """Values (n,) of an axis, its name and unit."""
         record, ratio, slides = self.d.record, self.ratio(node), self.slides(node)
         if axis == "velocity":
-            return ratio * speed(self.x, self.kind, record.dt), "speed", "m/s" if slides else "rad/s"
+            return ratio * speed(self.x, self.kind, record.dt), "speed", self.unit("speed", node)
         if axis == "angle" and not slides:
             return np.mod(ratio * self.x, 2 * np.pi), "angle", "rad"
         if axis in ("position", "angle"):
-            return ratio * self.x, "position", "m" if slides else "rad"
+            return ratio * self.x, "position", self.unit("position", node)
         if axis in ("command", "tension"):
             channel = 1 if node.endswith("2") else 0
             u = record.u if axis == "command" else np.abs(record.u)
-            return u[:, min(channel, u.shape[1] - 1)], "command" if axis == "command" else "size of the command", "V"
+            what = "command" if axis == "command" else "size of the command"
+            return u[:, min(channel, u.shape[1] - 1)], what, self.units.command
         return record.t - record.t[0], "time", "s"
 
 

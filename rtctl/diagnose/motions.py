@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.words import nice
+from rtctl.diagnose.numbers import nice
+from rtctl.diagnose.quantities import Quantities
 
 MARGIN = 0.02  # share of the travel that is kept free at each end
 CORNER = 4  # knots in a change of speed
@@ -30,13 +31,14 @@ class Limits(NamedTuple):
 
     plant: str
     unit: str  # rad or m
+    units: Quantities
     dt: float  # s
     low: float
     high: float
     speed: float
     acceleration: float
     resolution: float  # smallest step that the sensor shows, in `unit`
-    command: float  # V
+    command: float  # in units.command
 
     @property
     def span(self) -> float:
@@ -236,7 +238,7 @@ def small_reversals(limits: Limits, ease: float) -> Motion:
             path.curve(np.array([half, 2 * half]), np.array([side * size, 0.0]))
         path.rest(0.3)
     words = (
-        f"Turn it back and forth within {nice(sizes[0], limits.unit)} and, in five stages, up to "
+        f"Move back and forth within {nice(sizes[0], limits.unit)} and, in five stages, up to "
         f"{nice(top, limits.unit)}, slowly, three times each."
     )
     return path.done("small_reversals", words)

@@ -49,8 +49,8 @@ PHRASES: dict[str, Phrase] = {name: Phrase(*words) for name, words in {
                       "load", "moves under several loads"),
     "friction.asymmetry": ("uneven friction", "{here} drags more one way", "dry friction is {a:%} {a:larger|smaller} "
                            "forwards and {a:%} {a:smaller|larger} backwards", BOTH),
-    "friction.presliding": ("a spring before sliding", "{here} gives like a spring before it slides", "it springs over "
-                            "{z_s}", "standstills and slow reversals"),
+    "friction.presliding": ("a spring before breakaway", "{here} gives like a spring before it breaks away",
+                            "it springs over {z_s}", "standstills and slow reversals"),
     "friction.quadratic": ("drag by the square of speed", "{here} drags by the square of its speed", "{Q} of it",
                            "moves at several speeds"),
     "load.spring": ("a spring force", "something pulls {here} like a spring", "{k} {k:back to|away from} one place",

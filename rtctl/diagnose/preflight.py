@@ -16,6 +16,7 @@ from scipy.signal import welch
 
 from rtctl.diagnose.case import NoLaw, believed
 from rtctl.diagnose.columns import unwrap
+from rtctl.diagnose.quantities import node_words, of_case
 from rtctl.diagnose.record import Record, law_agreement
 from rtctl.diagnose.simulate import way
 from rtctl.diagnose.tacho import counts_up, unsigned
@@ -122,7 +123,7 @@ def shafts(record: Record) -> list[Shaft]:
             Shaft("carriage", turned * p["R_c"], step * p["R_c"], ("carriage",), {}, False),
         ]
     q = way(record)
-    rotary = case.sensors.unit == "rad"
+    rotary = of_case(case).rotary
     per_rev = case.sensors.x_counts_per_rev
     quantum = 2 * np.pi / per_rev if per_rev and rotary else (case.sensors.x_resolution_m or _smallest_step(q))
     periodic = {"ripple.cogging": "carriage", "ripple.encoder": "sensor", "load.imbalance": "carriage"}
@@ -248,12 +249,13 @@ def _law(record: Record, findings: list[str], numbers: dict[str, Any]) -> None:
         findings.append(f"{why}: the recorded command is the input.")
         return
     numbers["law"] = {**agreement._asdict(), "exact": agreement.exact, "holds": agreement.holds}
+    unit = of_case(record.case).command
     if agreement.exact:
         findings.append("The law recomputed from the recorded columns gives the recorded command exactly.")
     else:
         findings.append(
             f"The recomputed law {'nearly gives' if agreement.holds else 'does not give'} the recorded command: "
-            f"{100 * agreement.nrmse:.2g} % rms, at worst {agreement.worst:.3g} V in row {agreement.worst_row}."
+            f"{100 * agreement.nrmse:.2g} % rms, at worst {agreement.worst:.3g} {unit} in row {agreement.worst_row}."
         )
 
 
@@ -297,12 +299,13 @@ def _drive(
 def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str, Any], cannot: list[str]) -> None:
     m = motion(record, shaft)
     unit = "turns" if shaft.turns else "m"
+    called = node_words(shaft.name, of_case(record.case))
+    called = called[:1].upper() + called[1:]
     numbers[shaft.name] = {**m._asdict(), "unit": unit}
     for name, node in shaft.periodic.items():
         if m.turns < TURNS.get(name, HALF):
             cannot.append(f"{name}:{node}")
     if shaft.turns and m.turns < 1.0:
-        called = "rotor" if shaft.name == "carriage" else shaft.name  # a carriage that turns is a rotary axis
         findings.append(f"{called} turns {m.turns:.2f} of a turn only; what repeats each turn is hard to see.")
     blind = unsigned(record) or counts_up(record)
     if blind:
@@ -313,18 +316,18 @@ def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str,
     commands = record.u[:, 0 if shaft.name != "reel2" else 1]
     pushed_both_ways = min(np.mean(commands > 0), np.mean(commands < 0)) >= SOME
     if one_way:
-        findings.append(f"{shaft.name} moves one way only.")
+        findings.append(f"{called} moves one way only.")
         _add(record, cannot, "friction.asymmetry", mechanical)
         if not pushed_both_ways:
             _add(record, cannot, "transmission.backlash", mechanical)
         sensors = [node for node in shaft.nodes if node in ("encoder", "sensor")]
         cannot += [f"sensor.rectified:{node}" for node in (*sensors, *(("sensor",) if record.plant == "axis" else ()))]
     if m.standstill + m.crawl < SOME:
-        findings.append(f"{shaft.name} neither stands still nor crawls.")
+        findings.append(f"{called} neither stands still nor crawls.")
         _add(record, cannot, "friction.stribeck", mechanical)
         _add(record, cannot, "friction.presliding", mechanical)
     if 0.0 < m.high_speed < STEADY * m.low_speed:
-        findings.append(f"{shaft.name} has one speed only: dry and viscous friction are one.")
+        findings.append(f"{called} has one speed only: dry and viscous friction are one.")
         _add(record, cannot, "friction.viscous", mechanical)
 
 

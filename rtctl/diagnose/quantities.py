@@ -1,23 +1,39 @@
-"""Units and nouns of a recorded axis: what turns has Nm, rad and kg m^2, what slides N, m and kg.
+"""Units and nouns of what moves: what turns has Nm, rad and kg m^2, what slides N, m and kg.
 
 They follow from the units of two columns, `sensors.unit` of x and `drive.unit` of u. Nothing else decides whether an
 axis is rotary, and every text, table, figure and file takes its units from here.
 """
 
+import re
 from typing import Any, NamedTuple
 
-TURNS = ("rad",)  # units of x that make an axis rotary
+from rtctl.config.units import ANGLES
+
 EFFORT = ("N", "Nm")  # units of u that are the force or torque itself: the gain K is 1
+VOLT = "V"  # unit of a command, where nothing else is said
+DIMENSIONS = {  # unit of a quantity where a node turns, and where it slides
+    "position": ("rad", "m"), "speed": ("rad/s", "m/s"), "force": ("Nm", "N"), "inertia": ("kg m^2", "kg"),
+    "stiffness": ("Nm/rad", "N/m"), "square": ("Nm/rad^2", "N/m^2"), "cubic": ("Nm/rad^3", "N/m^3"),
+    "drag": ("Nms/rad", "Ns/m"), "square_drag": ("Nms^2/rad^2", "Ns^2/m^2"), "per_force": ("1/Nm", "1/N"),
+}  # fmt: skip
+TURNED = {slides: turns for turns, slides in DIMENSIONS.values()}  # unit on a sliding axis -> on a rotary one
+NODES = {
+    "motor": "the motor", "capstan": "the capstan", "wheel": "the friction wheel",
+    "encoder": "the encoder", "scale": "the scale", "sensor": "the sensor", "drive": "the drive", "loop": "the loop",
+    "tape1": "the tape at reel 1", "tape2": "the tape at reel 2",
+}  # fmt: skip
+NAMES = {"V": "volt", "A": "ampere", "N": "newton", "Nm": "newton metre"}  # of a command's unit
 
 
 class Quantities(NamedTuple):
     rotary: bool
+    command: str  # unit of u
     position: str
     speed: str
     force: str
     inertia: str
     stiffness: str
-    drag: str  # viscous
+    drag: str  # viscous, as the plant's settings write it
     gain: str  # force by command
     body: str  # noun of what moves
 
@@ -26,21 +42,51 @@ class Quantities(NamedTuple):
         units = {"M": self.inertia, "K": self.gain, "F_v": self.drag, "F_c": self.force, "k": self.stiffness}
         return units.get(parameter)
 
+    def said(self, unit: str) -> str:
+        """The unit of a setting, written for a sliding axis and a command in V, as it is on this axis."""
+        unit = TURNED.get(unit, unit) if self.rotary else unit
+        return re.sub(r"\bV\b", self.command, unit)
 
-def quantities(x_unit: str | None, u_unit: str | None = "V") -> Quantities:
+    @property
+    def command_name(self) -> str:
+        """Noun of the command's unit: "volt"."""
+        return NAMES.get(self.command, self.command)
+
+
+def quantities(x_unit: str | None, u_unit: str | None = VOLT) -> Quantities:
     """Of an axis whose position is in `x_unit` (None: m) and whose command is in `u_unit`."""
-    u = u_unit or "V"
-    if x_unit in TURNS:
-        force = "Nm"
-        units = ("rad", "rad/s", force, "kg m^2", "Nm/rad", "Nm*s/rad")
-        body = "the rotor"
-    else:
-        force = "N"
-        units = ("m", "m/s", force, "kg", "N/m", "N*s/m")
-        body = "the carriage"
-    return Quantities(x_unit in TURNS, *units, "" if u == force else f"{force}/{u}", body)
+    u, rotary = u_unit or VOLT, x_unit in ANGLES
+    unit = {name: pair[not rotary] for name, pair in DIMENSIONS.items()}
+    force = unit["force"]
+    return Quantities(
+        rotary=rotary,
+        command=u,
+        position=unit["position"],
+        speed=unit["speed"],
+        force=force,
+        inertia=unit["inertia"],
+        stiffness=unit["stiffness"],
+        drag="Nm*s/rad" if rotary else "N*s/m",
+        gain="" if u == force else f"{force}/{u}",
+        body="the rotor" if rotary else "the carriage",
+    )
+
+
+def node_words(node: str, units: Quantities) -> str:
+    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; a rotary axis has a rotor."""
+    if node == "carriage":
+        return units.body
+    if node in NODES:
+        return NODES[node]
+    stem = node.rstrip("0123456789")
+    return f"{stem} {node[len(stem) :]}".strip() if node else "the machine"
 
 
 def of_case(case: Any) -> Quantities:
     """Of a case (rtctl.diagnose.case.Case)."""
     return quantities(case.sensors.unit, case.drive.unit)
+
+
+def of_main(case: Any) -> Quantities:
+    """Of the main sensor's motion: that of a reel unit and of a linear drive is the turning of a shaft."""
+    return of_case(case) if case.plant == "axis" else quantities(ANGLES[0], case.drive.unit)

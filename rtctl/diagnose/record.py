@@ -23,6 +23,7 @@ from rtctl.diagnose.columns import (
     unwrap,
     unwrap_turns,
 )
+from rtctl.diagnose.quantities import of_case
 from rtctl.trace.bundle import PARQUET, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
@@ -127,7 +128,7 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
                 )
             y[name] = unwrap(values)[0]
         else:
-            y[name] = unwrap_turns(values) if case.sensors.unit == "rad" else values
+            y[name] = unwrap_turns(values) if of_case(case).rotary else values
     if case.sample_rate is None:
         even = even_clock(t, dt)
         y = {name: laid(even, t, values, whole=is_counter(name)) for name, values in y.items()}
@@ -343,16 +344,17 @@ def _supports(
 
 
 def _disagrees(case: Case, agreement: Agreement | None) -> str:
+    unit = of_case(case).command
     if case.beyond and agreement is not None:
         return (
             f"the law of the config has {', '.join(case.beyond)}, which 'controller' of case.json does not say; "
-            f"'{case.controller.kind}' alone is off the recorded command by up to {agreement.worst:.3g} V (row "
+            f"'{case.controller.kind}' alone is off the recorded command by up to {agreement.worst:.3g} {unit} (row "
             f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
         )
     has = f"; in its config the law has {', '.join(case.beyond)}" if case.beyond else ""
     if agreement is None:
         return f"the law '{case.controller.kind}' cannot be recomputed from this recording{has}"
     return (
-        f"the law '{case.controller.kind}' does not give the recorded command (off by {agreement.worst:.3g} V in row "
-        f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
+        f"the law '{case.controller.kind}' does not give the recorded command (off by {agreement.worst:.3g} {unit} "
+        f"in row {agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
     )

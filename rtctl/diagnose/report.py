@@ -75,7 +75,7 @@ def html(d: Diagnosis) -> str:
         summary=summary(d),
         effects=effect_rows(d),
         located=located(d),
-        hides=[(words.entry_noun(k, d.owner.units.rotary), words.hidden_size(d, k)) for k in d.hides],
+        hides=[(words.entry_noun(k, d.owner.units), words.hidden_size(d, k)) for k in d.hides],
         rivals=rival_rows(d),
         experiment=experiment(d),
         parameters=parameter_rows(d),
@@ -102,7 +102,7 @@ def alt_text(d: Diagnosis, name: str, caption: str) -> str:
         return f"{caption} The error {words.falls(d)}."
     if name == "evidence" and d.evidence:
         best = max(d.evidence, key=lambda e: e.gain)
-        names = " and ".join(words.entry_noun(name, d.owner.units.rotary) for name in best.names)
+        names = " and ".join(words.entry_noun(name, d.owner.units) for name in best.names)
         return f"{caption} The most, {numbers.percent(best.gain)}: {names}."
     return caption
 
@@ -141,9 +141,7 @@ def effect_rows(d: Diagnosis) -> list[tuple[str, ...]]:
         for k, (name, v) in enumerate(parameters):
             value, ends = interval(v, effect_unit(d, e, name)) if name else ("", "")
             first = (
-                (f"{words.noun(e.name)} ({e.name})", words.node_words(e.node, d.owner.units.rotary))
-                if k == 0
-                else ("", "")
+                (f"{words.noun(e.name)} ({e.name})", words.node_words(e.node, d.owner.units)) if k == 0 else ("", "")
             )
             rows.append(
                 (*first, f"{name} = {value}" if name else "", ends, f"{100 * e.confidence:.0f} %" if k == 0 else "")
@@ -153,7 +151,7 @@ def effect_rows(d: Diagnosis) -> list[tuple[str, ...]]:
 
 def effect_unit(d: Diagnosis, e: Effect, name: str) -> str:
     """Of an effect's parameter: as given, or as the node has it."""
-    return e.parameters[name].unit or words.unit_at(d.record.plant, e.name, e.node, name, d.owner.units.rotary)
+    return e.parameters[name].unit or words.unit_at(d.record.plant, e.name, e.node, name, d.owner.units)
 
 
 def parameter_rows(d: Diagnosis) -> list[tuple[str, ...]]:
@@ -175,7 +173,7 @@ def rival_rows(d: Diagnosis) -> list[tuple[str, ...]]:
         for r in e.look_alikes:
             tell = TERMS[e.name].look_alikes.get(r.name, "") if e.name in TERMS else ""
             tell = tell or (TERMS[r.name].look_alikes.get(e.name, "") if r.name in TERMS else "")
-            names = words.noun(e.name, e.node, d.owner.units.rotary), words.noun(r.name, r.node, d.owner.units.rotary)
+            names = words.noun_at(e.name, e.node, d.owner.units), words.noun_at(r.name, r.node, d.owner.units)
             rows.append((*names, f"{r.p_value:.2g}" if r.p_value >= 1e-4 else "< 0.0001", f"{r.rms:.3g}", tell))
     return rows
 
@@ -196,11 +194,11 @@ def located(d: Diagnosis) -> str:
     at = d.located
     if at is None:
         return ""
-    shown = words.channel_words(at.channel)
+    shown = words.channel_words(at.channel, d.owner.units)
     since = f" from {numbers.nice(at.since_s, 's', 3)} on" if at.since_s > 0 else ""
     return (
         f"{shown[:1].upper()}{shown[1:]} shows it{since}. Of the error {numbers.percent(at.share)} comes from "
-        f"{words.node_words(at.node, d.owner.units.rotary)}; {words.goes(at)}."
+        f"{words.node_words(at.node, d.owner.units)}; {words.goes(at)}."
     )
 
 
@@ -210,9 +208,7 @@ def cannot_lines(d: Diagnosis) -> list[str]:
     for entry in d.cannot_test:
         name, _, node = entry.partition(":")
         nodes[name].append(node)
-    return [
-        words.sentence(f"{name}:{found[0]}", *found[1:], rotary=d.owner.units.rotary) for name, found in nodes.items()
-    ]
+    return [words.sentence(f"{name}:{found[0]}", *found[1:], units=d.owner.units) for name, found in nodes.items()]
 
 
 def experiment(d: Diagnosis) -> dict[str, Any] | None:

@@ -22,6 +22,7 @@ from scipy.stats import t as student
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, Diagnosis
 from rtctl.diagnose.hints import peaks, spectrum
 from rtctl.diagnose.model import Model
+from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 
 PLACES = 360  # over the turn
@@ -91,7 +92,7 @@ def of_diagnosis(d: Diagnosis) -> Turn | None:
 
 def turns(record: Record) -> bool:
     """Whether it is of an axis that turns and shows its angle."""
-    return record.plant == "axis" and record.case.sensors.unit == "rad" and "x" in record.y
+    return record.plant == "axis" and of_case(record.case).rotary and "x" in record.y
 
 
 def missing(record: Record, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -160,7 +160,7 @@ def _turn(
 
 def parameter_unit(model: Model, h: Hypothesis, name: str) -> str:
     """Unit of a term's parameter at its node."""
-    return unit_at(model.kind, h.term, h.node, name, model.units.rotary)
+    return unit_at(model.kind, h.term, h.node, name, model.units)
 
 
 def plant_unit(model: Model, name: str) -> str:

@@ -12,74 +12,56 @@ from rtctl.diagnose.numbers import both, nice, percent
 from rtctl.diagnose.numbers import figures as figures
 from rtctl.diagnose.numbers import prefix as prefix
 from rtctl.diagnose.phrases import PHRASES
-from rtctl.diagnose.quantities import of_case
+from rtctl.diagnose.quantities import DIMENSIONS, Quantities, node_words, of_case
 from rtctl.plants.physics import TERMS
 
 LIKELY = 0.5  # confidence below which an effect without a rival is no more than possible
 MOST_HIDDEN = 4  # smallest sizes named in a verdict of nothing, these first
 HIDDEN_FIRST = "friction.coulomb", "friction.stribeck", "drive.deadband", "transmission.backlash", "ripple.cogging"
 
-NODES = {
-    "motor": "the motor", "capstan": "the capstan", "carriage": "the carriage", "wheel": "the friction wheel",
-    "encoder": "the encoder", "scale": "the scale", "sensor": "the sensor", "drive": "the drive", "loop": "the loop",
-    "tape1": "the tape at reel 1", "tape2": "the tape at reel 2",
-}  # fmt: skip
 SLIDING = {
     "ivu": ("tape1", "tape2"),
     "ldu": ("carriage", "scale"),
-    "axis": ("carriage", "sensor"),
-}  # nodes that move in m and not in rad
-DIMENSIONS = {  # unit of a parameter where a node turns, and where it slides
-    "force": ("Nm", "N"), "speed": ("rad/s", "m/s"), "way": ("rad", "m"), "drag": ("Nms/rad", "Ns/m"),
-    "stiff": ("Nm/rad", "N/m"), "inertia": ("kg m^2", "kg"), "cubic": ("Nm/rad^3", "N/m^3"),
-}  # fmt: skip
+}  # nodes that move in m and not in rad; of an axis all or none
+CONTACTS = ("transmission.creep", "transmission.slip")
 BY_NODE = {
     "F_C": "force", "F_added": "force", "F_s": "force", "F": "force", "F_h": "force", "B": "drag", "B_a": "drag",
     "v_s": "speed",
-    "z_s": "way", "z_h": "way", "gap": "way", "size": "way", "each": "way", "mark": "way", "at": "way", "width": "way",
-    "x0": "way", "turn": "way", "mass": "inertia", "c3": "cubic", "k": "stiff",
+    "z_s": "position", "z_h": "position", "gap": "position", "size": "position", "each": "position", "mark": "position",
+    "at": "position", "width": "position", "x0": "position", "turn": "position", "mass": "inertia", "k": "stiffness",
+    "c2": "square", "c3": "cubic", "Q": "square_drag",
 }  # fmt: skip
-AMPLITUDES = {"load.imbalance": "force", "ripple.cogging": "force", "ripple.encoder": "way"}
-SPECIAL = {"f_Hz": "Hz", "transmission.creep.kappa": "1/N", "transmission.slip.F_max": "N", "drive.supply_sag.k": "1/V",
-           "sensor.missed_counts.at": "s"}  # fmt: skip
+AMPLITUDES = {"load.imbalance": "force", "ripple.cogging": "force", "ripple.encoder": "position"}
+SPECIAL = {  # by term and parameter: a dimension, or a unit
+    "transmission.creep.kappa": "per_force", "transmission.slip.F_max": "force", "drive.supply_sag.k": "1/V",
+    "sensor.missed_counts.at": "s", "structure.resonance.f_Hz": "Hz",
+}  # fmt: skip
 
 
-def node_words(node: str, rotary: bool = False) -> str:
-    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; a `rotary` axis has a rotor."""
-    if rotary and node == "carriage":
-        return "the rotor"
-    if node in NODES:
-        return NODES[node]
-    stem = node.rstrip("0123456789")
-    return f"{stem} {node[len(stem) :]}".strip() if node else "the machine"
-
-
-def channel_words(channel: str) -> str:
+def channel_words(channel: str, units: Quantities) -> str:
     """A recorded channel: "the capstan's counter"."""
     if channel.endswith("_counts"):
-        return f"the counter of {node_words(channel.removesuffix('_counts'))}"
+        return f"the counter of {node_words(channel.removesuffix('_counts'), units)}"
     return {"x": "the position", "speed": "the speed"}.get(channel, channel.replace("_", " "))
 
 
-def unit_at(kind: str, name: str, node: str, parameter: str, rotary: bool = False) -> str:
+def unit_at(kind: str, name: str, node: str, parameter: str, units: Quantities) -> str:
     """Unit of a term's parameter at a node; "" for a bare number."""
-    if parameter in SPECIAL:
-        return SPECIAL[parameter]
-    key = f"{name}.{parameter}"
-    if key in SPECIAL:
-        turns = rotary or (name.startswith("transmission") and node == "wheel")
-        return {"N": "Nm", "1/N": "1/Nm"}[SPECIAL[key]] if turns else SPECIAL[key]
     field = TERMS[name].settings.model_fields.get(parameter) if name in TERMS else None
-    unit = (
-        str((field.json_schema_extra or {}).get("unit", ""))
-        if field and isinstance(field.json_schema_extra, dict)
-        else ""
-    )
-    stem = parameter.rstrip("23")
-    dimension = BY_NODE.get(parameter) or (AMPLITUDES.get(name) if stem == "A" else None)
-    if unit or dimension is None:
-        return unit
-    return DIMENSIONS[dimension][not rotary and node in SLIDING.get(kind, ())]
+    extra = field.json_schema_extra if field is not None else None
+    dimension = BY_NODE.get(parameter) or (AMPLITUDES.get(name) if parameter.rstrip("23") == "A" else None)
+    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    unit = SPECIAL.get(f"{name}.{parameter}") or unit or dimension or ""
+    if unit not in DIMENSIONS:
+        return units.said(unit)
+    return DIMENSIONS[unit][slides(kind, name, node, units)]
+
+
+def slides(kind: str, name: str, node: str, units: Quantities) -> bool:
+    """Whether a term at a node acts on what moves in m. A contact that drives a tape or a carriage does."""
+    if kind == "axis":
+        return not units.rotary
+    return node in SLIDING.get(kind, ()) or (name in CONTACTS and node != "wheel")
 
 
 class Sizes:
@@ -87,7 +69,7 @@ class Sizes:
 
     def __init__(self, name: str, node: str, parameters: dict[str, Interval], model: Model):
         self.name, self.node, self.parameters, self.model = name, node, parameters, model
-        self.here = node_words(node, model.units.rotary)
+        self.here = node_words(node, model.units)
         terms: list[Any] = list(model.terms)
         self.term: Any = next((t for t in terms if (t.term, t.node) == (name, node)), None)
 
@@ -108,7 +90,7 @@ class Sizes:
     def unit(self, name: str) -> str:
         """Of a parameter."""
         given = self.parameters[name].unit if name in self.parameters else ""
-        return given or unit_at(self.model.kind, self.name, self.node, name, self.model.units.rotary)
+        return given or unit_at(self.model.kind, self.name, self.node, name, self.model.units)
 
 
 class _Slot:
@@ -152,7 +134,8 @@ def _sticking(s: Sizes) -> str:
 
 def _form(s: Sizes) -> str:
     if s.name == "drive.supply_sag":
-        return "volt squared" if s.text("form") == "power" else "volt"
+        name = s.model.units.command_name
+        return f"{name} squared" if s.text("form") == "power" else name
     return "all give the same" if s.text("form") == "floor" else "do nothing"
 
 
@@ -185,28 +168,32 @@ def effect_clause(effect: Effect, model: Model) -> tuple[str, str]:
     return phrase.head.format_map(slots), phrase.detail.format_map(slots)
 
 
-def noun(name: str, node: str = "", rotary: bool = False) -> str:
-    """An effect in a few words: "sticking, motor 1"."""
-    word = PHRASES[name].noun if name in PHRASES else name
-    return f"{word}, {node_words(node, rotary).removeprefix('the ')}" if node else word
+def noun(name: str) -> str:
+    """An effect in a few words: "sticking"."""
+    return PHRASES[name].noun if name in PHRASES else name
 
 
-def entry_noun(entry: str, rotary: bool = False) -> str:
-    """The same of "name:node"."""
+def noun_at(name: str, node: str, units: Quantities) -> str:
+    """An effect with its node in a few words: "sticking, motor 1"."""
+    return f"{noun(name)}, {node_words(node, units).removeprefix('the ')}" if node else noun(name)
+
+
+def entry_noun(entry: str, units: Quantities) -> str:
+    """A hypothesis "name:node" in a few words: "sticking, motor 1"."""
     name, _, node = entry.partition(":")
-    return noun(name, node, rotary)
+    return noun_at(name, node, units)
 
 
-def at(entry: str, rotary: bool = False) -> str:
-    """The same as part of a sentence: "sticking at motor 1"."""
+def at(entry: str, units: Quantities) -> str:
+    """A hypothesis "name:node" as part of a sentence: "sticking at motor 1"."""
     name, _, node = entry.partition(":")
-    return f"{noun(name)} at {node_words(node, rotary)}" if name in PHRASES and node else entry
+    return f"{noun(name)} at {node_words(node, units)}" if name in PHRASES and node else entry
 
 
-def sentence(entry: str, *more: str, rotary: bool = False) -> str:
+def sentence(entry: str, *more: str, units: Quantities) -> str:
     """Why a hypothesis "name:node" cannot be tested, and at `more` nodes: what a record would have to hold."""
     name, _, node = entry.partition(":")
-    at = f" at {_join([node_words(n, rotary) for n in (node, *more)], 'and')}" if node else ""
+    at = f" at {_join([node_words(n, units) for n in (node, *more)], 'and')}" if node else ""
     if name not in PHRASES:
         return f"This record cannot show {name}{at}."
     return f"This record cannot show {PHRASES[name].noun}{at}: that takes {PHRASES[name].need}."
@@ -315,7 +302,7 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
     one, two = both(left, noise, unit)
     amount = f"the error on the part that was not fitted is {one} where noise leaves {two}"
     if d.untestable:
-        what = _join([at(entry) for entry in d.untestable], "and")
+        what = _join([at(entry, d.owner.units) for entry in d.untestable], "and")
         needs = _join(list(dict.fromkeys(need(entry) for entry in d.untestable)), "and")
         return (
             f"Something is missing, and what fits best, {what}, cannot be tested by this record, so it has no name.",
@@ -330,19 +317,19 @@ def _unnamed(d: Diagnosis) -> tuple[str, str]:
     if d.resembles is not None:
         name, node = d.resembles
         return (
-            f"Something is missing at {node_words(node, d.owner.units.rotary)} that has no name in the table: "
+            f"Something is missing at {node_words(node, d.owner.units)} that has no name in the table: "
             f"it looks like {noun(name)}.",
             f"{_capital(amount)}.",
         )
     if d.located is None:
         return "Something is missing that no known effect explains.", f"It has no clear place: {amount}."
-    place = node_words(d.located.node, d.owner.units.rotary)
+    place = node_words(d.located.node, d.owner.units)
     since = f", from {nice(d.located.since_s, 's', 3)} on" if d.located.since_s > 0 else ""
     kind = f"{goes(d.located)}{since}"
     share = f"{percent(d.located.share)} of the error lies there"
     return (
         f"Something is missing at {place} that no known effect explains: {kind}.",
-        f"{_capital(channel_words(d.located.channel))} shows it, {share}; {amount}.",
+        f"{_capital(channel_words(d.located.channel, d.owner.units))} shows it, {share}; {amount}.",
     )
 
 
@@ -372,7 +359,7 @@ def _nothing(d: Diagnosis) -> tuple[str, str]:
         name, _, node = entry.partition(":")
         if name not in seen and len(words) < MOST_HIDDEN:
             seen.add(name)
-            words.append(f"{noun(name)} of {hidden_size(d, entry)} at {node_words(node, d.owner.units.rotary)}")
+            words.append(f"{noun(name)} of {hidden_size(d, entry)} at {node_words(node, d.owner.units)}")
     return first, f"It would have shown {_join(words, 'and')}."
 
 
@@ -381,7 +368,7 @@ def hidden_size(d: Diagnosis, entry: str) -> str:
     size = d.hides[entry]
     name, _, node = entry.partition(":")
     known = name in TERMS and size.unit in TERMS[name].settings.model_fields  # the main parameter instead of its unit
-    unit = unit_at(d.record.plant, name, node, size.unit, d.owner.units.rotary) if known else size.unit
+    unit = unit_at(d.record.plant, name, node, size.unit, d.owner.units) if known else size.unit
     return nice(abs(size.value), unit) if unit else percent(abs(size.value))
 
 

@@ -73,6 +73,7 @@ def steps(record: Record, by: str | None = None) -> Steps:
     each = step_metrics(record["t"], record["target"], record[by], mm, rad, settle_floor=floor)
     if not each:
         raise NoAnswer(f"{record.source}: the reference makes no step")
+    assert mm is not None  # our own machines move along a line
     return summary(each, by, mm)
 
 

@@ -1,11 +1,12 @@
 """What a step response is judged by: final error, overshoot, settling time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from rtctl.config.units import ANGLES
 from rtctl.machines import MODULES, Machine
 
 POSITION = {"ivu": "capstan", "ldu": "position", "axis": "x"}  # the column that steps are judged by
@@ -16,7 +17,7 @@ def step_metrics(
     t: np.ndarray,
     ref: np.ndarray,
     y: np.ndarray,
-    scale_mm: float,
+    scale_mm: float | None,
     rad_per_unit: float | None = 1.0,
     settle_band: float = 0.02,
     settle_floor: float = 0.0,
@@ -27,7 +28,8 @@ def step_metrics(
     both for a case. The keys:
 
     - `t`: s, when the reference arrives at its new value; `size`: in the machine's unit, with its sign
-    - `final_error_rad`, `final_error_mm`: mean of ref - y over the last tenth of the hold; rad is None without a scale
+    - `final_error_rad`, `final_error_mm`: mean of ref - y over the last tenth of the hold; None where the
+      unit of either has no scale: an angle that moves no tape has no mm
     - `overshoot_pct`: how far y went beyond the new value, in % of the step; never negative
     - `settling_s`: from `t` until y stays within `settle_band` of the step, or `settle_floor` (machine's unit; a few
       counts of the sensor) where that is more; None if it does not before the next step
@@ -50,7 +52,7 @@ def step_metrics(
                 "t": float(t[start]),
                 "size": size,
                 "final_error_rad": None if rad_per_unit is None else final * rad_per_unit,
-                "final_error_mm": final * scale_mm,
+                "final_error_mm": None if scale_mm is None else final * scale_mm,
                 "overshoot_pct": max(0.0, float(np.max((y[hold] - ref[hold]) / size)) * 100),
                 "settling_s": _settling(t[hold], ref[hold] - y[hold], max(settle_band * abs(size), settle_floor)),
             }
@@ -69,11 +71,19 @@ def settle_floor(kind: str) -> float:
     return MODULES[kind].SETTLE_FLOOR if kind in MODULES else 0.0
 
 
-def scales(case: Mapping[str, Any]) -> tuple[float, float | None]:
+def final_error_unit(steps: Sequence[Mapping[str, Any]]) -> str:
+    """Unit in which people read the final errors of the steps: mm, or rad where nothing moves along a line."""
+    return "mm" if not steps or any(step.get("final_error_mm") is not None for step in steps) else "rad"
+
+
+def scales(case: Mapping[str, Any]) -> tuple[float | None, float | None]:
     """mm and rad in one unit of position: rad of the capstan on an ivu, m on an ldu or another linear axis.
 
-    rad is None where a linear axis has no capstan radius R_c. Raises ValueError where an ivu has none.
+    mm is None on a rotary axis, rad where a linear axis has no capstan radius R_c. Raises ValueError where an ivu has
+    none.
     """
+    if (case.get("sensors") or {}).get("unit") in ANGLES:
+        return None, 1.0
     radius = case.get("parameters", {}).get("R_c")
     if case.get("plant") == "ivu":
         if not radius:

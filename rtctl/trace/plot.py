@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from rtctl.config.errors import UserError
 from rtctl.config.files import replaced
 from rtctl.trace.bundle import Bundle
+from rtctl.trace.metrics import final_error_unit
 
 BUCKETS = 1500  # about the pixels of a panel's width
 
@@ -135,13 +136,14 @@ def save(figure: Figure, path: Path, option: str = "--plot ") -> None:
 
 def summary(metrics: Sequence[Mapping[str, Any]]) -> str:
     """The steps of a run in one line."""
-    worst = max(metrics, key=lambda step: abs(step["final_error_mm"]))["final_error_mm"]
+    unit = final_error_unit(metrics)
+    worst = max((step[f"final_error_{unit}"] for step in metrics), key=abs)
     over = max(step["overshoot_pct"] for step in metrics)
     times = [step["settling_s"] for step in metrics]
     settled = [s for s in times if s is not None]
     parts = [
         "1 step" if len(metrics) == 1 else f"{len(metrics)} steps",
-        f"largest final error {worst:.3g} mm",
+        f"largest final error {worst:.3g} {unit}",
         f"largest overshoot {over:.3g} %",
         f"slowest settling {max(settled):.3g} s" if settled else "",
         f"{times.count(None)} did not settle" if None in times else "",

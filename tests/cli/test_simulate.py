@@ -55,6 +55,24 @@ def model(bundle, tmp_path_factory):
     return write_model(owner_model(record.case).add(SPRING), record, tmp_path_factory.mktemp("model") / "model.yaml")
 
 
+def test_a_rotary_axis_is_told_in_radians_and_newton_metres(rtctl, tmp_path):
+    t = np.arange(2500) * 1e-3
+    u, x = 0.1 * np.sin(2 * np.pi * t), 1 - np.cos(2 * np.pi * t)
+    for name, gain in (("a", 1.0), ("b", 1.1)):
+        rows = np.column_stack([t, u, gain * x, np.where(t < 1.0, 0.0, 0.5)])
+        np.savetxt(tmp_path / f"{name}.csv", rows, delimiter=",", header="t,u,x,ref", comments="")
+        units = [word for pair in ("u=Nm", "x=rad", "ref=rad") for word in ("--unit", pair)]
+        values = ["--parameter", "M=0.02 kg*m^2", "--parameter", "F_v=1 mN*m*s/rad"]
+        file = tmp_path / f"{name}.csv"
+        made = rtctl("import", file, "--out", tmp_path / name, "--plant", "axis", "--rate", "1kHz", *units, *values)
+        assert made.code == 0 and "u [Nm], x [rad]" in made.out
+    found = json.loads(rtctl("simulate", "case", tmp_path / "a", "--json").out)
+    assert found["unit"] == {"x": "rad"}
+    assert " rad " in rtctl("simulate", "case", tmp_path / "a").out
+    lines = rtctl("trace", "compare", tmp_path / "a", tmp_path / "b").out
+    assert "final error [rad]" in lines and "x [rad]" in lines and "[mm]" not in lines
+
+
 def test_the_model_that_has_it_all(rtctl, bundle, model):
     code, out, err = rtctl("simulate", model, bundle, "--json")
     assert (code, err) == (0, "")

@@ -11,6 +11,7 @@ from rtctl.diagnose.experiment import design, limits_of
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.motions import MENU, Limits
+from rtctl.diagnose.quantities import quantities
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator
 from rtctl.laws import reference
@@ -162,7 +163,7 @@ def test_limits_are_those_of_the_recording(recorded):
 def test_every_motion_stays_within_travel_and_speed(plant, low, span, speed, stiff, ease):
     low = max(low, -span)
     dt = {"ivu": 2e-3, "ldu": 1e-4, "axis": 1e-3}[plant]
-    limits = Limits(plant, "m", dt, low, low + span, speed, stiff * speed, 1e-4 * span, 10.0)
+    limits = Limits(plant, "m", quantities(None), dt, low, low + span, speed, stiff * speed, 1e-4 * span, 10.0)
     for make in MENU:
         motion = make(limits, ease)
         t, r = motion.knots.T
@@ -176,11 +177,12 @@ def test_every_motion_stays_within_travel_and_speed(plant, low, span, speed, sti
 
 def test_rivals_are_called_by_what_they_differ_in():
     rivals = ("friction.stribeck:carriage + drive.lag:drive", "friction.stribeck:carriage + timing.delay:loop")
-    assert experiment.called(rivals) == ["a lag at the drive", "extra delay at the loop"]
-    assert experiment.called(("drive.lag:drive", "nothing")) == ["a lag at the drive", "nothing"]
-    assert experiment.called(("drive.lag:drive + drive.offset:drive", "drive.lag:drive"))[1] == "no more"
+    assert experiment.called(rivals, quantities(None)) == ["a lag at the drive", "extra delay at the loop"]
+    assert experiment.called(("drive.lag:drive", "nothing"), quantities(None)) == ["a lag at the drive", "nothing"]
+    more = ("drive.lag:drive + drive.offset:drive", "drive.lag:drive")
+    assert experiment.called(more, quantities(None))[1] == "no more"
     numbered = ("drive.lag:drive (1)", "drive.lag:drive (2)")
-    assert len(set(experiment.called(numbered))) == 2
+    assert len(set(experiment.called(numbered, quantities(None)))) == 2
 
 
 def test_what_it_is_for_is_said_in_words(dry_or_viscous):

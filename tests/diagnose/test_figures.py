@@ -10,6 +10,7 @@ from rtctl.diagnose.diagnosis import NAMED, NOTHING, Diagnosis, Effect, Evidence
 from rtctl.diagnose.kernel import OPEN
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.preflight import preflight
+from rtctl.diagnose.quantities import quantities
 from rtctl.diagnose.record import check, load_record
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
@@ -161,7 +162,7 @@ def test_evidence_marks_what_was_found_and_the_null_line(found):
     d, sim = found
     figure = figures.evidence_bars(d, sim)
     shown = texts(figure)
-    assert words.noun("friction.stribeck", "carriage") in shown and "by chance: 8.0 %" in shown
+    assert words.entry_noun("friction.stribeck:carriage", quantities(None)) in shown and "by chance: 8.0 %" in shown
     assert np.allclose(figure.axes[0].patches[0].get_width(), 98)
     brackets = [line for line in figure.axes[0].lines if len(line.get_xdata()) == 4]
     assert len(brackets) == 1 and list(brackets[0].get_ydata()) == [0, 0, 1, 1]

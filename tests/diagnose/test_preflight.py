@@ -116,7 +116,7 @@ def test_less_than_half_a_turn_hides_what_repeats_each_turn():
     assert "ripple.reel:reel2" in found.cannot_test
     assert "ripple.cogging:motor1" in found.cannot_test
     assert "ripple.capstan:capstan" not in found.cannot_test
-    assert said(found, "reel1", "of a turn only")
+    assert said(found, "Reel 1", "of a turn only")
 
 
 def test_one_way_hides_what_a_reversal_shows():

@@ -3,7 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.trace.metrics import scales, step_metrics
+from rtctl.trace.metrics import final_error_unit, scales, step_metrics
+from rtctl.trace.plot import summary
 
 DT = 0.002
 KEYS = ["t", "size", "final_error_rad", "final_error_mm", "overshoot_pct", "settling_s"]
@@ -122,6 +123,13 @@ def test_both_units_are_filled_on_both_machines():
     assert scales({"plant": "axis"}) == (1000.0, None)
     with pytest.raises(ValueError, match="R_c is missing"):
         scales({"plant": "ivu"})
+
+
+def test_the_error_of_a_rotary_axis_is_an_angle():
+    ref = held(0.0, 1.0)
+    (step,) = step_metrics(clock(ref), ref, ref - 0.01, *scales({"plant": "axis", "sensors": {"unit": "rad"}}))
+    assert step["final_error_mm"] is None and step["final_error_rad"] == pytest.approx(0.01)
+    assert final_error_unit([step]) == "rad" and summary([step]).startswith("1 step   |   largest final error 0.01 rad")
 
 
 def test_refuses_columns_of_different_length():
