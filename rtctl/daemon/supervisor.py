@@ -14,29 +14,26 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import structlog
 import zmq
 
 from rtctl import machines
 from rtctl.config.bounds import Bounds
 from rtctl.config.errors import UserError
-from rtctl.daemon import ending, keys, shared_memory
+from rtctl.daemon import ending, shared_memory
 from rtctl.daemon.answers import Answers
 from rtctl.daemon.captures import Captures
 from rtctl.daemon.case import describe
 from rtctl.daemon.children import ChildProcess
 from rtctl.daemon.commands import Commands
-from rtctl.daemon.doors import COMMANDERS, VIEWERS, Doors, raise_limit
 from rtctl.daemon.events import Recording, Trips
 from rtctl.daemon.faults import Faults
 from rtctl.daemon.lock import MachineLock
 from rtctl.daemon.notify import Service
+from rtctl.daemon.outside import Outside
 from rtctl.daemon.reload import reload
-from rtctl.daemon.rows import RowsOut
-from rtctl.daemon.server import CommandServer, default_endpoint, runtime_dir
+from rtctl.daemon.server import runtime_dir
 from rtctl.daemon.starting import Starting, ended
-from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop import generate, safety
 from rtctl.loop.histogram import account
 from rtctl.loop.mailbox import Mailbox
@@ -81,8 +78,6 @@ class Supervisor(Answers):
         self.failure: Exception | None = None  # why the run ended by itself, once it has
         self._ended = False
         self._stack = contextlib.ExitStack()
-        self._last_telemetry = 0.0
-        self._rows_after: list[np.ndarray] = []
 
     def __enter__(self) -> "Supervisor":
         with contextlib.ExitStack() as stack:
@@ -117,38 +112,11 @@ class Supervisor(Answers):
         stack.callback(self.journal.close)
         if self.armed_at_start:
             self.order(_arm_and_play)  # there before the first tick, so that a virtual run repeats to the bit
-        raise_limit()
-        self.doors = Doors(runtime_dir(), config.name)
-        stack.callback(self.doors.close)
-        context = zmq.Context()
-        stack.callback(context.destroy, linger=100)
         self.faults = Faults(self)
         self.commands = Commands(self)
-        curve = keys.server_curve() if config.commands.keys else None
-        self.server = CommandServer(
-            config.commands.endpoint or default_endpoint(config.name, "command"),
-            self.commands,
-            context,
-            curve,
-            self.commands.heard,
-            self.doors.door("command", "control", COMMANDERS, replaces=True),
-        )
-        stack.callback(self.server.close)
-        self._signals = [c.name for c in made.columns if c.name not in ("t",)]
-        per_message = max(1, int(config.commands.telemetry_rate * config.commands.telemetry_period))
-        self.telemetry = Telemetry(
-            config.commands.telemetry or default_endpoint(config.name, "telemetry"),
-            config.name,
-            self._signals,
-            context,
-            max_rows_per_message=per_message,
-            curve=curve,
-            door=self.doors.door("telemetry", "viewers", VIEWERS),
-        )
-        stack.callback(self.telemetry.close)
-        rows_at = default_endpoint(config.name, "rows")
-        self.rows_out = RowsOut(rows_at, config.name, made.row, context, self.doors.door("rows", "viewers", VIEWERS))
-        stack.callback(self.rows_out.close)
+        self.outside = Outside(config, [column.name for column in made.columns], made.row, self.commands)
+        stack.callback(self.outside.close)
+        self.server = self.outside.server
         self.case = describe(self.machine, made)
         self.captures = Captures(self.machine.rate, made.columns, made.row, self.case)
         stack.callback(self.captures.close)
@@ -237,10 +205,9 @@ class Supervisor(Answers):
         self._beat()
         over = bool(self.status["ended"]) or not self.loop.running()
         self._drain()
-        self.doors.look()
         self._recording.look(None if self.recorder is None else self.recorder.trouble)
         self.faults.act()
-        self.server.process()
+        self.outside.look()
         self.commands.watch_commander()
         if not self._ended:
             self._fail(ending.reported(self._hear))
@@ -297,17 +264,7 @@ class Supervisor(Answers):
             self.captures.feed(rows)
             if self.recorder is not None:
                 self.recorder.put(rows)
-            self._publish(rows)
-            self.rows_out.publish(rows)
-
-    def _publish(self, rows: np.ndarray) -> None:
-        self._rows_after.append(rows[-2000:])
-        now = time.monotonic()
-        if now - self._last_telemetry >= self.config.commands.telemetry_period:
-            self._last_telemetry = now
-            kept = np.concatenate(self._rows_after)[-2000:]
-            self._rows_after = []
-            self.telemetry.publish(np.column_stack([kept["t"], *[kept[name] for name in self._signals]]))
+            self.outside.publish(rows)
 
     def run(self) -> Iterator[None]:
         """Turns until the run ends; yields after each, so that the caller can show a status line."""
