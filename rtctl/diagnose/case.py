@@ -148,6 +148,7 @@ class Case(NamedTuple):
     warnings: tuple[str, ...]
     beyond: tuple[str, ...]  # what the law in `config` has that the exchange format cannot say
     file: Path = Path("case.json")
+    unsaid: str = ""  # why a law that the owner knows cannot be recomputed from `controller`; "" where it can
 
     @property
     def estimated(self) -> tuple[str, ...]:
@@ -199,13 +200,10 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     known = case.get("controller_known", not isinstance(controller, UnknownLaw))
     if not isinstance(known, bool):
         raise UserError(f"{where}: controller_known is {known!r}; it should be true or false")
-    beyond = beyond_format(case.get("config"))
+    beyond, unsaid = beyond_format(case.get("config")), ""
     if known and isinstance(controller, UnknownLaw):
         has = f" (it has {', '.join(beyond)})" if beyond else ""
-        warnings.append(
-            f"{where}: a law of kind '{controller.kind}' cannot be recomputed on this plant{has}; "
-            "the recorded command is taken as the input"
-        )
+        unsaid = f"a law of kind '{controller.kind}' cannot be recomputed on this plant{has}"
         known = False
     notes = case.get("notes")
     return Case(
@@ -222,6 +220,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
         warnings=tuple(warnings),
         beyond=beyond,
         file=where,
+        unsaid=unsaid,
     )
 
 
