@@ -206,6 +206,10 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
         unsaid = f"a law of kind '{controller.kind}' cannot be recomputed on this plant{has}"
         known = False
     notes = case.get("notes")
+    reaches = _part(where, "reaches", Reaches, case.get("reaches"), warnings)
+    if case.get("parameters") and "parameter_tolerance" not in reaches.model_fields_set:
+        share = reaches.parameter_tolerance
+        warnings.append(f"{where}: reaches.parameter_tolerance is missing; {share} is taken for what parameters say")
     return Case(
         plant=plant,
         sample_rate=rate,
@@ -215,7 +219,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
         delay_samples=delay,
         controller=controller,
         controller_known=known,
-        reaches=_part(where, "reaches", Reaches, case.get("reaches"), warnings),
+        reaches=reaches,
         notes=notes if isinstance(notes, str) else "",
         warnings=tuple(warnings),
         beyond=beyond,

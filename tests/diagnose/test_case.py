@@ -229,6 +229,16 @@ def test_a_parameter_that_cannot_be_is_told_by_its_name_and_in_the_unit_of_the_a
     assert "should be a" in said or f"it must be more than 0 {unit}" in said
 
 
+def test_a_tolerance_that_the_case_does_not_give_is_told(case_of):
+    silent, given = (read_case(case_of("axis", reaches=r), "bundle") for r in ({}, {"parameter_tolerance": 0.15}))
+    assert silent.tolerance("M") == given.tolerance("M") == 0.15
+    assert [w for w in silent.warnings if "reaches.parameter_tolerance is missing; 0.15 is taken" in w]
+    assert not [w for w in given.warnings if "tolerance" in w]
+    nothing = read_case(case_of("axis", reaches={"parameter_tolerance": None}), "bundle")
+    assert nothing.tolerance("M") == math.inf and not [w for w in nothing.warnings if "tolerance" in w]
+    assert not [w for w in read_case(case_of("axis", reaches={}, parameters={}), "b").warnings if "tolerance" in w]
+
+
 def test_two_names_of_one_parameter_are_both_told(case_of):
     said = refused(case_of("axis", parameters={"J": 1.0, "M": 1.0}))
     assert "parameters.J and parameters.M are one and the same" in said
