@@ -189,7 +189,7 @@ def _machine(
     from rtctl.own import files
 
     config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)
-    files.refuse_plant(config, "rtctl diagnose")
+    files.refuse_plant(config, f"{what}: ")
     config = repair.ready(config, mode)
     folder = out if out is not None else common.default_folder(config.name)
     with console.stages() as stage:

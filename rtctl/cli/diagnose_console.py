@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 STAGES = {  # how a stage's sentence begins -> share of the whole that is then done
-    "recording": 0.0, "preflight": 0.02, "fitting the owner": 0.04, "screening": 0.15, "fitting": 0.25,
+    "recording": 0.0, "preflight": 0.02, "fitting the nominal": 0.04, "screening": 0.15, "fitting": 0.25,
     "look-alikes": 0.6, "predicting": 0.9, "writing": 0.95,
 }  # fmt: skip
 ONWARD = 0.12  # of what is left, when a stage comes once more

@@ -96,7 +96,7 @@ def records(
     from rtctl.own import files
 
     config = common.load_config(words[0], set_)
-    files.refuse_plant(config, "rtctl identify")
+    files.refuse_plant(config, f"{words[0]}: ")
     return take_all(play(config, plan(config), out, say_on_stderr(json)))
 
 

@@ -59,7 +59,7 @@ def simulate(
     if not json:
         for warning in record.case.warnings:
             typer.echo(f"note: {warning}", err=True)
-    result = compare(record, _model(model, bundle, record), mode, skip)
+    result = compare(record, _model(model, record), mode, skip)
     if plot is not None:
         _draw(result, plot)
     if json:
@@ -68,22 +68,13 @@ def simulate(
         typer.echo("\n".join(_table(result)))
 
 
-def _model(name: str, bundle: Path, record: Any) -> Any:
-    from rtctl.config.errors import UserError
+def _model(name: str, record: Any) -> Any:
     from rtctl.diagnose.export import read_model
     from rtctl.diagnose.model import owner_model
 
     if name != OWNER:
         return read_model(name, record)
-    model = owner_model(record.case)
-    if model.kind == "axis":
-        for key, words in (("M", "the moving mass"), ("K", "the force per volt")):
-            if key not in model.base:
-                raise UserError(
-                    f"{bundle / 'case.json'}: parameters.{key} is missing, {words}; without it there is no belief to "
-                    "simulate, only a model that was fitted"
-                )
-    return model
+    return owner_model(record.case)
 
 
 def _table(result: "Comparison") -> list[str]:

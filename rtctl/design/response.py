@@ -18,7 +18,7 @@ from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.drivers import ldu_amplifier
 from rtctl.laws import allocation, gain_schedule
-from rtctl.own.files import is_own
+from rtctl.own.files import is_own, refuse_plant
 from rtctl.plants import axis as plant_axis
 from rtctl.plants import ivu as plant_ivu
 from rtctl.plants import ldu as plant_ldu
@@ -48,11 +48,12 @@ def take(config: Any, motor: int = 1) -> Loop:
 
     Raises ValueError where the settings contradict each other.
     """
-    for key, settings in (("law.position", config.law.position), ("plant", config.plant)):
-        if is_own(getattr(settings, "kind", "")):
-            raise UserError(
-                f"{key}: the response of {settings.kind} is not known from a model; measure it with rtctl identify frf"
-            )
+    refuse_plant(config)
+    kind = getattr(config.law.position, "kind", "")
+    if is_own(kind):
+        raise UserError(
+            f"law.position: the response of {kind} is not known from a model; measure it with rtctl identify frf"
+        )
     machine = machines.build(config)
     blocks = {block.name: block.params for block in machine.diagram.blocks if block.params is not None}
     plant = next(block.params for block in machine.plant_diagram.blocks if block.name == "plant")

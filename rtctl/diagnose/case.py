@@ -14,9 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
-from rtctl.diagnose.quantities import EFFORT
+from rtctl.diagnose.quantities import EFFORT, Quantities, quantities, settings_in
 from rtctl.idiom import Settings
-from rtctl.own.files import is_own
+from rtctl.own.files import refuse_plant
 from rtctl.plants import axis, ivu, ldu
 
 DAMPING = math.sqrt(0.5)  # of a drive of which the owner says nothing
@@ -57,7 +57,7 @@ class Sensors(_Part):
     scale_m_per_count: float | None = Field(None, gt=0)
     x_counts_per_rev: float | None = Field(None, gt=0)
     x_resolution_m: float | None = Field(None, ge=0)
-    unit: str | None = None  # of x: m, rad or V
+    unit: Literal["m", "rad", "V"] | None = None  # of x
     column: str | None = None  # that holds x
 
 
@@ -73,7 +73,7 @@ class Drive(_Part):
     newton_metre_per_ampere: float | None = Field(None, gt=0)
     newton_metre_per_volt: float | None = Field(None, gt=0)
     column: str | None = None  # what the recorded command is called at its origin
-    unit: str = "V"
+    unit: Literal["V", "A", "N", "Nm"] = "V"  # of the command
 
     @property
     def late(self) -> float:
@@ -147,6 +147,8 @@ class Case(NamedTuple):
     notes: str
     warnings: tuple[str, ...]
     beyond: tuple[str, ...]  # what the law in `config` has that the exchange format cannot say
+    file: Path = Path("case.json")
+    unsaid: str = ""  # why a law that the owner knows cannot be recomputed from `controller`; "" where it can
 
     @property
     def estimated(self) -> tuple[str, ...]:
@@ -179,7 +181,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     if not isinstance(plant, str) or plant not in PARAMETERS:
         hint = nearest(str(plant), PARAMETERS)
         raise UserError(f"{where}: plant is {plant!r}; it should be ivu, ldu or axis" + _or(hint))
-    _refuse_own_plant(where, case.get("config"))
+    refuse_plant(case.get("config"), f"{where}: config.")
     warnings = [_strange(where, key, "", KEYS) for key in case if key not in (*KEYS, *FROM_ELSEWHERE)]
     rate = _number(where, "sample_rate", case.get("sample_rate"))
     if rate is not None and rate <= 0:
@@ -198,41 +200,32 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     known = case.get("controller_known", not isinstance(controller, UnknownLaw))
     if not isinstance(known, bool):
         raise UserError(f"{where}: controller_known is {known!r}; it should be true or false")
-    beyond = beyond_format(case.get("config"))
+    beyond, unsaid = beyond_format(case.get("config")), ""
     if known and isinstance(controller, UnknownLaw):
         has = f" (it has {', '.join(beyond)})" if beyond else ""
-        warnings.append(
-            f"{where}: a law of kind '{controller.kind}' cannot be recomputed on this plant{has}; "
-            "the recorded command is taken as the input"
-        )
+        unsaid = f"a law of kind '{controller.kind}' cannot be recomputed on this plant{has}"
         known = False
     notes = case.get("notes")
+    reaches = _part(where, "reaches", Reaches, case.get("reaches"), warnings)
+    if case.get("parameters") and "parameter_tolerance" not in reaches.model_fields_set:
+        share = reaches.parameter_tolerance
+        warnings.append(f"{where}: reaches.parameter_tolerance is missing; {share} is taken for what parameters say")
     return Case(
         plant=plant,
         sample_rate=rate,
-        parameters=_parameters(where, plant, case.get("parameters"), warnings),
+        parameters=_parameters(where, plant, case.get("parameters"), quantities(sensors.unit, drive.unit), warnings),
         sensors=sensors,
         drive=drive,
         delay_samples=delay,
         controller=controller,
         controller_known=known,
-        reaches=_part(where, "reaches", Reaches, case.get("reaches"), warnings),
+        reaches=reaches,
         notes=notes if isinstance(notes, str) else "",
         warnings=tuple(warnings),
         beyond=beyond,
+        file=where,
+        unsaid=unsaid,
     )
-
-
-def _refuse_own_plant(where: Path, config: Any) -> None:
-    plant = config.get("plant") if isinstance(config, dict) else None
-    kind = plant.get("kind") if isinstance(plant, dict) else None
-    if isinstance(kind, str) and is_own(kind):
-        raise UserError(
-            f"{where}: config.plant.kind is '{kind}', a plant of the user's own; its equations are not those of ivu, "
-            "ldu or axis, so no model of this program can be fitted to it or simulated. `rtctl replay`, `trace plot`, "
-            "`trace compare` and `trace export` take this recording; to diagnose it as a plain axis, export it and "
-            "import the table with `rtctl import --plant axis`"
-        )
 
 
 def believed(case: Case) -> dict[str, float]:
@@ -293,14 +286,15 @@ def beyond_format(config: Any) -> tuple[str, ...]:
     return tuple(has)
 
 
-def _parameters(where: Path, plant: str, given: Any, warnings: list[str]) -> dict[str, float]:
+def _parameters(where: Path, plant: str, given: Any, units: Quantities, warnings: list[str]) -> dict[str, float]:
     if given is None:
         given = {}
     if not isinstance(given, dict):
         raise UserError(f"{where}: parameters is a {type(given).__name__}; it should be an object of names and numbers")
-    model = PARAMETERS[plant]
+    model = settings_in(PARAMETERS[plant], units) if plant == "axis" else PARAMETERS[plant]
     known = (*model.model_fields, *DERIVED[plant], *OTHER_NAMES[plant])
     values: dict[str, float] = {}
+    written: dict[str, Any] = {}  # own name -> as the owner writes it
     for name, value in given.items():
         if name not in known:
             warnings.append(_strange(where, name, "parameters.", known))
@@ -310,8 +304,9 @@ def _parameters(where: Path, plant: str, given: Any, warnings: list[str]) -> dic
             continue
         own = OTHER_NAMES[plant].get(str(name), str(name))
         if own in values:
-            raise UserError(f"{where}: parameters.{name} and parameters.{own} are one and the same; give one of them")
-        values[own] = number
+            both = f"parameters.{written[own]} and parameters.{name}"
+            raise UserError(f"{where}: {both} are one and the same; give one of them")
+        values[own], written[own] = number, name
         if own in DERIVED[plant]:
             if number <= 0:
                 raise UserError(f"{where}: parameters.{name} is {number:g}; it should be above 0")
@@ -319,7 +314,8 @@ def _parameters(where: Path, plant: str, given: Any, warnings: list[str]) -> dic
         try:
             model(**{own: number})
         except ValidationError as error:
-            raise UserError(sentences(error, model, {own: number}, lambda path: f"{where}: parameters")) from None
+            said = sentences(error, model, {own: number}).removeprefix(f"{own}: ")
+            raise UserError(f"{where}: parameters.{name}: {said}") from None
     absent = [n for n in model.model_fields if n not in (*values, *TERMS[plant], "J_1", "J_2", "M", "K")]
     if absent:
         warnings.append(f"{where}: parameters does not say {', '.join(absent)}; the model's own values are taken")

@@ -78,7 +78,7 @@ def searched(record: Record, progress: Progress) -> Found:
     only if what is missing still shows, or if no hypothesis explained any of the wandering and what is left without it
     is hiss.
     """
-    progress("fitting the owner's parameters")
+    progress("fitting the nominal parameters")
     if record.plant == "axis" and record.case.controller.kind == "none":
         return held_or_smooth(record, progress)
     problem, base = base_of(Simulator(record))

@@ -25,7 +25,7 @@ from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
-from rtctl.own.files import OwnError
+from rtctl.own.files import OwnError, refuse_plant
 from rtctl.own.term import texts
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import TERMS
@@ -109,6 +109,7 @@ def read_model(path: Path | str, record: Record) -> Model:
         raise UserError(f"{path}: machine is {kind!r}; it should be {record.plant}, as in the bundle")
     if kind != record.plant:
         raise UserError(f"{path}: machine is {kind}, and the bundle was recorded on the {record.plant}")
+    refuse_plant(data, f"{path}: ")
     plant = load_settings(file, machines.CONFIGS[kind], widen=machines.OWN).plant
     if kind == "ivu":
         base = _numbers(ivu.parameters(plant))

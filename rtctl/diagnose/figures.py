@@ -347,13 +347,14 @@ def regimes(d: Diagnosis, sim: Simulator) -> dict[str, np.ndarray]:
 
 
 def parameters(d: Diagnosis, sim: Simulator | None = None) -> Figure:
-    """Fitted parameters over the owner's values with their 90 % intervals, and how far the owner may be off."""
+    """Fitted parameters over the nominal values with their 90 % intervals, and the tolerance where there is one."""
     names = [n for n in FITTED[d.record.plant] if n in d.parameters and d.owner.base.get(n)]
     figure, (ax,) = new(0.9 + 0.24 * max(len(names), 1))
     for row, name in enumerate(names):
         v, owner = d.parameters[name], d.owner.base[name]
-        tolerance = 100 * min(d.record.case.tolerance(name), 3.0)
-        ax.barh(row, 2 * tolerance, left=-tolerance, color=SEEN, alpha=0.25, height=0.8)
+        tolerance = 100 * d.record.case.tolerance(name)
+        if np.isfinite(tolerance):
+            ax.barh(row, 2 * tolerance, left=-tolerance, color=SEEN, alpha=0.25, height=0.8)
         value, low, high = (100 * (x / owner - 1) for x in (v.value, v.low, v.high))
         ends = [[max(value - low, 0)], [max(high - value, 0)]]
         ax.errorbar(value, row, xerr=ends, fmt="o", ms=4, color=AFTER, capsize=3)
@@ -361,7 +362,7 @@ def parameters(d: Diagnosis, sim: Simulator | None = None) -> Figure:
     estimated = d.record.case.estimated
     ax.set_yticks(range(len(names)), [f"{n} (estimated)" if n in estimated else n for n in names])
     ax.invert_yaxis()
-    label(ax, "fitted over the nominal value, %; grey: how far it may be off")
+    label(ax, "fitted over the nominal value, %; grey: its tolerance, where it has one")
     return figure
 
 

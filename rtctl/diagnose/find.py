@@ -69,7 +69,7 @@ def find(
     It ends after the first round where the best model is not `sound`: then the record is to be looked at otherwise.
     """
     if base is None:
-        progress("fitting the owner's parameters")
+        progress("fitting the nominal parameters")
         base = base_fit(sim, problem)
     off = jitter(sim, base.model, problem.rows)
     if off is not None:

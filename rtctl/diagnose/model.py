@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rtctl.config.errors import UserError
 from rtctl.diagnose.case import DAMPING, Case, believed
 from rtctl.diagnose.quantities import Quantities, of_case, quantities
 from rtctl.diagnose.tacho import signed
@@ -51,8 +52,17 @@ class Model(NamedTuple):
 
 
 def owner_model(case: Case, record: "Record | None" = None) -> Model:
-    """The nominal model, without any term; what `case.estimated` names comes from the record."""
+    """The nominal model, without any term; what `case.estimated` names comes from the record.
+
+    Raises UserError where the record is to give both M and K of an axis: it shows only their ratio.
+    """
     base = {k: v for k, v in believed(case).items() if v is not None}
+    if case.plant == "axis" and record is not None and not {"M", "K"} & set(base):
+        words = of_case(case).needed()
+        raise UserError(
+            f"{case.file}: neither parameters.M nor parameters.K is there, {words['M']} and {words['K']}; a recording "
+            "shows only their ratio, so one of them should be given (K: 1 takes the command itself for it)"
+        )
     if case.estimated and record is not None:
         found = guess(record, base)
         if "M" in base:  # known in kg or kg m^2, so the record gives the force of one unit of the command
@@ -106,9 +116,18 @@ def dry_with_terms(model: Model, node: str) -> float:
 
 
 def plant_params(model: Model, case: Case, h: float) -> Any:
-    """The plant's params for substeps of `h` s, as its `build` would make them but without checking settings anew."""
+    """The plant's params for substeps of `h` s, as its `build` would make them but without checking settings anew.
+
+    Raises UserError where an axis has no mass, or no force for its command.
+    """
     base = model.base
     if model.kind == "axis":
+        for name, words in model.units.needed().items():
+            if not base.get(name):
+                raise UserError(
+                    f"{case.file}: parameters.{name} is missing, {words}; without it there is no belief to simulate, "
+                    "only a model that was fitted"
+                )
         params = axis.AxisParams
         return params(h, *(base.get(name, 0.0) for name in params._fields[1:]))
     w = 2 * np.pi * (case.drive.bandwidth_hz or DIRECT)

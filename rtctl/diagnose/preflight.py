@@ -243,7 +243,11 @@ def _counters(record: Record, findings: list[str], numbers: dict[str, Any]) -> N
 
 
 def _law(record: Record, findings: list[str], numbers: dict[str, Any]) -> None:
-    agreement = law_agreement(record)
+    agreement, replay = law_agreement(record), record.replay
+    if replay is not None and replay.rows:
+        numbers["law"] = {"replayed": replay.rows, "exact": replay.identical, "holds": replay.identical}
+        findings.append(f"{replay.words[:1].upper()}{replay.words[1:]}.")
+        return
     if agreement is None:
         why = "There is no loop" if isinstance(record.case.controller, NoLaw) else "No law can be recomputed"
         findings.append(f"{why}: the recorded command is the input.")

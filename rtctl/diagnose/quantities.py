@@ -5,9 +5,14 @@ axis is rotary, and every text, table, figure and file takes its units from here
 """
 
 import re
+from copy import copy
+from functools import lru_cache
 from typing import Any, NamedTuple
 
+from pydantic import create_model
+
 from rtctl.config.units import ANGLES
+from rtctl.idiom import Settings
 
 EFFORT = ("N", "Nm")  # units of u that are the force or torque itself: the gain K is 1
 VOLT = "V"  # unit of a command, where nothing else is said
@@ -41,6 +46,11 @@ class Quantities(NamedTuple):
         """Unit of a parameter of the axis; None where it has none of these."""
         units = {"M": self.inertia, "K": self.gain, "F_v": self.drag, "F_c": self.force, "k": self.stiffness}
         return units.get(parameter)
+
+    def needed(self) -> dict[str, str]:
+        """What a model of the axis cannot do without: parameter -> noun with its unit."""
+        noun, push = ("moment of inertia", "torque") if self.rotary else ("moving mass", "force")
+        return {"M": f"the {noun} ({self.inertia})", "K": f"the {push} for one {self.command_name}"}
 
     def said(self, unit: str) -> str:
         """The unit of a setting, written for a sliding axis and a command in V, as it is on this axis."""
@@ -80,6 +90,18 @@ def node_words(node: str, units: Quantities) -> str:
         return NODES[node]
     stem = node.rstrip("0123456789")
     return f"{stem} {node[len(stem) :]}".strip() if node else "the machine"
+
+
+@lru_cache
+def settings_in(model: type[Settings], units: Quantities) -> type[Settings]:
+    """Settings class with the fields and bounds of an axis's parameters, whose messages give the units of this axis."""
+    fields: dict[str, Any] = {}
+    for name, field in model.model_fields.items():
+        said, extra = copy(field), field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+        said.json_schema_extra = {**extra, "unit": units.of(name) or units.said(str(extra.get("unit", "")))}
+        fields[name] = (field.annotation, said)
+    made: type[Settings] = create_model(model.__name__, __base__=Settings, **fields)
+    return made
 
 
 def of_case(case: Any) -> Quantities:

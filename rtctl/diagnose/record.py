@@ -24,7 +24,8 @@ from rtctl.diagnose.columns import (
     unwrap_turns,
 )
 from rtctl.diagnose.quantities import of_case
-from rtctl.trace.bundle import PARQUET, load_bundle
+from rtctl.diagnose.replayed import LawReplay, replayed_law
+from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
 COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
@@ -45,6 +46,7 @@ class Record(NamedTuple):
     u: np.ndarray  # (n, nu) V, or what `case.drive.unit` says
     y: dict[str, np.ndarray]  # name -> (n,) in the sensor's own unit; counters without their wraps
     columns: dict[str, np.ndarray]  # as they stand in the file, `t` at its own uneven times
+    replay: LawReplay | None = None  # of our own recordings whose law `controller` cannot say
 
     @property
     def closed_loop(self) -> bool:
@@ -97,11 +99,11 @@ def load_record(folder: Path | str) -> Record:
         columns = {name: values[rows] for name, values in columns.items()}
         if case.plant == "ldu" and "u" in columns and measured_amplifier(bundle.case["config"]):
             columns["u"] = through_amplifier(columns["u"])
-    return check(columns, case, bundle.folder)
+    return check(columns, case, bundle.folder, bundle)
 
 
-def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") -> Record:
-    """The Record of these columns, by the same rules as `load_record`."""
+def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".", whole: Bundle | None = None) -> Record:
+    """The Record of these columns, by the same rules as `load_record`; `whole` is the bundle that they are from."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
     if case.estimated and case.reaches.parameter_tolerance is not None:  # null: the owner says that nothing is known
@@ -138,9 +140,11 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".") 
     _supports(path, t, u, y, case, warnings)
     record = Record(case.plant, case, t, dt, ref, w, u, y, columns)
     agreement = law_agreement(record)
-    if record.closed_loop and (agreement is None or not agreement.holds):
-        warnings.append(f"{path.parent}: {_disagrees(case, agreement)}; the recorded command is taken as the input")
-        case = case._replace(controller_known=False)
+    if (record.closed_loop or case.unsaid) and (agreement is None or not agreement.holds):
+        found = replayed_law(whole) if whole is not None else None
+        words = _replayed(case, found) if found is not None else case.unsaid or _disagrees(case, agreement)
+        warnings.append(f"{path.parent}: {words}; the recorded command is taken as the input")
+        case, record = case._replace(controller_known=False), record._replace(replay=found)
     return record._replace(case=case._replace(warnings=tuple(warnings)))
 
 
@@ -341,6 +345,13 @@ def _supports(
             if k == 0:
                 raise NoAnswer(f"{path}: column '{name}' never changes; nothing moved, so it supports no verdict")
             warnings.append(f"{path}: column '{name}' never changes")
+
+
+def _replayed(case: Case, found: LawReplay) -> str:
+    has = f"has {', '.join(case.beyond)}, which 'controller' of case.json cannot say" if case.beyond else ""
+    if found.identical:
+        return f"{found.words}: nothing is wrong with it. It {has or 'is more than the controller of case.json says'}"
+    return f"{found.words}; it {has}" if has else found.words
 
 
 def _disagrees(case: Case, agreement: Agreement | None) -> str:

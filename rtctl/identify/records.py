@@ -111,22 +111,27 @@ def take_all(sources: Any) -> list[Record]:
 
 
 def config_of(bundle: Bundle) -> Any:
-    """Settings of the machine that a bundle was recorded with. Raises UserError where case.json does not hold them."""
+    """Settings of the machine that a bundle was recorded with, but for a law or terms of the user's own: no analysis
+    here works with them, and their code, which came with the recording, is not run.
+
+    Raises UserError where case.json does not hold them, and where the plant is the user's own.
+    """
     from pydantic import ValidationError
 
     from rtctl import machines
     from rtctl.config.complaints import sentences
     from rtctl.config.fields import Shape, fill
-    from rtctl.own.files import OwnError
+    from rtctl.config.yaml_file import find, load_yaml
+    from rtctl.own.files import refuse_plant
+    from rtctl.own.model import without_own
 
     data = bundle.case.get("config")
     where = bundle.folder / "case.json"
     if not isinstance(data, dict) or data.get("machine") not in machines.CONFIGS:
         raise UserError(f"{where}: no config of a machine under 'config'; experiments read recordings of `rtctl run`")
-    try:
-        model, data = machines.widened(data)
-    except OwnError as error:
-        raise UserError(f"{where}: config: {error}") from error
+    refuse_plant(data, f"{where}: config.")
+    model = machines.CONFIGS[data["machine"]]
+    data = without_own(data, load_yaml(find(data["machine"])).data["law"]["position"])
     filled = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(filled)

@@ -119,13 +119,19 @@ def read(file: str, folder: Path) -> str:
     return text
 
 
-def refuse_plant(config: Any, what: str) -> None:
-    """Raise UserError where `what` works with the equations of the plant, and the config has a plant of its own."""
+def refuse_plant(config: Any, where: str = "") -> None:
+    """Raise UserError where a config, as settings or as plain data, has a plant of its user's own: each analysis works
+    with the equations of ours. `where` says in which file the config stands."""
     from rtctl.config.errors import UserError
 
-    if is_own(getattr(config.plant, "kind", "")):
+    plant = config.get("plant") if isinstance(config, dict) else getattr(config, "plant", None)
+    kind = (plant.get("kind") if isinstance(plant, dict) else getattr(plant, "kind", None)) or plant
+    if is_own(kind):
         raise UserError(
-            f"plant.kind: {what} needs the equations of the {config.machine}; of {config.plant.kind} it knows nothing"
+            f"{where}plant.kind is '{kind}', a plant of the user's own: its equations are not those of ivu, ldu or "
+            "axis, and analysis of such plants (diagnose, identify, simulate, tune) is not there yet. What works: "
+            "rtctl run, replay, trace plot, trace compare, trace export, campaign; a recording can be exported and "
+            "imported again as a plain axis, rtctl import --plant axis"
         )
 
 

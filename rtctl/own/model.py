@@ -71,6 +71,20 @@ def long_form(data: Any) -> Any:
     return {**data, **changed}
 
 
+def without_own(data: dict[str, Any], position: Any) -> dict[str, Any]:
+    """Plain data of a config without its own law and terms: `position` stands in the place of `law.position`."""
+    data = {key: value for key, value in long_form(data).items() if key != "own"}
+    found = _named(data)
+    if LAW in found:
+        data["law"] = {**data["law"], "position": position}
+    if any(key[:2] == PHYSICS for key in found):
+        physics = [e for i, e in enumerate(data["plant"]["physics"]) if (*PHYSICS, i, "term") not in found]
+        data["plant"] = {**data["plant"], "physics": physics}
+    if isinstance(data.get("record"), dict) and found:
+        data["record"] = {k: v for k, v in data["record"].items() if k != "trace"}  # signals of the own law, perhaps
+    return data
+
+
 def _named(data: dict[str, Any]) -> dict[Key, str]:
     """Key -> ./file.py:Name of all own files that the data names."""
     found: dict[Key, str] = {}

@@ -70,6 +70,11 @@ def replay(folder: Path | str, changed: Mapping[str, Any] | None = None, own: It
     """
     bundle = load_bundle(folder)
     give(map(Path, own))
+    return replay_bundle(bundle, changed)
+
+
+def replay_bundle(bundle: Bundle, changed: Mapping[str, Any] | None = None) -> Replayed:
+    """Replay a bundle that is read already, as `replay` does."""
     config, changed = _config(bundle), dict(changed or {})
     config = set_paths(config, changed)
     machine = _machine(config)

@@ -70,7 +70,7 @@ def test_an_unknown_controller_is_a_warning_and_its_command_the_input(case_of):
     case = read_case(case_of("ldu", controller={"kind": "sliding_mode"}), "bundle")
     assert isinstance(case.controller, UnknownLaw)
     assert not case.controller_known
-    assert any("sliding_mode" in w for w in case.warnings)
+    assert "sliding_mode" in case.unsaid
 
 
 def test_unknown_keys_are_warned_of_with_the_nearest_name(case_of):
@@ -102,7 +102,7 @@ def test_says_what_the_law_of_a_config_has_beyond_the_format(case_of):
     assert "inertia" not in " ".join(beyond_format({"machine": "ivu", "law": {"inertia": {"share": 0}}}))
     law = {"position": {"kind": "pi_velocity"}}
     own = case_of("axis", controller={"kind": "pi_velocity"}, config={"machine": "axis", "law": law})
-    assert "filtered speed" in " ".join(read_case(own, "bundle").warnings)
+    assert "filtered speed" in read_case(own, "bundle").unsaid
 
 
 def test_a_rotary_axis_has_an_inertia_for_a_mass(case_of):
@@ -138,8 +138,8 @@ def test_tolerance_null_means_anything(case_of):
         ({"sample_rate": 0}, ("sample_rate is 0", "above 0 Hz")),
         ({"sample_rate": "fast"}, ("sample_rate is 'fast'", "number")),
         ({"delay_samples": -1}, ("delay_samples is -1", "between 0 and 100")),
-        ({"parameters__J_m1": -0.0015}, ("parameters: J_m1", "more than 0")),
-        ({"parameters__tau_F1": -1e-3}, ("parameters: tau_F1", "at least 0")),
+        ({"parameters__J_m1": -0.0015}, ("parameters.J_m1", "more than 0")),
+        ({"parameters__tau_F1": -1e-3}, ("parameters.tau_F1", "at least 0")),
         ({"parameters__R1": math.nan}, ("parameters.R1 is nan", "finite")),
         ({"parameters__R1": 10**400}, ("parameters.R1", "finite")),
         ({"parameters__R1": "3 cm"}, ("parameters.R1 is '3 cm'", "SI")),
@@ -217,4 +217,34 @@ def test_an_estimate_of_the_program_has_no_tolerance(case_of):
 def test_a_plant_of_the_users_own_is_refused(case_of, plant):
     said = refused(case_of(plant, config={"machine": plant, "plant": {"kind": "./my_plant.py:Plant"}}))
     assert "./my_plant.py:Plant" in said
-    assert "rtctl replay" in said
+    assert "replay" in said and "not there yet" in said
+
+
+@pytest.mark.parametrize("value", [0, -1, "two", float("nan"), float("inf"), [1], {}, True])
+@pytest.mark.parametrize("name", ["M", "K", "J", "K_m"])
+def test_a_parameter_that_cannot_be_is_told_by_its_name_and_in_the_unit_of_the_axis(case_of, name, value):
+    said = refused(case_of("axis", parameters={name: value}, sensors={"unit": "rad"}))
+    unit = {"M": "kg m^2", "J": "kg m^2"}.get(name, "Nm/V")
+    assert said.startswith(f"bundle/case.json: parameters.{name}") and "kg;" not in said
+    assert "should be a" in said or f"it must be more than 0 {unit}" in said
+
+
+def test_a_tolerance_that_the_case_does_not_give_is_told(case_of):
+    silent, given = (read_case(case_of("axis", reaches=r), "bundle") for r in ({}, {"parameter_tolerance": 0.15}))
+    assert silent.tolerance("M") == given.tolerance("M") == 0.15
+    assert [w for w in silent.warnings if "reaches.parameter_tolerance is missing; 0.15 is taken" in w]
+    assert not [w for w in given.warnings if "tolerance" in w]
+    nothing = read_case(case_of("axis", reaches={"parameter_tolerance": None}), "bundle")
+    assert nothing.tolerance("M") == math.inf and not [w for w in nothing.warnings if "tolerance" in w]
+    assert not [w for w in read_case(case_of("axis", reaches={}, parameters={}), "b").warnings if "tolerance" in w]
+
+
+def test_two_names_of_one_parameter_are_both_told(case_of):
+    said = refused(case_of("axis", parameters={"J": 1.0, "M": 1.0}))
+    assert "parameters.J and parameters.M are one and the same" in said
+
+
+@pytest.mark.parametrize(("part", "unit"), [("sensors", "deg"), ("sensors", ""), ("drive", "furlong"), ("drive", 5)])
+def test_a_unit_that_no_axis_has_is_refused(case_of, part, unit):
+    said = refused(case_of("axis", **{f"{part}__unit": unit}))
+    assert f"{part}: unit" in said and "is not one of" in said

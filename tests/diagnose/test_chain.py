@@ -99,7 +99,7 @@ def test_the_new_model_predicts_what_it_was_not_fitted_on(spring):
 def test_its_stages_are_told_in_order(spring):
     _, said = spring
     assert said[0] == "preflight"
-    assert said.index("fitting the owner's parameters") == 1
+    assert said.index("fitting the nominal parameters") == 1
     assert any(text.startswith("screening ") for text in said)
     assert said[-1].startswith("predicting ")
 

@@ -234,3 +234,11 @@ def test_the_turn_of_an_axis_that_turns_with_its_orders(found):
     boxes = visible(figure)
     width, height = figure.canvas.get_width_height()
     assert all(b.x0 > -2 and b.x1 < width + 2 and b.y0 > -2 and b.y1 < height + 2 for _, b in boxes)
+
+
+def test_only_what_has_a_tolerance_has_a_grey_bar(found):
+    d, _ = found
+    reaches = d.record.case.reaches.model_copy(update={"parameter_tolerance": None})
+    unknown = d._replace(record=d.record._replace(case=d.record.case._replace(reaches=reaches)))
+    bars = [len(figures.parameters(each).axes[0].patches) for each in (d, unknown)]
+    assert bars[0] == len([n for n in d.parameters if d.owner.base.get(n)]) > 0 and bars[1] == 0

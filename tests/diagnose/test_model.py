@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rtctl.config.errors import UserError
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.kernel import OPEN
 from rtctl.diagnose.model import FITTED, Model, free_parameters, owner_model, plant_params
@@ -94,7 +95,7 @@ def test_an_axis_whose_mass_is_said_is_not_guessed(plain):
     assert owner_model(plain.record.case, plain.record).base == owner_model(plain.record.case).base
 
 
-@pytest.mark.parametrize(("given", "wanted"), [({}, {"M": 0.5}), ({"M": 2.0}, {"M": 2.0, "K": 4.0})])
+@pytest.mark.parametrize(("given", "wanted"), [({"K": 2.0}, {"M": 1.0, "K": 2.0}), ({"M": 2.0}, {"M": 2.0, "K": 4.0})])
 def test_what_the_case_does_not_say_is_estimated_from_the_record(given, wanted):
     case = read_case({"plant": "axis", "sample_rate": 1000.0, "parameters": given, "controller": {"kind": "none"}}, ".")
     t = np.arange(4000) / 1000.0
@@ -105,3 +106,19 @@ def test_what_the_case_does_not_say_is_estimated_from_the_record(given, wanted):
     for name, value in wanted.items():
         assert base[name] == pytest.approx(value, rel=0.03)
     assert any("estimated from the recording" in warning for warning in record.case.warnings)
+
+
+@pytest.mark.parametrize("unit", ["m", "rad"])
+def test_a_recording_gives_the_ratio_of_mass_and_force_alone(blank, unit):
+    record = blank("axis", np.sin(np.arange(2000.0)), np.cos(np.arange(2000.0)), parameters={}, drive={},
+                   sensors={"unit": unit})  # fmt: skip
+    noun = {"m": "the moving mass (kg)", "rad": "the moment of inertia (kg m^2)"}[unit]
+    with pytest.raises(UserError, match=r"case\.json: neither parameters\.M nor parameters\.K") as error:
+        owner_model(record.case, record)
+    assert noun in str(error.value)
+    with pytest.raises(UserError, match=r"case\.json: parameters\.M is missing") as error:
+        plant_params(owner_model(record.case), record.case, 1e-3)
+    assert noun in str(error.value)
+    known = owner_model(record.case).change(M=1.0)
+    with pytest.raises(UserError, match=r"parameters\.K is missing, the \w+ for one volt"):
+        plant_params(known, record.case, 1e-3)

@@ -188,7 +188,7 @@ def test_bad_rows(tmp_path, rows, words):
         ({"columns": {**MAP, "x_counts": "qm"}}, r"column 'qm', line 3: .* is not a whole number; a counter counts"),
         ({"columns": {**MAP, "ref": {"column": "qm", "unit": "rad"}}}, "x in m, ref in rad: position and reference"),
         ({"parameters": {"M": "95 m"}}, "--parameter M=95 m: '95 m' is not a quantity in kg"),
-        ({"parameters": {"M": -1}}, "^parameters: M: -1.0 kg is out of bounds"),
+        ({"parameters": {"M": -1}}, "^parameters.M: -1.0 kg is out of bounds"),
         ({"case": {"delay_samples": -1}}, "delay_samples is -1"),
         ({"case": {"drive": 3}}, "--case drive=3: it holds keys of its own"),
         ({"case": {"other": float("nan")}}, "NaN and infinity are nothing"),

@@ -1,0 +1,46 @@
+"""The law of a recording by our own daemon, replayed: whether the config in case.json gives the recorded command.
+
+`controller` of case.json says the law in the words of the exchange format, which has none for friction compensation,
+inertia feedforward or a tension that is ramped. The config beside it says all, and `rtctl replay` recomputes its tick
+to the bit. Code that came with the recording is never run.
+"""
+
+from typing import NamedTuple
+
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.trace.bundle import Bundle
+from rtctl.trace.replay import replay_bundle
+
+NEEDED = ("tick", "order", "link_age")  # columns of every recording of our own
+
+
+class LawReplay(NamedTuple):
+    rows: int  # that were replayed; 0 where none could be
+    identical: bool  # to the bit, in all voltages written
+    words: str  # sentence without its full stop
+
+
+def replayed_law(bundle: Bundle) -> LawReplay | None:
+    """The recorded voltages against those that the law of the config writes for the recorded readings.
+
+    None where the recording is not one of our own.
+    """
+    if not isinstance(bundle.case.get("config"), dict) or any(name not in bundle.columns for name in NEEDED):
+        return None
+    try:
+        found = replay_bundle(bundle)
+    except (NoAnswer, UserError) as error:
+        return LawReplay(0, False, f"the law of the config was not replayed: {error}")
+    rows = len(found.rows)
+    wrong = next((d for d in found.differences if d.column in found.written), None)
+    if wrong is None:
+        return LawReplay(
+            rows, True, f"the law of the config, replayed, gives the recorded command to the bit ({rows} rows)"
+        )
+    version = "" if found.same_program else "; the recording is of another version of rtctl"
+    return LawReplay(
+        rows,
+        False,
+        f"the law of the config, replayed, does not give the recorded command: {wrong.column} differs from tick "
+        f"{wrong.tick} ({wrong.t:g} s) on, by up to {wrong.largest:.3g} V{version}",
+    )
