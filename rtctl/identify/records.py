@@ -111,20 +111,24 @@ def take_all(sources: Any) -> list[Record]:
 
 
 def config_of(bundle: Bundle) -> Any:
-    """Settings of the machine that a bundle was recorded with. Raises UserError where case.json does not hold them."""
+    """Settings of the machine that a bundle was recorded with, without code of its owner.
+
+    Raises UserError where case.json does not hold them, and for an own plant.
+    """
     from pydantic import ValidationError
 
     from rtctl import machines
     from rtctl.config.complaints import sentences
     from rtctl.config.fields import Shape, fill
     from rtctl.own.files import OwnError
+    from rtctl.own.model import without_code
 
     data = bundle.case.get("config")
     where = bundle.folder / "case.json"
     if not isinstance(data, dict) or data.get("machine") not in machines.CONFIGS:
         raise UserError(f"{where}: no config of a machine under 'config'; experiments read recordings of `rtctl run`")
     try:
-        model, data = machines.widened(data)
+        model, data = without_code(machines.CONFIGS[data["machine"]], data)
     except OwnError as error:
         raise UserError(f"{where}: config: {error}") from error
     filled = fill(Shape(model, model=model), data)
