@@ -43,7 +43,8 @@ def widened(base: Any, data: Any, folder: Path | None = None, law: bool = True) 
         return base, data
     data = long_form(data)
     found = _named(data)
-    if not law and found.pop(LAW, None):
+    if not law and LAW in found:
+        del found[LAW]
         base = _with_any_law(base)
     if not found:
         return base, data
