@@ -10,6 +10,7 @@ from rtctl.campaign import cell
 from rtctl.campaign.metrics import METRICS
 from rtctl.campaign.plan import Plan
 from rtctl.config.errors import UserError
+from rtctl.config.files import made_in
 from rtctl.daemon.case import describe
 from rtctl.loop.fused import Run
 from rtctl.trace.bundle import PARQUET, save_case, write_parquet
@@ -66,7 +67,7 @@ def write(plan: Plan, number: int, folder: Path) -> Path:
         return bundle
     run = cell.play(plan, number)
     try:
-        bundle.mkdir(parents=True, exist_ok=True)
+        made_in(folder, FOLDER, name_of(number))
         save_case(bundle, case_of(plan, number, run))
         journal = Journal()
         journal.note(run.loop.c[0], {})

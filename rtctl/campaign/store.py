@@ -87,7 +87,7 @@ class Store:
 
     def _save(self, table: pa.Table, path: Path) -> None:
         try:
-            path.parent.mkdir(exist_ok=True)
+            files.made_in(self.folder, *path.parent.relative_to(self.folder).parts)
             with files.replaced(path, "wb", sync=True) as file:
                 pq.write_table(table, file, compression="zstd")
         except OSError as error:

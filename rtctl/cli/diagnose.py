@@ -135,7 +135,7 @@ def _bundle(console: Any, bundle: Path, other: Path | None, out: Path | None, re
     with console.stages() as stage:
         d = chain(bundle, other, stage)
         stage("writing the results")
-        faults = write(d, folder, own_config(bundle), report)
+        faults = write(d, folder, own_config(bundle), report, bundle if out is None else None)
     console.notes([*d.record.case.warnings, *faults])
     if json:
         common.print_json(finite(as_json(d)))

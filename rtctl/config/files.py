@@ -117,6 +117,20 @@ def inside(path: Path, folder: Path) -> Path:
     return path
 
 
+def made_in(base: Path, *names: str) -> Path:
+    """The folder base/name/..., made where it is missing.
+
+    Raises OSError, and UserError where a link leads out of `base`.
+    """
+    folder = base.joinpath(*names)
+    there = next(path for path in (folder, *folder.parents) if path.exists() or path.is_symlink() or path == base)
+    real = there.resolve()
+    if not real.is_relative_to(base.resolve()):
+        raise UserError(f"{there} leads to {real}, outside of {base}, and nothing is written there; remove the link")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
 def _created(folder: int, name: str) -> tuple[str, int]:
     """Name and descriptor of a new file in an open folder."""
     draft = f".{name[:200]}.{secrets.token_hex(8)}.tmp"

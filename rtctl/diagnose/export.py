@@ -25,7 +25,8 @@ from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
-from rtctl.own.files import OwnError, refuse_plant
+from rtctl.own.files import ForeignError, OwnError, is_own, refuse_plant
+from rtctl.own.model import without_code
 from rtctl.own.term import texts
 from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import TERMS
@@ -59,13 +60,17 @@ def write_model(
 
     data, left = _settings_data(model, record, config)
     own = data.get("own", {}) | texts(entry["term"] for entry in data["plant"]["physics"])
+    data = {**data, "own": own} if own else data
     try:
-        kind, data = machines.widened({**data, "own": own} if own else data)
-    except OwnError as error:
-        raise UserError(str(error)) from None
-    settings = _checked(data, kind)
-    try:
+        kind, data = machines.widened(data)
+        settings = _checked(data, kind)
         machines.build(settings)
+    except OwnError as error:
+        terms = any(is_own(entry["term"]) for entry in data["plant"]["physics"])
+        if not isinstance(error.__cause__, ForeignError) or terms:
+            raise UserError(str(error)) from None
+        kind, data = without_code(machines.CONFIGS[model.kind], data)  # of a law that came with the data
+        settings = _checked(data, kind)
     except ValueError as error:
         raise UserError(f"the model cannot be run: {error}") from error
     path = Path(path)
@@ -110,7 +115,7 @@ def read_model(path: Path | str, record: Record) -> Model:
     if kind != record.plant:
         raise UserError(f"{path}: machine is {kind}, and the bundle was recorded on the {record.plant}")
     refuse_plant(data, f"{path}: ")
-    plant = load_settings(file, machines.CONFIGS[kind], widen=machines.OWN).plant
+    plant = load_settings(file, machines.CONFIGS[kind], widen=machines.OWN_PLANT).plant
     if kind == "ivu":
         base = _numbers(ivu.parameters(plant))
         if not plant.follow_tape:

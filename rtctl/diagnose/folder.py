@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.failures import told
-from rtctl.config.files import replaced_path, write_text
+from rtctl.config.files import made_in, replaced_path, write_text
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
 
 RESULT, MODEL, EXPERIMENT = "diagnosis.json", "model.yaml", "experiment.yaml"
@@ -62,11 +62,14 @@ class Outcome(NamedTuple):
 Work = Callable[[Task, bool], Outcome]
 
 
-def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bool = True) -> list[str]:
+def write(
+    d: Any, folder: Path, config: dict[str, Any] | None = None, report: bool = True, base: Path | None = None
+) -> list[str]:
     """diagnosis.json, model.yaml, experiment.yaml where there is one, report.html; each is there whole or not at all.
 
-    `config` is the recorded machine's own, see `own_config`. Returns a sentence on each file but the first that could
-    not be made: the verdict stands without them. Raises UserError where the disk does not take them.
+    `config` is the recorded machine's own, see `own_config`. Where `base` is given, no link may lead out of it.
+    Returns a sentence on each file but the first that could not be made: the verdict stands without them. Raises
+    UserError where the disk does not take them.
     """
     from rtctl.diagnose.diagnosis import as_json
     from rtctl.diagnose.export import write_model, write_turn
@@ -74,7 +77,7 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
     from rtctl.diagnose.turn import of_diagnosis
 
     faults: list[str] = []
-    _fresh(folder, (RESULT, MODEL, EXPERIMENT, TURN, "report.html"))
+    _fresh(folder, (RESULT, MODEL, EXPERIMENT, TURN, "report.html"), base)
     try:
         _put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config, d.left_out))
     except UserError as error:
@@ -100,9 +103,11 @@ def write(d: Any, folder: Path, config: dict[str, Any] | None = None, report: bo
     return faults
 
 
-def _fresh(folder: Path, names: tuple[str, ...]) -> None:
+def _fresh(folder: Path, names: tuple[str, ...], base: Path | None) -> None:
     """The folder, without files that would pass for the new diagnosis's."""
     try:
+        if base is not None:
+            made_in(base, *folder.relative_to(base).parts)
         folder.mkdir(parents=True, exist_ok=True)
         for name in names:
             (folder / name).unlink(missing_ok=True)
@@ -183,7 +188,7 @@ def one(task: Task, report: bool) -> Outcome:
     began = time.monotonic()
     try:
         d = diagnose(task.bundle, task.other)
-        faults = write(d, task.out, own_config(task.bundle), report)
+        faults = write(d, task.out, own_config(task.bundle), report, task.out.parent)
         return Outcome(task.name, 0, time.monotonic() - began, finite(as_json(d)), "; ".join(faults))
     except (UserError, NoAnswer) as error:
         return Outcome(task.name, error.exit_code, time.monotonic() - began, message=_line(error))

@@ -111,8 +111,7 @@ def take_all(sources: Any) -> list[Record]:
 
 
 def config_of(bundle: Bundle) -> Any:
-    """Settings of the machine that a bundle was recorded with, but for a law or terms of the user's own: no analysis
-    here works with them, and their code, which came with the recording, is not run.
+    """Settings of the machine that a bundle was recorded with, without code of its owner, which came with the recording.
 
     Raises UserError where case.json does not hold them, and where the plant is the user's own.
     """
@@ -121,17 +120,15 @@ def config_of(bundle: Bundle) -> Any:
     from rtctl import machines
     from rtctl.config.complaints import sentences
     from rtctl.config.fields import Shape, fill
-    from rtctl.config.yaml_file import find, load_yaml
     from rtctl.own.files import refuse_plant
-    from rtctl.own.model import without_own
+    from rtctl.own.model import without_code
 
     data = bundle.case.get("config")
     where = bundle.folder / "case.json"
     if not isinstance(data, dict) or data.get("machine") not in machines.CONFIGS:
         raise UserError(f"{where}: no config of a machine under 'config'; experiments read recordings of `rtctl run`")
     refuse_plant(data, f"{where}: config.")
-    model = machines.CONFIGS[data["machine"]]
-    data = without_own(data, load_yaml(find(data["machine"])).data["law"]["position"])
+    model, data = without_code(machines.CONFIGS[data["machine"]], data)
     filled = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(filled)

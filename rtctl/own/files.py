@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from rtctl.config.files import write_text
+from rtctl.config.files import made_in, write_text
 
 OWN = re.compile(r"(?P<file>.+\.py):(?P<name>[A-Za-z_]\w*)")
 MOST_BYTES = 1 << 18
@@ -138,9 +138,7 @@ def refuse_plant(config: Any, where: str = "") -> None:
 def keep(texts: dict[str, str], folder: Path) -> None:
     """Write the texts of own files into a bundle's `own`, for people; a replay takes them from its case.json."""
     for file, text in texts.items():
-        path = folder / "own" / Path(file).name
-        path.parent.mkdir(exist_ok=True)
-        write_text(path, text)
+        write_text(made_in(folder, "own") / Path(file).name, text)
 
 
 def _missing(file: str, path: Path) -> str:

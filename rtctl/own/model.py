@@ -31,16 +31,21 @@ class MisplacedError(OwnError):
         self.key = key
 
 
-def widened(base: Any, data: Any, folder: Path | None = None) -> tuple[Any, Any]:
+def widened(base: Any, data: Any, folder: Path | None = None, law: bool = True) -> tuple[Any, Any]:
     """Settings class for plain `data` of a machine, and the data with the texts of its own files.
 
     `base` is the machine's class, and what comes back where no own file is named. A text that is not in the data is
-    read, from `folder`. Raises MisplacedError, an OwnError that knows the key.
+    read, from `folder`. Without `law` an own law is not run, and its settings stay plain data.
+
+    Raises MisplacedError, an OwnError that knows the key.
     """
     if not isinstance(data, dict):
         return base, data
     data = long_form(data)
     found = _named(data)
+    if not law and LAW in found:
+        del found[LAW]
+        base = _with_any_law(base)
     if not found:
         return base, data
     given = data.get("own")
@@ -71,18 +76,24 @@ def long_form(data: Any) -> Any:
     return {**data, **changed}
 
 
-def without_own(data: dict[str, Any], position: Any) -> dict[str, Any]:
-    """Plain data of a config without its own law and terms: `position` stands in the place of `law.position`."""
-    data = {key: value for key, value in long_form(data).items() if key != "own"}
+def without_code(base: Any, data: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """Settings class and plain data of a recorded machine for analysis, which runs no own file.
+
+    The settings of an own law stay as plain data, own terms are left out. Raises MisplacedError for an own plant: its
+    equations are its code.
+    """
+    data = long_form(data)
     found = _named(data)
+    if PLANT in found:
+        why = f"{found[PLANT]}: rtctl knows the equations of the {data.get('machine')}, and nothing of an own plant's"
+        raise MisplacedError(PLANT, OwnError(why))
     if LAW in found:
-        data["law"] = {**data["law"], "position": position}
-    if any(key[:2] == PHYSICS for key in found):
-        physics = [e for i, e in enumerate(data["plant"]["physics"]) if (*PHYSICS, i, "term") not in found]
-        data["plant"] = {**data["plant"], "physics": physics}
-    if isinstance(data.get("record"), dict) and found:
-        data["record"] = {k: v for k, v in data["record"].items() if k != "trace"}  # signals of the own law, perhaps
-    return data
+        base = _with_any_law(base)
+    terms = [key for key in found if key[:2] == PHYSICS]
+    if terms:
+        kept = [entry for i, entry in enumerate(data["plant"]["physics"]) if (*PHYSICS, i, "term") not in terms]
+        data = {**data, "plant": {**data["plant"], "physics": kept}}
+    return base, data
 
 
 def _named(data: dict[str, Any]) -> dict[Key, str]:
@@ -127,6 +138,11 @@ def _model(base: Any, sources: tuple[tuple[Key, Source], ...]) -> Any:
     if terms:
         model = _with_terms(model, terms)
     return model
+
+
+def _with_any_law(base: Any) -> Any:
+    """The machine's class whose law of position may be any plain data."""
+    return _replaced(base, "law", _replaced(base.model_fields["law"].annotation, "position", Any))
 
 
 def _kind(base: Any) -> str:

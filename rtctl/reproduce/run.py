@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
+from rtctl.config.files import made_in
 from rtctl.reproduce.rows import Part, Row, measured
 
 MODULES = {  # module that holds the parts of a chapter
@@ -67,9 +68,7 @@ def reproduce(
 
     `say` gets a line after each. Results come in the order of the parts.
     """
-    folder = None if out is None else out / FOLDER
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
+    folder = None if out is None else made_in(out, *FOLDER.split("/"))
     done: dict[int, Result] = {}
 
     def note(i: int, result: Result) -> None:

@@ -185,6 +185,7 @@ def _tally(reader: StreamReader, losses: Losses) -> None:
 
 def _case(folder: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     """The case, and what had to be done to have one. A file that cannot be read is put aside, never thrown away."""
+    inside(folder / CASE, folder)
     try:
         return load_case(folder), ()
     except UserError as error:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rtctl.config.files import made_in
 from rtctl.trace import moved
 from rtctl.trace.bundle import PART, index, load_case, save_case
 from rtctl.trace.columns import Column
@@ -184,7 +185,7 @@ class Parts:
 
     def _next(self) -> Part:
         self._number += 1
-        return Part(self.folder / PART.format(self._number), *self._of, {**self.case, "part": self._number})
+        return Part(made_in(self.folder, PART.format(self._number)), *self._of, {**self.case, "part": self._number})
 
     def _make_bundles(self) -> None:
         while (full := self._full.get()) is not None:

@@ -107,7 +107,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(Path(__file__).parents[2] / "configs" / "axis.yaml", folder)
     assert main([*IMPORT, str(log_of(folder)), "-o", str(folder / "imported")]) == 0
     shutil.copytree(folder / "imported", folder / "repaired")
-    record(load_config("ivu", {"name": "refused"}), 0.1, folder / "recorded")
+    record(load_config("ivu", {"name": "refused", "loop.mode": "fused"}), 0.1, folder / "recorded")
     return folder
 
 

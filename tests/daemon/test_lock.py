@@ -1,5 +1,6 @@
 """The lock of a machine: who holds it, and what a holder that died leaves."""
 
+import errno
 import os
 import pwd
 import signal
@@ -37,6 +38,19 @@ def test_it_is_there_with_the_pid_while_it_is_held(tmp_path: Path) -> None:
     with MachineLock(path, "ivu"):
         assert path.read_text() == f"{os.getpid()}\n" and path.stat().st_mode & 0o777 == 0o600
     assert not path.exists()
+
+
+def test_a_lock_that_a_full_disk_does_not_take_is_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    path = tmp_path / "ivu.lock"
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "ftruncate", full)
+        with pytest.raises(OSError, match="No space"):
+            MachineLock(path, "ivu").__enter__()
+    with MachineLock(path, "ivu"):
+        assert path.read_text() == f"{os.getpid()}\n"
 
 
 def test_a_second_holder_is_refused_with_the_pid_and_leaves_the_first_alone(tmp_path: Path) -> None:
