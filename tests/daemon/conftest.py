@@ -1,5 +1,7 @@
 """A command server in a thread, and a handler that remembers."""
 
+import errno
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,6 +27,8 @@ class Echo:
             raise UserError("not while a capture runs")
         if op == "reset":
             raise RuntimeError("boom")
+        if op == "play":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/data")
         if op == "signals":
             return {"names": ["x" * 1000] * 100}
         if op == "disarm":

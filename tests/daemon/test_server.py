@@ -67,6 +67,7 @@ def test_handles_no_more_than_asked(idle, context, endpoint):
     [
         ("stop", "refused", "not while a capture runs"),
         ("reset", "internal", "RuntimeError: boom"),
+        ("play", "refused", "/data: no space left on device"),
         ("disarm", "internal", "must be a map"),
         ("signals", "too_large", "the result of 'signals' is"),
     ],
