@@ -111,7 +111,7 @@ def take_all(sources: Any) -> list[Record]:
 
 
 def config_of(bundle: Bundle) -> Any:
-    """Settings of the machine that a bundle was recorded with, without code of its owner, which came with the recording.
+    """Settings of the machine that a bundle was recorded with, without the code of its owner that came with it.
 
     Raises UserError where case.json does not hold them, and where the plant is the user's own.
     """
