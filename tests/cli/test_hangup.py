@@ -1,10 +1,13 @@
 """A terminal that is closed ends the run: disarmed, recorded to its end. And a run that lost something says so."""
 
+import fcntl
 import json
 import os
 import pty
+import signal
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
@@ -15,6 +18,12 @@ from rtctl.trace.bundle import load_bundle
 RUN = [sys.executable, "-m", "rtctl.cli.main", "run", "ivu", "--no-plot"]
 
 
+def _at_a_terminal() -> None:
+    """In the new process: standard input is its terminal, and hangs up as one does, also where the tests run by nohup."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+
 @pytest.mark.realtime
 def test_a_closed_terminal_disarms_and_ends_the_recording(runtime: Path, tmp_path: Path) -> None:
     master, slave = pty.openpty()
@@ -23,7 +32,7 @@ def test_a_closed_terminal_disarms_and_ends_the_recording(runtime: Path, tmp_pat
     run = subprocess.Popen(
         [*RUN, "--mode", "real", "--link", "shm", "--out", str(out), *sets, "--set", "safety.link_timeout=10"],
         stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
-        preexec_fn=lambda: __import__("fcntl").ioctl(0, __import__("termios").TIOCSCTTY, 0),
+        preexec_fn=_at_a_terminal,
     )  # fmt: skip
     os.close(slave)
     shown, deadline = b"", time.monotonic() + 240
