@@ -19,7 +19,7 @@ RUN = [sys.executable, "-m", "rtctl.cli.main", "run", "ivu", "--no-plot"]
 
 
 def _at_a_terminal() -> None:
-    """In the new process: standard input is its terminal, and hangs up as one does, also where the tests run by nohup."""
+    """In the new process: standard input is its terminal, and hangs up as one does, though the tests run by nohup."""
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
