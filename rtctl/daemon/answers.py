@@ -27,7 +27,7 @@ class Answers:
     server: Any
     faults: Any
     lacks: list[str]
-    failure: Exception | None
+    failure: Exception | None = None  # why the run ended by itself, once it has
     last_row: Any = None
 
     def snapshot(self) -> dict[str, Any]:
