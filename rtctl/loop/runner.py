@@ -53,7 +53,9 @@ def run_real(
     wake = clock.now() + period
     st.first_ns = wake
     before = wake
-    awake = clock.boot() - clock.now()  # grows by the time that the computer is suspended
+    # grows by the time that the computer is suspended; where this process is stopped between two reads, too large here
+    # and too small below, so that nothing else counts as that
+    awake = -(clock.now() - clock.boot())
     m[0].on = 1
     for k in range(most):
         if st.stop != 0:
@@ -63,8 +65,8 @@ def run_real(
         woke = clock.now()
         while woke < due:  # short spin, and sleeps cut short by a signal
             woke = clock.now()
-        suspended = clock.boot() - woke - awake
-        if suspended < period:  # two reads of a clock apart
+        suspended = clock.boot() - clock.now() - awake
+        if suspended < period:  # what two clocks differ by from read to read
             suspended = 0
         awake += suspended
         lateness = woke - wake + suspended
