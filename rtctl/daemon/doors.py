@@ -22,15 +22,18 @@ log = structlog.get_logger()
 COMMANDERS = 64  # places at the command socket; one more takes that of who has been silent for longest
 VIEWERS = 32  # at telemetry, and at the rows; one more is not let in
 WAITING = 128  # connections that wait to be taken
+FILES = 65536  # open files that are enough for all that a daemon has
 SIOCGIFADDR = 0x8915  # netdevice(7)
 
 
 def raise_limit() -> int:
-    """Raise the limit of open files of this process to what it may have; returns it."""
+    """Raise the limit of open files of this process to FILES, or to what it may have; returns it."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != hard:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    return hard
+    wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
+    if soft == resource.RLIM_INFINITY or soft >= wanted:
+        return soft
+    resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+    return wanted
 
 
 class Door:
@@ -69,8 +72,11 @@ class Doors:
             if running is not None:
                 log.warning("door ended", door=process, code=running.returncode)
                 del self._processes[process]
-            listeners = [door.listener for door in doors if door.listener is not None]
-            if listeners and select.select(listeners, [], [], 0)[0]:
+            waits = select.poll()  # not select(), which takes no descriptor beyond 1023
+            for door in doors:
+                if door.listener is not None:
+                    waits.register(door.listener, select.POLLIN)
+            if waits.poll(0):
                 self._processes[process] = _start(doors)
 
     def close(self) -> None:

@@ -19,8 +19,9 @@ import pytest
 import zmq
 
 from rtctl.config.errors import UserError
+from rtctl.daemon import doors
 from rtctl.daemon.client import Client
-from rtctl.daemon.doors import Doors, listen_tcp
+from rtctl.daemon.doors import FILES, Doors, listen_tcp
 from rtctl.daemon.protocol import decode_reply, encode_request
 from rtctl.daemon.server import CommandServer
 from rtctl.daemon.telemetry import Telemetry
@@ -211,6 +212,24 @@ def test_the_answer_to_the_last_request_still_goes_out(tmp_path: Path) -> None:
     assert peer.poll(5000) and decode_reply(peer.recv()).id == 7
     assert not list(tmp_path.glob("m.*"))
     context.destroy(linger=0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "then"),
+    [
+        ((256, 4096), (4096, 4096)),
+        ((256, resource.RLIM_INFINITY), (FILES, resource.RLIM_INFINITY)),
+        ((80_000, 90_000), None),
+    ],
+)
+def test_the_limit_of_open_files_is_raised_and_never_lowered(
+    monkeypatch: pytest.MonkeyPatch, limits: tuple[int, int], then: tuple[int, int] | None
+) -> None:
+    kept = []
+    monkeypatch.setattr(doors.resource, "getrlimit", lambda _: limits)
+    monkeypatch.setattr(doors.resource, "setrlimit", lambda _, new: kept.append(new))
+    assert doors.raise_limit() == (then or limits)[0]
+    assert kept == ([then] if then else [])
 
 
 @pytest.mark.parametrize("endpoint", ["tcp://127.0.0.1:99999", "tcp://127.0.0.1:x", "tcp://:5"])
