@@ -107,7 +107,8 @@ def _table(paths: list[Path]) -> pa.Table:
     tables: list[pa.Table] = []
     for path in paths:
         try:
-            tables.append(pq.read_table(path))
+            with pq.ParquetFile(path) as file:  # read_table would load datasets, and with them pandas: half a second
+                tables.append(file.read())
             tables[-1].column_names  # noqa: B018  names that are no text are told only when asked for
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             raise UserError(f"{path} cannot be read as Parquet: {_first_line(error)}") from None
@@ -190,7 +191,22 @@ def _numbers(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:
         raise UserError(f"{path}: column '{name}' holds {kind}; it should hold numbers")
     if column.null_count:
         raise UserError(f"{path}: column '{name}' has {column.null_count} empty cells; every row needs a number")
-    return column.to_numpy()
+    if pa.types.is_boolean(kind):
+        return column.to_numpy()
+    return np.concatenate([np.empty(0, _dtype(kind)), *map(_values, column.chunks)])
+
+
+def _values(chunk: pa.Array) -> np.ndarray:
+    """Numbers of a column without empty cells, as they lie in memory. `to_numpy` would load pandas, where it is
+    installed, and take half a second for it."""
+    data = chunk.buffers()[1]
+    kind = _dtype(chunk.type)
+    return np.frombuffer(data, kind)[chunk.offset : chunk.offset + len(chunk)] if data else np.empty(0, kind)
+
+
+def _dtype(kind: pa.DataType) -> np.dtype:
+    letter = "f" if pa.types.is_floating(kind) else "u" if pa.types.is_unsigned_integer(kind) else "i"
+    return np.dtype(f"<{letter}{kind.bit_width // 8}")
 
 
 def _plain(value: Any) -> Any:

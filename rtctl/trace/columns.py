@@ -37,7 +37,16 @@ def _field(column: Column, dtype: np.dtype) -> pa.Field:
 
 def record_batch(rows: np.ndarray, schema: pa.Schema) -> pa.RecordBatch:
     """The rows (structured array) as columns. Copies."""
-    return pa.record_batch([pa.array(np.ascontiguousarray(rows[name])) for name in schema.names], schema=schema)
+    return pa.record_batch([_array(rows[field.name], field.type) for field in schema], schema=schema)
+
+
+def _array(values: np.ndarray, kind: pa.DataType) -> pa.Array:
+    """The values as they lie in memory. `pa.array` would load pandas, where it is installed, to ask whether they are
+    a categorical: half a second at the start of every recording."""
+    values = np.ascontiguousarray(values)
+    if pa.types.is_boolean(kind):  # eight of them a byte
+        return pa.array(values)
+    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(values)])
 
 
 def columns_of(schema: pa.Schema) -> list[Column]:
