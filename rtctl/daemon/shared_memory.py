@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from rtctl.config.errors import UserError
+from rtctl.config.files import write_text
 from rtctl.daemon import tap
 from rtctl.loop.memory import Segment
 
@@ -87,11 +88,7 @@ def describe(segment: Segment, columns: Any, case: dict[str, Any], out: Path | N
         "case": case,
         "bundle": None if out is None else str(out.absolute()),
     }
-    text = json.dumps(about, default=_plain)
-    path.unlink(missing_ok=True)
-    fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
-    with os.fdopen(fd, "w", encoding="utf-8") as file:
-        file.write(text)
+    write_text(path, json.dumps(about, default=_plain))
     return path
 
 

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
 from rtctl.diagnose.quantities import EFFORT, Quantities, quantities, settings_in
+from rtctl.diagnose.unsaid import beyond_format
 from rtctl.idiom import Settings
 from rtctl.own.files import refuse_plant
 from rtctl.plants import axis, ivu, ldu
@@ -250,40 +251,6 @@ def believed(case: Case) -> dict[str, float]:
     model = ldu.LduParameters(**{**absent, **own})
     values = {k: float(v) for k, v in model.model_dump().items()}
     return {**values, "N": given.get("N", values["R_t"] / values["R_s"])}
-
-
-def beyond_format(config: Any) -> tuple[str, ...]:
-    """What the law of a config has, in words, that no key of `controller` can say."""
-    law = config.get("law") if isinstance(config, dict) else None
-    if not isinstance(law, dict):
-        return ()
-    part = {k: v if isinstance(v, dict) else {} for k, v in law.items()}
-    has = []
-    if config.get("machine") == "ivu":
-        if part.get("friction"):
-            has.append("friction compensation that passes from motor to motor with speed")
-        if part.get("gain_schedule", {}).get("mode", "off") != "off":
-            has.append("a gain schedule")
-        if part.get("inertia", {}).get("share") != 0:  # on where the config does not say
-            has.append("inertia feedforward from the shaped reference")
-        has.append("tension that is ramped up and follows the radii")
-        if part.get("allocation", {}).get("floor") is not None:
-            has.append("a floor of the tension voltage")
-    else:
-        if part.get("friction"):
-            has.append("friction compensation")
-        if part.get("position", {}).get("kind") == "pi_velocity":
-            has.append("feedback of a filtered speed with anti-windup")
-        if part.get("inertia", {}).get("volts"):
-            has.append("computed torque from the shaped reference")
-        sensors = config.get("sensors") or {}
-        if config.get("machine") == "ldu" and sensors.get("feedback") == "scale":
-            has.append("feedback from the scale")
-        if sensors.get("correction"):
-            has.append("an error table for the encoder")
-    if part.get("limit", {}).get("slew") is not None:
-        has.append("a slew limit")
-    return tuple(has)
 
 
 def _parameters(where: Path, plant: str, given: Any, units: Quantities, warnings: list[str]) -> dict[str, float]:

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
+import small
 
 from rtctl.api import load_config, record
 from rtctl.cli.main import main
@@ -15,14 +15,6 @@ from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.trace.bundle import CASE, PARQUET
 from rtctl.trace.orders import ORDERS
 
-MATRIX = """
-campaign: small
-config: ivu
-seconds: 0.7
-set: {reference: {steps: [{at: 0.1, to: 1.0}]}}
-matrix: {law.position.gain: [25, 26]}
-keep: {worst: 1}
-"""
 IMPORT = ("import", "log.csv", "--plant", "axis", "--parameter", "M=1", "-o")
 WRITERS = {  # in a folder with the bundles `recorded` and `imported`, log.csv, matrix.yaml
     "repair": ["trace", "repair", "recorded"],
@@ -43,12 +35,8 @@ WRITERS = {  # in a folder with the bundles `recorded` and `imported`, log.csv, 
 @pytest.fixture(scope="module")
 def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("given")
-    (folder / "matrix.yaml").write_text(MATRIX)
-    t = np.arange(600) / 100
-    u = np.sin(5 * t) + np.sin(1.3 * t)
-    x = np.cumsum(np.cumsum(u)) * 1e-4
-    rows = (f"{t:.2f},{u:.4f},{x:.5f}" for t, u, x in zip(t, u, x, strict=True))
-    (folder / "log.csv").write_text("t,u,x\n" + "\n".join(rows) + "\n")
+    (folder / "matrix.yaml").write_text(small.MATRIX + "keep: {worst: 1}\n")
+    small.log_of(folder)
     steps = {"steps": [{"at": 0.1, "to": 1.0}]}
     record(load_config("ivu", {"name": "planted", "loop.mode": "fused", "reference": steps}), 3.0, folder / "recorded")
     with pytest.MonkeyPatch.context() as patch:

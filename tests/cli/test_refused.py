@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import small
 
 from rtctl.api import load_config, record
 from rtctl.cli.main import main
@@ -60,24 +61,6 @@ class Refusing:
 refusing = Refusing()
 
 
-def log_of(folder: Path) -> Path:
-    """A small log of an axis, as a logger writes it."""
-    t = np.arange(600) / 100
-    u = np.sin(5 * t) + np.sin(1.3 * t)
-    x = np.cumsum(np.cumsum(u)) * 1e-4
-    rows = (f"{t:.2f},{u:.4f},{x:.5f}" for t, u, x in zip(t, u, x, strict=True))
-    path = folder / "log.csv"
-    path.write_text("t,u,x\n" + "\n".join(rows) + "\n")
-    return path
-
-
-MATRIX = """
-campaign: small
-config: ivu
-seconds: 0.7
-set: {reference: {steps: [{at: 0.1, to: 1.0}]}}
-matrix: {law.position.gain: [25, 26]}
-"""
 COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
     "check": lambda here, out: ["check", str(here / "axis.yaml")],
     "import": lambda here, out: [*IMPORT, str(here / "log.csv"), "-o", str(out / "made")],
@@ -103,9 +86,9 @@ FILLED = {"run": 1, "campaign": 3, "reproduce": 1}  # sizes of a full disk, from
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with what the commands read: a log, a bundle imported from it, a recording, a campaign."""
     folder = tmp_path_factory.mktemp("refused")
-    (folder / "matrix.yaml").write_text(MATRIX)
+    (folder / "matrix.yaml").write_text(small.MATRIX)
     shutil.copy(Path(__file__).parents[2] / "configs" / "axis.yaml", folder)
-    assert main([*IMPORT, str(log_of(folder)), "-o", str(folder / "imported")]) == 0
+    assert main([*IMPORT, str(small.log_of(folder)), "-o", str(folder / "imported")]) == 0
     shutil.copytree(folder / "imported", folder / "repaired")
     record(load_config("ivu", {"name": "refused", "loop.mode": "fused"}), 0.1, folder / "recorded")
     return folder

@@ -14,10 +14,10 @@ from rtctl.diagnose.case import (
     SectionsLaw,
     UnknownLaw,
     believed,
-    beyond_format,
     pd_section,
     read_case,
 )
+from rtctl.diagnose.unsaid import beyond_format
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 

@@ -1,5 +1,6 @@
 """Makes a bundle of a table and a plan: SI units, an even clock, finite numbers, and a case of what is believed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -122,11 +123,12 @@ def _signals(
             continue
         values = table.numbers(given.column, name)
         ours = known[name].unit if name in known else theirs or ""
+        choices = OTHER_UNITS.get(ours, (ours,)) if plan.plant == "axis" else (ours,)
         if theirs is None:
-            _ask_suffix(table, name, given.column, ours, plan.plant == "axis")
+            _ask_suffix(table, name, given.column, ours, choices)
             assumed += [f"{name} in {ours}"] if ours not in ("", "counts", "ticks") else []
         elif name in known:
-            factor, ours = _factor(table, name, given.column, theirs, ours, plan.plant == "axis")
+            factor, ours = _factor(table, name, given.column, theirs, choices)
             values = values if factor == 1.0 else values * factor
         if name.endswith(COUNTS):
             _whole(table, given.column, values)
@@ -153,8 +155,8 @@ def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
     if is_date(table.has(column, "t")):
         return table.times(column, 1.0)
     if theirs is not None:
-        return table.times(column, _factor(table, "t", column, theirs, "s", False)[0])
-    _ask_suffix(table, "t", column, "s", False)
+        return table.times(column, _factor(table, "t", column, theirs, ("s",))[0])
+    _ask_suffix(table, "t", column, "s", ("s",))
     t = table.times(column, 1.0)
     step = float(np.median(np.abs(np.diff(t)))) if len(t) > 1 else 0.0
     begin = abs(float(table.columns[column][0])) if len(t) else 0.0  # of integers, which are counted from the first
@@ -167,12 +169,12 @@ def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
     return t
 
 
-def _ask_suffix(table: Table, name: str, column: str, ours: str, axis: bool) -> None:
-    """Refuse a name such as `pos_mm` that ends in another unit of the same dimension, where no unit is given."""
+def _ask_suffix(table: Table, name: str, column: str, ours: str, choices: Sequence[str]) -> None:
+    """Refuse a name such as `pos_mm` that ends in another unit of one of the dimensions that it may be in, where no
+    unit is given."""
     base, mark, unit = column.rpartition("_")
     if not (base and mark and unit in SUFFIXES):
         return
-    choices = OTHER_UNITS.get(ours, (ours,)) if axis else (ours,)
     for choice in choices:
         try:
             if convert(1.0, unit, choice) == 1.0 and choice == ours:
@@ -185,10 +187,9 @@ def _ask_suffix(table: Table, name: str, column: str, ours: str, axis: bool) -> 
         )
 
 
-def _factor(table: Table, name: str, column: str, theirs: str, ours: str, axis: bool) -> tuple[float, str]:
-    """What turns the file's unit into ours, and ours."""
+def _factor(table: Table, name: str, column: str, theirs: str, choices: Sequence[str]) -> tuple[float, str]:
+    """What turns the file's unit into ours, and ours: the first of `choices` that fits."""
     first: ValueError | None = None
-    choices = OTHER_UNITS.get(ours, (ours,)) if axis else (ours,)
     if theirs in choices:
         return 1.0, theirs
     for unit in choices:
@@ -196,7 +197,7 @@ def _factor(table: Table, name: str, column: str, theirs: str, ours: str, axis: 
             return convert(1.0, theirs, unit), unit
         except ValueError as error:
             first = first or error
-    wanted = ours or "a number without unit"
+    wanted = choices[0] or "a number without unit"
     given = f"in '{theirs}'" if theirs else "a mere number by the file"
     raise UserError(
         f"{table.path}: column '{column}' ({name}) is {given}, which is not {wanted}; --unit {name}=... says what it is"
