@@ -134,8 +134,8 @@ def _collect(out: dict[str, float], prefix: str, params: Any) -> None:
 def _matrices(machine: machines.Machine) -> tuple[np.ndarray, np.ndarray]:
     """Phi and Gamma of one substep, from the plant's own equations."""
     plant = next(b for b in machine.plant_diagram.blocks if b.name == "plant")
-    state = np.zeros(1, plant.state)[0]
-    A, G = np.zeros_like(state["m"]["A"]), np.zeros_like(state["m"]["G"])
+    module = ivu if machine.kind == "ivu" else ldu
+    A, G = np.zeros((module.NX, module.NX)), np.zeros((module.NX, module.NU + module.NQ))
     p = plant.params
     if machine.kind == "ivu":
         ivu.assemble(p, p.R1, p.R2, p.J_1, p.J_2, A, G)

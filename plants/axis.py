@@ -21,7 +21,7 @@ LINKS = {"carriage": 0}  # the spring to the frame
 DRIVES = {"drive": 0}
 RUBS = {"drive": CARRIAGE}  # where the dry friction is that a drive works against
 SENSORS = {"sensor": 0}
-NQ, NU, NX = 1, 1, 2
+NQ, NU, NX, NY, NL = 1, 1, 2, len(SENSORS), len(LINKS)
 
 
 class AxisParameters(Settings):
@@ -48,7 +48,7 @@ class AxisParams(NamedTuple):
     k: float
 
 
-AXIS_STATE = state(m=linear.machine_state(NQ, NX, NU, len(SENSORS), len(LINKS)))
+AXIS_STATE = state(m=linear.MACHINE)
 
 
 def build(settings: AxisSettings, h: float) -> AxisParams:
@@ -72,10 +72,11 @@ def assemble(p, A, G):
 @tick
 def start(p, s):
     """Matrices and dry friction; position and speed stay as they are (zero at first)."""
+    linear.size(s.m, NQ, NX, NU, NY, NL)
     s.m.h = p.h
     s.m.dry_base[CARRIAGE] = p.F_c
     assemble(p, s.m.A, s.m.G)
-    linear.discretise_into(s.m.A, s.m.G, s.m.h, s.m.Phi_T, s.m.Gamma_T, s.m.work)
+    linear.discretise_machine(s.m)
     linear.link(s.m, 0, CARRIAGE, 1.0, CARRIAGE, 0.0, p.k, 0.0)
 
 

@@ -32,6 +32,7 @@ LINKS = {"tape1": 0, "tape2": 1, "motor1": 2, "motor2": 3}  # the tapes, and the
 DRIVES = {"drive1": 0, "drive2": 1}
 RUBS = {"drive1": MOTOR1, "drive2": MOTOR2}  # where the dry friction is that a drive works against
 SENSORS = {"encoder": 0, "reel1": 1, "reel2": 2}
+NY, NL = len(SENSORS), len(LINKS)
 NQ, NU, NX = 5, 2, 14  # five rotations and their speeds, two states of each motor driver
 RELINEARISE = 5e-3  # of a radius: the explicit correction forces stay a hundred times below the linear ones
 
@@ -118,7 +119,7 @@ class IvuParams(NamedTuple):
 
 
 IVU_STATE = state(
-    m=linear.machine_state(NQ, NX, NU, len(SENSORS), len(LINKS)),
+    m=linear.MACHINE,
     R1=float,  # m, now
     R2=float,
     J1=float,  # kg m^2, now
@@ -205,6 +206,7 @@ def _spring(A, i, wi, j, wj, ai, aj, c, k):
 def start(p, s):
     """Matrices and dry friction for the starting radii; positions and speeds stay as they are (all zero at first)."""
     s.R1, s.R2, s.J1, s.J2 = p.R1, p.R2, p.J_1, p.J_2
+    linear.size(s.m, NQ, NX, NU, NY, NL)
     s.m.h = p.h
     s.m.dry_base[MOTOR1] = p.tau_F1
     s.m.dry_base[MOTOR2] = p.tau_F2
@@ -216,7 +218,7 @@ def start(p, s):
 def _linearise(p, s):
     s.R1_lin, s.R2_lin, s.J1_lin, s.J2_lin = s.R1, s.R2, s.J1, s.J2
     assemble(p, s.R1, s.R2, s.J1, s.J2, s.m.A, s.m.G)
-    linear.discretise_into(s.m.A, s.m.G, s.m.h, s.m.Phi_T, s.m.Gamma_T, s.m.work)
+    linear.discretise_machine(s.m)
     linear.link(s.m, 0, REEL1, s.R1, CAPSTAN, -p.R_c, p.c1, p.k1)  # positive when taut
     linear.link(s.m, 1, REEL2, s.R2, CAPSTAN, p.R_c, p.c2, p.k2)
     linear.link(s.m, 2, MOTOR1, 1.0, REEL1, -1.0, p.c_m1, p.k_m1)

@@ -34,6 +34,7 @@ LINKS = {
 DRIVES = {"drive": 0}
 RUBS = {"drive": CAPSTAN}  # where the dry friction is that a drive works against
 SENSORS = {"encoder": 0, "scale": 1}
+NY, NL = len(SENSORS), 3
 NQ, NU, NX = 4, 1, 10  # four rotations and their speeds, two states of the amplifier
 
 
@@ -96,7 +97,7 @@ class LduParams(NamedTuple):
     drive: np.ndarray  # (2,) of the amplifier: natural frequency rad/s, damping
 
 
-LDU_STATE = state(m=linear.machine_state(NQ, NX, NU, len(SENSORS), 3))
+LDU_STATE = state(m=linear.MACHINE)
 
 
 def parameters(settings: LduSettings) -> LduParameters:
@@ -153,10 +154,11 @@ def assemble(p, A, G):
 @tick
 def start(p, s):
     """Matrices and dry friction; positions and speeds stay as they are (all zero at first)."""
+    linear.size(s.m, NQ, NX, NU, NY, NL)
     s.m.h = p.h
     s.m.dry_base[CAPSTAN] = p.R_c * p.F_c
     assemble(p, s.m.A, s.m.G)
-    linear.discretise_into(s.m.A, s.m.G, s.m.h, s.m.Phi_T, s.m.Gamma_T, s.m.work)
+    linear.discretise_machine(s.m)
     linear.link(s.m, 0, MOTOR, 1.0, WHEEL, -p.N, p.k_s, p.b_s)
     linear.link(s.m, 1, WHEEL, 1.0, CAPSTAN, -1.0, p.k_c, p.b_c)
     linear.link(s.m, 2, CAPSTAN, 1.0, ENCODER, -1.0, p.k_c, p.b_c)

@@ -23,43 +23,56 @@ TAYLOR = 12  # terms; the argument is scaled below a half, so the remainder is u
 BALANCE_SWEEPS = 20
 
 
-def machine_state(nq: int, nx: int, nu: int, ny: int, nl: int) -> np.dtype:
-    """Record of a machine: its matrices for one substep, its state, and what acts on it.
+MOST_BODIES = 12  # coordinates, as many as a machine may have; a record of one size is compiled once for all machines
+MOST_DRIVES = 4
+MOST_SENSORS = 12
+MOST_LINKS = 16
+DRIVE_STATES = 3
+MOST_STATES = 2 * MOST_BODIES + DRIVE_STATES * MOST_DRIVES  # a multiple of LANES
+MOST_INPUTS = MOST_DRIVES + MOST_BODIES
+LANES = 4  # states that are advanced side by side
 
-    `nq` positions come first in x, then their nq velocities, then other states; `nu` inputs, then nq node forces;
-    `ny` sensors; `nl` links, each the spring of elongation a q_i + b q_j between two nodes that is already part of A.
-    """
-    n = nx + nu + nq
-    return state(
-        h=float,  # s, one substep
-        t=float,  # s, since the start
-        A=(float, (nx, nx)),
-        G=(float, (nx, nu + nq)),  # [B | E]
-        Phi_T=(float, (nx, nx)),  # transposed: the inner loop runs along memory
-        Gamma_T=(float, (nu + nq, nx)),
-        work=(float, (4, n, n)),
-        volts=(float, nu),  # at the input of each driver
-        u=(float, nu),  # what enters the linear machine: volts, or amperes asked for
-        y=(float, ny),  # what each sensor would show before it is cut into counts, rad or m
-        x=(float, nx),
-        x_next=(float, nx),
-        qm=(float, nq),  # positions and velocities at the middle of the substep
-        vm=(float, nq),
-        v_before=(float, nq),
-        f=(float, nq),  # smooth force on each node, N or Nm
-        dry_base=(float, nq),
-        dry=(float, nq),  # limit of the dry friction on each node
-        r=(float, nq),  # dry friction in force
-        link_i=(int, nl),
-        link_j=(int, nl),
-        link_a=(float, nl),
-        link_b=(float, nl),
-        link_c=(float, nl),  # stiffness and damping of the linear spring
-        link_k=(float, nl),
-        link_T=(float, nl),  # what terms pull with on top of it, this substep
-        link_e=(float, nl),  # elongation that the linear model does not know, as of tape wound at another radius
-        link_v=(float, nl),  # its rate
-    )
+MACHINE = state(  # a machine: its matrices for one substep, its state, and what acts on it
+    nq=int,  # positions, which come first in x, then as many speeds, then other states
+    nx=int,
+    nu=int,  # inputs, then nq forces
+    ny=int,  # sensors
+    nl=int,  # links: springs of elongation a q_i + b q_j between two coordinates, already part of A
+    h=float,  # s, one substep
+    t=float,  # s, since the start
+    A=(float, (MOST_STATES, MOST_STATES)),
+    G=(float, (MOST_STATES, MOST_INPUTS)),  # [B | E]
+    Phi_T=(float, (MOST_STATES, MOST_STATES)),  # transposed: the inner loop runs along memory
+    Gamma_T=(float, (MOST_INPUTS, MOST_STATES)),
+    work=(float, (4, MOST_STATES + MOST_INPUTS, MOST_STATES + MOST_INPUTS)),
+    volts=(float, MOST_DRIVES),  # at the input of each driver
+    u=(float, MOST_DRIVES),  # what enters the linear machine: volts, or amperes asked for
+    y=(float, MOST_SENSORS),  # what each sensor would show before it is cut into counts, SI
+    x=(float, MOST_STATES),
+    x_next=(float, MOST_STATES),
+    qm=(float, MOST_BODIES),  # positions and velocities at the middle of the substep
+    vm=(float, MOST_BODIES),
+    v_before=(float, MOST_BODIES),
+    f=(float, MOST_BODIES),  # smooth force on each coordinate, N or Nm
+    dry_base=(float, MOST_BODIES),
+    dry=(float, MOST_BODIES),  # limit of the dry friction on each coordinate
+    r=(float, MOST_BODIES),  # dry friction in force
+    link_i=(int, MOST_LINKS),
+    link_j=(int, MOST_LINKS),
+    link_a=(float, MOST_LINKS),
+    link_b=(float, MOST_LINKS),
+    link_c=(float, MOST_LINKS),  # stiffness and damping of the linear spring
+    link_k=(float, MOST_LINKS),
+    link_T=(float, MOST_LINKS),  # what terms pull with on top of it, this substep
+    link_e=(float, MOST_LINKS),  # elongation that the linear model does not know, as of tape wound at another radius
+    link_v=(float, MOST_LINKS),  # its rate
+)
+
+
+@tick
+def size(m, nq, nx, nu, ny, nl):
+    """Set the numbers of coordinates, states, inputs, sensors and links."""
+    m.nq, m.nx, m.nu, m.ny, m.nl = nq, nx, nu, ny, nl
 
 
 def discretise(A: np.ndarray, G: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
@@ -67,15 +80,14 @@ def discretise(A: np.ndarray, G: np.ndarray, h: float) -> tuple[np.ndarray, np.n
     nx, ng = G.shape
     Phi_T, Gamma_T = np.zeros((nx, nx)), np.zeros((ng, nx))
     work = np.zeros((4, nx + ng, nx + ng))
-    discretise_into(np.ascontiguousarray(A, float), np.ascontiguousarray(G, float), h, Phi_T, Gamma_T, work)
+    discretise_into(np.ascontiguousarray(A, float), np.ascontiguousarray(G, float), nx, ng, h, Phi_T, Gamma_T, work)
     return Phi_T, Gamma_T
 
 
 @tick
-def discretise_into(A, G, h, Phi_T, Gamma_T, work):
-    """As `discretise`, into given arrays; `work` is (4, n, n) with n = nx + ninputs. Allocates nothing."""
-    nx = A.shape[0]
-    n = work.shape[1]
+def discretise_into(A, G, nx, ng, h, Phi_T, Gamma_T, work):
+    """As `discretise`, into given arrays of that size or larger ones; `work` is (4, n, n), n >= nx + ng."""
+    n = nx + ng
     M, P, T, scale = work[0], work[1], work[2], work[3, 0]
     for i in range(n):
         for j in range(n):
@@ -86,7 +98,7 @@ def discretise_into(A, G, h, Phi_T, Gamma_T, work):
             M[i, j] = A[i, j] * h
         for j in range(nx, n):
             M[i, j] = G[i, j - nx] * h
-    _balance(M, scale)
+    _balance(M, scale, n)
     norm = 0.0
     for i in range(n):
         row = 0.0
@@ -101,12 +113,12 @@ def discretise_into(A, G, h, Phi_T, Gamma_T, work):
         for j in range(n):
             M[i, j] *= 0.5**squarings
     for k in range(TAYLOR, 0, -1):  # Horner: I + M (I + M/2 (I + M/3 (...)))
-        _multiply(M, P, 1.0 / k, T)
+        _multiply(M, P, 1.0 / k, T, n)
         for i in range(n):
             for j in range(n):
                 P[i, j] = T[i, j] + (1.0 if i == j else 0.0)
     for _ in range(squarings):
-        _multiply(P, P, 1.0, T)
+        _multiply(P, P, 1.0, T, n)
         for i in range(n):
             for j in range(n):
                 P[i, j] = T[i, j]
@@ -118,13 +130,12 @@ def discretise_into(A, G, h, Phi_T, Gamma_T, work):
 
 
 @tick
-def _balance(M, scale):
+def _balance(M, scale, n):
     """Scale rows and columns by powers of two until they are alike: positions and velocities differ by 1e4.
 
     Without it the scaling of the exponential is ruled by the stiffest spring, and twenty squarings would let the
     rigid rotation, whose eigenvalue is exactly one, creep. Source: Parlett & Reinsch, Numer. Math. 13 (1969).
     """
-    n = M.shape[0]
     for i in range(n):
         scale[i] = 1.0
     for _ in range(BALANCE_SWEEPS):
@@ -151,8 +162,7 @@ def _balance(M, scale):
 
 
 @tick
-def _multiply(L, R, factor, out):
-    n = L.shape[0]
+def _multiply(L, R, factor, out, n):
     for i in range(n):
         for j in range(n):
             out[i, j] = 0.0
@@ -164,9 +174,15 @@ def _multiply(L, R, factor, out):
 
 
 @tick
+def discretise_machine(m):
+    """Transition of a machine over its substep, from its A and G."""
+    discretise_into(m.A, m.G, m.nx, m.nu + m.nq, m.h, m.Phi_T, m.Gamma_T, m.work)
+
+
+@tick
 def midpoint(m):
     """Extrapolate positions and velocities to the middle of the coming substep and clear the forces."""
-    nq = m.r.shape[0]
+    nq = m.nq
     for i in range(nq):
         v = m.x[nq + i]
         m.vm[i] = 1.5 * v - 0.5 * m.v_before[i]
@@ -174,7 +190,7 @@ def midpoint(m):
         m.v_before[i] = v
         m.f[i] = 0.0
         m.dry[i] = m.dry_base[i]
-    for j in range(m.link_T.shape[0]):
+    for j in range(m.nl):
         m.link_T[j] = 0.0
         m.link_e[j] = 0.0
         m.link_v[j] = 0.0
@@ -244,25 +260,25 @@ def slid(m, j, d, v, T):
 @tick
 def advance(m):
     """One substep with the inputs `m.u` and the smooth forces `m.f` held; dry friction `m.dry` closes it."""
-    nx, nu, nq = m.x.shape[0], m.u.shape[0], m.r.shape[0]
+    nx, nu, nq = m.nx, m.nu, m.nq
     m.t += m.h
-    for i in range(0, nx - 1, 2):  # two sums at a time, which stay in registers; both add up in the order of j
-        one, two = 0.0, 0.0
+    Phi, Gamma, x, u = m.Phi_T, m.Gamma_T, m.x, m.u
+    for i in range(0, nx, LANES):  # sums side by side, which stay in registers; each adds up in the order of j
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for j in range(nx):
-            one += m.Phi_T[j, i] * m.x[j]
-            two += m.Phi_T[j, i + 1] * m.x[j]
+            a += Phi[j, i] * x[j]
+            b += Phi[j, i + 1] * x[j]
+            c += Phi[j, i + 2] * x[j]
+            d += Phi[j, i + 3] * x[j]
         for j in range(nu):
-            one += m.Gamma_T[j, i] * m.u[j]
-            two += m.Gamma_T[j, i + 1] * m.u[j]
-        m.x_next[i] = one
-        m.x_next[i + 1] = two
-    if nx % 2 == 1:
-        one = 0.0
-        for j in range(nx):
-            one += m.Phi_T[j, nx - 1] * m.x[j]
-        for j in range(nu):
-            one += m.Gamma_T[j, nx - 1] * m.u[j]
-        m.x_next[nx - 1] = one
+            a += Gamma[j, i] * u[j]
+            b += Gamma[j, i + 1] * u[j]
+            c += Gamma[j, i + 2] * u[j]
+            d += Gamma[j, i + 3] * u[j]
+        m.x_next[i] = a
+        m.x_next[i + 1] = b
+        m.x_next[i + 2] = c
+        m.x_next[i + 3] = d
     dry_nodes = 0
     for j in range(nq):
         if m.dry[j] > 0.0:
@@ -271,7 +287,7 @@ def advance(m):
             m.r[j] = 0.0
         force = m.f[j] + m.r[j]  # the last reaction is the warm start
         if force != 0.0:
-            _add_row(m.x_next, m.Gamma_T, nu + j, force)
+            _add_row(m.x_next, m.Gamma_T, nu + j, force, nx)
     for _ in range(SWEEPS if dry_nodes > 1 else dry_nodes):  # one alone is exact at once
         settled = True
         for j in range(nq):
@@ -279,7 +295,7 @@ def advance(m):
                 gain = m.Gamma_T[nu + j, nq + j]
                 r = dry_friction(m.x[nq + j], m.x_next[nq + j] - gain * m.r[j], gain, m.dry[j])
                 if r != m.r[j]:
-                    _add_row(m.x_next, m.Gamma_T, nu + j, r - m.r[j])
+                    _add_row(m.x_next, m.Gamma_T, nu + j, r - m.r[j], nx)
                     m.r[j] = r
                     settled = False
         if settled:  # as it is while they slide
@@ -312,6 +328,6 @@ def dry_friction(v, v_free, gain, limit):
 
 
 @tick
-def _add_row(x, T, j, a):
-    for i in range(x.shape[0]):
+def _add_row(x, T, j, a, n):
+    for i in range(n):
         x[i] += T[j, i] * a

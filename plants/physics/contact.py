@@ -139,7 +139,7 @@ def slip_wheel(p, s, m, i, j):
     if p.strip == 0:
         linear.pull(m, j, slide(s, p.F_max, undone(m, j), m.link_c[j], m.link_k[j], p.h))
         return
-    gain = p.h * m.G[m.r.shape[0] + i, m.u.shape[0] + i] * p.R_c * p.R_c  # speed that a newton gives the carriage
+    gain = p.h * m.G[m.nq + i, m.nu + i] * p.R_c * p.R_c  # speed that a newton gives the carriage
     free = s.rate + gain * strip_force(p, m)
     rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
     if abs(rate) < 1e-12 * abs(free):  # rounding of a stop

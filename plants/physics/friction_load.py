@@ -51,7 +51,7 @@ def lever(m, j, i):
 @tick
 def load_drive(p, m, i):
     """Limit of dry friction at node `i` under the force of the drives, N."""
-    nq, nu = m.r.shape[0], m.u.shape[0]
+    nq, nu = m.nq, m.nu
     F = 0.0
     for d in range(nu):
         F += m.G[nq + i, d] * m.u[d]

@@ -70,7 +70,7 @@ def turned(p, m, i, grow):
     m.f[i] -= (R - R_0) * linear.tension(m, j)
     # All that turns the reel turns another inertia: what the matrices divide by the old one is put right as a force.
     torque, c, k = m.f[i], 0.0, 0.0
-    for n in range(m.link_i.shape[0]):
+    for n in range(m.nl):
         T = linear.known(m, n)
         if m.link_i[n] == i:
             torque -= m.link_a[n] * T
@@ -80,7 +80,7 @@ def turned(p, m, i, grow):
             torque -= m.link_b[n] * T
             c += m.link_b[n] ** 2 * m.link_c[n]
             k += m.link_b[n] ** 2 * m.link_k[n]
-    nq, nu = m.r.shape[0], m.u.shape[0]
+    nq, nu = m.nq, m.nu
     J_0 = 1.0 / m.G[nq + i, nu + i]
     J = max(J_0 + 0.5 * math.pi * p.rho_h * (R**4 - R_0**4), SMALLEST * J_0)
     change = J_0 / J - 1.0

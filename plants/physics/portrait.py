@@ -53,7 +53,7 @@ from rtctl.plants.physics import {module}
 def run(acts, P, S, p, s, i, r, l, c, q, v, volts, read, pull, dry, force):
     """Move the nodes row by row; commands come in, and what the term leaves of everything goes out."""
     m = s.m
-    nq = m.r.shape[0]
+    nq = m.nq
     for k in range(q.shape[0]):
         for n in range(nq):
             m.x[n], m.x[nq + n] = q[k, n] - 0.5 * m.h * v[k, n], v[k, n]
@@ -70,12 +70,12 @@ def run(acts, P, S, p, s, i, r, l, c, q, v, volts, read, pull, dry, force):
         for n in range(nq):
             m.r[n] = -np.sign(v[k, n]) * m.dry[n]
             m.x[n] = q[k, n] + 0.5 * m.h * v[k, n]
-        for n in range(m.link_T.shape[0]):
+        for n in range(m.nl):
             pull[k, n] = linear.tension(m, n)
         {read}
         if acts:
             {reading}
-        volts[k], read[k], dry[k], force[k] = m.volts, m.y, m.dry, m.f
+        volts[k], read[k], dry[k], force[k] = m.volts, m.y, m.dry[:nq], m.f[:nq]
 '''
 READ = {"axis": "axis.read(s)", "ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)"}
 
@@ -250,7 +250,7 @@ def stand(kind: str, h: float) -> tuple[Any, Any]:
     p = plant.build(getattr(plant, f"{name}Settings")(parameters=STAND[kind]), h, *DRIVES[kind])
     s = np.zeros(1, getattr(plant, f"{kind.upper()}_STATE")).view(np.recarray)[0]
     scope = dict(vars(plant))  # as plain Python, and without the matrix exponential, which nobody asks for
-    scope["linear"] = SimpleNamespace(link=linear.link.py_func, discretise_into=lambda *_: None)
+    scope["linear"] = SimpleNamespace(link=linear.link.py_func, size=linear.size.py_func, discretise_machine=lambda _: None)
     for key, value in vars(plant).items():
         if hasattr(value, "py_func"):
             scope[key] = FunctionType(value.py_func.__code__, scope)

@@ -64,7 +64,7 @@ def build_presliding(settings: PreslidingSettings, h: float) -> PreslidingParams
 @tick
 def replace(p, s, m, i, r):
     """Put bristles in the place of the dry friction of node `i`; `r` takes its rotation to the unit of z_s."""
-    nq, nu = m.r.shape[0], m.u.shape[0]
+    nq, nu = m.nq, m.nu
     z = p.z_s / r
     s.w = bend(s.w, m.x[i] - s.q, z)
     s.q = m.x[i]

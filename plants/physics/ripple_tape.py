@@ -87,7 +87,7 @@ def arm(p, q):
 @tick
 def tape_of(m, i):
     """The link that starts at reel `i`."""
-    for j in range(m.link_i.shape[0]):
+    for j in range(m.nl):
         if m.link_i[j] == i:
             return j
     return 0

@@ -13,12 +13,12 @@ from pydantic import Field
 from rtctl.config.errors import UserError
 from rtctl.counted import uniform
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants import ivu, ldu
+from rtctl.plants import ivu, ldu, linear
 from rtctl.plants.physics.term import Node, Term
 
 LENGTH = 1024  # substeps that the line holds
 LONGEST = 0.03  # s
-CHANNELS = 2
+CHANNELS = linear.MOST_DRIVES
 JITTER_FORMS = ("gaussian", "uniform")
 LOOPS = {"ivu": ("loop",), "ldu": ("loop",), "axis": ("loop",)}
 

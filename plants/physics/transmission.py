@@ -72,7 +72,7 @@ def ahead(m, j):
     relative speed if that point lies tan(w h/2) / (w h/2) times as far ahead as the middle; at the middle itself they
     would lose (w h)^4 / 24 of it, which at the 2 kHz of the LDU's shaft is as much as a contact carries.
     """
-    nq, nu = m.r.shape[0], m.u.shape[0]
+    nq, nu = m.nq, m.nu
     a, b = m.link_a[j], m.link_b[j]
     mobility = a * a * m.G[nq + m.link_i[j], nu + m.link_i[j]] + b * b * m.G[nq + m.link_j[j], nu + m.link_j[j]]
     x = min(m.link_c[j] * mobility * m.h * m.h, 1.0)

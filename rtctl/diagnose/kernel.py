@@ -73,13 +73,13 @@ def substep(job, p, s, t):
     m = s.m
     command(t, m)
     {drives}
-    for c in range(m.u.shape[0]):
+    for c in range(m.nu):
         m.u[c] += job.correction * job.share[c]
     linear.midpoint(m)
     {follow}
     force(t, m)
     last(t, m)
-    for i in range(m.f.shape[0]):
+    for i in range(m.nq):
         m.f[i] += job.correction * job.push[i]
     linear.advance(m)
 
@@ -91,7 +91,7 @@ def look(job, p, s, t):
     {read}
     reading(t, m)
     {rate}
-    for c in range(m.y.shape[0]):
+    for c in range(m.ny):
         y = m.y[c] * job.per_unit[c]
         if job.rectified[c] != 0:
             job.way[c] += abs(y - job.y_last[c])
@@ -118,7 +118,7 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
         if k == 0:  # counters and the clock start at zero here
             m.t = 0.0
             look(job, p, s, t)
-            for c in range(m.y.shape[0]):
+            for c in range(m.ny):
                 job.zero[c] = job.y[c] * (job.speed == 0)
         if k <= job.release < k + stride:
             for i in range({kind}.NQ):
@@ -139,7 +139,7 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
                 job.e = e
             job.correction = job.P * job.e + job.D * job.d
         if k >= 0:
-            for c in range(m.y.shape[0]):
+            for c in range(m.ny):
                 y = job.y[c] - job.zero[c]
                 for back in range(min(stride - 1, k)):  # rows in between lie on a line
                     if k - back - 1 < n:

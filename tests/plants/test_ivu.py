@@ -140,7 +140,7 @@ def test_inertia_of_the_reels():
 def test_end_deflection_under_tension():
     """Erratum: section 6.1 prints twice as much."""
     p, s = plant(built("simulation", h=1e-3, R1=0.03, R2=0.03, d_tape=0.0, **FREE))
-    s.m.u[:] = 0.049 / AMP_PER_VOLT
+    s.m.u[:2] = 0.049 / AMP_PER_VOLT
     run(p, s, 20_000)
     wanted = 0.049 * 0.061 / (100.0 * 0.03**2)
     assert wanted == pytest.approx(3.3e-2, rel=0.01)
@@ -173,7 +173,7 @@ def test_rigid_rotation_keeps_its_eigenvalue():
         _, s = plant(p)
         rigid = np.zeros(ivu.NX)
         rigid[[0, 1, 2, 3, 4]] = 1 / p.R1, 1 / p.R1, 1 / p.R_c, -1 / p.R2, -1 / p.R2
-        error = np.abs(s.m.Phi_T.T @ rigid - rigid).max() / np.abs(rigid).max()
+        error = np.abs(s.m.Phi_T.T[: ivu.NX, : ivu.NX] @ rigid - rigid).max() / np.abs(rigid).max()
         assert error * 3600 / p.h < 1e-4
 
 
@@ -339,5 +339,5 @@ def test_integration_error_against_the_limit_of_short_steps():
 
 def test_a_substep_allocates_nothing(allocations):
     record, s = plant(built())
-    s.m.u[:] = 0.3
+    s.m.u[:2] = 0.3
     assert allocations(run, record, s, 1000) == allocations(run, record, s, 1)

@@ -106,7 +106,7 @@ def test_all_that_turns_together_keeps_turning():
     s = plant(built())
     rigid = np.zeros(ldu.NX)
     rigid[:4] = N, 1, 1, 1
-    assert np.abs(s.m.Phi_T.T @ rigid - rigid).max() < 1e-11
+    assert np.abs(s.m.Phi_T.T[: ldu.NX, : ldu.NX] @ rigid - rigid).max() < 1e-11
 
 
 def test_the_amplifier_gives_the_current_asked_for():

@@ -60,10 +60,10 @@ def reading(number, p, s, m, i, r, l, c):
 def run(slots, ps, ss, p, s, inputs, substeps, q, v, y, work):
     """Hold each row of inputs for some substeps; positions, speeds, readings and work of the terms, row by row."""
     m = s.m
-    nq = m.r.shape[0]
+    nq = m.nq
     done = 0.0
     for k in range(inputs.shape[0]):
-        for d in range(m.u.shape[0]):
+        for d in range(m.nu):
             m.u[d] = inputs[k, d]
         for _ in range(substeps):
             linear.midpoint(m)
@@ -79,7 +79,7 @@ def run(slots, ps, ss, p, s, inputs, substeps, q, v, y, work):
             reading(slots[n].number, ps[n], ss[n], m, slots[n].i, slots[n].r, slots[n].l, slots[n].c)
         for i in range(nq):
             q[k, i], v[k, i] = m.x[i], m.x[nq + i]
-        for i in range(m.y.shape[0]):
+        for i in range(m.ny):
             y[k, i] = m.y[i]
         work[k] = done
 '''

@@ -57,10 +57,10 @@ def run(q, z, p, s, volts, substeps, x, y):
     m = s.m
     for k in range(volts.shape[0]):
         for _ in range(substeps):
-            for c in range(m.u.shape[0]):
+            for c in range(m.nu):
                 m.volts[c] = volts[k, c]
             command(q, z, m)
-            for c in range(m.u.shape[0]):
+            for c in range(m.nu):
                 m.u[c] = m.volts[c]
             linear.midpoint(m)
             force(q, z, m)
@@ -68,9 +68,9 @@ def run(q, z, p, s, volts, substeps, x, y):
             linear.advance(m)
         {read}
         reading(q, z, m)
-        for i in range(m.x.shape[0]):
+        for i in range(m.nx):
             x[k, i] = m.x[i]
-        for i in range(m.y.shape[0]):
+        for i in range(m.ny):
             y[k, i] = m.y[i]
 '''
 SITE = '''

@@ -23,7 +23,7 @@ def wind(p, s, volts, substeps, x, reel):
             ripple_tape.reel(reel, m, ivu.REEL2)
             ripple_tape.reel_arm(reel, m, ivu.REEL2)
             linear.advance(m)
-        for i in range(m.x.shape[0]):
+        for i in range(m.nx):
             x[k, i] = m.x[i]
 
 

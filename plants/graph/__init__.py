@@ -1,0 +1,1 @@
+"""Machines as graphs: a description of bodies, joints, drives and sensors becomes matrices, links, places and words."""
