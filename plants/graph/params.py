@@ -122,17 +122,16 @@ def place(layout: Layout, element: Any, values: dict[str, float]) -> tuple[int, 
 
 
 def joint_place(layout: Layout, name: str, values: dict[str, float]) -> tuple[int, float, int, float]:
-    """Elongation of a joint, q_to - ratio q_from, by coordinates."""
+    """Elongation of a joint, q_to - ratio q_from, by coordinates; that of `to` comes first."""
     joint = layout.machine.joints[name]
     a, b = getattr(joint, "from"), joint.to
-    i, j = layout.coordinate(a), layout.coordinate(b)
-    ra = -values[f"joints.{name}.ratio"] * layout.ratio(a, values)
-    rb = layout.ratio(b, values)
-    if ra == 0.0:  # the frame
+    i, j = layout.coordinate(b), layout.coordinate(a)
+    of_to, of_from = layout.ratio(b, values), -values[f"joints.{name}.ratio"] * layout.ratio(a, values)
+    if of_to == 0.0:  # the frame
         i = j
-    if rb == 0.0:
+    if of_from == 0.0:
         j = i
-    return i, ra, j, rb
+    return i, of_to, j, of_from
 
 
 def _put_place(a: dict[str, np.ndarray], what: str, number: int, at: tuple[int, float, int, float]) -> None:
