@@ -114,7 +114,7 @@ class Space(NamedTuple):
         terms = list(self.owner.terms)
         for hypothesis, part in zip(self.hypotheses, self.parts(x), strict=True):
             terms.append(hypothesis.settings(part))
-        return Model(self.owner.kind, base, tuple(terms), self.owner.units)
+        return self.owner._replace(base=base, terms=tuple(terms))
 
     def parts(self, x: np.ndarray) -> list[np.ndarray]:
         """The coordinates of each hypothesis."""

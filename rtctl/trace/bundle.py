@@ -23,7 +23,8 @@ ARROWS = "recording.arrows"
 PARQUET = "recording.parquet"
 CASE = "case.json"
 PART = "part-{:04d}"
-FORMAT = 1
+FORMAT = 1  # of our own recordings of machines known by name
+FORMATS = (FORMAT, 2)
 ROW_GROUP = 65_536  # rows; what a conversion holds in memory
 
 
@@ -134,8 +135,8 @@ def load_case(folder: Path) -> dict[str, Any]:
         raise UserError(f"{path} is nested too deeply to be a case") from None
     if not isinstance(case, dict):
         raise UserError(f"{path} holds a {type(case).__name__}; it should hold one object {{...}}")
-    if case.get("format", FORMAT) != FORMAT:
-        raise UserError(f"{path}: format is {case['format']!r}; this program reads format {FORMAT}")
+    if case.get("format", 1) not in FORMATS:
+        raise UserError(f"{path}: format is {case['format']!r}; this program reads formats 1 and 2")
     return case
 
 

@@ -1,0 +1,189 @@
+"""Case of a described machine: exchange format 2, checked."""
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from rtctl.config.complaints import sentences
+from rtctl.config.errors import UserError, nearest
+from rtctl.plants.graph.description import Description, Input
+from rtctl.plants.graph.layout import Layout, layout
+
+FORMAT = 2
+KEYS = (
+    "format", "sample_rate", "machine", "delay_samples", "tolerance", "physics", "inputs", "problem", "group",
+    "per_recording", "controller", "controller_known", "notes",
+)  # fmt: skip
+PROBLEMS = ("driven", "free", "kinematic", "static")
+DEFAULT_TOLERANCE = 0.15
+EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise", "bandwidth_hz")
+NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
+
+
+class GraphCase(NamedTuple):
+    """What the owner believes of a described machine."""
+
+    machine: Description
+    layout: Layout
+    values: dict[str, float]  # every number of the description by dotted path, SI
+    tolerances: dict[str, float | None]  # by dotted path; None: the value says nothing
+    default_tolerance: float | None
+    physics: tuple[dict[str, Any], ...]  # terms that the owner knows
+    inputs: dict[str, Input]
+    problem: str
+    delay_samples: float
+    sample_rate: float | None  # Hz
+    group: str
+    per_recording: tuple[str, ...]
+    notes: str
+    warnings: tuple[str, ...]
+    file: Path
+
+    def tolerance(self, path: str) -> float:
+        """Share by which a value may be wrong; inf where it may be anything."""
+        for end in (path, *(path.rsplit(".", n)[0] for n in range(1, path.count(".") + 1))):
+            if end in self.tolerances:
+                found = self.tolerances[end]
+                return math.inf if found is None else found
+        if path.rsplit(".", 1)[-1] in EXACT:
+            return 0.0
+        return math.inf if self.default_tolerance is None else self.default_tolerance
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """Paths of the values that a fit may move, in the order of the description."""
+        out = []
+        for path, value in self.values.items():
+            key = path.rsplit(".", 1)[-1]
+            if value != 0.0 and key not in NEVER and self.tolerance(path) > 1e-3 and self._acts(path):
+                out.append(path)
+        return tuple(out)
+
+    def _acts(self, path: str) -> bool:
+        """Whether a number has a part in the motion: the damping of a drive without a bandwidth has none."""
+        group, name, *rest = path.split(".")
+        if group == "drives" and rest == ["damping"]:
+            return self.machine.drives[name].bandwidth_hz is not None
+        if group == "drives" and rest == ["inductance"]:
+            return self.machine.drives[name].kind == "voltage"
+        return True
+
+
+def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
+    """The checked case of the bundle in `folder`. Raises UserError that names the key and what would be right."""
+    where = Path(folder) / "case.json"
+    given = case.get("machine")
+    if not isinstance(given, dict):
+        raise UserError(f"{where}: machine is {type(given).__name__}; it should be an object with bodies and sensors")
+    warnings = [_strange(where, key) for key in case if key not in KEYS and key not in _foreign()]
+    try:
+        machine = Description.model_validate(given)
+    except ValidationError as error:
+        raise UserError(sentences(error, Description, given, lambda _: f"{where}: machine").splitlines()[0]) from None
+    placed = layout(machine)
+    values = dict(machine.paths())
+    tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
+    problem = case.get("problem", "driven")
+    if problem not in PROBLEMS:
+        raise UserError(f"{where}: problem is {problem!r}; it should be one of {', '.join(PROBLEMS)}")
+    rate = _number(where, "sample_rate", case.get("sample_rate"))
+    if rate is not None and rate <= 0.0:
+        raise UserError(f"{where}: sample_rate is {rate:g}; it should be above 0 Hz, or null where the clock is uneven")
+    delay = _number(where, "delay_samples", case.get("delay_samples"))
+    if delay is None:
+        delay = 0.0
+        if machine.drives:
+            warnings.append(f"{where}: delay_samples is missing; 0 is taken")
+    if not 0.0 <= delay <= 100.0:
+        raise UserError(f"{where}: delay_samples is {delay:g}; it should be between 0 and 100")
+    return GraphCase(
+        machine=machine,
+        layout=placed,
+        values=values,
+        tolerances=tolerances,
+        default_tolerance=default,
+        physics=_physics(where, case.get("physics")),
+        inputs=_inputs(where, machine, case.get("inputs")),
+        problem=problem,
+        delay_samples=delay,
+        sample_rate=rate,
+        group=str(case.get("group") or ""),
+        per_recording=tuple(map(str, case.get("per_recording") or ())),
+        notes=str(case.get("notes") or ""),
+        warnings=tuple(warnings),
+        file=where,
+    )
+
+
+def _foreign() -> tuple[str, ...]:
+    from rtctl.diagnose.case import FROM_ELSEWHERE
+
+    return FROM_ELSEWHERE
+
+
+def _tolerances(
+    where: Path, given: Any, values: dict[str, float], warnings: list[str]
+) -> tuple[dict[str, float | None], float | None]:
+    if given is None:
+        warnings.append(f"{where}: tolerance is missing; {DEFAULT_TOLERANCE} is taken for every value")
+        return {}, DEFAULT_TOLERANCE
+    if not isinstance(given, dict):
+        raise UserError(f"{where}: tolerance is a {type(given).__name__}; it should be an object of paths and shares")
+    out: dict[str, float | None] = {}
+    for path, share in given.items():
+        number = _number(where, f"tolerance.{path}", share)
+        if number is not None and number < 0.0:
+            raise UserError(f"{where}: tolerance.{path} is {number:g}; it should be 0 or more, or null")
+        out[path] = number
+        known = any(one == path or one.startswith(f"{path}.") for one in values)
+        if path != "default" and not known and not path.startswith("physics."):
+            hint = nearest(path, values)
+            near = f" (is it '{hint}'?)" if hint else ""
+            warnings.append(f"{where}: tolerance.{path} speaks of no value of the machine; it is left out{near}")
+    return out, out.pop("default", DEFAULT_TOLERANCE)
+
+
+def _physics(where: Path, given: Any) -> tuple[dict[str, Any], ...]:
+    if given is None:
+        return ()
+    if not isinstance(given, list) or not all(isinstance(entry, dict) and "term" in entry for entry in given):
+        raise UserError(f"{where}: physics should be a list of objects with 'term', 'node' and the term's parameters")
+    return tuple(given)
+
+
+def _inputs(where: Path, machine: Description, given: Any) -> dict[str, Input]:
+    if given is None:
+        return {}
+    if not isinstance(given, dict):
+        raise UserError(f"{where}: inputs is a {type(given).__name__}; it should be an object of names and columns")
+    out = {}
+    for name, entry in given.items():
+        try:
+            out[name] = Input.model_validate(entry)
+        except ValidationError as error:
+            said = sentences(error, Input, entry, lambda _, n=name: f"{where}: inputs.{n}")
+            raise UserError(said.splitlines()[0]) from None
+        if out[name].body not in machine.bodies:
+            hint = nearest(out[name].body, machine.bodies)
+            raise UserError(
+                f"{where}: inputs.{name}.body: there is no body '{out[name].body}'"
+                + (f"; did you mean '{hint}'?" if hint else "")
+            )
+    return out
+
+
+def _number(where: Path, key: str, value: Any) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise UserError(f"{where}: {key} is {value!r}; it should be a finite number in SI units")
+    return float(value)
+
+
+def _strange(where: Path, name: str) -> str:
+    hint = nearest(name, KEYS)
+    return f"{where}: {name} is not a key that this program knows; it is left out" + (
+        f" (is it '{hint}'?)" if hint else ""
+    )

@@ -1,0 +1,100 @@
+"""Likelihood of a recording under a model: innovations of the residuals that the tracking observer leaves.
+
+The residual of each sensor is averaged over a few ticks, made white by an autoregression (noise.py) and weighed by its
+innovation. The negative logarithm of the likelihood is half the sum of squares plus n ln sigma for each sensor, so that
+models compare each under a noise of its own.
+
+Source: Ljung, System Identification (1999), ch. 7 and 16.4.
+"""
+
+from collections.abc import Sequence
+from copy import copy
+
+import numpy as np
+
+from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.noise import Noise, noise_of
+from rtctl.diagnose.graph.simulate import Simulator
+
+RATE = 500.0  # 1/s, of the averaged residuals
+ORDER = 20  # of the autoregression
+FORGET = 8.0  # over the bandwidth of the observer: until the start is forgotten
+QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
+WILD = 1e6  # residual of a model that runs away, in steps of noise
+
+
+class Likelihood:
+    """A recording, its noise and the rows that count."""
+
+    together = 1.0  # errors that count as one in the weight of the prior (rtctl.diagnose.fit)
+
+    def __init__(self, sim: Simulator, noise: Sequence[Noise] | None = None, rows: tuple[int, int] | None = None):
+        self.sim = sim
+        record = sim.record
+        self.mean = max(1, round(1.0 / (RATE * record.dt)))
+        self.channels = [sim.layout.sensors[name] for name in sim.channels]
+        begin = min(settled(sim), len(record.t) // 4)
+        self.rows = (begin, len(record.t)) if rows is None else rows
+        self.target = np.stack([record.y[name] for name in sim.channels], axis=1)
+        grain = np.array([record.grain[name] for name in sim.channels])
+        smooth = np.std(np.diff(self.target, 2, axis=0), axis=0) / 10.0
+        self.least = np.where(grain > 0.0, QUANTISED * grain, np.maximum(smooth, 1e-12)) / np.sqrt(self.mean)
+        self.noise: list[Noise] = list(noise) if noise is not None else [
+            Noise(np.ones(1), float(max(least, 1e-300))) for least in self.least
+        ]  # fmt: skip
+
+    def raw(self, model: GraphModel) -> np.ndarray:
+        """Residuals (blocks, sensors), SI, averaged over `mean` ticks, each sensor's constant left out."""
+        out = self.sim.run(model, n=self.rows[1])
+        return self.of_readings(out)
+
+    def of_readings(self, out: np.ndarray) -> np.ndarray:
+        """The same of simulated readings (n, sensors of the machine)."""
+        begin, end = self.rows
+        e = self.target[begin:end] - out[begin:end, self.channels]
+        keep = len(e) // self.mean * self.mean
+        e = e[:keep].reshape(-1, self.mean, e.shape[1]).mean(axis=1)
+        wild = WILD * self.least
+        e = np.clip(np.nan_to_num(e, nan=np.inf), -wild, wild)
+        return np.asarray(e - e.mean(axis=0))
+
+    def white(self, e: np.ndarray) -> np.ndarray:
+        """Innovations of residuals (blocks, sensors), sensor after sensor."""
+        return np.concatenate([noise.whiten(e[:, c]) for c, noise in enumerate(self.noise)])
+
+    def residual(self, model: GraphModel, coarse: bool = False, at: str = "") -> np.ndarray:
+        """Innovations of a model, as a fit minimises them."""
+        return self.white(self.raw(model))
+
+    def told(self, e: np.ndarray) -> "Likelihood":
+        """The same with the noise of these residuals (blocks, sensors)."""
+        other = copy(self)
+        other.noise = [noise_of(e[:, c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
+        return other
+
+    def loss(self, e: np.ndarray) -> float:
+        """Negative logarithm of the likelihood of residuals under a noise of their own, up to a constant, nats."""
+        total = 0.0
+        for c in range(e.shape[1]):
+            own = noise_of(e[:, c], ORDER, float(self.least[c]))
+            r = own.whiten(e[:, c])
+            total += len(r) * float(np.log(own.sigma)) + 0.5 * float(r @ r)
+        return total
+
+    @property
+    def size(self) -> int:
+        """Number of innovations."""
+        return sum((self.rows[1] - self.rows[0]) // self.mean - noise.order for noise in self.noise)
+
+    def during(self, begin: int, end: int) -> "Likelihood":
+        """The same of rows `begin` to `end`."""
+        other = copy(self)
+        other.rows = (max(begin, self.rows[0]), end)
+        return other
+
+
+def settled(sim: Simulator) -> int:
+    """First row that counts: the machine has moved and forgotten how it stood before the recording began."""
+    y = sim.seen
+    moved = int(np.argmax(np.abs(y - y[0]) > 0.01 * np.ptp(y)))
+    return min(moved + round(FORGET / sim.follow / sim.record.dt), len(y) // 5)

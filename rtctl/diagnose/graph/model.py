@@ -1,0 +1,51 @@
+"""Model of a described machine: numbers by dotted path, and terms of physics on top of its equations."""
+
+from typing import Any, NamedTuple
+
+from rtctl.diagnose.graph.case import GraphCase
+from rtctl.idiom import Settings
+from rtctl.plants.graph.layout import Layout
+from rtctl.plants.graph.params import GraphParams, build
+from rtctl.plants.physics import TERMS
+
+
+class GraphModel(NamedTuple):
+    """Numbers (SI) and the terms of the `physics:` list."""
+
+    layout: Layout
+    base: dict[str, float]
+    terms: tuple[Settings, ...] = ()
+
+    def add(self, *terms: Settings) -> "GraphModel":
+        """The same with more terms."""
+        return self._replace(terms=(*self.terms, *terms))
+
+    def params(self, h: float) -> GraphParams:
+        """Params of the plant for substeps of `h` s."""
+        return build(self.layout, self.base, h)
+
+
+def nominal(case: GraphCase) -> GraphModel:
+    """The owner's model: the description and the terms that the owner knows."""
+    return GraphModel(case.layout, dict(case.values), tuple(settings_of(entry) for entry in case.physics))
+
+
+def settings_of(entry: dict[str, Any]) -> Settings:
+    """Settings of an entry of a `physics:` list."""
+    return TERMS[str(entry["term"])].settings.model_validate(entry)
+
+
+def rigid(layout: Layout, values: dict[str, float], main: str) -> dict[str, float]:
+    """Motion of each body for one unit of the body `main`, every joint taken as rigid; 0 where nothing connects them."""
+    machine = layout.machine
+    out = {main: 1.0}
+    todo = [main]
+    while todo:
+        here = todo.pop()
+        for name, joint in machine.joints.items():
+            a, b, n = getattr(joint, "from"), joint.to, values[f"joints.{name}.ratio"]
+            for one, other, ratio in ((a, b, n), (b, a, 1.0 / n)):
+                if one == here and other not in out and not machine.is_frame(other):
+                    out[other] = out[here] * ratio
+                    todo.append(other)
+    return {name: out.get(name, 0.0) for name in machine.bodies if not machine.is_frame(name)}

@@ -1,0 +1,39 @@
+"""Noise of a sensor's residual: an autoregression that whitens it, and the variance of what it cannot predict.
+
+Source: Ljung, System Identification (1999), ch. 4; Kay, Modern Spectral Estimation (1988), ch. 7 for the covariance
+method with both directions of time.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+
+
+class Noise(NamedTuple):
+    """Autoregression of one sensor's residual."""
+
+    a: np.ndarray  # (p + 1,) whitening filter, a[0] = 1
+    sigma: float  # standard deviation of the innovation
+
+    @property
+    def order(self) -> int:
+        """Number of past values."""
+        return len(self.a) - 1
+
+    def whiten(self, e: np.ndarray) -> np.ndarray:
+        """Innovations (n - p, ...) of residuals (n, ...), by their standard deviation."""
+        return np.asarray(lfilter(self.a, [1.0], e, axis=0)[self.order :] / self.sigma)
+
+
+def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
+    """Autoregression of `order` of a residual (n,), whose innovation is not below `least`."""
+    n = len(e)
+    order = min(order, n // 20)
+    f = np.fft.rfft(e - e.mean(), 2 * n)
+    r = np.fft.irfft(np.abs(f) ** 2)[: order + 1] / n
+    r[0] = r[0] * (1.0 + 1e-9) + 1e-300
+    a = np.concatenate([[1.0], -solve_toeplitz(r[:-1], r[1:])]) if order else np.ones(1)
+    innovation = lfilter(a, [1.0], e - e.mean())[order:]
+    return Noise(a, max(float(np.sqrt(np.mean(innovation**2))), least))

@@ -1,0 +1,174 @@
+"""Simulator of a recording: any model of its machine, under the recorded commands and a tracking observer.
+
+    track   the recorded command, and a correction that makes the model follow the main sensor. It pushes every body as
+            its inertia asks for, so that the rigid motion is corrected and no joint is stretched by the correction.
+    open    the recorded command alone: a free run
+"""
+
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from rtctl.config.errors import UserError
+from rtctl.diagnose.graph import kernel
+from rtctl.diagnose.graph.kernel import OPEN, TRACK
+from rtctl.diagnose.graph.model import GraphModel, nominal, rigid
+from rtctl.diagnose.graph.places import find
+from rtctl.diagnose.graph.record import GraphRecord
+from rtctl.diagnose.kernel import SLOTS
+from rtctl.idiom import fill_record, record_dtype
+from rtctl.plants.graph.layout import NOWHERE
+from rtctl.plants.graph.plant import GRAPH_STATE
+from rtctl.plants.physics import TERMS, ordered
+
+FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
+FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
+QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
+SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
+LEAD = 0.5  # s at the first row, in which springs come to rest
+NEVER = np.iinfo(np.int64).max  # row
+ABSENT = np.zeros((1, 1))
+
+
+class Simulator:
+    """A recording, ready to be simulated by models; one call is one run, and calls may go on in several threads."""
+
+    def __init__(self, record: GraphRecord, follow: float | None = None):
+        self.record, self.case = record, record.case
+        self.kernel = kernel.kernel()
+        self.layout = record.case.layout
+        self.main = record.main
+        sensor = record.case.machine.sensors[self.main]
+        self.shows_speed = sensor.measures == "speed"
+        self.body = sensor.body
+        usual = FOLLOW_SPEED if self.shows_speed else FOLLOW
+        self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
+        self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP - 1e-9)))
+        self.seen = np.ascontiguousarray(record.y[self.main])
+        self.volts = np.ascontiguousarray(record.u)
+        self.forces = self._forces(record.forces)
+        self.channels = [name for name in self.layout.sensors if name in record.y]
+        flexible = bool(self.layout.links) or any(b.weights for b in record.case.machine.bodies.values())
+        self.lead = round(LEAD / record.dt) if flexible else 0
+        self.release = NEVER
+        self.ratios = rigid(self.layout, record.case.values, str(self.body))
+        self._p: dict[int, np.dtype] = {}
+
+    def _forces(self, by_body: np.ndarray | None) -> np.ndarray:
+        if by_body is None:
+            return ABSENT
+        out = np.zeros((len(by_body), self.layout.nq))
+        for i, name in enumerate(self.case.machine.bodies):
+            place = self.layout.bodies[name]
+            if place.coordinate != NOWHERE:
+                out[:, place.coordinate] += self.layout.ratio(name, self.case.values) * by_body[:, i]
+        return out
+
+    def released(self, row: int) -> "Simulator":
+        """The same whose correction ends at `row`: a free run from there, from the state that the observer reached."""
+        other = copy(self)
+        other.release = row
+        return other
+
+    def pushed(self, forces: np.ndarray) -> "Simulator":
+        """The same with forces (n, coordinates) on top of the measured ones."""
+        other = copy(self)
+        other.forces = np.ascontiguousarray(forces if len(self.forces) < 2 else self.forces + forces)
+        return other
+
+    def commanded(self, volts: np.ndarray) -> "Simulator":
+        """The same with other commands (n, drives)."""
+        other = copy(self)
+        other.volts = np.ascontiguousarray(volts)
+        return other
+
+    def finer(self, times: int) -> "Simulator":
+        """The same with steps that are so many `times` shorter."""
+        other = copy(self)
+        other.substeps *= times
+        return other
+
+    def run(self, model: GraphModel, mode: int = TRACK, n: int | None = None) -> np.ndarray:
+        """Readings (n, sensors of the machine) in SI; nan from the tick on at which the model ran away."""
+        return self.everything(model, mode, n)[0]
+
+    def everything(self, model: GraphModel, mode: int = TRACK, n: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Readings, and the correction (n,), in N or Nm at the main sensor's body."""
+        record, k = self.record, self.kernel
+        n = len(self.seen) if n is None else n
+        stiff = any(is_stiff(str(getattr(t, "term", ""))) for t in model.terms)
+        substeps = self.substeps * (2 if stiff else 1)
+        h = record.dt / substeps
+        params = model.params(h)
+        p = np.zeros(1, _dtype(params))
+        fill_record(p[0], params)
+        if len(model.terms) > SLOTS:
+            raise UserError(f"physics: has {len(model.terms)} terms; {SLOTS} is the most that can be simulated")
+        slots = np.zeros(1, k.slots)
+        for slot, settings in zip(slots[0]["q"], ordered(list(model.terms)), strict=False):
+            s: Any = settings
+            kernel.fill_slot(k, slot, s, find(TERMS[s.term], s.node, self.layout, model.base), h)
+        job = self._job(model, params, mode, substeps)
+        states = np.zeros(1, GRAPH_STATE)
+        self._begin(states, model)
+        out, push = np.full((n, params.ny), np.nan), np.zeros(n)
+        done = k.module.run(
+            job, p, states, slots, self.volts[:n], self.forces[:n] if len(self.forces) > 1 else self.forces,
+            self.seen[:n], out, push,
+        )  # fmt: skip
+        out[max(done, 0) :] = np.nan
+        return out, push
+
+    def _begin(self, states: np.ndarray, model: GraphModel) -> None:
+        """Put every coordinate where the first row of the main sensor has it, the joints unstretched."""
+        x = states["m"]["x"][0]
+        for name, ratio in self.ratios.items():
+            own = self.layout.ratio(name, model.base)
+            value = ratio * self.seen[0] / own
+            at = self.layout.coordinate(name)
+            if self.shows_speed:
+                x[self.layout.nq + at] = value
+                states["m"]["v_before"][0, at] = value
+            else:
+                x[at] = value
+
+    def _job(self, model: GraphModel, params: Any, mode: int, substeps: int) -> np.ndarray:
+        job = np.zeros(1, kernel.JOB)
+        j = job[0]
+        dt = self.record.dt
+        j["mode"], j["substeps"], j["rate"], j["release"] = mode, substeps, 1.0 / dt, self.release
+        j["lead"] = self.lead if mode == TRACK else 0
+        j["part"], j["delay"] = np.modf(self.case.delay_samples * substeps)
+        j["main"], j["speed"] = self.layout.sensors[self.main], self.shows_speed
+        inertia = 0.0
+        push = np.zeros(len(j["push"]))
+        for name, ratio in self.ratios.items():
+            at, own = self.layout.coordinate(name), self.layout.ratio(name, model.base)
+            push[at] = params.inertia[at] * ratio / own
+        for at in range(self.layout.nq):
+            inertia += push[at] ** 2 / params.inertia[at]
+        j["push"] = push / inertia  # a unit of correction is a unit of force at the main body
+        j["P"], j["D"] = self.follow**2 * inertia, 1.4 * self.follow * inertia
+        j["a"] = -np.expm1(-10.0 * self.follow * dt)
+        return job
+
+
+def is_stiff(term: str) -> bool:
+    """Whether a term alters a joint, and asks for shorter steps."""
+    return term.startswith(("transmission.", "tape.", "structure."))
+
+
+_dtypes: dict[type, np.dtype] = {}
+
+
+def _dtype(params: Any) -> np.dtype:
+    return _dtypes.setdefault(type(params), record_dtype(params))
+
+
+def simulator(record: GraphRecord) -> tuple[Simulator, GraphModel]:
+    """Simulator and nominal model of a record."""
+    return Simulator(record), nominal(record.case)
+
+
+__all__ = ["OPEN", "TRACK", "Simulator", "simulator"]
