@@ -14,6 +14,7 @@ import numpy as np
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
+from rtctl.plants.element import LOOP, element
 
 CARRIAGE = 0
 NODES = {"carriage": CARRIAGE}
@@ -21,6 +22,13 @@ LINKS = {"carriage": 0}  # the spring to the frame
 DRIVES = {"drive": 0}
 RUBS = {"drive": CARRIAGE}  # where the dry friction is that a drive works against
 SENSORS = {"sensor": 0}
+ELEMENTS = (
+    element("carriage", "body", "turns slides driven dry rubs rotor loaded bounded"),
+    element("carriage", "joint", "spring ground"),
+    element("drive", "drive", "force supply"),
+    element("sensor", "sensor", "position turns slides driven guided lone feedback"),
+    LOOP,
+)
 NQ, NU, NX, NY, NL = 1, 1, 2, len(SENSORS), len(LINKS)
 
 

@@ -25,6 +25,7 @@ from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
+from rtctl.plants.element import LOOP, element
 
 MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 = range(5)
 NODES = {"motor1": MOTOR1, "reel1": REEL1, "capstan": CAPSTAN, "reel2": REEL2, "motor2": MOTOR2}
@@ -32,6 +33,24 @@ LINKS = {"tape1": 0, "tape2": 1, "motor1": 2, "motor2": 3}  # the tapes, and the
 DRIVES = {"drive1": 0, "drive2": 1}
 RUBS = {"drive1": MOTOR1, "drive2": MOTOR2}  # where the dry friction is that a drive works against
 SENSORS = {"encoder": 0, "reel1": 1, "reel2": 2}
+ELEMENTS = (
+    element("motor1", "body", "turns driven dry rubs rotor loaded"),
+    element("motor2", "body", "turns driven dry rubs rotor loaded"),
+    element("reel1", "body", "turns load reel rotor loaded"),
+    element("reel2", "body", "turns load reel rotor loaded"),
+    element("capstan", "body", "turns load capstan dry rotor loaded wrapped"),
+    element("tape1", "joint", "spring span"),
+    element("tape2", "joint", "spring span"),
+    element("motor1", "joint", "spring shaft"),
+    element("motor2", "joint", "spring shaft"),
+    element("capstan", "joint", "contact span"),
+    element("drive1", "drive", "current supply"),
+    element("drive2", "drive", "current"),
+    element("encoder", "sensor", "position counts turns load feedback"),
+    element("reel1", "sensor", "edges counts turns load"),
+    element("reel2", "sensor", "edges counts turns load"),
+    LOOP,
+)
 NY, NL = len(SENSORS), len(LINKS)
 NQ, NU, NX = 5, 2, 14  # five rotations and their speeds, two states of each motor driver
 RELINEARISE = 5e-3  # of a radius: the explicit correction forces stay a hundred times below the linear ones

@@ -22,6 +22,7 @@ from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
+from rtctl.plants.element import LOOP, element
 
 MOTOR, WHEEL, CAPSTAN, ENCODER = range(4)
 NODES = {"motor": MOTOR, "wheel": WHEEL, "capstan": CAPSTAN, "encoder": ENCODER}
@@ -34,6 +35,19 @@ LINKS = {
 DRIVES = {"drive": 0}
 RUBS = {"drive": CAPSTAN}  # where the dry friction is that a drive works against
 SENSORS = {"encoder": 0, "scale": 1}
+ELEMENTS = (
+    element("motor", "body", "turns driven"),
+    element("wheel", "body", "turns load wheel rotor loaded"),
+    element("capstan", "body", "turns load capstan rotor loaded"),
+    element("carriage", "body", "slides load dry rubs bounded guided"),
+    element("motor", "joint", "shaft"),  # the spring of the wheel by its other end
+    element("wheel", "joint", "spring shaft contact"),
+    element("capstan", "joint", "spring shaft contact rigid"),  # its two halves are springs, the strip's contact none
+    element("drive", "drive", "current supply"),
+    element("encoder", "sensor", "position counts turns load feedback"),
+    element("scale", "sensor", "position counts slides load guided"),
+    LOOP,
+)
 NY, NL = len(SENSORS), 3
 NQ, NU, NX = 4, 1, 10  # four rotations and their speeds, two states of the amplifier
 

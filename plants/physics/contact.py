@@ -23,12 +23,14 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Limit, Size
+from rtctl.plants.physics.story import BEHIND, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 from rtctl.plants.physics.transmission import undone
 
 STRIP = "capstan"  # node of the LDU whose contact is rigid
 LINK1, LINK2 = 1, 2  # of the LDU: the halves of its capstan, before and behind the strip
-NODES = {"ivu": ("capstan",), "ldu": ("wheel", "capstan")}
 
 
 class SlipSettings(Settings):
@@ -171,7 +173,7 @@ SLIP = Term(
         "reading:ldu": "{m}.y[1] -= {s}.fallen",
     },
     moves=True,
-    nodes=NODES,
+    stands=(stand("joint", "contact"),),
     look_alikes={
         "transmission.creep": "one way, softly and hard: creep is lost both times, slip only when hard",
         "sensor.missed_counts": "hard acceleration at low top speed: counts go at speed, slip at force",
@@ -182,6 +184,22 @@ SLIP = Term(
     scale={"F_max": "contact"},
     axis="tension",
     state=CONTACT_STATE,
+    phrase=Phrase(
+        noun="slip",
+        head="the contact at {here} slips",
+        detail="it carries no more than {F_max}",
+        need="hard acceleration, with a sensor behind the contact",
+    ),
+    check=(
+        "Mark both sides of the contact and see whether the marks part in hard acceleration; look at "
+        "its pressure, oil and wear."
+    ),
+    units={"F_max": "force"},
+    search=(Limit("F_max", "grip"),),
+    contact=True,
+    stiff=True,
+    slips=True,
+    draws={"F_max": Draw(1.05, 1.5, "contact")},
 )
 CREEP = Term(
     name="transmission.creep",
@@ -196,7 +214,10 @@ CREEP = Term(
         "reading:ldu": "{m}.y[1] -= {s}.fallen",
     },
     moves=True,
-    nodes=NODES,
+    stands=(
+        stand("joint", "contact span"),
+        stand("joint", "contact", usual=False),
+    ),
     look_alikes={
         "sensor.scale": "out with load and back without: a wrong scale errs the same both ways, creep by the load",
         "transmission.slip": "a gentle long move under load: slip needs a peak, creep only way",
@@ -206,4 +227,19 @@ CREEP = Term(
     typical={"kappa": (1e-3, 0.5)},
     axis="tension",
     state=CONTACT_STATE,
+    phrase=Phrase(
+        noun="creep",
+        head="the contact at {here} creeps",
+        detail="it loses {kappa} of the way by load",
+        need=BEHIND,
+    ),
+    check=(
+        "Mark both sides of the contact and see whether the marks part over a long gentle move; look at its pressure."
+    ),
+    units={"kappa": "per_force"},
+    needs=Needs(second=(stand("joint", "contact rigid"),)),
+    search=(Size("kappa", "compliance", 0.001),),
+    contact=True,
+    stiff=True,
+    draws={"kappa": Draw(0.001, 0.01, "per_contact")},
 )

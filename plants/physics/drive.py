@@ -12,9 +12,11 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Limit, Shape, Size
+from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
-DRIVES = {"ivu": ("drive1", "drive2"), "ldu": ("drive",), "axis": ("drive",)}
 DEADBAND_FORMS = ("shift", "cut", "floor")
 SAG_FORMS = ("current", "power", "drawn")
 
@@ -220,7 +222,7 @@ OFFSET = Term(
     settings=OffsetSettings,
     build=build_offset,
     act={"command": "{m}.volts[{c}] = drive.offset({p}, {m}.volts[{c}])"},
-    nodes=DRIVES,
+    stands=(stand("drive"),),
     look_alikes={
         "friction.asymmetry": "at two places or loads of different friction: an offset stays, asymmetry grows with it",
         "drive.gain_asymmetry": "command at one, two and three times the size: an offset does not grow with it",
@@ -232,6 +234,17 @@ OFFSET = Term(
     typical={"offset": (0.02, 0.2)},
     axis="command",
     passive=False,
+    phrase=Phrase(
+        noun="an offset",
+        head="{here} pushes when nothing is asked for",
+        detail="it gives {offset:+} at a command of zero",
+        need="changes of command",
+    ),
+    check="Set the command to zero and measure the output of the amplifier; trim its zero.",
+    search=(Size("offset", "volts", 0.05, signed=True, slight=0.05),),
+    static=True,
+    defined=True,
+    draws={"offset": Draw(0.05, 0.3, "volts", signed=True)},
 )
 DEADBAND = Term(
     name="drive.deadband",
@@ -241,7 +254,7 @@ DEADBAND = Term(
     settings=DeadbandSettings,
     build=build_deadband,
     act={"command": "{m}.volts[{c}] = drive.deadband({p}, {m}.volts[{c}])"},
-    nodes=DRIVES,
+    stands=(stand("drive"),),
     look_alikes={
         "friction.coulomb": "move it by hand or by the other motor: friction is still there, a dead band is not",
         "drive.offset": "commands of both signs: a dead band loses on both, an offset gains on one",
@@ -250,6 +263,21 @@ DEADBAND = Term(
     },
     typical={"band": (0.02, 0.2)},
     axis="command",
+    phrase=Phrase(
+        noun="a dead zone",
+        head="{here} has a dead zone",
+        detail="commands below {band} {form:words}",
+        need="small commands of both signs",
+        forms={"": "do nothing", "floor": "all give the same"},
+    ),
+    check="Raise the command slowly from zero and see where the output of the amplifier begins to follow.",
+    needs=Needs(command="small"),
+    search=(Size("band", "volts", 0.1), Choice("form", ("shift", "cut", "floor"))),
+    variants=Choice("form", ("shift", "cut", "floor")),
+    told_first=True,
+    static=True,
+    draws={"band": Draw(0.05, 0.3, "volts")},
+    chosen={"form": ("shift", "cut", "floor")},
 )
 GAIN_ASYMMETRY = Term(
     name="drive.gain_asymmetry",
@@ -259,7 +287,7 @@ GAIN_ASYMMETRY = Term(
     settings=GainAsymmetrySettings,
     build=build_gain_asymmetry,
     act={"command": "{m}.volts[{c}] = drive.gain_asymmetry({p}, {m}.volts[{c}])"},
-    nodes=DRIVES,
+    stands=(stand("drive"),),
     look_alikes={
         "friction.asymmetry": "brake at speed: the gain goes by the sign of the command, friction by that of the speed",
         "drive.offset": "command at one, two and three times the size: a gain grows with it, an offset does not",
@@ -268,6 +296,18 @@ GAIN_ASYMMETRY = Term(
     typical={"a": (0.03, 0.2)},
     axis="command",
     passive=False,
+    phrase=Phrase(
+        noun="unequal gain",
+        head="{here} is stronger one way",
+        detail=("{a:%} {a:more|less} than asked for at positive commands and {a:%} {a:less|more} at negative ones"),
+        need="commands of both signs",
+    ),
+    check=("Command the same size with either sign and measure both outputs; look for a weak half of the bridge."),
+    needs=Needs(command="signs"),
+    search=(Size("a", "one", 0.1, signed=True),),
+    static=True,
+    defined=True,
+    draws={"a": Draw(0.03, 0.2, signed=True)},
 )
 SATURATION = Term(
     name="drive.saturation",
@@ -277,7 +317,7 @@ SATURATION = Term(
     settings=SaturationSettings,
     build=build_saturation,
     act={"command": "{m}.volts[{c}] = drive.saturation({p}, {s}, {m}.volts[{c}])"},
-    nodes=DRIVES,
+    stands=(stand("drive"),),
     look_alikes={
         "drive.supply_sag": "a hard push of one motor alone and of both: a limit does not ask what the other draws",
         "drive.lag": "small and large steps: a lag takes the same time for both, a limit only spoils the large",
@@ -288,6 +328,19 @@ SATURATION = Term(
     scale={"limit": "largest command"},
     axis="command",
     state=SATURATION_STATE,
+    phrase=Phrase(
+        noun="a lower limit",
+        head="{here} runs out of push",
+        detail="beyond {limit} there is no more",
+        need="commands near the limit",
+    ),
+    check="Look at the current limit that is set in the amplifier and at the voltage of its supply.",
+    needs=Needs(command="large"),
+    search=(Limit("limit", "peak", (0.5, 0.8)),),
+    richer=(Shape("knee", "one", (0.15,), 6.0),),
+    variants=Choice("form", ("parabola", "rapp")),
+    static=True,
+    draws={"limit": Draw(0.6, 0.9, "peak")},
 )
 SUPPLY_SAG = Term(
     name="drive.supply_sag",
@@ -297,7 +350,7 @@ SUPPLY_SAG = Term(
     settings=SupplySagSettings,
     build=build_supply_sag,
     act={"command": "drive.supply_sag({p}, {s}, {m}.volts)"},
-    nodes={"ivu": ("drive1",), "ldu": ("drive",), "axis": ("drive",)},
+    stands=(stand("drive", "supply"),),
     look_alikes={
         "drive.saturation": "a hard push of one motor alone and of both: sag asks what the other draws",
         "drive.thermal": "the same burst cold and after a minute: sag is there from the first moment",
@@ -307,4 +360,20 @@ SUPPLY_SAG = Term(
     typical={"k": (0.01, 0.08)},
     axis="command",
     state=SUPPLY_SAG_STATE,
+    phrase=Phrase(
+        noun="a weak supply",
+        head="the supply of {here} sags",
+        detail="{k:%} is lost for each {form:words} that all drives ask for",
+        need="hard work of all drives at once",
+        forms={"": "{command}", "power": "{command} squared"},
+    ),
+    check=(
+        "Measure the supply at the terminals of the drives while all of them work hard; look at its "
+        "cables and its rating."
+    ),
+    units={"k": "1/V"},
+    search=(Size("k", "per_volt", 0.05), Choice("form", ("current", "power"))),
+    richer=(Shape("tau", "seconds", (0.02,), 30.0),),
+    variants=Choice("form", ("current", "power", "drawn")),
+    draws={"k": Draw(0.03, 0.15, "per_volt")},
 )

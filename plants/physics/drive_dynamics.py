@@ -16,7 +16,9 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants.physics.drive import DRIVES
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Shape, Size
+from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 THERMAL_FORMS = ("exponential", "linear", "hyperbolic")
@@ -145,7 +147,7 @@ LAG = Term(
     settings=LagSettings,
     build=build_lag,
     act={"command": "{m}.volts[{c}] = drive_dynamics.lag({p}, {s}, {m}.volts[{c}])"},
-    nodes=DRIVES,
+    stands=(stand("drive"),),
     look_alikes={
         "timing.delay": "a sweep up to half the sample rate: a lag weakens the fast part, a delay only turns its phase",
         "structure.resonance": "a sweep: a lag falls off for good, a resonance has a peak",
@@ -156,6 +158,19 @@ LAG = Term(
     scale={"tau": "sample period"},
     axis="frequency",
     state=LAG_STATE,
+    phrase=Phrase(
+        noun="a lag",
+        head="{here} comes late and soft",
+        detail="it takes {tau} to build up what is asked for",
+        need="quick changes of the command",
+    ),
+    check="Look for a filter on the command input and at the gains of the current loop.",
+    needs=Needs(command="changes"),
+    search=(Size("tau", "tick", 0.5, blur="driver"), Choice("order", (1, 2))),
+    richer=(Shape("zeta", "one", (0.7,), 5.0),),
+    defined=True,
+    late="bends",
+    chosen={"order": (1, 2)},
 )
 THERMAL = Term(
     name="drive.thermal",
@@ -168,11 +183,10 @@ THERMAL = Term(
         "command": "drive_dynamics.thermal_gain({p}, {s}, {m}.volts)",
         "force": "{m}.dry[{i}] = drive_dynamics.thermal_friction({p}, {s}, {m}.dry[{i}])",
     },
-    nodes={
-        "ivu": ("drive1", "drive2", "motor1", "motor2"),
-        "ldu": ("drive", "carriage"),
-        "axis": ("drive", "carriage"),
-    },
+    stands=(
+        stand("drive"),
+        stand("body", "rubs"),
+    ),
     look_alikes={
         "drive.supply_sag": "the same burst cold and after a minute of work: sag is there from the first moment",
         "geometry.radius_change": "wind there and back slowly: a radius comes back with the tape, heat does not",
@@ -182,4 +196,20 @@ THERMAL = Term(
     axis="time",
     passive=False,
     state=THERMAL_STATE,
+    phrase=Phrase(
+        noun="drift with warmth",
+        head="{here} changes as it warms",
+        detail="{a:%} {a:weaker|stronger} once warm, with a time constant of {tau}",
+        need="a longer time of hard work",
+    ),
+    check="Feel the motor and the amplifier after hard work, and look at the cooling and at the grease.",
+    search=(
+        Size("a", "one", 0.1, signed=True),
+        Shape("tau", "duration", (0.1, 0.5, 2.0), 5.0),
+        Choice("V_ref", (1.0,), "volts"),
+    ),
+    richer=(Size("ease", "one", 0.1, signed=True),),
+    variants=Choice("form", ("exponential", "linear", "hyperbolic")),
+    richer_at="drive",
+    draws={"a": Draw(0.05, 0.4), "tau": Draw(3.0, 30.0), "V_ref": Draw(1.0, 1.0, "volts")},
 )

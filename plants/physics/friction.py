@@ -16,14 +16,10 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Shape, Size
+from rtctl.plants.physics.story import BOTH, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
-
-SHAFTS = {
-    "ivu": ("motor1", "motor2", "reel1", "reel2", "capstan"),
-    "ldu": ("motor", "wheel", "capstan", "carriage"),
-    "axis": ("carriage",),
-}
-DRY = {"ivu": ("motor1", "motor2", "capstan"), "ldu": ("carriage",), "axis": ("carriage",)}  # where the model has it
 
 
 class CoulombSettings(Settings):
@@ -153,7 +149,7 @@ COULOMB = Term(
     settings=CoulombSettings,
     build=build_coulomb,
     act={"force": "{m}.dry[{i}] += {r} * friction.coulomb({p})"},
-    nodes=SHAFTS,
+    stands=(stand("body"),),
     look_alikes={
         "friction.stribeck": "constant speeds from crawl to full: only Stribeck falls at the start",
         "friction.load": "the same motion at three tensions: only load friction grows",
@@ -161,6 +157,18 @@ COULOMB = Term(
     },
     typical={"F_C": (0.3, 1.0)},
     scale={"F_C": "dry"},
+    phrase=Phrase(
+        noun="dry friction",
+        head="{here} rubs",
+        detail="{F_added} {F_added:more|less} dry friction than in the model, at any speed",
+        need=BOTH,
+    ),
+    check="Pull slowly with a spring balance in both directions; look at bearings, wipers and seals.",
+    search=(Size("F_C", "force", 0.1, signed=True, undoes="dry", slight=0.1),),
+    told_first=True,
+    static=True,
+    friction="dry",
+    draws={"F_C": Draw(0.4, 1.0, "dry")},
 )
 VISCOUS = Term(
     name="friction.viscous",
@@ -170,13 +178,25 @@ VISCOUS = Term(
     settings=ViscousSettings,
     build=build_viscous,
     act={"force": "{m}.f[{i}] += {r} * friction.viscous({p}, {r} * {m}.vm[{i}])"},
-    nodes=SHAFTS,
+    stands=(stand("body"),),
     look_alikes={
         "friction.coulomb": "constant speeds over a decade: only viscous friction grows with speed",
         "drive.supply_sag": "load the other motor at constant speed: sag changes the gain, grease does not",
     },
     typical={"B": (0.1, 0.5)},
     scale={"B": "force/speed"},
+    phrase=Phrase(
+        noun="viscous friction",
+        head="{here} drags with speed",
+        detail="{B} {B:more|less} viscous friction than in the model",
+        need="moves at several speeds",
+    ),
+    check="Let it run out from several speeds; look at the grease, its amount and its temperature.",
+    needs=Needs(speeds=True),
+    search=(Size("B", "drag", 0.1, signed=True, undoes="thick"),),
+    static=True,
+    friction="viscous",
+    makes_up=True,
 )
 QUADRATIC = Term(
     name="friction.quadratic",
@@ -186,7 +206,7 @@ QUADRATIC = Term(
     settings=QuadraticSettings,
     build=build_quadratic,
     act={"force": "{m}.f[{i}] += {r} * friction.quadratic({p}, {r} * {m}.vm[{i}])"},
-    nodes=SHAFTS,
+    stands=(stand("body"),),
     look_alikes={
         "friction.viscous": "constant speeds over a decade: viscous friction only doubles with speed",
         "friction.stribeck": "constant speeds from crawl to full: sticking falls at the start, this drag grows",
@@ -194,6 +214,17 @@ QUADRATIC = Term(
     typical={"Q": (0.2, 1.0)},
     scale={"Q": "force/speed^2"},
     tabled=False,
+    phrase=Phrase(
+        noun="drag by the square of speed",
+        head="{here} drags by the square of its speed",
+        detail="{Q} of it",
+        need="moves at several speeds",
+    ),
+    check="Look for a fan, a cover or an open wheel that moves air or oil.",
+    search=(Size("Q", "drag2", 0.1),),
+    offered=False,
+    imitated=("friction.viscous", "friction.stribeck", "friction.coulomb", "drive.supply_sag"),
+    static=True,
 )
 STRIBECK = Term(
     name="friction.stribeck",
@@ -203,7 +234,7 @@ STRIBECK = Term(
     settings=StribeckSettings,
     build=build_stribeck,
     act={"force": "{m}.dry[{i}] += {r} * friction.stribeck({p}, {m}.dry_base[{i}] / {r}, {r} * {m}.vm[{i}])"},
-    nodes=SHAFTS,
+    stands=(stand("body"),),
     look_alikes={
         "friction.presliding": "reverse by a tiny way: a spring with hysteresis is presliding",
         "friction.coulomb": "constant speeds from crawl to full: Coulomb stays flat",
@@ -212,4 +243,22 @@ STRIBECK = Term(
     },
     typical={"F_s": (1.1, 2.0), "v_s": (0.02, 0.3)},
     scale={"F_s": "dry", "v_s": "speed"},
+    phrase=Phrase(
+        noun="sticking",
+        head="{here} sticks",
+        detail="{sticking:words}",
+        need="standstills and slow moves",
+    ),
+    check=(
+        "Pull slowly with a spring balance and compare the force that starts it with the force that "
+        "keeps it moving; look at the lubrication."
+    ),
+    needs=Needs(slow=True),
+    search=(Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.012, 0.035, 0.1, 0.3, 0.9), 4.0)),
+    variants=Choice("form", ("gaussian", "exponential", "tustin")),
+    told_first=True,
+    static=True,
+    falls_to="dry",
+    makes_up=True,
+    chosen={"form": ("gaussian", "exponential", "tustin")},
 )

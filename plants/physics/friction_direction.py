@@ -12,7 +12,9 @@ reference models of EMPS (2019), whose axis has it.
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
-from rtctl.plants.physics.friction import DRY
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Size
+from rtctl.plants.physics.story import BOTH, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -54,7 +56,7 @@ ASYMMETRY = Term(
     settings=AsymmetrySettings,
     build=build_asymmetry,
     act={"force": "{m}.f[{i}] += friction_direction.asymmetry({p}, {m}.vm[{i}], {m}.dry[{i}], {r})"},
-    nodes=DRY,
+    stands=(stand("body", "dry"),),
     look_alikes={
         "drive.offset": "at two places or loads of different friction: asymmetry grows with it, an offset stays",
         "drive.gain_asymmetry": "the same speeds under two loads: the drive's error grows with the command",
@@ -63,4 +65,18 @@ ASYMMETRY = Term(
     },
     typical={"a": (0.1, 0.3), "B_a": (0.02, 0.1)},
     scale={"B_a": "force/speed"},
+    phrase=Phrase(
+        noun="uneven friction",
+        head="{here} drags more one way",
+        detail="dry friction is {a:%} {a:larger|smaller} forwards and {a:%} {a:smaller|larger} backwards",
+        need=BOTH,
+    ),
+    check=(
+        "Pull slowly with a spring balance in one direction and then in the other; look at wipers, and at the level."
+    ),
+    needs=Needs(ways="motion"),
+    search=(Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
+    richer=(Size("B_a", "drag", 0.05, signed=True),),
+    static=True,
+    draws={"a": Draw(0.1, 0.3, signed=True), "B_a": Draw(0.0, 0.0)},
 )

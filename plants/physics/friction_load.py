@@ -11,6 +11,9 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Size
+from rtctl.plants.physics.story import Phrase
 from rtctl.plants.physics.term import Node, Term
 
 BESIDE = {"capstan": (0, 1), "reel1": (0, 0), "reel2": (1, 1), "motor1": (2, 2), "motor2": (3, 3)}  # links of the ivu
@@ -70,11 +73,11 @@ LOAD = Term(
         "force:ivu": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {p}.one, {p}.two)",
         "force:axis": "{m}.dry[{i}] += friction_load.load_drive({p}, {m}, {i})",
     },
-    nodes={
-        "ivu": ("capstan", "reel1", "reel2", "motor1", "motor2"),
-        "ldu": ("wheel", "capstan"),
-        "axis": ("carriage",),
-    },
+    stands=(
+        stand("body", "loaded wrapped"),
+        stand("body", "loaded reel"),
+        stand("body", "loaded"),
+    ),
     look_alikes={
         "friction.coulomb": "the same motion at three tensions: Coulomb friction stays the same",
         "friction.viscous": "constant speeds at one tension: load friction stays flat",
@@ -83,4 +86,13 @@ LOAD = Term(
     },
     typical={"mu": (0.05, 0.3)},
     axis="tension",
+    phrase=Phrase(
+        noun="friction from load",
+        head="{here} drags by its load",
+        detail="friction {mu:grows|falls} by {mu:%} of the load",
+        need="moves under several loads",
+    ),
+    check="Pull slowly with and without the load; look at the bearing that carries it.",
+    search=(Size("mu", "one", 0.05, signed=True),),
+    makes_up=True,
 )

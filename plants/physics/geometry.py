@@ -14,7 +14,10 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import ivu, linear
+from rtctl.plants.element import stand
 from rtctl.plants.physics.ripple_tape import tape_of
+from rtctl.plants.physics.search import Choice, Size
+from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 PAPER = 1700.0 * 0.037  # kg/m^2: density times width of the thesis's paper
@@ -112,7 +115,7 @@ RADIUS_CHANGE = Term(
     settings=RadiusChangeSettings,
     build=build_radius_change,
     act={"force": "geometry.wind({p}, {m}, {i})", "last": "geometry.turn({p}, {m}, {i})"},
-    nodes={"ivu": ("reel1", "reel2")},
+    stands=(stand("body", "reel"),),
     look_alikes={
         "sensor.scale": "two turns and two more: a growing reel goes with the square of the way, a factor does not",
         "drive.thermal": "wind there and back slowly: a radius comes back with the tape, heat does not",
@@ -122,4 +125,14 @@ RADIUS_CHANGE = Term(
     },
     typical={"d": (1e-4, 1e-3)},
     axis="position",
+    phrase=Phrase(
+        noun="a changing radius",
+        head="{here} changes its radius",
+        detail="by {d} in each turn",
+        need="many turns",
+    ),
+    check="Measure the radius of the reel before and after, and look at how the tape lies on it.",
+    needs=Needs(turns=0.25),
+    search=(Size("d", "one", 0.0001, signed=True), Choice("other", (1.0, 0.0))),
+    draws={"d": Draw(0.0001, 0.001)},
 )

@@ -13,10 +13,11 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.element import stand
 from rtctl.plants.physics.ripple import harmonics
+from rtctl.plants.physics.search import INF, Hint, OtherName, Shape, Size, Turn
+from rtctl.plants.physics.story import PASSES, WAVES, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
-
-GUIDES = {"ldu": ("carriage", "scale"), "axis": ("sensor",)}
 
 
 class ThicknessSettings(Settings):
@@ -129,7 +130,11 @@ THICKNESS = Term(
     build=build_thickness,
     moves=True,
     act={"reading": "{m}.y[{c}] += guide.thickness({p}, {m}.y[{c}])"},
-    nodes=GUIDES,
+    stands=(
+        stand("body", "guided"),
+        stand("sensor", "guided load", again=True),
+        stand("sensor", "guided lone"),
+    ),
     look_alikes={
         "ripple.capstan": "lift the carriage, turn the capstan half a turn and repeat: only the capstan's wave moves",
         "ripple.encoder": "start from another angle of the shaft: a disc goes with the angle, a strip with the place",
@@ -140,6 +145,19 @@ THICKNESS = Term(
     },
     typical={"A": (2e-6, 5e-4), "wavelength": (0.02, 0.3)},
     axis="position",
+    phrase=Phrase(
+        noun="uneven thickness",
+        head="the guide at {here} is uneven",
+        detail="{A} in waves of {wavelength}",
+        need=WAVES,
+    ),
+    check="Measure the thickness of the strip or rail every few millimetres with a micrometer.",
+    needs=Needs(compared=True, alone="slides", second=(stand("body", "guided"), stand("sensor", "guided load"))),
+    search=(Turn("A", "phi", "one", 5e-06), Hint("wavelength", "wavelength", 0.6, lengths=(0.012, INF))),
+    richer=(Turn("A2", "phi2", "one", 1e-06), Turn("A3", "phi3", "one", 1e-06)),
+    other_name=OtherName("wavelength", "ripple.encoder", "turn"),
+    defined=True,
+    draws={"A": Draw(2e-06, 3e-05), "wavelength": Draw(0.2, 1.0, "travel")},
 )
 STRIP = Term(
     name="guide.strip",
@@ -150,13 +168,26 @@ STRIP = Term(
     build=build_strip,
     moves=True,
     act={"reading": "{m}.y[{c}] += guide.strip({p}, {m}.y[{c}])"},
-    nodes=GUIDES,
+    stands=(
+        stand("body", "guided"),
+        stand("sensor", "guided load", again=True),
+        stand("sensor", "guided lone"),
+    ),
     look_alikes={
         "sensor.scale": "look for the waves on top of the trend, two to each wave of the strip: a scale error has none",
         "guide.thickness": "travel over several wavelengths: the way along a wavy strip grows, thickness does not",
     },
     typical={"longer": (1e-6, 1e-4), "wavelength": (0.05, 0.3)},
     axis="position",
+    phrase=Phrase(
+        noun="a wavy strip",
+        head="the strip at {here} is wavy",
+        detail="the way along it is {longer:%} longer than straight, in waves of {wavelength}",
+        need=WAVES,
+    ),
+    check="Lay a straight edge along the strip and look for gaps; look at its tension and its supports.",
+    defined=True,
+    draws={"longer": Draw(1e-05, 0.0001), "wavelength": Draw(0.2, 1.0, "travel")},
 )
 DIRT = Term(
     name="guide.dirt",
@@ -167,7 +198,11 @@ DIRT = Term(
     build=build_dirt,
     moves=True,
     act={"reading": "{m}.y[{c}] += guide.dirt({p}, {m}.y[{c}])"},
-    nodes=GUIDES,
+    stands=(
+        stand("body", "guided"),
+        stand("sensor", "guided load", again=True),
+        stand("sensor", "guided lone"),
+    ),
     look_alikes={
         "load.bump": "the same travel seen by both sensors: dirt shows as a difference of the two, a bump in both",
         "guide.thickness": "several wavelengths of travel: dirt is at one place, thickness everywhere",
@@ -175,4 +210,19 @@ DIRT = Term(
     },
     typical={"A": (5e-6, 5e-5), "width": (5e-4, 5e-3)},
     axis="position",
+    phrase=Phrase(
+        noun="dirt on the strip",
+        head="there is dirt on the strip at {here}",
+        detail="it is {A} off at {at:3}, within {width}",
+        need=PASSES,
+    ),
+    check="Wipe the strip at the place and repeat the pass.",
+    needs=Needs(compared=True),
+    search=(
+        Size("A", "one", 1e-05, signed=True),
+        Hint("at", "spot", 0.05, True),
+        Shape("width", "span", (0.02,), 10.0),
+    ),
+    defined=True,
+    draws={"A": Draw(5e-06, 5e-05), "at": Draw(0.02, 0.08, "travel"), "width": Draw(0.005, 0.02, "travel")},
 )

@@ -12,11 +12,12 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants.physics.friction import SHAFTS
+from rtctl.plants.element import stand
 from rtctl.plants.physics.presliding import bend
+from rtctl.plants.physics.search import At, Choice, Size, Turn, Where
+from rtctl.plants.physics.story import PASSES, TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
-CARRIAGES = {"ldu": ("carriage",), "axis": ("carriage",)}
 HILL = math.sqrt(math.e)  # steepest slope of exp(-x^2 / 2) is 1 / HILL, at x = 1
 FORMS = ("drag", "hill", "push")
 
@@ -173,7 +174,7 @@ SPRING = Term(
     settings=SpringSettings,
     build=build_spring,
     act={"force": "{m}.f[{i}] += {r} * load.spring({p}, {r} * {m}.qm[{i}])"},
-    nodes=CARRIAGES,
+    stands=(stand("body", "bounded"),),
     look_alikes={
         "drive.offset": "the same short move at both ends of the travel: an offset is the same everywhere",
         "load.cable_chain": "approach one place from both sides slowly: a spring pulls the same, a chain does not",
@@ -183,6 +184,15 @@ SPRING = Term(
     typical={"k": (0.2, 1.0)},
     scale={"k": "force/travel"},
     axis="position",
+    phrase=Phrase(
+        noun="a spring force",
+        head="something pulls {here} like a spring",
+        detail="{k} {k:back to|away from} one place",
+        need="long moves",
+    ),
+    check=("Let go at several places and see where it moves to; look at hoses, cables and the level of the rail."),
+    search=(Size("k", "stiff", 0.2, signed=True), Where("x0")),
+    static=True,
 )
 CABLE_CHAIN = Term(
     name="load.cable_chain",
@@ -192,7 +202,7 @@ CABLE_CHAIN = Term(
     settings=CableChainSettings,
     build=build_cable_chain,
     act={"force": "{m}.f[{i}] += {r} * load.cable_chain({p}, {s}, {r} * {m}.qm[{i}])"},
-    nodes=CARRIAGES,
+    stands=(stand("body", "bounded"),),
     look_alikes={
         "load.spring": "approach one place from both sides slowly: a spring pulls the same, a chain does not",
         "friction.presliding": "reverse in mid-travel: bristles turn within a tiny way, a chain within a long one",
@@ -202,6 +212,13 @@ CABLE_CHAIN = Term(
     scale={"k": "force/travel", "F_h": "force", "z_h": "travel"},
     axis="position",
     state=CABLE_CHAIN_STATE,
+    phrase=Phrase(
+        noun="a cable chain",
+        head="a cable chain pulls {here}",
+        detail="{k} by position and {F_h} of drag",
+        need="long moves with reversals",
+    ),
+    check="Unhook the cable chain and repeat the move.",
 )
 IMBALANCE = Term(
     name="load.imbalance",
@@ -211,11 +228,7 @@ IMBALANCE = Term(
     settings=ImbalanceSettings,
     build=build_imbalance,
     act={"force": "{m}.f[{i}] += {r} * load.imbalance({p}, {r} * {m}.qm[{i}])"},
-    nodes={
-        "ivu": ("motor1", "motor2", "reel1", "reel2", "capstan"),
-        "ldu": ("wheel", "capstan"),
-        "axis": ("carriage",),
-    },
+    stands=(stand("body", "rotor turns"),),
     look_alikes={
         "ripple.cogging": "turn slowly by hand and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: imbalance stays, an eccentric reel follows the tension",
@@ -225,6 +238,23 @@ IMBALANCE = Term(
     typical={"A": (0.05, 0.3)},
     scale={"A": "force"},
     axis="angle",
+    phrase=Phrase(
+        noun="imbalance",
+        head="{here} is heavy on one side",
+        detail="{A} helps once a turn and hinders once a turn",
+        need=TURNS,
+    ),
+    check=(
+        "Turn it by hand to several angles, let go and see whether it always comes to rest with the same side down."
+    ),
+    units={"A": "force"},
+    needs=Needs(
+        turns=0.5, turned=(stand("body", "rotor reel"), stand("body", "rotor wheel"), stand("body", "rotor bounded"))
+    ),
+    search=(Turn("A", "phi", "force", 0.1),),
+    static=True,
+    defined=True,
+    draws={"A": Draw(0.05, 0.3, "force"), "turn": Draw(1.0, 1.0, "turn")},
 )
 BUMP = Term(
     name="load.bump",
@@ -234,7 +264,7 @@ BUMP = Term(
     settings=BumpSettings,
     build=build_bump,
     act={"force": "load.bump({p}, {m}, {i}, {r})"},
-    nodes=SHAFTS,
+    stands=(stand("body"),),
     look_alikes={
         "sensor.missed_counts": "pass the place ten times: a bump comes back to zero error, lost counts add up",
         "guide.thickness": "the same travel seen by both sensors: thickness shows as a difference, a bump in both",
@@ -245,4 +275,21 @@ BUMP = Term(
     scale={"F": "force", "width": "travel"},
     axis="position",
     state=None,
+    phrase=Phrase(
+        noun="a tight spot",
+        head="{here} has a tight spot",
+        detail="{F} {F:more|less} to pass at {at:3}, within {width}",
+        need=PASSES,
+    ),
+    check="Move slowly by hand past the place and feel for it; look for dirt, a dent or a joint of the rail.",
+    search=(
+        Size("F", "force", 0.2, signed=True),
+        At("at", "width", 8, 0.05, 0.012),
+        Choice("form", ("drag", "hill", "push")),
+    ),
+    variants=Choice("form", ("drag", "hill", "push")),
+    closer="places",
+    static=True,
+    draws={"F": Draw(0.2, 1.0, "force"), "at": Draw(0.02, 0.08, "travel"), "width": Draw(0.01, 0.05, "travel")},
+    chosen={"form": ("drag", "hill", "push")},
 )

@@ -13,6 +13,7 @@ import numpy as np
 
 from rtctl.idiom import Settings, interpreted
 from rtctl.plants import linear
+from rtctl.plants.physics.nodes import by_kind
 from rtctl.plants.physics.place import PLANTS, place
 from rtctl.plants.physics.term import SITES, Term
 
@@ -110,8 +111,9 @@ class Hand(NamedTuple):
 def portrait(term: Term) -> Curve:
     """The curve of a term at a typical size, at the first node of the plant that shows its axis best."""
     order = ("ivu", *ORDER) if term.axis in IVU_FIRST else ORDER
-    kind = next(k for k in order if k in term.nodes)
-    return curve(term, typical(term, kind, term.nodes[kind][0]), kind)
+    where = by_kind(term)
+    kind = next(k for k in order if k in where)
+    return curve(term, typical(term, kind, where[kind][0]), kind)
 
 
 def typical(term: Term, kind: str, node: str) -> Settings:

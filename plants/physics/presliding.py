@@ -22,7 +22,9 @@ from typing import Literal, NamedTuple
 from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants.physics.friction import DRY
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Shape, Size
+from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 NEWTON = 40  # steps at most, from below: far from the root each is one unit of the exponent, near it digits double
@@ -123,7 +125,7 @@ PRESLIDING = Term(
     settings=PreslidingSettings,
     build=build_presliding,
     act={"force": "presliding.replace({p}, {s}, {m}, {i}, {r})"},
-    nodes=DRY,
+    stands=(stand("body", "dry"),),
     look_alikes={
         "friction.stribeck": "reverse by a tiny way: plain dry friction holds still, bristles move as a spring",
         "transmission.backlash": "reverse with a small force: bristles push back at once, a gap does not",
@@ -134,4 +136,22 @@ PRESLIDING = Term(
     scale={"z_s": "travel"},
     axis="position",
     state=PRESLIDING_STATE,
+    phrase=Phrase(
+        noun="a spring before breakaway",
+        head="{here} gives like a spring before it breaks away",
+        detail="it springs over {z_s}",
+        need="standstills and slow reversals",
+    ),
+    check="Push lightly without moving it, let go and see whether it springs back; look at seals and wipers.",
+    needs=Needs(slow=True),
+    search=(Size("z_s", "span", 0.001, finest=2.0), Choice("form", ("dahl", "lugre"))),
+    richer=(
+        Size("rise", "one", 0.1, most=3.0),
+        Shape("v_s", "speed", (0.1,), 50.0),
+        Shape("tau_s", "seconds", (0.003,), 300.0),
+        Choice("form", ("lugre",)),
+    ),
+    replaces="dry",
+    draws={"z_s": Draw(0.002, 0.02, "travel")},
+    chosen={"form": ("dahl", "lugre")},
 )

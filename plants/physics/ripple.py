@@ -13,6 +13,9 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Hint, OtherName, Turn
+from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 TURN = 2.0 * math.pi
@@ -110,7 +113,7 @@ COGGING = Term(
     settings=CoggingSettings,
     build=build_cogging,
     act={"force": "{m}.f[{i}] += {r} * ripple.cogging({p}, {r} * {m}.qm[{i}])"},
-    nodes={"ivu": ("motor1", "motor2"), "ldu": ("motor",), "axis": ("carriage",)},
+    stands=(stand("body", "driven"),),
     look_alikes={
         "load.imbalance": "turn slowly and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: cogging stays, an eccentric reel follows the tension",
@@ -121,6 +124,26 @@ COGGING = Term(
     typical={"A": (0.02, 0.3), "per_turn": (3, 48)},
     scale={"A": "force"},
     axis="angle",
+    phrase=Phrase(
+        noun="cogging",
+        head="{here} is notchy",
+        detail="{A}, {per_turn:g} times a turn{harmonics:words}",
+        need=TURNS,
+        again=" as often",
+    ),
+    check="Turn the motor slowly by hand with the power off and count the notches of a turn.",
+    units={"A": "force", "A2": "force", "A3": "force"},
+    needs=Needs(turns=0.25),
+    search=(Turn("A", "phi", "force", 0.05), Hint("per_turn", "order")),
+    sliding=(Turn("A", "phi", "force", 0.05), Hint("turn", "wavelength", 0.4)),
+    richer=(Turn("A2", "phi2", "force", 0.02), Turn("A3", "phi3", "force", 0.02)),
+    told_first=True,
+    counted=("per_turn",),
+    more_starts=6,
+    static=True,
+    defined=True,
+    draws={"A": Draw(0.02, 0.3, "force"), "turn": Draw(1.0, 1.0, "turn")},
+    chosen={"per_turn": (3.0, 5.0, 7.0, 12.0, 24.0)},
 )
 ENCODER = Term(
     name="ripple.encoder",
@@ -130,7 +153,10 @@ ENCODER = Term(
     settings=EncoderSettings,
     build=build_encoder,
     act={"reading": "{m}.y[{c}] = ripple.encoder({p}, {m}.y[{c}])"},
-    nodes={"ivu": ("encoder",), "ldu": ("encoder",), "axis": ("sensor",)},
+    stands=(
+        stand("sensor", "position turns slides", usual=False),
+        stand("sensor", "position turns"),
+    ),
     look_alikes={
         "ripple.capstan": "on the LDU look at both sensors: a disc off centre does not move the carriage; on the IVU "
         "change the tape's tension: a capstan out of round pulls harder, a reading error stays",
@@ -142,4 +168,21 @@ ENCODER = Term(
     },
     typical={"A": (3e-4, 1e-2)},
     axis="angle",
+    phrase=Phrase(
+        noun="a disc off centre",
+        head="the disc of {here} is off centre",
+        detail="it reads up to {A} ahead and behind once a turn{harmonics:words}",
+        need=TURNS,
+    ),
+    check=(
+        "Put a dial gauge on the hub of the encoder and turn it once; look at its coupling and at how its disc sits."
+    ),
+    units={"A": "position", "A2": "position", "A3": "position"},
+    needs=Needs(turns=0.5),
+    search=(Turn("A", "phi", "one", 0.002),),
+    sliding=(Turn("A", "phi", "one", 1e-05), Hint("turn", "wavelength", 0.4, lengths=(0.0, 0.045))),
+    richer=(Turn("A2", "phi2", "one", 0.0005), Turn("A3", "phi3", "one", 0.0005)),
+    other_name=OtherName("turn", "guide.thickness", "wavelength"),
+    defined=True,
+    draws={"A": Draw(0.0003, 0.01, "lever"), "turn": Draw(1.0, 1.0, "turn")},
 )

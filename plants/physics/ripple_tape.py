@@ -15,7 +15,10 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
+from rtctl.plants.element import stand
 from rtctl.plants.physics.ripple import harmonics
+from rtctl.plants.physics.search import Turn
+from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -127,7 +130,7 @@ REEL = Term(
     settings=ReelSettings,
     build=build_reel,
     act={"force": "ripple_tape.reel({p}, {m}, {i})", "last": "ripple_tape.reel_arm({p}, {m}, {i})"},
-    nodes={"ivu": ("reel1", "reel2")},
+    stands=(stand("body", "reel"),),
     look_alikes={
         "load.imbalance": "the same turns at another tension: an eccentric reel follows the tension, a weight does not",
         "ripple.cogging": "the same turns at another tension: an eccentric reel follows the tension, cogging does not",
@@ -136,6 +139,18 @@ REEL = Term(
     },
     typical={"e": (5e-5, 5e-4)},
     axis="angle",
+    phrase=Phrase(
+        noun="a reel off centre",
+        head="{here} is off centre",
+        detail="by {e} once a turn{harmonics:words}",
+        need=TURNS,
+    ),
+    check="Turn the reel slowly past a pointer and see how far its rim moves; look at its seat on the shaft.",
+    needs=Needs(turns=0.5),
+    search=(Turn("e", "phi", "one", 0.0001),),
+    richer=(Turn("e2", "phi2", "one", 3e-05), Turn("e3", "phi3", "one", 3e-05)),
+    defined=True,
+    draws={"e": Draw(5e-05, 0.0005)},
 )
 CAPSTAN = Term(
     name="ripple.capstan",
@@ -150,7 +165,7 @@ CAPSTAN = Term(
         "reading:ldu": "{m}.y[1] += ripple_tape.way({p}, {m}.x[{i}])",
     },
     moves=True,
-    nodes={"ivu": ("capstan",), "ldu": ("capstan",)},
+    stands=(stand("body", "capstan"),),
     look_alikes={
         "ripple.encoder": "on the LDU both give the same difference of the sensors, and only in closed loop does the "
         "carriage itself follow the encoder; on the IVU change the tension: only a capstan out of round pulls harder",
@@ -160,4 +175,16 @@ CAPSTAN = Term(
     },
     typical={"a": (2e-6, 2e-4)},
     axis="angle",
+    phrase=Phrase(
+        noun="a capstan out of round",
+        head="{here} is out of round",
+        detail="by {a} once a turn{harmonics:words}",
+        need=TURNS,
+    ),
+    check="Put a dial gauge on the capstan and turn it once; look at its bearings and at dirt on its rim.",
+    needs=Needs(turns=0.5),
+    search=(Turn("a", "phi", "one", 1e-05),),
+    richer=(Turn("a2", "phi2", "one", 3e-06), Turn("a3", "phi3", "one", 3e-06)),
+    defined=True,
+    draws={"a": Draw(1e-05, 0.0001)},
 )

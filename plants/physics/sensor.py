@@ -14,10 +14,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Jumps, Size
+from rtctl.plants.physics.story import BOTH, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 MOST = 48  # jumps
-READINGS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)}
 WAYS = {"forward": 1, "backward": -1}
 
 
@@ -170,7 +172,10 @@ MISSED_COUNTS = Term(
             for kind, x in X.items()
         },
     },
-    nodes=READINGS,
+    stands=(
+        stand("sensor", "position"),
+        stand("sensor", "speed"),
+    ),
     look_alikes={
         "transmission.slip": "drive to a hard stop and back: slip comes with force, lost counts with nothing",
         "load.bump": "pass the place ten times: a bump comes back to zero error, lost counts add up",
@@ -183,6 +188,18 @@ MISSED_COUNTS = Term(
     typical={"size": (3e-3, 6e-2)},
     axis="time",
     state=MISSED_COUNTS_STATE,
+    phrase=Phrase(
+        noun="lost counts",
+        head="{here} loses counts",
+        detail="{jumps:words}",
+        need="fast motion and a return to a known place",
+    ),
+    check="Look at the screen and the plug of the cable of the sensor, and at its highest count rate.",
+    units={"at": "s"},
+    needs=Needs(second=(stand("sensor", "slides load"),)),
+    search=(Jumps("size"),),
+    defined=True,
+    draws={"each": Draw(0.003, 0.03, "lever", signed=True), "mark": Draw(0.02, 0.08, "travel"), "size": Draw(0.0, 0.0)},
 )
 RECTIFIED = Term(
     name="sensor.rectified",
@@ -195,7 +212,10 @@ RECTIFIED = Term(
         **{f"force{kind}": f"sensor.go({{s}}, {x})" for kind, x in X.items()},
         **{f"reading{kind}": f"{{m}}.y[{{c}}] += sensor.rectified({{p}}, {{s}}, {x})" for kind, x in X.items()},
     },
-    nodes=READINGS,
+    stands=(
+        stand("sensor", "position"),
+        stand("sensor", "speed"),
+    ),
     look_alikes={
         "sensor.scale": "one move out and back: a scale error ends at zero, a rectified reading at twice the way",
         "sensor.missed_counts": "one slow move out and back: lost counts jump, a rectified reading turns over smoothly",
@@ -203,6 +223,21 @@ RECTIFIED = Term(
     typical={"share": (0.5, 1.0)},
     axis="velocity",
     state=RECTIFIED_STATE,
+    phrase=Phrase(
+        noun="a sensor without direction",
+        head="{here} cannot tell direction",
+        detail="{share:%} of the way back counts as way out",
+        need=BOTH,
+    ),
+    check=(
+        "Move it by hand there and back and see whether the reading comes back; look at the second "
+        "channel of the sensor."
+    ),
+    needs=Needs(ways="motion", compared=True, alone="unsigned"),
+    search=(Choice("share", (1.0,)),),
+    defined=True,
+    unsigned=True,
+    draws={"share": Draw(0.5, 1.0)},
 )
 SCALE = Term(
     name="sensor.scale",
@@ -212,7 +247,10 @@ SCALE = Term(
     settings=ScaleSettings,
     build=build_scale,
     act={"reading": "{m}.y[{c}] = sensor.scale({p}, {m}.y[{c}])"},
-    nodes=READINGS,
+    stands=(
+        stand("sensor", "position"),
+        stand("sensor", "speed"),
+    ),
     look_alikes={
         "transmission.creep": "the same travel at two loads: creep grows with the load, a factor does not",
         "transmission.slip": "the same travel hard and gently: slip comes with force, a factor always",
@@ -224,4 +262,15 @@ SCALE = Term(
     },
     typical={"relative": (1e-4, 5e-3)},
     axis="position",
+    phrase=Phrase(
+        noun="a wrong factor",
+        head="{here} has a wrong factor",
+        detail="every way reads {relative:%} too {relative:long|short}",
+        need="a second sensor to compare with",
+    ),
+    check=("Move by a known length and compare the reading; look at the counts per turn and the radius that were set."),
+    needs=Needs(compared=True, second=(stand("sensor"), stand("body", "capstan"))),
+    search=(Size("relative", "one", 0.001, signed=True),),
+    defined=True,
+    draws={"relative": Draw(0.001, 0.005, signed=True)},
 )

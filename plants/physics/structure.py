@@ -18,7 +18,9 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants.physics.friction import SHAFTS
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Shape, Size
+from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -108,7 +110,7 @@ RESONANCE = Term(
     settings=ResonanceSettings,
     build=build_resonance,
     act={"force": "{m}.f[{i}] += {r} * structure.resonance({p}, {s}, {r} * {m}.qm[{i}], {r} * {m}.vm[{i}])"},
-    nodes=SHAFTS,
+    stands=(stand("body"),),
     look_alikes={
         "timing.delay": "a sweep through the frequency: a resonance has a dip and a peak, a delay only lags",
         "drive.lag": "a sweep through the frequency: a lag falls off and never rings",
@@ -119,6 +121,22 @@ RESONANCE = Term(
     scale={"mass": "inertia"},
     axis="frequency",
     state=RESONANCE_STATE,
+    phrase=Phrase(
+        noun="a resonance",
+        head="something on {here} shakes",
+        detail="{mass} rings at {f_Hz:3}",
+        need="excitation up to the resonance",
+    ),
+    check="Knock on the part and listen; look for a loose screw, a cable or a cover that can swing.",
+    units={"f_Hz": "Hz"},
+    search=(
+        Size("mass", "inertia", 0.1),
+        Shape("f_Hz", "ring", (3.0, 6.0, 11.0, 19.0, 30.0, 43.0, 60.0, 85.0, 120.0, 165.0, 225.0), 1.4),
+        Shape("zeta", "one", (0.02,), 30.0),
+    ),
+    closer="frequencies",
+    stiff=True,
+    draws={"f_Hz": Draw(0.04, 0.2, "rate"), "mass": Draw(0.1, 0.4, "inertia"), "zeta": Draw(0.01, 0.1)},
 )
 STIFFENING = Term(
     name="structure.stiffening",
@@ -131,11 +149,7 @@ STIFFENING = Term(
         "force": "linear.pull({m}, {l}, structure.stiffening({p}, linear.stretch({m}, {l}), "
         "linear.stretch_rate({m}, {l})))"
     },
-    nodes={
-        "ivu": ("tape1", "tape2", "motor1", "motor2"),
-        "ldu": ("wheel", "capstan"),
-        "axis": ("carriage",),
-    },
+    stands=(stand("joint", "spring"),),
     look_alikes={
         "tape.viscoelastic": "the same load slowly and fast: stiffening does not ask how fast",
         "transmission.backlash": "small motions about the middle: a gap is loose there, a cubic spring is linear",
@@ -144,4 +158,19 @@ STIFFENING = Term(
     typical={"c3": (0.1, 1.0)},
     scale={"c3": "stiffness/stretch^2"},
     axis="position",
+    phrase=Phrase(
+        noun="a bent spring law",
+        head="the spring at {here} grows {c3:stiffer|softer} as it bends",
+        detail="its cubic stiffness is {c3:+}",
+        need="large deflections",
+    ),
+    check=(
+        "Push with one, two and three times a force and measure the deflection; look at clearances "
+        "that close under load."
+    ),
+    needs=Needs(stiffness=True),
+    search=(Size("c3", "cubic", 0.2, signed=True),),
+    richer=(Size("c2", "square", 0.05, signed=True), Size("b2", "swell", 0.05)),
+    stiff=True,
+    draws={"c3": Draw(1.0, 5.0, "cubic")},
 )

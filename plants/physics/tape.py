@@ -15,9 +15,10 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Shape, Size
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
-
-TAPES = {"ivu": ("tape1", "tape2")}
 
 
 class ViscoelasticSettings(Settings):
@@ -109,7 +110,7 @@ VISCOELASTIC = Term(
         "force": "linear.pull({m}, {l}, tape.viscoelastic({p}, {s}, linear.stretch({m}, {l}), "
         "linear.stretch_rate({m}, {l})))"
     },
-    nodes=TAPES,
+    stands=(stand("joint", "spring span"),),
     look_alikes={
         "transmission.creep": "hold tension at standstill: creep needs travel, relaxation only time",
         "friction.presliding": "hold and wait: bristles stay where they are, a relaxing tape moves on",
@@ -120,6 +121,16 @@ VISCOELASTIC = Term(
     scale={"c_branch": "stiffness"},
     axis="frequency",
     state=VISCOELASTIC_STATE,
+    phrase=Phrase(
+        noun="slow give",
+        head="{here} gives way slowly",
+        detail="a stiffness of {c_branch} relaxes within {tau}",
+        need="changes of tension",
+    ),
+    check="Hang a weight on the tape and see whether it still gives after a minute; look at its material.",
+    search=(Size("c_branch", "stiffness", 0.5), Shape("tau", "seconds", (0.01, 0.05, 0.25, 1.2))),
+    richer=(Size("c_branch2", "stiffness", 0.2), Shape("tau2", "seconds", (0.5,), 60.0)),
+    stiff=True,
 )
 SLACK = Term(
     name="tape.slack",
@@ -132,10 +143,21 @@ SLACK = Term(
         "force": "linear.pull({m}, {l}, tape.slack({p}.share, linear.tension({m}, {l})))\n"
         "linear.pull({m}, 1 - {l}, tape.slack({p}.other, linear.tension({m}, 1 - {l})))"
     },
-    nodes=TAPES,
+    stands=(stand("joint", "spring span"),),
     look_alikes={
         "transmission.backlash": "the same moves at a higher tension: the tape stays taut, play stays",
         "transmission.slip": "the same moves at a higher tension: slack goes, slip goes too but leaves a lost way",
     },
     axis="tension",
+    phrase=Phrase(
+        noun="slack",
+        head="{here} goes slack",
+        detail="it pulls and cannot push",
+        need="moments of low tension",
+    ),
+    check="Watch the tape in quick reversals and see whether it hangs through; look at its pretension.",
+    search=(Choice("share", (1.0,)), Choice("other", (1.0, 0.0))),
+    closer="tolerance",
+    stiff=True,
+    draws={"share": Draw(0.8, 1.0)},
 )

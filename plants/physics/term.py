@@ -29,6 +29,9 @@ import numpy as np
 from pydantic import Field
 
 from rtctl.idiom import Settings
+from rtctl.plants.element import Stand
+from rtctl.plants.physics.search import Choice, OtherName, Part
+from rtctl.plants.physics.story import NOTHING, Draw, Needs, Phrase
 
 SITES = ("command", "force", "last", "reading")
 Node = Annotated[str, Field(description="where it acts; `rtctl physics TERM` lists the nodes of each machine")]
@@ -36,7 +39,10 @@ Node = Annotated[str, Field(description="where it acts; `rtctl physics TERM` lis
 
 @dataclass(frozen=True)
 class Term:
-    """One effect that a machine can have beyond its equations."""
+    """One effect that a machine can have beyond its equations, and all that is told about it.
+
+    A term in a file of a user's own gives what has no default here; the rest has a meaning without it.
+    """
 
     name: str
     words: str
@@ -45,7 +51,7 @@ class Term:
     settings: type[Settings]
     build: Callable[[Any, float], Any]
     act: dict[str, str]  # site, or site:kind for one kind of plant -> line
-    nodes: Mapping[str, tuple[str, ...]]  # plant kind -> nodes where it can stand
+    stands: tuple[Stand, ...]  # elements at which it can stand; see plants/physics/nodes.py
     look_alikes: dict[str, str]  # rival name -> the experiment that separates the two
     typical: dict[str, tuple[float, float]] = field(default_factory=dict)  # parameter -> range; see `scale`
     scale: dict[str, str] = field(default_factory=dict)  # parameter -> what its typical range is a multiple of
@@ -54,6 +60,46 @@ class Term:
     moves: bool = False  # its reading line is where the carriage stands, not an error of a sensor
     tabled: bool = True  # the exchange format has its name
     state: np.dtype | None = None
+
+    # how it is spoken of
+    phrase: Phrase | None = None
+    check: str = ""  # what a mechanic should look at on the machine, one sentence
+    units: Mapping[str, str] = field(
+        default_factory=dict
+    )  # parameter -> unit, or dimension by its node (quantities.py)
+    contact: bool = False  # acts in m and N where its contact drives a tape or a carriage
+    told_first: bool = False  # among the sizes that a verdict of nothing names
+
+    # what a record must hold, and how it is looked for
+    needs: Needs = NOTHING
+    search: tuple[Part, ...] = ()  # of the plain form; without it the first of `typical` is the size
+    sliding: tuple[Part, ...] = ()  # the same where its node slides, if that is another
+    offered: bool = True  # among the hypotheses; else only looked for in the place of those that imitate it
+    imitated: tuple[str, ...] = ()  # names that a fit takes for it
+    richer: tuple[Part, ...] = ()  # further parameters, tried once the plain form stands
+    richer_at: str = ""  # kind of element at which it has its richer form; all of them without it
+    variants: Choice | None = None  # a setting that is tried in its other values once the term stands
+    counted: tuple[str, ...] = ()  # parameters that are whole numbers: slots and poles
+    other_name: OtherName | None = None
+    more_starts: int = 0  # that a search keeps beyond the usual number
+    closer: str = ""  # a closer look: at all "frequencies", all over the "tolerance", at the likeliest "places"
+    static: bool = False  # a function of what `axis` says, without memory
+    defined: bool = False  # its sizes are numbers by definition: constants, factors, times, waves
+    late: str = ""  # "delay" of what is commanded, or what "bends" to one
+    stiff: bool = False  # alters a spring: simulated in shorter steps
+    slips: bool = False  # lets go what a contact carries: the bodies behind it move freely
+    unsigned: bool = False  # a reading without direction
+    clock: bool = False  # of the ticks: shows in the noise, not in the error of a fit
+
+    # friction
+    friction: str = ""  # it is this friction of a body, at its first size: "dry", "viscous"
+    falls_to: str = ""  # friction of its node to which its own falls with speed: "dry"
+    replaces: str = ""  # friction of its node whose place it takes: "dry"
+    makes_up: bool = False  # drags in the place of dry friction that a fit takes away
+
+    # how large one is hidden by `plant --conceal`
+    draws: Mapping[str, Draw] = field(default_factory=dict)  # ranges in place of the typical ones
+    chosen: Mapping[str, tuple] = field(default_factory=dict)  # settings that are chosen rather than sized
 
     def act_at(self, site: str, kind: str) -> str | None:
         """Its line at a site of a plant, None where it does nothing there."""

@@ -14,13 +14,15 @@ from rtctl.config.errors import UserError
 from rtctl.counted import uniform
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import ivu, ldu, linear
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Size
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 LENGTH = 1024  # substeps that the line holds
 LONGEST = 0.03  # s
 CHANNELS = linear.MOST_DRIVES
 JITTER_FORMS = ("gaussian", "uniform")
-LOOPS = {"ivu": ("loop",), "ldu": ("loop",), "axis": ("loop",)}
 
 
 class DelaySettings(Settings):
@@ -135,7 +137,7 @@ DELAY = Term(
     settings=DelaySettings,
     build=build_delay,
     act={"command": "timing.delay({p}, {s}, {m}.volts)"},
-    nodes=LOOPS,
+    stands=(stand("loop"),),
     look_alikes={
         "drive.lag": "a sweep up to half the sample rate: a delay only turns the phase, a lag weakens it too",
         "structure.resonance": "a sweep: a delay leaves the gain as it is",
@@ -147,6 +149,20 @@ DELAY = Term(
     scale={"extra": "sample period"},
     axis="frequency",
     state=DELAY_STATE,
+    phrase=Phrase(
+        noun="extra delay",
+        head="{here} acts late",
+        detail="commands take effect {extra} later than stated",
+        need="quick changes of the command",
+    ),
+    check=(
+        "Look for a filter, a bus or a buffer between the command and the amplifier, and count the "
+        "ticks that each of them holds."
+    ),
+    search=(Size("extra", "tick", 0.5, blur="driver"),),
+    defined=True,
+    late="delay",
+    draws={"extra": Draw(0.3, 1.5, "tick")},
 )
 JITTER = Term(
     name="timing.jitter",
@@ -160,7 +176,7 @@ JITTER = Term(
         "reading:ldu": "timing.jitter_ldu({p}, {m}, {r})",
         "reading:axis": "timing.jitter_axis({p}, {m})",
     },
-    nodes=LOOPS,
+    stands=(stand("loop"),),
     look_alikes={
         "ripple.encoder": "two constant speeds: jitter grows with speed and has no angle, ripple stays on its angle",
         "sensor.missed_counts": "there and back: jitter leaves nothing, lost counts stay lost",
@@ -168,4 +184,15 @@ JITTER = Term(
     typical={"sigma": (0.05, 0.3)},
     scale={"sigma": "sample period"},
     axis="velocity",
+    phrase=Phrase(
+        noun="an unsteady clock",
+        head="the clock of {here} is unsteady",
+        detail="ticks are off by {sigma} rms",
+        need="fast motion",
+    ),
+    check="Look at what else runs on the computer of the controller and at the priority of its loop.",
+    defined=True,
+    clock=True,
+    draws={"sigma": Draw(0.05, 0.3, "tick"), "rate": Draw(1.0, 1.0, "hertz")},
+    chosen={"form": ("gaussian", "uniform")},
 )

@@ -20,6 +20,9 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Shape, Size
+from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -118,7 +121,10 @@ BACKLASH = Term(
         "force:axis": "transmission.follow({s}, {p}, {m}.x[{i}])",
         "reading:axis": "{m}.y[{c}] = min(max({s}.at, {m}.y[{c}] - {p}.half), {m}.y[{c}] + {p}.half)",
     },
-    nodes={"ivu": ("motor1", "motor2"), "ldu": ("motor", "wheel", "capstan"), "axis": ("sensor",)},
+    stands=(
+        stand("joint", "shaft"),
+        stand("sensor", "lone", usual=False),
+    ),
     look_alikes={
         "friction.presliding": "reverse with a small force: in a gap nothing pushes back, bristles do at once",
         "drive.deadband": "push both ways against a stop: a dead band has no memory of the side that it came from",
@@ -128,4 +134,19 @@ BACKLASH = Term(
     typical={"gap": (2e-4, 4e-3)},
     axis="velocity",
     state=BACKLASH_STATE,
+    phrase=Phrase(
+        noun="play",
+        head="{here} has play",
+        detail="{gap} is lost on each reversal",
+        need="reversals",
+    ),
+    check="Hold one side of the coupling and turn the other by hand; look at keys, set screws and gear teeth.",
+    needs=Needs(ways="push"),
+    search=(Size("gap", "twist", (0.3, 5.0, 60.0)), Choice("damping", (0.0, 1.0)), Choice("edge", (0.005, 0.1))),
+    richer=(Shape("edge", "one", (0.05,), 20.0),),
+    variants=Choice("damping", (0.0, 1.0)),
+    told_first=True,
+    richer_at="joint",
+    stiff=True,
+    draws={"gap": Draw(1.0, 5.0, "twist")},
 )

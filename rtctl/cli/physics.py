@@ -81,6 +81,8 @@ def speaks_braille() -> bool:
 
 def explain(term: Any) -> list[str]:
     """Lines about one term."""
+    from rtctl.plants.physics import by_kind
+
     lines = [
         term.name,
         f"  {term.words}",
@@ -94,12 +96,16 @@ def explain(term: Any) -> list[str]:
         if name not in ("term", "node"):
             lines += _item(name, _parameter(field, term.typical.get(name), term.scale.get(name)))
     lines += ["", "  nodes"]
-    for plant, nodes in term.nodes.items():
+    for plant, nodes in by_kind(term).items():
         lines += _item(plant, ", ".join(nodes))
     if term.look_alikes:
         lines += ["", "  mistaken for, and the experiment that tells them apart"]
         for rival, experiment in term.look_alikes.items():
             lines += _item(rival, experiment)
+    if term.check:
+        indent = " " * 4
+        wrapped = textwrap.wrap(term.check, WIDTH, initial_indent=indent, subsequent_indent=indent)
+        lines += ["", "  on the machine", *wrapped]
     return lines
 
 

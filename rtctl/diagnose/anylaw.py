@@ -17,30 +17,16 @@ from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.scales import spaced, speed
 from rtctl.diagnose.simulate import Simulator, gear, way
 from rtctl.diagnose.space import Hypothesis
+from rtctl.plants.physics import TERMS
 
 HATS = 10
 STEP = 1e-3  # of the rms of all voltages, of a difference quotient
 RIDGE = 1e-9  # of the largest column, for what no hat can show
-LAWS = {  # what static laws depend on; those with a memory or between bodies have other forms than a function
-    "friction.coulomb": "velocity",
-    "friction.viscous": "velocity",
-    "friction.stribeck": "velocity",
-    "friction.asymmetry": "velocity",
-    "friction.quadratic": "velocity",
-    "drive.offset": "command",
-    "drive.deadband": "command",
-    "drive.gain_asymmetry": "command",
-    "drive.saturation": "command",
-    "load.spring": "position",
-    "load.bump": "position",
-    "load.imbalance": "angle",
-    "ripple.cogging": "angle",
-}
 
 
 def static(fitted: Fit) -> bool:
     """Whether all that was found are functions that can be set free."""
-    return all(h.term in LAWS for h in fitted.space.hypotheses)
+    return all(TERMS[h.term].static for h in fitted.space.hypotheses)
 
 
 def freed(problem: Problem, before: Fit, after: Fit) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +59,7 @@ def abscissa(sim: Simulator, model: Model, law: Hypothesis) -> np.ndarray:
     """Values (n,) of what a law depends on, up to a factor."""
     record = sim.record
     x = way(record)
-    along = LAWS[law.term]
+    along = TERMS[law.term].axis
     if along == "velocity":
         return speed(x, record.plant, record.dt)
     if along == "command":

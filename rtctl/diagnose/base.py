@@ -18,6 +18,7 @@ from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.space import WIDE, Space
 from rtctl.diagnose.tacho import unsigned
+from rtctl.plants.physics import only
 
 AGAIN = 4  # fits from where the last one stopped
 NEAR = 2.5  # times the noise floor: a base this close is worth every round
@@ -51,7 +52,7 @@ def unfolded(problem: Problem, fitted: Fit) -> Fit:
     """The parameters that follow a speed without its sign best once the sensor is told not to know direction; `fitted`
     where that explains no more. No values of theirs make a machine go one way only."""
     space, record = fitted.space, problem.sim.record
-    (blind,) = hypotheses(record, fitted.model.base, only=("sensor.rectified",))
+    (blind,) = hypotheses(record, fitted.model.base, only=(only("unsigned"),))
     starts = (fitted.x, np.zeros(len(space.names)))
     both = min((settle(problem, fit(problem, space.add(blind), x)) for x in starts), key=lambda f: f.cost)
     return fit(problem, space, both.x[: space.nb], rounds=0) if both.cost < UNFOLDED * fitted.cost else fitted

@@ -13,10 +13,8 @@ from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped, polish
 from rtctl.diagnose.rivals import look_alikes
 from rtctl.diagnose.screen import screen
+from rtctl.plants.physics import TERMS
 
-IMITATED = {  # by which names of the table
-    "friction.quadratic": ("friction.viscous", "friction.stribeck", "friction.coulomb", "drive.supply_sag"),
-}
 SURELY = 0.02  # chance of explaining as well, below which a name gives way to one law in its place
 AS_GOOD = 1.02  # times the merit of several names: one law that does as well is likelier
 
@@ -27,8 +25,8 @@ def nameless(problem: Problem, base: Fit, best: Fit, progress: Callable[[str], N
     In the place of one name it has to be ahead by more than chance, in the place of several, or alone in the place of
     all that `best` has beyond `base`, it has to do as well.
     """
-    for term, imitated in IMITATED.items():
-        out = [i for i, h in enumerate(best.space.hypotheses) if h.term in imitated]
+    for term, told in TERMS.items():
+        out = [i for i, h in enumerate(best.space.hypotheses) if h.term in told.imitated]
         nodes = {best.space.hypotheses[i].node for i in out}
         if not out:
             continue

@@ -35,7 +35,6 @@ from rtctl.plants.physics.timing import JitterSettings
 QUICK = 10 / 3  # times the usual bandwidth of the correction
 FASTEST = 0.1  # rad a tick
 OTHERWISE, AS_WELL = 0.9, 1.05  # of the cost
-LATE = ("drive.lag", "timing.delay")
 ASTRAY = 5.0  # times the noise of a reel's edges, where no model explains them
 SHOWS = 2.5  # times the noise floor
 HELD = 0.3  # of the share of the cost that a term takes off, which it must take off however the model is kept on track
@@ -126,7 +125,7 @@ def suits(other: Problem, best: Fit) -> bool:
         return False
     space, x, limit = best.space, best.x, OTHERWISE
     for index in reversed(range(len(best.space.hypotheses))):
-        if best.space.hypotheses[index].term in LATE:
+        if TERMS[best.space.hypotheses[index].term].late:
             x, space, limit = drop(best._replace(space=space, x=x), index), space.without(index), AS_WELL
     return fit(other, space, x, rounds=8).cost < limit * best.cost
 

@@ -25,6 +25,7 @@ from rtctl.diagnose.model import FITTED, Model
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.scales import speed
 from rtctl.diagnose.simulate import Simulator
+from rtctl.plants import physics
 from rtctl.plants.physics import TERMS
 
 INK, BEFORE, AFTER, SEEN, NOISE = "#1d1d1f", "#d9730d", "#1f83d6", "#84898f", "#84898f"
@@ -150,7 +151,7 @@ def missing_force(d: Diagnosis, sim: Simulator) -> Figure:
         y_unit = _curve(ax, d, x[map_.rows], y[map_.rows], law[map_.rows], unit)
         scale, shown = prefixed(x, x_unit) if along != "angle" else (1.0, x_unit)
         ax.xaxis.set_major_formatter(lambda v, _, s=scale: f"{v * s:.4g}")
-        if name == "friction.stribeck":
+        if name in TERMS and TERMS[name].falls_to:
             near = 8 * words.Sizes(name, node, {}, d.after).value("v_s")
             if np.isfinite(near):
                 ax.set_xlim(*np.clip((-near, near), *ax.get_xlim()))
@@ -369,11 +370,12 @@ def parameters(d: Diagnosis, sim: Simulator | None = None) -> Figure:
 def coverage(d: Diagnosis, sim: Simulator | None = None) -> Figure:
     """Which effect could be tested at which node: dots where it could, crosses where this record cannot show it."""
     plant, cannot = d.record.plant, set(d.cannot_test)
-    names = [n for n, term in TERMS.items() if term.nodes.get(plant)]
-    nodes = list(dict.fromkeys(node for n in names for node in TERMS[n].nodes[plant]))
+    where = {n: there for n, term in TERMS.items() if (there := physics.nodes(term, plant))}
+    names = list(where)
+    nodes = list(dict.fromkeys(node for there in where.values() for node in there))
     figure, (ax,) = new(1.1 + 0.2 * len(names))
     for row, name in enumerate(names):
-        for node in TERMS[name].nodes[plant]:
+        for node in where[name]:
             blind = f"{name}:{node}" in cannot
             ax.plot(nodes.index(node), row, "x" if blind else "o", ms=6, color=BEFORE if blind else AFTER)
     ax.set_yticks(range(len(names)), [words.noun(n) for n in names])

@@ -227,7 +227,7 @@ def replacements(
             else:
                 alike -= {f.space.hypotheses[0].term for f in tried}
                 tried += look_alikes(problem, looked.base, looked.scores, alike, best.cost)
-        other = renamed(h, best.space.parts(best.x)[index])
+        other = renamed(best.model.kind, h, best.space.parts(best.x)[index])
         if other is not None:
             tried.append(fit(problem, exchanged(best, index, other), best.x, rounds=2, J=best.J))
         nearest: dict[tuple[str, ...], Fit] = {}

@@ -5,69 +5,37 @@ another shape of the same physics; and where two names of the library are one la
 """
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
-from rtctl.diagnose.hypotheses import LENGTHS, SEARCH, Choice, Part, Shape, Size, Turn, Where, starts_of
+from rtctl.diagnose.hypotheses import starts_of
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.yardstick import Measures
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, nodes, standing
+from rtctl.plants.physics.search import Choice, Hint, Where
 
-COUNTED, NEARLY_WHOLE = ("per_turn",), 1e-3  # slots and poles are; and how near a fit comes to them
-EXTRAS: dict[str, tuple[Part, ...]] = {  # further parameters of richer forms, tried once the plain form stands
-    "ripple.cogging": (Turn("A2", "phi2", "force", 0.02), Turn("A3", "phi3", "force", 0.02)),
-    "ripple.encoder": (Turn("A2", "phi2", "one", 5e-4), Turn("A3", "phi3", "one", 5e-4)),
-    "ripple.reel": (Turn("e2", "phi2", "one", 3e-5), Turn("e3", "phi3", "one", 3e-5)),
-    "ripple.capstan": (Turn("a2", "phi2", "one", 3e-6), Turn("a3", "phi3", "one", 3e-6)),
-    "guide.thickness": (Turn("A2", "phi2", "one", 1e-6), Turn("A3", "phi3", "one", 1e-6)),
-    "tape.viscoelastic": (Size("c_branch2", "stiffness", 0.2), Shape("tau2", "seconds", (0.5,), 60.0)),
-    "friction.asymmetry": (Size("B_a", "drag", 0.05, signed=True),),
-    "friction.presliding": (
-        Size("rise", "one", 0.1, most=3.0), Shape("v_s", "speed", (0.1,), 50.0),
-        Shape("tau_s", "seconds", (3e-3,), 300.0), Choice("form", ("lugre",)),
-    ),
-    "drive.lag": (Shape("zeta", "one", (0.7,), 5.0),),
-    "drive.saturation": (Shape("knee", "one", (0.15,), 6.0),),
-    "drive.supply_sag": (Shape("tau", "seconds", (0.02,), 30.0),),
-    "drive.thermal": (Size("ease", "one", 0.1, signed=True),),
-    "structure.stiffening": (Size("c2", "square", 0.05, signed=True), Size("b2", "swell", 0.05)),
-    "transmission.backlash": (Shape("edge", "one", (0.05,), 20.0),),
-}  # fmt: skip
-RICH_AT = {"drive.thermal": ("drive",), "transmission.backlash": ("motor", "wheel", "capstan")}  # how nodes begin
-FORMS: dict[str, tuple[str, tuple[Any, ...]]] = {  # a setting that is tried in its other values once the term stands
-    "friction.stribeck": ("form", ("gaussian", "exponential", "tustin")),
-    "transmission.backlash": ("damping", (0.0, 1.0)),
-    "drive.supply_sag": ("form", ("current", "power", "drawn")),
-    "drive.deadband": ("form", ("shift", "cut", "floor")),
-    "drive.saturation": ("form", ("parabola", "rapp")),
-    "load.bump": ("form", ("drag", "hill", "push")),
-    "drive.thermal": ("form", ("exponential", "linear", "hyperbolic")),
-}
+NEARLY_WHOLE = 1e-3  # how near a fit comes to a whole number
 NO_SWING = 3.0  # damping of a second-order lag, whose faster half is 34 times faster by then
-OTHER_NAMES = {  # of a wave that a sliding axis misreads: what its length is called, the other name, its length there
-    "ripple.encoder": ("turn", "guide.thickness", "wavelength"),
-    "guide.thickness": ("wavelength", "ripple.encoder", "turn"),
-}
 
 
 def richer(record: Record, base: dict[str, float], h: Hypothesis) -> Hypothesis | None:
     """The same hypothesis with the further parameters of its richer form; None where it has none."""
-    parts = EXTRAS.get(h.term)
-    if parts is None or not h.node.startswith(RICH_AT.get(h.term, ("",))):
+    term = TERMS[h.term]
+    found = standing(term, record.plant, h.node)
+    if not term.richer or (term.richer_at and (found is None or found[1].kind != term.richer_at)):
         return None
     measures = Measures(record, base, node_scales(record, base), {})
     if is_rich(h):
         return None
-    more = starts_of(h.term, h.node, parts, measures)[0]
+    more = starts_of(h.term, h.node, term.richer, measures)[0]
     return h._replace(coordinates=(*h.coordinates, *more.coordinates), fixed={**h.fixed, **more.fixed})
 
 
 def is_rich(h: Hypothesis) -> bool:
     """Whether it has its richer form already."""
-    more = {part[0] for part in EXTRAS.get(h.term, ()) if not isinstance(part, Choice)}
+    more = {part[0] for part in TERMS[h.term].richer if not isinstance(part, Choice)}
     return any(c.name.partition("|")[0] in more for c in h.coordinates)
 
 
@@ -75,7 +43,7 @@ def as_harmonic(h: Hypothesis, x: np.ndarray, span: float) -> Iterator[tuple[Hyp
     """The wave of a richer form as the second and the third of a longer one, which errors that are judged on track
     show less of than of its harmonics; no longer than the `span` of its node in m, so that it comes once at least."""
     names = [c.name for c in h.coordinates]
-    long = next((names.index(name) for name in LENGTHS if name in names), None)
+    long = next((names.index(hint.name) for hint in waves(h.term) if hint.name in names), None)
     if long is None or not is_rich(h):
         return
     for k in (2, 3):
@@ -94,15 +62,18 @@ def as_harmonic(h: Hypothesis, x: np.ndarray, span: float) -> Iterator[tuple[Hyp
 
 def forms(h: Hypothesis) -> list[Hypothesis]:
     """The same hypothesis in each of its other forms."""
-    name, values = FORMS.get(h.term, ("", ()))
-    default = TERMS[h.term].settings.model_fields[name].default if name else None
+    term = TERMS[h.term]
+    if term.variants is None:
+        return []
+    name, values, _ = term.variants
+    default = term.settings.model_fields[name].default
     return [h._replace(fixed={**h.fixed, name: v}) for v in values if v != h.fixed.get(name, default)]
 
 
 def about_others(record: Record, base: dict[str, float], h: Hypothesis) -> list[Hypothesis]:
     """The same hypothesis about each other place that it may be about: beside a push that has a name of its own, what
     was taken for the middle of the travel may be the start."""
-    parts = tuple(part for part in SEARCH.get(h.term, ()) if isinstance(part, Where))
+    parts = tuple(part for part in TERMS[h.term].search if isinstance(part, Where))
     if not parts:
         return []
     rest = {name: value for name, value in h.fixed.items() if name not in {part.name for part in parts}}
@@ -131,7 +102,7 @@ def rounded(h: Hypothesis, x: np.ndarray) -> tuple[int, Hypothesis] | None:
     """The same hypothesis with its order at the whole number that it is next to at x, and which coordinate it loses by
     that; None where it has no order or one in between."""
     for i, c in enumerate(h.coordinates):
-        order = c.scale * float(np.exp(x[i])) if c.name in COUNTED else 0.0
+        order = c.scale * float(np.exp(x[i])) if c.name in TERMS[h.term].counted else 0.0
         if order > 0.5 and abs(order / round(order) - 1.0) < NEARLY_WHOLE:
             rest = (*h.coordinates[:i], *h.coordinates[i + 1 :])
             return i, h._replace(coordinates=rest, fixed={**h.fixed, c.name: float(round(order))})
@@ -150,14 +121,22 @@ def of_first_order(h: Hypothesis, x: np.ndarray) -> tuple[Hypothesis, np.ndarray
     return h._replace(coordinates=rest, fixed={**h.fixed, "order": 1}), np.delete(y, zeta)
 
 
-def renamed(h: Hypothesis, x: np.ndarray) -> Hypothesis | None:
+def renamed(plant: str, h: Hypothesis, x: np.ndarray) -> Hypothesis | None:
     """The same law by its other name, at the same x: a wave that a sliding axis misreads is of its screw or encoder, or
     of its guide, and at lengths that both may have nothing tells them apart. None where it has no other name."""
-    own, other, name = OTHER_NAMES.get(h.term, ("", "", ""))
-    if h.node != "sensor" or own not in (c.name for c in h.coordinates):
+    other = TERMS[h.term].other_name
+    if other is None or other.own not in (c.name for c in h.coordinates):
         return None
-    shortest, longest = LENGTHS[name]
-    if not shortest < h.values(x)[own] < longest:
+    if h.node not in nodes(TERMS[other.term], plant):
         return None
-    coordinates = tuple(c._replace(name=name) if c.name == own else c for c in h.coordinates)
-    return h._replace(term=other, coordinates=coordinates)
+    shortest, longest = next(hint.lengths for hint in waves(other.term) if hint.name == other.name)
+    if not shortest < h.values(x)[other.own] < longest:
+        return None
+    coordinates = tuple(c._replace(name=other.name) if c.name == other.own else c for c in h.coordinates)
+    return h._replace(term=other.term, coordinates=coordinates)
+
+
+def waves(term: str) -> list[Hint]:
+    """Lengths of waves among what is fitted of a term."""
+    parts = (*TERMS[term].sliding, *TERMS[term].search)
+    return [part for part in parts if isinstance(part, Hint) and part.kind == "wavelength"]

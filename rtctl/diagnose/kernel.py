@@ -15,7 +15,7 @@ import numpy as np
 
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
-from rtctl.plants.physics import TERMS, place
+from rtctl.plants.physics import TERMS, by_kind, nodes, place
 from rtctl.plants.physics.place import PLANTS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
@@ -185,7 +185,7 @@ def field(name: str) -> str:
 
 def terms_of(kind: str) -> tuple[Term, ...]:
     """The library's terms that can stand somewhere in this plant."""
-    return tuple(term for term in TERMS.values() if term.nodes.get(kind))
+    return tuple(term for term in TERMS.values() if nodes(term, kind))
 
 
 def job_dtype(ny: int, nu: int, nq: int) -> np.dtype:
@@ -224,7 +224,7 @@ def job_dtype(ny: int, nu: int, nq: int) -> np.dtype:
 
 def sample(term: Term) -> Any:
     """Params of a term with any values, for their layout."""
-    values: dict[str, Any] = {"node": next(iter(term.nodes.values()))[0]}
+    values: dict[str, Any] = {"node": next(iter(by_kind(term).values()))[0]}
     for name, info in term.settings.model_fields.items():
         if info.is_required() and name != "node":
             values[name] = _inside(info)

@@ -10,6 +10,7 @@ from rtctl.diagnose.quantities import Quantities, of_case, quantities
 from rtctl.diagnose.tacho import signed
 from rtctl.idiom import Settings
 from rtctl.plants import axis, ivu, ldu
+from rtctl.plants.physics import only
 
 if TYPE_CHECKING:
     from rtctl.diagnose.record import Record
@@ -26,6 +27,7 @@ FITTED = {  # what a fit may move, in the order of the Jacobian's columns; the r
     ),
     "axis": ("M", "K", "F_v", "F_c", "k"),
 }  # fmt: skip
+ADDS_DRY = only("friction", "dry")  # term that adds to the dry friction of a node at any speed
 DRY = {  # parameter that the dry friction of a node is, or comes from
     "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
     "ldu": {"capstan": "F_c", "carriage": "F_c"},
@@ -111,7 +113,7 @@ def dry_friction(kind: str, base: dict[str, float], node: str) -> float:
 def dry_with_terms(model: Model, node: str) -> float:
     """The same with what terms add to it at any speed."""
     terms: list[Any] = list(model.terms)
-    added = sum(float(t.F_C) for t in terms if (t.term, t.node) == ("friction.coulomb", node))
+    added = sum(float(t.F_C) for t in terms if (t.term, t.node) == (ADDS_DRY, node))
     return dry_friction(model.kind, model.base, node) + added
 
 

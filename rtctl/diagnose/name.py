@@ -13,7 +13,7 @@ import numpy as np
 
 from rtctl.diagnose import decide, plausible
 from rtctl.diagnose.fit import Fit, fit, jacobian, parallel
-from rtctl.diagnose.hypotheses import HINTED
+from rtctl.diagnose.hypotheses import hinted
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import enrich, polish, whole_orders
 from rtctl.diagnose.rubbing import rubbing, soft
@@ -21,12 +21,12 @@ from rtctl.diagnose.scan import bumps, resonances, slack
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import Hypothesis, Space
 from rtctl.diagnose.stretches import loudness, usual
+from rtctl.plants.physics import TERMS
 
 FAR = 0.4  # of the base's cost: where two terms leave more, no third will do
 CALMER = 0.8  # of the usual error: parameters that fit the quiet stretches this much better are a start of their own
 ROBUST = 3  # rounds of weights
 STARTS = 3  # of one hypothesis that later rounds try
-ORDERS = {"ripple.cogging": 6}  # more of them: of orders that pass slowly at a few places only, a look shows little
 MOST = 3  # terms at once
 WAVES = ("turn", "wavelength", "per_turn")  # what a wave is as long as, or how often it comes
 ROUGH = 4  # rounds of a rough fit
@@ -307,7 +307,7 @@ def best_starts(scores: Sequence[Score]) -> list[Hypothesis]:
     for score in scores:
         name = score.hypothesis.name
         count[name] = count.get(name, 0) + 1
-        if count[name] <= STARTS + ORDERS.get(score.hypothesis.term, 0):
+        if count[name] <= STARTS + TERMS[score.hypothesis.term].more_starts:
             out.append(score.hypothesis)
     return out
 
@@ -316,7 +316,7 @@ def new_starts(proposed: Sequence[Hypothesis], known: set[tuple]) -> list[Hypoth
     """Those of the proposed that were not proposed before: by what the record suggests through the model so far, or
     because they ask for what it has by now. `known` is kept up to date."""
     before = {name for name, *_ in known}
-    new = [h for h in proposed if (h.term in HINTED or h.name not in before) and key(h) not in known]
+    new = [h for h in proposed if (hinted(h.term) or h.name not in before) and key(h) not in known]
     known.update(key(h) for h in proposed)
     return new
 
@@ -351,7 +351,7 @@ def shortlist(scores: Sequence[Score], count: int) -> list[Score]:
         h = score.hypothesis
         same = sum(s.hypothesis.name == h.name for s in out)
         nodes = len({s.hypothesis.node for s in out if s.hypothesis.term == h.term} - {h.node})
-        if same < 2 + ORDERS.get(h.term, 0) and nodes < 3 and score.gain > 0:
+        if same < 2 + TERMS[h.term].more_starts and nodes < 3 and score.gain > 0:
             out.append(score)
             more += same >= 2
         if len(out) - more == count:

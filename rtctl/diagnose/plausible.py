@@ -4,16 +4,11 @@ import numpy as np
 
 from rtctl.diagnose.fit import Fit
 from rtctl.diagnose.space import COSINE, SIZE
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, Term, standing
+from rtctl.plants.physics.search import Size
 
 OFTEN = 1.5  # factor beyond the typical sizes that is one standard deviation
 ABSURD = 30.0  # times the largest typical size
-ELSEWHERE = (  # whose typical sizes are those of another machine: angles, or contacts of tape
-    ("ripple.encoder", "axis"),
-    ("transmission.backlash", "axis"),
-    ("transmission.creep", "ldu"),
-)
-LESS = {"friction.coulomb": "F_C", "friction.viscous": "B"}  # sizes that are frictions themselves
 
 
 def absurd(fitted: Fit) -> bool:
@@ -52,11 +47,17 @@ def unusual(fitted: Fit) -> float:
     total = 0.0
     for h, x in zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True):
         term, values = TERMS[h.term], h.values(x)
-        if values.get(LESS.get(h.term, ""), 0.0) < 0.0:
+        if any(values.get(name, 0.0) < 0.0 for name in frictions(term)):
             total -= 2.0
+        there = standing(term, fitted.model.kind, h.node)
         for name, (low, high) in term.typical.items():
             size = abs(values.get(name, 0.0))
-            known = name not in term.scale and (h.term, fitted.model.kind) not in ELSEWHERE
+            known = name not in term.scale and (there is None or there[0].usual)
             if known and size > 0.0:
                 total -= 0.5 * min(max(np.log(low / size), np.log(size / high), 0.0) / np.log(OFTEN), 3.0) ** 2
     return float(total)
+
+
+def frictions(term: Term) -> list[str]:
+    """Sizes that are frictions themselves, of which a negative one takes from what the owner has."""
+    return [part.name for part in term.search if isinstance(part, Size) and part.undoes]

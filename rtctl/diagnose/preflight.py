@@ -3,10 +3,11 @@
 Statistics are medians and quantiles, so that a few bad rows change nothing. `cannot_test` lists what this record leaves
 open whatever the machine has: a gain for each sign cannot be seen where a drive only ever had one sign.
 
-Source of the rules: what each effect does to the equations of plants/; what is periodic needs half a
-turn, or two periods.
+What a record must contain to show an effect is told by its term (`Needs` in plants/physics/story.py). Source of the
+rules: what each effect does to the equations of plants/; what is periodic needs half a turn, or two periods.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from rtctl.diagnose.quantities import node_words, of_case
 from rtctl.diagnose.record import Record, law_agreement
 from rtctl.diagnose.simulate import way
 from rtctl.diagnose.tacho import counts_up, unsigned
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, Term, elements, met, nodes
 
 LOOK = 0.02  # s over which a speed is a difference
 SOME = 0.005  # share of the rows below which something counts as not there
@@ -28,21 +29,6 @@ CRAWL = 0.1  # of the high speed
 NEAR_LIMIT = 0.1  # share of the limit that a command must pass to say anything of saturation
 NEAR_ZERO = 0.01  # share of the limit that counts as zero command
 STEADY = 1.2  # ratio of high to low speed below which viscous and dry friction are one
-TURNS = {"ripple.cogging": 1 / 4, "geometry.radius_change": 1 / 4}
-HALF = 0.5  # turns that the others need: less of a sine is a slope
-NODES = {  # where a family can stand, for names that the library does not hold
-    "friction": {
-        "ivu": ("motor1", "motor2", "capstan"),
-        "ldu": ("motor", "wheel", "capstan", "carriage"),
-        "axis": ("carriage",),
-    },
-    "transmission": {
-        "ivu": ("motor1", "motor2", "capstan"),
-        "ldu": ("motor", "wheel", "capstan"),
-        "axis": ("drive", "carriage"),
-    },
-    "sensor": {"ivu": ("encoder", "reel1", "reel2"), "ldu": ("encoder", "scale"), "axis": ("sensor",)},
-}
 
 
 class Shaft(NamedTuple):
@@ -52,7 +38,6 @@ class Shaft(NamedTuple):
     q: np.ndarray  # (n,) rad, or m for what slides
     quantum: float  # the sensor's step in that unit
     nodes: tuple[str, ...]
-    periodic: dict[str, str]  # ripple name -> node
     turns: bool  # False: slides
     fine: np.ndarray | None = None  # (n,) a finer reading of the same motion, for speeds, with its step
     fine_quantum: float = 0.0
@@ -103,31 +88,27 @@ def shafts(record: Record) -> list[Shaft]:
     if record.plant == "ivu":
         step = 2 * np.pi / _given(case.sensors.capstan_counts_per_rev)
         capstan = y["capstan_counts"] * step
-        found = [Shaft("capstan", capstan, step, ("capstan", "encoder"), _ripples("capstan", "encoder"), True)]
+        found = [Shaft("capstan", capstan, step, ("capstan", "encoder"), True)]
         tooth = 2 * np.pi / _given(case.sensors.reel_counts_per_rev)
         for i, sign in ((1, 1.0), (2, -1.0)):
             angle = sign * tooth * signed_counts(y[f"reel{i}_counts"], y["capstan_counts"], _look(record))
-            periodic = {"ripple.reel": f"reel{i}", "ripple.cogging": f"motor{i}", "load.imbalance": f"reel{i}"}
-            periodic["geometry.radius_change"] = f"reel{i}"
             ratio = sign * p["R_c"] / p[f"R{i}"]  # the tape says how a reel turns, finer than its own 209 a turn
-            nodes = (f"motor{i}", f"reel{i}")
-            found.append(Shaft(f"reel{i}", angle, tooth, nodes, periodic, True, capstan * ratio, step * abs(ratio)))
+            both = (f"motor{i}", f"reel{i}")
+            found.append(Shaft(f"reel{i}", angle, tooth, both, True, capstan * ratio, step * abs(ratio)))
         return found
     if record.plant == "ldu":
         step = 2 * np.pi / _given(case.sensors.encoder_counts_per_rev)
         turned = y["encoder_counts"] * step
-        repeats = _ripples("capstan", "encoder") | {"load.imbalance": "wheel"}
         return [
-            Shaft("capstan", turned, step, ("wheel", "capstan", "encoder"), repeats, True),
-            Shaft("motor", turned * p["N"], step * p["N"], ("motor",), {"ripple.cogging": "motor"}, True),
-            Shaft("carriage", turned * p["R_c"], step * p["R_c"], ("carriage",), {}, False),
+            Shaft("capstan", turned, step, ("wheel", "capstan", "encoder"), True),
+            Shaft("motor", turned * p["N"], step * p["N"], ("motor",), True),
+            Shaft("carriage", turned * p["R_c"], step * p["R_c"], ("carriage",), False),
         ]
     q = way(record)
     rotary = of_case(case).rotary
     per_rev = case.sensors.x_counts_per_rev
     quantum = 2 * np.pi / per_rev if per_rev and rotary else (case.sensors.x_resolution_m or _smallest_step(q))
-    periodic = {"ripple.cogging": "carriage", "ripple.encoder": "sensor", "load.imbalance": "carriage"}
-    return [Shaft("carriage", q, quantum, ("carriage",), periodic if rotary else {}, rotary)]
+    return [Shaft("carriage", q, quantum, ("carriage", "sensor"), rotary)]
 
 
 def signed_counts(counts: np.ndarray, guide: np.ndarray, look: int) -> np.ndarray:
@@ -288,16 +269,15 @@ def _drive(
         findings.append(f"{name} is clipped at {limit:g} {unit} in {100 * clipped:.2g} % of the rows.")
     if np.ptp(u) == 0.0:
         findings.append(f"{name} is constant, {u[0]:g} {unit}: this drive is not excited.")
-        cannot += [f"{n}:{node}" for n in ("drive.deadband", "drive.gain_asymmetry", "drive.lag", "drive.saturation")]
+        _add(record, cannot, [term for term in TERMS.values() if term.needs.command], (node,))
         return
     if min(positive, negative) < SOME:
         findings.append(f"{name} is never {'negative' if positive > negative else 'positive'}.")
-        cannot.append(f"drive.gain_asymmetry:{node}")
-        if numbers[node]["near_zero"] < SOME:
-            cannot.append(f"drive.deadband:{node}")
+        missing = ("signs", "small") if numbers[node]["near_zero"] < SOME else ("signs",)
+        _add(record, cannot, [term for term in TERMS.values() if term.needs.command in missing], (node,))
     if limit is not None and top < NEAR_LIMIT * limit:
         findings.append(f"{name} stays below {top:.3g} {unit} of {limit:g}: a limit above that cannot be seen.")
-        cannot.append(f"drive.saturation:{node}")
+        _add(record, cannot, [term for term in TERMS.values() if term.needs.command == "large"], (node,))
 
 
 def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str, Any], cannot: list[str]) -> None:
@@ -306,9 +286,10 @@ def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str,
     called = node_words(shaft.name, of_case(record.case))
     called = called[:1].upper() + called[1:]
     numbers[shaft.name] = {**m._asdict(), "unit": unit}
-    for name, node in shaft.periodic.items():
-        if m.turns < TURNS.get(name, HALF):
-            cannot.append(f"{name}:{node}")
+    if shaft.turns:
+        for term in (term for term in TERMS.values() if m.turns < term.needs.turns):
+            there = met(term.needs.turned or term.stands, record.plant)
+            cannot += [f"{term.name}:{node}" for node in there if node in shaft.nodes]
     if shaft.turns and m.turns < 1.0:
         findings.append(f"{called} turns {m.turns:.2f} of a turn only; what repeats each turn is hard to see.")
     blind = unsigned(record) or counts_up(record)
@@ -316,33 +297,28 @@ def _shaft(record: Record, shaft: Shaft, findings: list[str], numbers: dict[str,
         what = "speed" if record.shows_speed else "rate of the position"
         findings.append(f"The {what} never goes below zero although the command pushes both ways.")
     one_way = min(m.forward, m.backward) < SOME and not blind
-    mechanical = [node for node in shaft.nodes if node not in ("encoder", "sensor")]
+    bodies = {e.node for e in elements(record.plant) if e.kind == "body"}
+    mechanical = [node for node in shaft.nodes if node in bodies]
     commands = record.u[:, 0 if shaft.name != "reel2" else 1]
     pushed_both_ways = min(np.mean(commands > 0), np.mean(commands < 0)) >= SOME
     if one_way:
         findings.append(f"{called} moves one way only.")
-        _add(record, cannot, "friction.asymmetry", mechanical)
+        _add(record, cannot, [term for term in TERMS.values() if term.needs.ways == "motion"], shaft.nodes)
         if not pushed_both_ways:
-            _add(record, cannot, "transmission.backlash", mechanical)
-        sensors = [node for node in shaft.nodes if node in ("encoder", "sensor")]
-        cannot += [f"sensor.rectified:{node}" for node in (*sensors, *(("sensor",) if record.plant == "axis" else ()))]
+            _add(record, cannot, [term for term in TERMS.values() if term.needs.ways == "push"], mechanical)
     if m.standstill + m.crawl < SOME:
         findings.append(f"{called} neither stands still nor crawls.")
-        _add(record, cannot, "friction.stribeck", mechanical)
-        _add(record, cannot, "friction.presliding", mechanical)
+        _add(record, cannot, [term for term in TERMS.values() if term.needs.slow], mechanical)
     if 0.0 < m.high_speed < STEADY * m.low_speed:
         findings.append(f"{called} has one speed only: dry and viscous friction are one.")
-        _add(record, cannot, "friction.viscous", mechanical)
+        _add(record, cannot, [term for term in TERMS.values() if term.needs.speeds], mechanical)
 
 
 def _sensors(record: Record, findings: list[str], cannot: list[str]) -> None:
     if record.plant == "ldu" and "scale_counts" not in record.y:
         findings.append("No scale is mounted: what happens between capstan and carriage is unseen.")
-        cannot += [f"sensor.scale:{node}" for node in ("scale", "encoder", "capstan")]
-        cannot += [f"guide.thickness:{node}" for node in ("carriage", "scale")]
-        cannot += ["sensor.missed_counts:scale", "transmission.creep:capstan"]
-    if record.plant == "axis":
-        cannot.append("sensor.scale:sensor")  # nothing to compare the only sensor with
+    if len(record.y) < 2:  # nothing to compare the only sensor with
+        cannot += [f"{name}:{node}" for name, term in TERMS.items() for node in met(term.needs.second, record.plant)]
 
 
 def _spectrum(record: Record, findings: list[str], numbers: dict[str, Any]) -> None:
@@ -355,17 +331,9 @@ def _spectrum(record: Record, findings: list[str], numbers: dict[str, Any]) -> N
         findings.append(f"The excitation has its power between {bands['w'][0]:.3g} and {bands['w'][1]:.3g} Hz.")
 
 
-def _add(record: Record, cannot: list[str], name: str, among: list[str]) -> None:
-    """`name` at those of the nodes where it can stand."""
-    if name in TERMS:
-        where = TERMS[name].nodes.get(record.plant, ())
-    else:
-        where = NODES[name.partition(".")[0]][record.plant]
-    cannot += [f"{name}:{node}" for node in where if node in among]
-
-
-def _ripples(capstan: str, encoder: str) -> dict[str, str]:
-    return {"ripple.capstan": capstan, "ripple.encoder": encoder}
+def _add(record: Record, cannot: list[str], terms: Iterable[Term], among: Sequence[str]) -> None:
+    """Each of the terms at those of the nodes `among` where it can stand."""
+    cannot += [f"{term.name}:{node}" for term in terms for node in nodes(term, record.plant) if node in among]
 
 
 def _look(record: Record) -> int:

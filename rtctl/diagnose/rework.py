@@ -9,7 +9,7 @@ from rtctl.diagnose import decide
 from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.forms import about_others, as_harmonic, forms, moved_into, of_first_order, richer, rounded
 from rtctl.diagnose.hypotheses import FALLING
-from rtctl.diagnose.model import dry_friction
+from rtctl.diagnose.model import ADDS_DRY, dry_friction
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import Hypothesis, Space
@@ -65,7 +65,7 @@ def bears(found: Fit, index: int) -> bool:
     """Whether another term stands on one: friction that falls with speed falls to dry friction, the owner's or this."""
     h = found.space.hypotheses[index]
     falls = any((other.term, other.node) == (FALLING, h.node) for other in found.space.hypotheses)
-    return h.term == "friction.coulomb" and falls and not dry_friction(found.model.kind, found.model.base, h.node)
+    return h.term == ADDS_DRY and falls and not dry_friction(found.model.kind, found.model.base, h.node)
 
 
 def dropped(problem: Problem, found: Fit, index: int, rounds: int) -> Fit:

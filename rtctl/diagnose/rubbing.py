@@ -17,10 +17,11 @@ from rtctl.diagnose.fit import Fit, fit, parallel
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import polish
 from rtctl.diagnose.space import Hypothesis, Space
+from rtctl.plants.physics import only
 
-PLAIN = ("friction.coulomb", "friction.viscous")
+PLAIN = (only("friction", "dry"), only("friction", "viscous"))
 OWN = ("F_c", "F_v")  # the owner's names of them
-DRY, BRISTLES = "friction.coulomb", "friction.presliding"
+DRY, BRISTLES = PLAIN[0], only("replaces", "dry")
 SOFT = (1.0, 30.0, 300.0)  # times the least that bristles are tried with, up to a third of the travel
 
 

@@ -23,15 +23,16 @@ from rtctl.diagnose.hypotheses import USUAL
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.screen import Score, screen
 from rtctl.diagnose.space import SIZE, Hypothesis
+from rtctl.plants.physics import only
 
-TERM = "structure.resonance"
+TERM = only("closer", "frequencies")
 STEP = 1.2  # between frequencies: with this damping a fit finds the way from half of it
 HEAVY, BROAD = 0.25, 0.05  # of a tenth of the machine's inertia; damping ratio
 FASTEST = 0.2  # of the rate of the record: above it a part on a spring only shows as more inertia
 ROUGH, FULL = 4, 2  # rounds of a rough fit, full fits
-SLACK, ELSEWHERE, DEEP = "tape.slack", 32, 3  # values tried all over their tolerance, and full fits
+SLACK, ELSEWHERE, DEEP = only("closer", "tolerance"), 32, 3  # values tried all over their tolerance, and full fits
 LARGER = 3.0  # times the size of an effect beside it
-BUMP, PLACES = "load.bump", 2  # places that are tried of each shape
+BUMP, PLACES = only("closer", "places"), 2  # places that are tried of each shape
 
 
 def resonances(problem: Problem, base: Fit, scores: Sequence[Score]) -> list[Fit]:

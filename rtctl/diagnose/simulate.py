@@ -23,21 +23,20 @@ from rtctl.diagnose.record import Record
 from rtctl.diagnose.tacho import noise
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants import ivu, ldu
-from rtctl.plants.physics import ordered
+from rtctl.plants.physics import TERMS, only, ordered
 from rtctl.plants.physics.place import PLANTS
 
 NEVER = np.iinfo(np.int64).max  # row
 FASTEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
 MODES = {"open": OPEN, "track": TRACK, "closed": CLOSED}
 SUBSTEP = {"ivu": 1e-3, "ldu": 100e-6, "axis": 0.25e-3}  # s, at most: the linear part is exact at any
-STIFF = ("transmission.", "tape.", "structure.")  # terms that alter a spring need shorter ones
 COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
 FOLLOW = {"ivu": 10.0, "ldu": 30.0, "axis": 30.0}  # rad/s, bandwidth of the correction
 FOLLOW_SPEED = 5.0  # rad/s: a speed does not drift, has more noise to average, and a constant force must show in it
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
 LEAD = {"ivu": 1.0, "ldu": 0.1, "axis": 0.0}  # s at rest under the first row's voltage, until the tape is taut
-SLIPS, BEHIND = "transmission.slip", {"ldu": "encoder"}  # body behind the contact, where most inertia is before it
+SLIPS, BEHIND = only("slips"), {"ldu": "encoder"}  # body behind the contact, where most inertia is before it
 SHARE = {"ivu": (0.5, -0.5), "ldu": (1.0,), "axis": (1.0,)}
 CHANNELS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts", "scale_counts")}
 
@@ -135,7 +134,7 @@ class Simulator:
         k = self.kernel
         n = len(self.seen) if n is None else n
         terms = [str(getattr(t, "term", "")) for t in model.terms]
-        stiff, slips = any(term.startswith(STIFF) for term in terms), SLIPS in terms
+        stiff, slips = any(term in TERMS and TERMS[term].stiff for term in terms), SLIPS in terms
         substeps = self.substeps * (FINER[self.record.plant] if stiff else 1)
         stride = 1
         coarse = coarse and not (slips and self.record.dt < COARSE)  # when it sets in is a matter of single ticks

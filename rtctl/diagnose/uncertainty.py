@@ -16,18 +16,15 @@ import numpy as np
 from rtctl.diagnose.case import PARAMETERS
 from rtctl.diagnose.diagnosis import Interval
 from rtctl.diagnose.fit import Fit, trust
-from rtctl.diagnose.forms import COUNTED
-from rtctl.diagnose.model import DRY, Model, dry_friction
+from rtctl.diagnose.model import ADDS_DRY, DRY, Model, dry_friction
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, PRIOR, SHAPE, SINE, Hypothesis
 from rtctl.diagnose.stretches import in_blocks
 from rtctl.diagnose.words import unit_at
+from rtctl.plants.physics import TERMS
 
 Z90 = 1.645
 FORM = 0.05, 0.02  # standard deviations of sizes and of shapes, as shares, that the form of a law leaves open
-LITTLE = 0.01, 0.001  # the same of DEFINED ones
-DEFINED = (  # sizes that are numbers by definition, whatever the machine: constants, factors, times, waves
-    "drive.offset", "drive.gain_asymmetry", "drive.lag", "timing.", "ripple.", "guide.", "load.imbalance", "sensor.",
-)  # fmt: skip
+LITTLE = 0.01, 0.001  # the same of terms whose sizes are defined
 EVEN = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within one either way
 
 
@@ -53,7 +50,7 @@ def with_form(fitted: Fit, cov: np.ndarray) -> np.ndarray:
     more = np.zeros(len(cov))
     for index, (h, x) in enumerate(zip(fitted.space.hypotheses, fitted.space.parts(fitted.x), strict=True)):
         columns = fitted.space.columns(index)
-        form, shape = LITTLE if h.term.startswith(DEFINED) else FORM
+        form, shape = LITTLE if TERMS[h.term].defined else FORM
         for i, c in enumerate(h.coordinates):
             if c.kind in (COSINE, SINE):
                 j = i if c.kind == COSINE else i - 1
@@ -101,17 +98,17 @@ def effect_intervals(fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Inte
         elif c.kind in ("size", PLACE):
             v, w = values[c.name], abs(c.scale) * half
             out[c.name] = Interval(v, v - w, v + w, parameter_unit(model, h, c.name))
-    out |= {n: Interval(v, v, v, parameter_unit(model, h, n)) for n, v in h.fixed.items() if n in COUNTED}
-    if h.term == "friction.coulomb":
+    out |= {n: Interval(v, v, v, parameter_unit(model, h, n)) for n, v in h.fixed.items() if n in TERMS[h.term].counted}
+    if h.term == ADDS_DRY:
         return with_total(out, fitted, h, cov, columns[0])
-    return at_standstill(out, fitted, index, cov) if h.term == "friction.stribeck" else out
+    return at_standstill(out, fitted, index, cov) if TERMS[h.term].falls_to else out
 
 
 def at_standstill(own: dict[str, Interval], fitted: Fit, index: int, cov: np.ndarray) -> dict[str, Interval]:
     """F_s with the dry friction that another term adds at the node, which the law itself does not count."""
     h = fitted.space.hypotheses[index]
     for other, found in enumerate(fitted.space.hypotheses):
-        if (found.term, found.node) == ("friction.coulomb", h.node):
+        if (found.term, found.node) == (ADDS_DRY, h.node):
             columns = [fitted.space.columns(index)[0], fitted.space.columns(other)[0]]
             slope = np.array([h.coordinates[0].scale, found.coordinates[0].scale])
             half = _half(slope, columns, cov)

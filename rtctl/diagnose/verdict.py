@@ -14,12 +14,13 @@ from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect,
 from rtctl.diagnose.fit import Fit, fit
 from rtctl.diagnose.hypotheses import FALLING
 from rtctl.diagnose.jitter import Jitter, interval
-from rtctl.diagnose.model import DRY, dry_friction
+from rtctl.diagnose.model import ADDS_DRY, DRY, dry_friction
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.rework import dropped
 from rtctl.diagnose.space import Hypothesis
 from rtctl.diagnose.uncertainty import covariance, effect_intervals, with_form
 from rtctl.diagnose.white import White
+from rtctl.plants.physics import TERMS, only
 
 SURE = 0.9  # weight of a name among its rivals: of generated names below it, five in six were the rival's
 POSSIBLE = 0.05  # weight from which a rival is mentioned
@@ -35,9 +36,8 @@ MOST = 3  # names in an answer
 BESIDE = 2  # rivals told besides
 IN_WHITE = 8  # rounds of a fit to white errors
 WITHOUT = 4  # rounds of a fit that only tells how much depends on a term
-LATE = "drive.lag", "timing.delay"  # laws that bend to what the other is
+LATE = only("late", "bends"), only("late", "delay")  # of which the first bends to what the other is
 IMITATED = 1e-4  # chance that one does no more than that
-MORE = "friction.viscous", "friction.stribeck", "friction.load"  # that make up for dry friction that a model takes away
 
 
 class Alternative(NamedTuple):
@@ -176,8 +176,8 @@ def patched(best: Fit) -> bool:
             or values["F_s"] < dry_friction(model.kind, model.base, h.node)
         ):
             return True
-    dry = [values["F_C"] for h, values in found if h.term == "friction.coulomb"]
-    more = max(dry, default=0.0) > 0.0 or any(h.term in MORE for h, _ in found)
+    dry = [values["F_C"] for h, values in found if h.term == ADDS_DRY]
+    more = max(dry, default=0.0) > 0.0 or any(TERMS[h.term].makes_up for h, _ in found)
     return more and min(dry, default=0.0) < 0.0
 
 
@@ -198,7 +198,7 @@ def with_known(verdict: Verdict, known: Sequence[Effect]) -> Verdict:
 def of_jitter(found: Jitter) -> Effect:
     """Of the ticks, which shows in the noise."""
     low, high = interval(found)
-    return Effect("timing.jitter", "loop", KNOWN, {"sigma": Interval(found.sigma, low, high, "s")}, ())
+    return Effect(only("clock"), "loop", KNOWN, {"sigma": Interval(found.sigma, low, high, "s")}, ())
 
 
 def standing(problem: Problem, best: Fit, index: int, rivals: Sequence[Alternative]) -> float:

@@ -11,30 +11,23 @@ from rtctl.diagnose.numbers import PREFIXES as PREFIXES  # for those who draw wi
 from rtctl.diagnose.numbers import both, nice, percent
 from rtctl.diagnose.numbers import figures as figures
 from rtctl.diagnose.numbers import prefix as prefix
-from rtctl.diagnose.phrases import PHRASES
 from rtctl.diagnose.quantities import DIMENSIONS, Quantities, node_words, of_case
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, Phrase, having
+from rtctl.plants.physics.search import Turn
 
 LIKELY = 0.5  # confidence below which an effect without a rival is no more than possible
-MOST_HIDDEN = 4  # smallest sizes named in a verdict of nothing, these first
-HIDDEN_FIRST = "friction.coulomb", "friction.stribeck", "drive.deadband", "transmission.backlash", "ripple.cogging"
+MOST_HIDDEN = 4  # smallest sizes named in a verdict of nothing
 
 SLIDING = {
     "ivu": ("tape1", "tape2"),
     "ldu": ("carriage", "scale"),
 }  # nodes that move in m and not in rad; of an axis all or none
-CONTACTS = ("transmission.creep", "transmission.slip")
-BY_NODE = {
+BY_NODE = {  # dimension of a parameter by its name, where its term does not say
     "F_C": "force", "F_added": "force", "F_s": "force", "F": "force", "F_h": "force", "B": "drag", "B_a": "drag",
     "v_s": "speed",
     "z_s": "position", "z_h": "position", "gap": "position", "size": "position", "each": "position", "mark": "position",
     "at": "position", "width": "position", "x0": "position", "turn": "position", "mass": "inertia", "k": "stiffness",
     "c2": "square", "c3": "cubic", "Q": "square_drag",
-}  # fmt: skip
-AMPLITUDES = {"load.imbalance": "force", "ripple.cogging": "force", "ripple.encoder": "position"}
-SPECIAL = {  # by term and parameter: a dimension, or a unit
-    "transmission.creep.kappa": "per_force", "transmission.slip.F_max": "force", "drive.supply_sag.k": "1/V",
-    "sensor.missed_counts.at": "s", "structure.resonance.f_Hz": "Hz",
 }  # fmt: skip
 
 
@@ -47,11 +40,11 @@ def channel_words(channel: str, units: Quantities) -> str:
 
 def unit_at(kind: str, name: str, node: str, parameter: str, units: Quantities) -> str:
     """Unit of a term's parameter at a node; "" for a bare number."""
-    field = TERMS[name].settings.model_fields.get(parameter) if name in TERMS else None
+    term = TERMS.get(name)
+    field = term.settings.model_fields.get(parameter) if term else None
     extra = field.json_schema_extra if field is not None else None
-    dimension = BY_NODE.get(parameter) or (AMPLITUDES.get(name) if parameter.rstrip("23") == "A" else None)
     unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
-    unit = SPECIAL.get(f"{name}.{parameter}") or unit or dimension or ""
+    unit = (term.units.get(parameter) if term else "") or unit or BY_NODE.get(parameter, "")
     if unit not in DIMENSIONS:
         return units.said(unit)
     return DIMENSIONS[unit][slides(kind, name, node, units)]
@@ -61,7 +54,8 @@ def slides(kind: str, name: str, node: str, units: Quantities) -> bool:
     """Whether a term at a node acts on what moves in m. A contact that drives a tape or a carriage does."""
     if kind == "axis":
         return not units.rotary
-    return node in SLIDING.get(kind, ()) or (name in CONTACTS and node != "wheel")
+    contact = name in TERMS and TERMS[name].contact
+    return node in SLIDING.get(kind, ()) or (contact and node not in having(kind, "body", "wheel"))
 
 
 class Sizes:
@@ -133,10 +127,9 @@ def _sticking(s: Sizes) -> str:
 
 
 def _form(s: Sizes) -> str:
-    if s.name == "drive.supply_sag":
-        name = s.model.units.command_name
-        return f"{name} squared" if s.text("form") == "power" else name
-    return "all give the same" if s.text("form") == "floor" else "do nothing"
+    phrase = phrase_of(s.name)
+    said = phrase.forms if phrase else {}
+    return said.get(s.text("form"), said.get("", "")).format(command=s.model.units.command_name)
 
 
 def _jumps(s: Sizes) -> str:
@@ -149,9 +142,10 @@ def _jumps(s: Sizes) -> str:
 
 
 def _harmonics(s: Sizes) -> str:
-    stem = {"ripple.reel": "e", "ripple.capstan": "a"}.get(s.name, "A")
+    phrase = phrase_of(s.name)
+    stem = next((part.amplitude for part in TERMS[s.name].search if isinstance(part, Turn)), "")
     again = [(f"{stem}{n}", w) for n, w in ((2, "twice"), (3, "three times")) if s.value(f"{stem}{n}") > 0]
-    base = " as often" if s.name == "ripple.cogging" else ""
+    base = phrase.again if phrase else ""
     return "".join(f", {nice(s.value(k), s.unit(k))} {w}{base}" for k, w in again)
 
 
@@ -161,16 +155,23 @@ SPECIAL_WORDS = {"sticking": _sticking, "form": _form, "jumps": _jumps, "harmoni
 def effect_clause(effect: Effect, model: Model) -> tuple[str, str]:
     """What the effect does and how much: ("motor 1 sticks", "it needs 3.1 mNm to start ...")."""
     s = Sizes(effect.name, effect.node, effect.parameters, model)
-    if effect.name not in PHRASES:
+    phrase = phrase_of(effect.name)
+    if phrase is None:
         sizes = [f"{name} {nice(v.value, v.unit)}" for name, v in effect.parameters.items()]
         return f"{s.here} shows {effect.name}", ", ".join(sizes)
-    phrase, slots = PHRASES[effect.name], _Slots(s)
+    slots = _Slots(s)
     return phrase.head.format_map(slots), phrase.detail.format_map(slots)
+
+
+def phrase_of(name: str) -> Phrase | None:
+    """How an effect is spoken of; None of one whose term does not say."""
+    return TERMS[name].phrase if name in TERMS else None
 
 
 def noun(name: str) -> str:
     """An effect in a few words: "sticking"."""
-    return PHRASES[name].noun if name in PHRASES else name
+    phrase = phrase_of(name)
+    return phrase.noun if phrase else name
 
 
 def noun_at(name: str, node: str, units: Quantities) -> str:
@@ -187,22 +188,23 @@ def entry_noun(entry: str, units: Quantities) -> str:
 def at(entry: str, units: Quantities) -> str:
     """A hypothesis "name:node" as part of a sentence: "sticking at motor 1"."""
     name, _, node = entry.partition(":")
-    return f"{noun(name)} at {node_words(node, units)}" if name in PHRASES and node else entry
+    return f"{noun(name)} at {node_words(node, units)}" if phrase_of(name) and node else entry
 
 
 def sentence(entry: str, *more: str, units: Quantities) -> str:
     """Why a hypothesis "name:node" cannot be tested, and at `more` nodes: what a record would have to hold."""
     name, _, node = entry.partition(":")
     at = f" at {_join([node_words(n, units) for n in (node, *more)], 'and')}" if node else ""
-    if name not in PHRASES:
+    phrase = phrase_of(name)
+    if phrase is None:
         return f"This record cannot show {name}{at}."
-    return f"This record cannot show {PHRASES[name].noun}{at}: that takes {PHRASES[name].need}."
+    return f"This record cannot show {phrase.noun}{at}: that takes {phrase.need}."
 
 
 def need(entry: str) -> str:
     """What a record would have to hold to test "name:node"."""
-    name = entry.partition(":")[0]
-    return PHRASES[name].need if name in PHRASES else "a richer motion"
+    phrase = phrase_of(entry.partition(":")[0])
+    return phrase.need if phrase else "a richer motion"
 
 
 def main_unit(d: Diagnosis) -> str:
@@ -288,7 +290,7 @@ def separating(d: Diagnosis) -> str:
     names = {name for pair in pairs for name in pair} or {e.name for e in d.effects}
     if len(names) == 1:
         return "drive one motor alone, then the other, so that only one of the places is loaded"
-    needs = [PHRASES[n].need for n in sorted(names) if n in PHRASES]
+    needs = [phrase.need for phrase in map(phrase_of, sorted(names)) if phrase]
     return "a record with " + _join(list(dict.fromkeys(needs)), "and") if needs else "a longer record with richer moves"
 
 
@@ -355,12 +357,18 @@ def _nothing(d: Diagnosis) -> tuple[str, str]:
         return first, "How large an effect could be and still hide was not worked out."
     words: list[str] = []
     seen: set[str] = set()
-    for entry in sorted(d.hides, key=lambda e: not e.startswith(HIDDEN_FIRST)):
+    for entry in sorted(d.hides, key=lambda e: not told_first(e)):
         name, _, node = entry.partition(":")
         if name not in seen and len(words) < MOST_HIDDEN:
             seen.add(name)
             words.append(f"{noun(name)} of {hidden_size(d, entry)} at {node_words(node, d.owner.units)}")
     return first, f"It would have shown {_join(words, 'and')}."
+
+
+def told_first(entry: str) -> bool:
+    """Whether a verdict of nothing names the smallest size of "term:node" before others."""
+    name = entry.partition(":")[0]
+    return name in TERMS and TERMS[name].told_first
 
 
 def hidden_size(d: Diagnosis, entry: str) -> str:

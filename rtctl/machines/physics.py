@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field
 
 from rtctl.config.errors import nearest
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, nodes
 
 if TYPE_CHECKING:
     PhysicsTerm = Any
@@ -18,7 +18,7 @@ else:
 def check_nodes(terms: list[Any], kind: str) -> None:
     """Raise ValueError where a term stands at a node that this plant does not have or the term does not fit."""
     for i, settings in enumerate(terms):
-        allowed = TERMS[settings.term].nodes.get(kind, ())
+        allowed = nodes(TERMS[settings.term], kind)
         if settings.node not in allowed:
             near = nearest(settings.node, allowed)
             hint = (

@@ -8,7 +8,7 @@ from rtctl.config.schema import Row, about, settings_table
 from rtctl.machines import CONFIGS
 from rtctl.machines.base import MachineSettings
 from rtctl.manual.command_pages import cell
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, by_kind
 
 TITLES = {"ivu": "Image Verification Unit", "ldu": "Linear Drive Unit", "axis": "one axis"}
 PHYSICS = "plant.physics[]"
@@ -88,7 +88,7 @@ def _physics() -> str:
     for name, term in TERMS.items():
         start = f"{PHYSICS}[{name}]."
         mine = [row._replace(path=row.path.removeprefix(start)) for row in rows if row.path.startswith(start)]
-        there = [f"{kind} {', '.join(f'`{n}`' for n in nodes)}" for kind, nodes in term.nodes.items() if nodes]
+        there = [f"{kind} {', '.join(f'`{n}`' for n in nodes)}" for kind, nodes in by_kind(term).items()]
         text += [f"## {name} {{ #{name.replace('.', '-')} }}", sentences(term.words, about(term.settings))]
         text += [f"```text\n{term.equation}\n```", f"Nodes: {'; '.join(there)}. Source: {cell(term.source)}."]
         text += ["\n".join(table([row for row in mine if row.path not in ("term", "node")]))]

@@ -18,7 +18,7 @@ from rtctl.config.errors import nearest
 from rtctl.idiom import Settings
 from rtctl.own.files import Source, load, read, split
 from rtctl.own.parts import upper
-from rtctl.plants.physics import TERMS, Term
+from rtctl.plants.physics import TERMS, Term, by_kind
 from rtctl.plants.physics.place import PLANTS
 from rtctl.plants.physics.term import SITES
 
@@ -65,25 +65,9 @@ def own_term(source: Source) -> Term:
         if base not in SITES or (kind and kind not in PLANTS):
             known = ", ".join(SITES)
             raise source.error(line, f"{name}.act: there is no site '{site}'; it is {known}, or e.g. force:ivu")
-    for kind, nodes in found.nodes.items():
-        plant = PLANTS.get(kind)
-        if plant is None:
-            raise source.error(line, f"{name}.nodes: there is no plant '{kind}'; there is {', '.join(PLANTS)}")
-        known_nodes = {
-            *plant.NODES,
-            *plant.LINKS,
-            *plant.DRIVES,
-            *plant.SENSORS,
-            "carriage",
-            "scale",
-            "loop",
-            "encoder",
-        }
-        for node in nodes:
-            if node not in known_nodes:
-                near = nearest(node, known_nodes)
-                hint = f"did you mean '{near}'?" if near else f"there is {', '.join(sorted(known_nodes))}"
-                raise source.error(line, f"{name}.nodes: the {kind} has no node '{node}'; {hint}")
+    if not by_kind(found):
+        asked = " or ".join(" ".join((stand.element, *sorted(stand.needs))) for stand in found.stands) or "nothing"
+        raise source.error(line, f"{name}.stands: no machine has an element for it; it asks for {asked}")
     for parameter, (low, high) in found.typical.items():
         if parameter not in found.settings.model_fields or not 0 < low < high:
             raise source.error(

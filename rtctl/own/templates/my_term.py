@@ -10,7 +10,7 @@ Source: P. R. N. Childs, Rotating Flow (2011), section 6.3, with a constant mome
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
-from rtctl.plants.physics import Term
+from rtctl.plants.physics import Term, stand
 
 
 class MyTermSettings(Settings):
@@ -44,7 +44,7 @@ MY_TERM = Term(
     settings=MyTermSettings,
     build=build,
     act={"force": "{m}.f[{i}] += {r} * my_term.drag({p}, {r} * {m}.vm[{i}])"},
-    nodes={"ivu": ("reel1", "reel2", "capstan"), "ldu": ("carriage", "wheel"), "axis": ("carriage",)},
+    stands=(stand("body"),),  # a body; rtctl/plants/element.py lists the kinds of element, and traits to ask for
     look_alikes={
         "friction.viscous": "hold 0.5, 1 and 2 times the highest speed so far: viscous drag only doubles each time",
     },

@@ -1,0 +1,97 @@
+"""Elements of a machine and their traits: what an effect asks of the place where it may stand.
+
+A machine is a list of elements; the node of an element is the name by which effects, drives and reports call it. One
+node may name several elements: a motor and the shaft behind it, a wheel and the contact that drives it. Traits are
+physical: they say what an element is or does, never on which machine it is.
+"""
+
+from typing import NamedTuple
+
+TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
+    "body": {
+        "turns": "turns, or is moved by something that turns, as a slide by a screw",
+        "slides": "slides; with `turns` it is one of the two, as the units of the machine say",
+        "driven": "a drive acts on it",
+        "load": "no drive acts on it",
+        "dry": "the description gives it dry friction",
+        "rubs": "has the dry friction that a drive works against",
+        "rotor": "has a mass that may be off centre",
+        "loaded": "the force in a joint that ends at it presses on its bearing, or the load that it carries does",
+        "wrapped": "tape lies around it, whose two tensions add up in its bearing",
+        "bounded": "its way has two ends",
+        "guided": "runs along a strip whose thickness moves it",
+        "reel": "winds what changes its radius",
+        "capstan": "turns a length of tape or strip into an angle",
+        "wheel": "is driven at its rim",
+    },
+    "joint": {
+        "spring": "a spring in the equations; where one spring has two nodes, one of them",
+        "shaft": "passes on torque, and may have backlash",
+        "span": "a length of tape, or held by one",
+        "contact": "passes on force by friction",
+        "rigid": "has no spring in the equations",
+        "ground": "ends at the frame",
+    },
+    "drive": {
+        "voltage": "its command is a voltage at the motor",
+        "current": "its command is a current, held by an amplifier",
+        "force": "its command is a force or a torque",
+        "supply": "the first of the drives on one supply",
+    },
+    "sensor": {
+        "position": "shows a position",
+        "speed": "shows a speed",
+        "counts": "shows whole counts",
+        "edges": "shows edges without direction, seldomer than ticks",
+        "turns": "of something that turns, or that is moved by something that turns",
+        "slides": "of something that slides",
+        "driven": "of a body that a drive acts on",
+        "load": "of a body that no drive acts on",
+        "guided": "of what runs along a strip",
+        "lone": "the only sensor of the only body: nothing is between the drive and what it shows",
+        "feedback": "a law closes the loop on it",
+    },
+    "loop": {},
+}
+KINDS = tuple(TRAITS)
+NONE: frozenset[str] = frozenset()
+
+
+class Element(NamedTuple):
+    """One element of a machine: its node, its kind (body, joint, drive, sensor, loop), and its traits."""
+
+    node: str
+    kind: str
+    traits: frozenset[str] = NONE
+
+
+class Stand(NamedTuple):
+    """Where an effect may stand: at each element of a kind that has all the traits that it needs."""
+
+    element: str
+    needs: frozenset[str] = NONE
+    usual: bool = True  # the typical sizes of the effect are those of a place like this
+    again: bool = False  # the effect does here what it does at another node already: a search leaves it out
+
+
+LOOP = Element("loop", "loop")
+
+
+def element(node: str, kind: str, traits: str = "") -> Element:
+    """Element with its traits as words. Raises ValueError for a kind or a trait that there is not."""
+    return Element(node, kind, _traits(kind, traits))
+
+
+def stand(kind: str, needs: str = "", *, usual: bool = True, again: bool = False) -> Stand:
+    """Stand with the traits that it needs as words. Raises ValueError for a kind or a trait that there is not."""
+    return Stand(kind, _traits(kind, needs), usual, again)
+
+
+def _traits(kind: str, words: str) -> frozenset[str]:
+    if kind not in TRAITS:
+        raise ValueError(f"there is no element '{kind}'; there is {', '.join(KINDS)}")
+    for word in words.split():
+        if word not in TRAITS[kind]:
+            known = ", ".join(TRAITS[kind]) or "none"
+            raise ValueError(f"a {kind} has no trait '{word}'; its traits are {known}")
+    return frozenset(words.split())

@@ -1,0 +1,53 @@
+"""Nodes at which a term can stand: those of the elements of a plant that have what it asks for."""
+
+from collections.abc import Iterable
+from functools import lru_cache
+
+from rtctl.plants.element import Element, Stand
+from rtctl.plants.physics.place import PLANTS
+from rtctl.plants.physics.term import Term
+
+Plant = str | tuple[Element, ...]  # a kind of plant, or the elements of one
+
+
+def nodes(term: Term, plant: Plant) -> tuple[str, ...]:
+    """Nodes where the term can stand: in the order of its stands, and of the elements for each of them."""
+    return tuple(_stands(term.stands, elements(plant)))
+
+
+def standing(term: Term, plant: Plant, node: str) -> tuple[Stand, Element] | None:
+    """As what the term stands at a node, and at which element of it; None where it cannot stand there."""
+    return _stands(term.stands, elements(plant)).get(node)
+
+
+def elements(plant: Plant) -> tuple[Element, ...]:
+    """Elements of a kind of plant; none of a kind that has no nodes."""
+    if not isinstance(plant, str):
+        return plant
+    return PLANTS[plant].ELEMENTS if plant in PLANTS else ()
+
+
+def by_kind(term: Term) -> dict[str, tuple[str, ...]]:
+    """Nodes by the kind of plant, of those on which the term can stand."""
+    found = {kind: nodes(term, kind) for kind in PLANTS}
+    return {kind: there for kind, there in found.items() if there}
+
+
+def having(plant: Plant, kind: str, trait: str) -> tuple[str, ...]:
+    """Nodes of the elements of a kind that have a trait."""
+    return tuple(e.node for e in elements(plant) if e.kind == kind and trait in e.traits)
+
+
+def met(stands: Iterable[Stand], plant: Plant) -> tuple[str, ...]:
+    """Nodes of the elements that meet any of the stands."""
+    return tuple(_stands(tuple(stands), elements(plant)))
+
+
+@lru_cache(maxsize=1024)
+def _stands(stands: tuple[Stand, ...], there: tuple[Element, ...]) -> dict[str, tuple[Stand, Element]]:
+    out: dict[str, tuple[Stand, Element]] = {}
+    for stand in stands:
+        for element in there:
+            if element.kind == stand.element and stand.needs <= element.traits:
+                out.setdefault(element.node, (stand, element))
+    return out

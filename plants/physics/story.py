@@ -1,0 +1,55 @@
+"""What is told about a term: how it is spoken of, what a record must hold to show it, and how large one is hidden."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from rtctl.plants.element import Stand
+
+BOTH = "moves in both directions"
+TURNS = "at least a full turn"
+BEHIND = "long moves, with a sensor behind the contact"
+WAVES = "moves over several waves, with a second sensor"
+PASSES = "several passages of the same place"
+
+
+class Phrase(NamedTuple):
+    """How one effect is spoken of. `head` and `detail` are filled in by the names of the parameters:
+
+    {F_C} its size with unit, {a:%} a share in percent, {a:more|less} a word by its sign, {offset:+} the signed value,
+    {at:3} three figures, {here} the node, {form:words} the words of the form that was chosen, {harmonics:words} the
+    harmonics that were found.
+    """
+
+    noun: str
+    head: str
+    detail: str
+    need: str  # what a record must hold to show it
+    forms: Mapping[str, str] = {}  # value of `form` -> its words; "" for all others; {command} is the command's name
+    again: str = ""  # what follows "twice" and "three times" of its harmonics
+
+
+class Needs(NamedTuple):
+    """What a record must contain so that the effect can be tested."""
+
+    turns: float = 0.0  # turns of its node
+    turned: tuple[Stand, ...] = ()  # where they are asked for; without it wherever the term stands
+    ways: str = ""  # "motion": both ways; "push": a motion or a push both ways
+    slow: bool = False  # standstills, or a crawl
+    speeds: bool = False  # more than one speed
+    command: str = ""  # of its drive: "changes", and besides "signs": both; "small": near zero; "large": near the limit
+    compared: bool = False  # another sensor to compare with
+    alone: str = ""  # what a lone sensor shows it by all the same: "slides" its node, "unsigned" the reading
+    second: tuple[Stand, ...] = ()  # where a record of one sensor shows nothing of it
+    stiffness: bool = False  # a spring at its node
+
+
+NOTHING = Needs()
+
+
+class Draw(NamedTuple):
+    """Range of a parameter in units of a measure, drawn evenly in its logarithm; `signed`: either sign."""
+
+    low: float
+    high: float
+    measure: str = "one"
+    signed: bool = False
