@@ -21,6 +21,7 @@ from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
 OPEN, TRACK = range(2)
+SPECIAL = frozenset({"reel", "capstan", "wheel", "span", "contact", "guided", "wrapped", "edges", "loaded"})
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
 
@@ -143,9 +144,12 @@ class Kernel(NamedTuple):
 
 def terms() -> tuple[Term, ...]:
     """The library's terms that can stand in a described machine."""
-    from rtctl.diagnose.graph.places import stands
+    return tuple(term for term in TERMS.values() if any(site in term.act for site in SITES) and not special(term))
 
-    return tuple(term for term in TERMS.values() if stands(term))
+
+def special(term: Term) -> bool:
+    """Whether a term stands only at elements that no described machine has: reels, tapes, strips, contacts."""
+    return all(stand.needs & SPECIAL for stand in term.stands)
 
 
 def source() -> str:

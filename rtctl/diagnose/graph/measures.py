@@ -24,6 +24,10 @@ class Scales(NamedTuple):
     low: float  # lowest position
     sign: float  # of its motion for one of the main sensor's body
 
+    def at(self, share: float) -> float:
+        """Position of the node where the main sensor has gone that share of its span."""
+        return self.low + self.span * (1.0 - share if self.sign < 0.0 else share)
+
 
 class Measures:
     """Measures by name and node, from the main sensor, the ratios of the joints and the recorded commands."""
@@ -41,6 +45,7 @@ class Measures:
         self.u = sim.volts - np.median(sim.volts, axis=0)
         self.effort = self._effort()
         self.term = ""
+
 
     def _effort(self) -> float:
         """Rms of what all drives make at the main body, N or Nm."""

@@ -14,10 +14,10 @@ from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.kernel import OPEN, TRACK
 from rtctl.diagnose.graph.model import GraphModel, nominal, rigid
-from rtctl.diagnose.graph.places import find
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
+from rtctl.plants.graph.elements import elements, spot
 from rtctl.plants.graph.layout import NOWHERE
 from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.physics import TERMS, ordered
@@ -38,6 +38,7 @@ class Simulator:
         self.record, self.case = record, record.case
         self.kernel = kernel.kernel()
         self.layout = record.case.layout
+        self.elements = elements(self.layout)
         self.main = record.main
         sensor = record.case.machine.sensors[self.main]
         self.shows_speed = sensor.measures == "speed"
@@ -97,7 +98,7 @@ class Simulator:
         """Readings, and the correction (n,), in N or Nm at the main sensor's body."""
         record, k = self.record, self.kernel
         n = len(self.seen) if n is None else n
-        stiff = any(is_stiff(str(getattr(t, "term", ""))) for t in model.terms)
+        stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
         substeps = self.substeps * (2 if stiff else 1)
         h = record.dt / substeps
         params = model.params(h)
@@ -108,7 +109,7 @@ class Simulator:
         slots = np.zeros(1, k.slots)
         for slot, settings in zip(slots[0]["q"], ordered(list(model.terms)), strict=False):
             s: Any = settings
-            kernel.fill_slot(k, slot, s, find(TERMS[s.term], s.node, self.layout, model.base), h)
+            kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s.node, self.layout, self.elements, model.base), h)
         job = self._job(model, params, mode, substeps)
         states = np.zeros(1, GRAPH_STATE)
         self._begin(states, model)
@@ -152,11 +153,6 @@ class Simulator:
         j["P"], j["D"] = self.follow**2 * inertia, 1.4 * self.follow * inertia
         j["a"] = -np.expm1(-10.0 * self.follow * dt)
         return job
-
-
-def is_stiff(term: str) -> bool:
-    """Whether a term alters a joint, and asks for shorter steps."""
-    return term.startswith(("transmission.", "tape.", "structure."))
 
 
 _dtypes: dict[type, np.dtype] = {}

@@ -1,0 +1,63 @@
+"""Elements of a described machine with the traits that its topology gives them, and where each acts in the record."""
+
+from typing import NamedTuple
+
+from rtctl.plants.element import LOOP, Element, element
+from rtctl.plants.graph.layout import NOWHERE, Layout
+from rtctl.plants.graph.params import joint_place, place
+from rtctl.plants.physics import Term, standing
+
+
+class Spot(NamedTuple):
+    """Where a term acts in the machine's record."""
+
+    node: int  # coordinate
+    link: int
+    channel: int  # of the drive or the sensor
+    factor: float  # what the node moves for one unit of the coordinate
+
+
+def elements(layout: Layout) -> tuple[Element, ...]:
+    """Every element of a described machine, in the order of the description."""
+    machine = layout.machine
+    driven = {drive.body for drive in machine.drives.values()}
+    for drive in machine.drives.values():
+        if drive.joint is not None:
+            driven |= {getattr(machine.joints[drive.joint], "from"), machine.joints[drive.joint].to}
+    out: list[Element] = []
+    for name, body in machine.bodies.items():
+        if layout.bodies[name].coordinate != NOWHERE:
+            traits = ["turns rotor" if body.turns else "slides", "driven" if name in driven else "load", "bounded"]
+            traits += ["dry"] if body.dry > 0.0 else []
+            out.append(element(name, "body", " ".join(traits)))
+    out += [element(name, "joint", "spring shaft") for name in layout.links]
+    for number, (name, drive) in enumerate(machine.drives.items()):
+        out.append(element(name, "drive", f"{drive.kind} supply" if number == 0 else drive.kind))
+    for name, sensor in machine.sensors.items():
+        if sensor.body is None or sensor.measures not in ("position", "speed"):
+            continue
+        traits = [sensor.measures, "turns" if machine.turns(sensor.body) else "slides"]
+        traits += ["driven" if sensor.body in driven else "load"]
+        traits += ["counts"] if sensor.counts_per_unit is not None else []
+        out.append(element(name, "sensor", " ".join(traits)))
+    return (*out, LOOP)
+
+
+def spot(term: Term, node: str, layout: Layout, there: tuple[Element, ...], values: dict[str, float]) -> Spot:
+    """Where a term acts at a node. Raises ValueError where it cannot stand there."""
+    found = standing(term, there, node)
+    if found is None:
+        raise ValueError(f"{term.name} cannot stand at '{node}'")
+    kind, machine = found[1].kind, layout.machine
+    if kind == "body":
+        return Spot(layout.coordinate(node), 0, 0, layout.ratio(node, values))
+    if kind == "joint":
+        i, a, _, _ = joint_place(layout, node, values)
+        return Spot(i, layout.links[node], 0, a)
+    if kind == "drive":
+        i, a, _, _ = place(layout, machine.drives[node], values)
+        return Spot(i, 0, layout.drives[node], a)
+    if kind == "sensor":
+        i, a, _, _ = place(layout, machine.sensors[node], values)
+        return Spot(i, 0, layout.sensors[node], a)
+    return Spot(0, 0, 0, 1.0)

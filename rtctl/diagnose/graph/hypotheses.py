@@ -1,0 +1,99 @@
+"""Hypotheses of a recording: each term of the library at each element of the machine where it can stand."""
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from rtctl.diagnose.graph.measures import Measures, way
+from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.hints import MOST, ORDERS, jumps, peaks, seen, spectrum, spots
+from rtctl.diagnose.hypotheses import parts_of, searched, starts_of
+from rtctl.diagnose.space import Hypothesis
+from rtctl.idiom import Settings
+from rtctl.plants.graph.elements import elements
+from rtctl.plants.physics import TERMS, nodes, standing
+
+QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it shows
+WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
+SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
+ROWS = 8000  # of a spectrum
+
+
+def hypotheses(
+    sim: Simulator, model: GraphModel, hints: dict[str, list] | None = None, beside: Sequence[Settings] = ()
+) -> list[Hypothesis]:
+    """All of them for this machine, one for each start."""
+    there = elements(sim.layout)
+    measures = Measures(sim, model.base, hints or {})
+    measures.record = SimpleNamespace(plant=there, dt=sim.record.dt)  # type: ignore[attr-defined]
+    known = set(sim.kernel.names)
+    dry_too = {str(getattr(s, "node", "")) for s in beside if TERMS[str(getattr(s, "term", ""))].friction == "dry"}
+    out: list[Hypothesis] = []
+    for name, term in TERMS.items():
+        if name not in known or not searched(name):
+            continue
+        for node in nodes(term, there):
+            found = standing(term, there, node)
+            assert found is not None
+            stand, element = found
+            slides = "slides" in element.traits
+            rubs = measures.dry(node) > SLIGHT * measures.of("force", node) or node in dry_too
+            if (
+                stand.again
+                or (term.needs.compared and len(sim.channels) < 2)
+                or (term.falls_to and not rubs)
+                or (term.replaces and not rubs)
+            ):
+                continue
+            out += starts_of(name, node, (term.sliding if slides else ()) or parts_of(name), measures)  # type: ignore[arg-type]
+    return out
+
+
+def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
+    """Suggestions by kind (and node): order, wavelength, spot, and jump (time, size) of each sensor.
+
+    Source: order tracking by least squares on cosine and sine of the angle; the correction of the observer as the
+    missing force (Ohnishi, Shibata & Murakami 1996).
+    """
+    record = sim.record
+    read, _ = sim.everything(model)
+    _, push = faster(sim).everything(model)
+    x, d = way(sim)[begin:], push[begin:]
+    if not np.isfinite(d).all():
+        d = np.zeros_like(d)
+    thin = max(1, len(x) // ROWS)
+    rate = uniform_filter1d(np.abs(np.gradient(x)) / record.dt, 51)[::thin]
+    x, d = x[::thin], d[::thin]
+    quick = QUICK * faster(sim).follow
+    found: dict[str, list] = {}
+    for node, ratio in sim.ratios.items():
+        if ratio != 0.0 and sim.case.machine.turns(node):
+            found[f"order:{node}"] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
+        elif ratio != 0.0:
+            span = float(np.ptp(x)) * abs(ratio) or 1.0
+            waves = span * np.geomspace(0.02, 2.0, 2 * WAVES)
+            found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
+            found[f"order:{node}"] = []
+    for name in sim.channels:
+        body = sim.case.machine.sensors[name].body
+        if body is not None and not sim.case.machine.turns(body):
+            found[f"wavelength:{name}"] = found.get(f"wavelength:{body}", [])
+    found["spot"] = spots(x, d, MOST)
+    for name in sim.channels:
+        grain = record.grain[name]
+        if grain > 0.0 and sim.case.machine.sensors[name].measures == "position":
+            error = (record.y[name] - read[:, sim.layout.sensors[name]]) / grain
+            found[f"jump:{name}"] = [
+                (float(record.t[k] - record.t[0]), size * grain) for k, size in jumps(error, 1.0)
+            ]  # fmt: skip
+    return found
+
+
+def faster(sim: Simulator) -> Simulator:
+    """The observer that shows missing forces over a wider band."""
+    other = sim.finer(1)
+    other.follow = min(3.0 * sim.follow, 0.25 / sim.record.dt)
+    return other
