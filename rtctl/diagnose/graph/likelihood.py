@@ -43,9 +43,9 @@ class Likelihood:
             Noise(np.ones(1), float(max(least, 1e-300))) for least in self.least
         ]  # fmt: skip
 
-    def raw(self, model: GraphModel) -> np.ndarray:
+    def raw(self, model: GraphModel, coarse: bool = False) -> np.ndarray:
         """Residuals (blocks, sensors), SI, averaged over `mean` ticks, each sensor's constant left out."""
-        out = self.sim.run(model, n=self.rows[1])
+        out = self.sim.run(model, n=self.rows[1], coarse=coarse)
         return self.of_readings(out)
 
     def of_readings(self, out: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ class Likelihood:
 
     def residual(self, model: GraphModel, coarse: bool = False, at: str = "") -> np.ndarray:
         """Innovations of a model, as a fit minimises them."""
-        return self.white(self.raw(model))
+        return self.white(self.raw(model, coarse))
 
     def told(self, e: np.ndarray) -> "Likelihood":
         """The same with the noise of these residuals (blocks, sensors)."""
@@ -80,6 +80,10 @@ class Likelihood:
             r = own.whiten(e[:, c])
             total += len(r) * float(np.log(own.sigma)) + 0.5 * float(r @ r)
         return total
+
+    def filtered(self, columns: np.ndarray) -> np.ndarray:
+        """The same filters on many residuals at once (blocks, sensors, columns): (innovations, columns)."""
+        return np.concatenate([noise.whiten(columns[:, c]) for c, noise in enumerate(self.noise)])
 
     @property
     def size(self) -> int:

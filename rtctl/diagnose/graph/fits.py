@@ -1,0 +1,102 @@
+"""Fit of a model to a recording under a noise of its own, with its evidence.
+
+The noise is estimated from the residual of the fit and the fit made again, since a noise that was estimated without an
+effect holds the effect for noise. The evidence is Laplace's: the likelihood at its maximum, times the prior there, times
+the volume of the posterior.
+
+Source: MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28; Miller & Dunson, Robust Bayesian
+inference via coarsening, JASA 114 (2019) for the power of the likelihood.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.fit import fit, jacobian
+from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Hypothesis, Space
+
+ROUNDS = 3  # of noise and fit
+ENOUGH = 1.0  # nats, that a further round must gain
+COARSE = 2000.0  # innovations that a recording counts for at most: no model is exact
+
+
+class Fitted(NamedTuple):
+    """A model fitted to a record."""
+
+    space: Space
+    x: np.ndarray
+    e: np.ndarray  # (blocks, sensors) residual, SI
+    J: np.ndarray  # (innovations, unknowns), under its own noise
+    like: Likelihood  # with its own noise
+    loss: float  # negative logarithm of the likelihood, nats
+
+    @property
+    def model(self):  # noqa: ANN201
+        """The model itself."""
+        return self.space.model(self.x)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """term:node of each hypothesis."""
+        return tuple(h.name for h in self.space.hypotheses)
+
+    @property
+    def power(self) -> float:
+        """Share of the likelihood that counts."""
+        return COARSE / (COARSE + self.like.size)
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence, nats, up to a constant that all models of the record share."""
+        weight = prior(self.space)
+        H = self.power * self.J.T @ self.J + np.diag(weight)
+        keep = weight > 0.0
+        sign, volume = np.linalg.slogdet(H[np.ix_(keep, keep)])
+        volume -= float(np.sum(np.log(weight[keep])))
+        fitness = -self.power * self.loss - 0.5 * float(weight @ self.x**2)
+        return fitness - 0.5 * float(volume)
+
+
+def prior(space: Space) -> np.ndarray:
+    """Precision of the prior of each unknown: the owner's tolerance, and a typical size of each effect."""
+    out = list(space.prior()[: space.nb])
+    for h in space.hypotheses:
+        for c in h.coordinates:
+            width = 1.0 if np.isinf(c.high) or np.isinf(c.low) else max(0.3 * (c.high - c.low), 1e-3)
+            out.append(1.0 / (SPREAD[c.kind] if c.kind in SPREAD else min(width, 2.0)) ** 2)
+    return np.array(out)
+
+
+SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0}  # standard deviation of a size, in typical sizes
+
+
+def refit(like: Likelihood, space: Space, x: np.ndarray | None = None, rounds: int = 12) -> Fitted:
+    """The model of `space` from x, each time under the noise that it left the last time."""
+    x = space.start() if x is None else np.asarray(x, float)
+    e = like.raw(space.model(x))
+    loss, own = like.loss(e), like.told(e)
+    best = (loss, x, e, own)
+    for _ in range(ROUNDS):
+        found = fit(own, space, x, rounds=rounds, enough=1e-4)
+        x = found.x
+        e = like.raw(space.model(x))
+        loss, own = like.loss(e), like.told(e)
+        gain = best[0] - loss
+        if gain > 0.0:
+            best = (loss, x, e, own)
+        if gain < ENOUGH:
+            break
+    loss, x, e, own = best
+    return Fitted(space, x, e, jacobian(own, space, x), own, loss)  # type: ignore[arg-type]
+
+
+def with_term(base: Fitted, h: Hypothesis, x: Sequence[float] | np.ndarray) -> tuple[Space, np.ndarray]:
+    """Space and start of a model with one more hypothesis, which begins at x."""
+    return base.space.add(h), np.concatenate([base.x, np.asarray(x, float)])
+
+
+def without(base: Fitted, index: int) -> tuple[Space, np.ndarray]:
+    """Space and start of a model without one of its hypotheses."""
+    return base.space.without(index), np.delete(base.x, base.space.columns(index))

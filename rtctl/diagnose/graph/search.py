@@ -1,0 +1,120 @@
+"""Search: combinations of up to three effects, each refitted under a noise of its own, by evidence.
+
+Source: beam search over forward steps, with removal and exchange of each effect at the end.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.graph.fits import Fitted, refit, with_term, without
+from rtctl.diagnose.graph.hypotheses import hints, hypotheses
+from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.screen import Score, screen
+from rtctl.diagnose.space import Space
+
+MOST = 3  # effects
+NAMES = 8  # hypotheses that are refitted in a step
+STARTS = 2  # of each
+BEAM = 2
+WORTH = 3.0  # nats of evidence that a further effect must bring
+FAR = 30.0  # nats behind the best at which a combination is dropped
+
+Progress = Callable[[str], None]
+
+
+class Found(NamedTuple):
+    """All that was fitted."""
+
+    like: Likelihood
+    base: Fitted
+    scores: tuple[Score, ...]  # beside the base
+    fits: tuple[Fitted, ...]  # best first, the base among them
+    odds: float  # ln of the prior odds of one effect at one place
+
+    def merit(self, f: Fitted) -> float:
+        """Logarithm of the posterior, up to a constant."""
+        return f.log_evidence - self.odds * len(f.space.hypotheses)
+
+    @property
+    def best(self) -> Fitted:
+        """The combination with the highest posterior."""
+        return self.fits[0]
+
+
+def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
+    """Fit the base, then what is missing beside it."""
+    progress("fitting the nominal parameters")
+    base = refit(like, space)
+    progress("screening every hypothesis")
+    scores, odds = screened(base)
+    known: dict[tuple[str, ...], Fitted] = {(): base}
+
+    def merit(f: Fitted) -> float:
+        return f.log_evidence - odds * len(f.space.hypotheses)
+
+    beam, first = [base], scores
+    for level in range(MOST):
+        grown: list[Fitted] = []
+        for parent in beam:
+            progress(f"fitting effect {level + 1}" + (f" beside {', '.join(parent.names)}" if parent.names else ""))
+            promising = first if level == 0 else screened(parent)[0]
+            grown += step(like, parent, promising, known)
+        better = [f for f in grown if merit(f) > merit(_parent(f, beam)) + WORTH]
+        if not better:
+            break
+        better.sort(key=merit, reverse=True)
+        beam = [f for f in better if merit(f) > merit(better[0]) - FAR][:BEAM]
+    progress("exchanging each effect")
+    best = max(known.values(), key=merit)
+    for index in range(len(best.space.hypotheses)):
+        rest = refit(like, *without(best, index)) if len(best.names) > 1 else base
+        known.setdefault(key(rest), rest)
+        if len(best.names) > 1:
+            step(like, rest, screened(rest)[0], known)
+    return Found(like, base, tuple(scores), tuple(sorted(known.values(), key=merit, reverse=True)), odds)
+
+
+def screened(parent: Fitted) -> tuple[list[Score], float]:
+    """Scores beside a model, and the prior odds of one of them."""
+    sim = parent.like.sim
+    model = parent.model
+    candidates = [
+        h
+        for h in hypotheses(sim, model, hints(sim, model, parent.like.rows[0]), model.terms)
+        if h.name not in parent.names
+    ]
+    names = {h.name for h in candidates}
+    return screen(parent, candidates), float(np.log(max(len(names), 1)))
+
+
+def step(like: Likelihood, parent: Fitted, scores: list[Score], known: dict[tuple[str, ...], Fitted]) -> list[Fitted]:
+    """Refits of a model with each of the most promising hypotheses beside it."""
+    top: dict[str, list[Score]] = {}
+    for score in scores:
+        if score.gain > 0.0 and (len(top) < NAMES or score.hypothesis.name in top):
+            top.setdefault(score.hypothesis.name, []).append(score)
+    out = []
+    for chosen in top.values():
+        fits = [refit(like, *with_term(parent, s.hypothesis, s.x)) for s in chosen[:STARTS]]
+        best = max(fits, key=lambda f: f.log_evidence)
+        old = known.get(key(best))
+        if old is None or best.log_evidence > old.log_evidence:
+            known[key(best)] = best
+        out.append(known[key(best)])
+    return out
+
+
+def key(f: Fitted) -> tuple[str, ...]:
+    """The names of a combination, in alphabetical order."""
+    return tuple(sorted(f.names))
+
+
+def _parent(f: Fitted, beam: list[Fitted]) -> Fitted:
+    inside = [p for p in beam if set(p.names) <= set(f.names)]
+    return max(inside, key=lambda p: p.log_evidence)
+
+
+__all__ = ["Found", "partial", "search"]
