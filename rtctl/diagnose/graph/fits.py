@@ -18,7 +18,7 @@ from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Hypothesis, Space
 
 ROUNDS = 3  # of noise and fit
-ENOUGH = 1.0  # nats, that a further round must gain
+ENOUGH = 2.0  # nats, that a further round must gain
 COARSE = 2000.0  # innovations that a recording counts for at most: no model is exact
 
 
@@ -72,14 +72,14 @@ def prior(space: Space) -> np.ndarray:
 SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0}  # standard deviation of a size, in typical sizes
 
 
-def refit(like: Likelihood, space: Space, x: np.ndarray | None = None, rounds: int = 12) -> Fitted:
+def refit(like: Likelihood, space: Space, x: np.ndarray | None = None, rounds: int = 10) -> Fitted:
     """The model of `space` from x, each time under the noise that it left the last time."""
     x = space.start() if x is None else np.asarray(x, float)
     e = like.raw(space.model(x))
     loss, own = like.loss(e), like.told(e)
     best = (loss, x, e, own)
     for _ in range(ROUNDS):
-        found = fit(own, space, x, rounds=rounds, enough=1e-4)
+        found = fit(own, space, x, rounds=rounds, enough=1e-3)
         x = found.x
         e = like.raw(space.model(x))
         loss, own = like.loss(e), like.told(e)

@@ -31,9 +31,9 @@ def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
     """Autoregression of `order` of a residual (n,), whose innovation is not below `least`."""
     n = len(e)
     order = min(order, n // 20)
-    f = np.fft.rfft(e - e.mean(), 2 * n)
+    f = np.fft.rfft(e, 2 * n)
     r = np.fft.irfft(np.abs(f) ** 2)[: order + 1] / n
     r[0] = r[0] * (1.0 + 1e-9) + 1e-300
     a = np.concatenate([[1.0], -solve_toeplitz(r[:-1], r[1:])]) if order else np.ones(1)
-    innovation = lfilter(a, [1.0], e - e.mean())[order:]
+    innovation = lfilter(a, [1.0], e)[order:]
     return Noise(a, max(float(np.sqrt(np.mean(innovation**2))), least))

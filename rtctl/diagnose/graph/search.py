@@ -16,8 +16,10 @@ from rtctl.diagnose.graph.screen import Score, screen
 from rtctl.diagnose.space import Space
 
 MOST = 3  # effects
-NAMES = 8  # hypotheses that are refitted in a step
-STARTS = 2  # of each
+NAMES = (8, 5, 4)  # hypotheses that are refitted in each step, and in the exchange 4
+STARTS = 2  # of the first few of them
+FIRST = 3
+LEAST = 6.0  # nats that screening must promise for a refit
 BEAM = 2
 WORTH = 3.0  # nats of evidence that a further effect must bring
 FAR = 30.0  # nats behind the best at which a combination is dropped
@@ -61,7 +63,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         for parent in beam:
             progress(f"fitting effect {level + 1}" + (f" beside {', '.join(parent.names)}" if parent.names else ""))
             promising = first if level == 0 else screened(parent)[0]
-            grown += step(like, parent, promising, known)
+            grown += step(like, parent, promising, known, NAMES[level])
         better = [f for f in grown if merit(f) > merit(_parent(f, beam)) + WORTH]
         if not better:
             break
@@ -73,7 +75,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         rest = refit(like, *without(best, index)) if len(best.names) > 1 else base
         known.setdefault(key(rest), rest)
         if len(best.names) > 1:
-            step(like, rest, screened(rest)[0], known)
+            step(like, rest, screened(rest)[0], known, NAMES[-1])
     return Found(like, base, tuple(scores), tuple(sorted(known.values(), key=merit, reverse=True)), odds)
 
 
@@ -90,20 +92,24 @@ def screened(parent: Fitted) -> tuple[list[Score], float]:
     return screen(parent, candidates), float(np.log(max(len(names), 1)))
 
 
-def step(like: Likelihood, parent: Fitted, scores: list[Score], known: dict[tuple[str, ...], Fitted]) -> list[Fitted]:
+def step(
+    like: Likelihood, parent: Fitted, scores: list[Score], known: dict[tuple[str, ...], Fitted], most: int
+) -> list[Fitted]:
     """Refits of a model with each of the most promising hypotheses beside it."""
     top: dict[str, list[Score]] = {}
     for score in scores:
-        if score.gain > 0.0 and (len(top) < NAMES or score.hypothesis.name in top):
+        if score.gain > LEAST and (len(top) < most or score.hypothesis.name in top):
             top.setdefault(score.hypothesis.name, []).append(score)
     out = []
-    for chosen in top.values():
-        fits = [refit(like, *with_term(parent, s.hypothesis, s.x)) for s in chosen[:STARTS]]
+    for rank, chosen in enumerate(top.values()):
+        if tuple(sorted((*parent.names, chosen[0].hypothesis.name))) in known:
+            out.append(known[tuple(sorted((*parent.names, chosen[0].hypothesis.name)))])
+            continue
+        starts = chosen[: STARTS if rank < FIRST else 1]
+        fits = [refit(like, *with_term(parent, s.hypothesis, s.x)) for s in starts]
         best = max(fits, key=lambda f: f.log_evidence)
-        old = known.get(key(best))
-        if old is None or best.log_evidence > old.log_evidence:
-            known[key(best)] = best
-        out.append(known[key(best)])
+        known[key(best)] = best
+        out.append(best)
     return out
 
 

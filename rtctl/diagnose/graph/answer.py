@@ -1,0 +1,216 @@
+"""Answer of a diagnosis: verdict, effects with sizes, where it lives, held-out errors, what cannot be told."""
+
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
+from rtctl.diagnose.graph import words
+from rtctl.diagnose.graph.fits import Fitted, prior
+from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.model import nominal
+from rtctl.diagnose.graph.prediction import Heldout, predict
+from rtctl.diagnose.graph.record import GraphRecord, load_record
+from rtctl.diagnose.graph.search import Found, Progress, search
+from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.graph.verdict import SURE, Verdict, evidence, strongest, verdict
+from rtctl.diagnose.space import COSINE, PLACE, SHAPE, SINE, SIZE, Space
+from rtctl.plants.physics import TERMS
+
+SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
+Z90 = 1.645
+
+
+class GraphDiagnosis(NamedTuple):
+    """What a recording of a described machine says."""
+
+    record: GraphRecord
+    found: Found
+    decided: Verdict
+    effects: tuple[Effect, ...]
+    located: Located | None
+    parameters: dict[str, Interval]
+    heldout: Heldout
+    cannot_test: tuple[str, ...]
+    seconds: float
+
+    @property
+    def verdict(self) -> str:
+        """named, ambiguous, unnamed or nothing."""
+        return self.decided.verdict
+
+    @property
+    def headline(self) -> str:
+        """The verdict in one sentence or two."""
+        machine, model = self.record.case.machine, self.decided.best.model
+        if self.verdict == NOTHING:
+            return "Nothing is missing that this recording shows: the description follows it down to the noise."
+        if self.verdict == UNNAMED:
+            at = self.located
+            where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
+            return f"Something is missing{where}, and no name of the library explains it."
+        said = [words.clause(machine, e, model) for e in self.effects]
+        if self.verdict == NAMED:
+            text = "; ".join(said)
+            return f"{text[:1].upper()}{text[1:]}."
+        names = " or ".join(words.called(machine, f"{e.name}:{e.node}") for e in self.effects)
+        return f"Something is missing, and this recording cannot tell which: {names}."
+
+    def as_json(self) -> dict[str, Any]:
+        """diagnosis.json in the form of the exchange format."""
+        return {
+            "verdict": self.verdict,
+            "headline": self.headline,
+            "effects": [
+                {
+                    "name": e.name,
+                    "node": e.node,
+                    "confidence": round(e.confidence, 4),
+                    "parameters": {
+                        k: {"value": v.value, "ci90": [v.low, v.high], "unit": v.unit} for k, v in e.parameters.items()
+                    },
+                    "look_alikes": [{"name": r.name, "node": r.node, "probability": r.p_value} for r in e.look_alikes],
+                    "check": TERMS[e.name].check,
+                }
+                for e in self.effects
+            ],
+            "located": None if self.located is None else self.located._asdict(),
+            "why": self.decided.why,
+            "parameters": {
+                k: {"value": v.value, "ci90": [v.low, v.high], "unit": v.unit} for k, v in self.parameters.items()
+            },
+            "fit": {
+                "heldout_nrmse_before": self.heldout.before,
+                "heldout_nrmse_after": self.heldout.after,
+                "noise_floor": self.heldout.floor,
+            },
+            "probabilities": [
+                {"effects": list(names), "probability": round(p, 4)}
+                for names, p in self.decided.probabilities[:8]
+                if p > 1e-4
+            ],
+            "cannot_test": list(self.cannot_test),
+            "separating_experiment": None,
+            "warnings": list(self.record.case.warnings),
+            "seconds": round(self.seconds, 2),
+        }
+
+
+def diagnose(folder: Path | str, progress: Progress = lambda _: None) -> GraphDiagnosis:
+    """Diagnose the bundle of a described machine.
+
+    Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
+    """
+    return diagnose_record(load_record(folder), progress)
+
+
+def diagnose_record(record: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:
+    """As `diagnose`, for a record in memory."""
+    began = time.monotonic()
+    with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
+        sim = Simulator(record)
+        like = Likelihood(sim)
+        found = search(like, Space(nominal(record.case), record.case.fitted, record.case.tolerance), progress)  # type: ignore[arg-type]
+        progress("weighing names against forces without one")
+        decided = verdict(found)
+        progress("predicting rows that were not fitted")
+        heldout = predict(found.base, decided.best)
+        effects = _effects(decided)
+        return GraphDiagnosis(
+            record=record,
+            found=found,
+            decided=decided,
+            effects=effects,
+            located=_located(found, decided),
+            parameters=_parameters(decided.best, record),
+            heldout=heldout,
+            cannot_test=tuple(sorted(_cannot(found))),
+            seconds=time.monotonic() - began,
+        )
+
+
+def _effects(decided: Verdict) -> tuple[Effect, ...]:
+    if decided.verdict not in (NAMED, AMBIGUOUS):
+        return ()
+    best = decided.best
+    spread = _spread(best)
+    out = []
+    for i, h in enumerate(best.space.hypotheses):
+        looks = tuple(
+            Rival(name.partition(":")[0], name.partition(":")[2], round(p, 4), float("nan"))
+            for name, p in decided.rivals[i]
+            if not name.startswith(f"{h.term}:")
+        )
+        out.append(Effect(h.term, h.node, min(decided.confidence[i], 0.99), _sizes(best, i, spread), looks))
+    if decided.verdict == AMBIGUOUS and len(out) == 1:
+        others = [r for r in out[0].look_alikes if r.p_value > (1.0 - SURE) / 2][:2]
+        out += [Effect(r.name, r.node, r.p_value, {}, (), f"{out[0].name}:{out[0].node}") for r in others]
+    return tuple(out)
+
+
+def _spread(f: Fitted) -> np.ndarray:
+    """Half width of the 90 % interval of each unknown."""
+    H = f.power * f.J.T @ f.J + np.diag(prior(f.space))
+    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(H)), 0.0)))
+
+
+def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
+    h, columns = f.space.hypotheses[index], f.space.columns(index)
+    x, half = f.x[columns], spread[columns]
+    values, machine = h.values(x), f.like.sim.case.machine
+    out: dict[str, Interval] = {}
+    for i, c in enumerate(h.coordinates):
+        if c.kind == SINE:
+            continue
+        name = c.name.partition("|")[0]
+        value, unit = values[name], words.unit_at(machine, h.term, h.node, name)
+        if c.kind == SHAPE:
+            low, high = value * float(np.exp(-half[i])), value * float(np.exp(half[i]))
+        elif c.kind in (SIZE, PLACE, COSINE):
+            low, high = value - c.scale * half[i], value + c.scale * half[i]
+        else:
+            low = high = value
+        out[name] = Interval(value, float(low), float(high), unit)
+    return out
+
+
+def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
+    out, spread, machine = {}, _spread(f), record.case.machine
+    for i, path in enumerate(f.space.names):
+        value = f.model.base[path]
+        low, high = sorted((value * float(np.exp(-spread[i])), value * float(np.exp(spread[i]))))
+        out[path] = Interval(value, low, high, words.value_unit(machine, path))
+    return out
+
+
+def _located(found: Found, decided: Verdict) -> Located | None:
+    if decided.verdict == NOTHING:
+        return None
+    base, best = found.base, decided.best
+    scale = base.like.least
+    c = int(np.argmax(np.sqrt(np.mean(base.e**2, axis=0)) / scale))
+    channel = found.like.sim.channels[c]
+    begin = found.like.rows[0] * found.like.sim.record.dt
+    share = float(np.clip(1.0 - np.exp(min(best.loss - base.loss, 0.0) / base.like.size), 0.0, 1.0))
+    if decided.verdict == UNNAMED:
+        free = decided.unlisted
+        if free is not None:
+            return Located(channel, free.node, free.axis, f"along the {free.axis}", begin, share)
+        return Located(channel, str(found.like.sim.body), "time", "over the whole recording", begin, share)
+    h = best.space.hypotheses[0]
+    axis = TERMS[h.term].axis
+    return Located(channel, h.node, axis, f"along the {axis}", begin, share)
+
+
+def _cannot(found: Found) -> list[str]:
+    """Hypotheses of which a typical size would not show beside the nominal parameters."""
+    norms: dict[str, float] = {}
+    for score in found.scores:
+        norms[score.hypothesis.name] = max(norms.get(score.hypothesis.name, 0.0), score.norm)
+    return [name for name, norm in norms.items() if norm < SEEN]
+
+
+__all__ = ["GraphDiagnosis", "diagnose", "diagnose_record", "evidence", "strongest"]

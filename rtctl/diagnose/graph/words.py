@@ -1,0 +1,146 @@
+"""Words of a diagnosis: each effect as its term tells it, with the names, units and sizes of the described machine."""
+
+import math
+from typing import Any
+
+from rtctl.diagnose.diagnosis import Effect
+from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.numbers import both, nice, percent
+from rtctl.diagnose.quantities import DIMENSIONS
+from rtctl.diagnose.words import BY_NODE, noun, phrase_of
+from rtctl.plants.graph.description import Description
+from rtctl.plants.physics import TERMS
+from rtctl.plants.physics.search import Turn
+
+
+def here(machine: Description, node: str) -> str:
+    """A node as part of a sentence: "the carriage"."""
+    return "the loop" if node == "loop" else f"the {node.replace('_', ' ').replace('-', ' ')}"
+
+
+def body_of(machine: Description, node: str) -> str:
+    """The body whose unit a node has; "" for none."""
+    if node in machine.bodies:
+        return node
+    if node in machine.joints:
+        return str(machine.joints[node].to)
+    for group in (machine.drives, machine.sensors):
+        element = group.get(node)
+        if element is not None:
+            if element.body is not None:
+                return str(element.body)
+            return body_of(machine, str(element.joint or element.drive))
+    return ""
+
+
+def unit_at(machine: Description, term: str, node: str, parameter: str) -> str:
+    """Unit of a term's parameter at a node; "" for a bare number."""
+    known = TERMS[term]
+    field = known.settings.model_fields.get(parameter)
+    extra = field.json_schema_extra if field is not None else None
+    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    unit = known.units.get(parameter, "") or unit or BY_NODE.get(parameter, "")
+    if unit in DIMENSIONS:
+        return DIMENSIONS[unit][not machine.turns(body_of(machine, node))]
+    if unit == "V" and node in machine.drives:
+        return machine.drives[node].unit
+    return unit
+
+
+def value_unit(machine: Description, path: str) -> str:
+    """Unit of a number of the description by its dotted path."""
+    from rtctl.plants.graph.units import BODY, GRAVITY, drive_units, joint_units
+
+    group, name, *rest = path.split(".")
+    key = rest[-1]
+    if group == "bodies" and "gravity" in rest:
+        return GRAVITY.get(key, "")
+    if group == "bodies":
+        return BODY[key][not machine.bodies[name].turns] if key in BODY else ""
+    if group == "joints":
+        joint = machine.joints[name]
+        return joint_units(machine.turns(getattr(joint, "from")), machine.turns(joint.to)).get(key, "")
+    if group == "drives":
+        drive = machine.drives[name]
+        return drive_units(drive.kind, drive.unit, machine.turns(body_of(machine, name))).get(key, "")
+    return ""
+
+
+class _Slot:
+    def __init__(self, slots: "_Slots", name: str):
+        self.slots, self.name = slots, name
+
+    def __format__(self, form: str) -> str:
+        s, name = self.slots, self.name
+        if form == "words":
+            return s.said(name)
+        value = s.value(name)
+        if "|" in form:
+            return form.split("|")[int(value < 0)]
+        if form == "%":
+            return percent(abs(value))
+        if form == "g":
+            return f"{value:.3g}"
+        if form == "+":
+            return nice(value, s.unit(name))
+        return nice(abs(value) if form == "" else value, s.unit(name), int(form or 2))
+
+
+class _Slots(dict):
+    """The numbers of an effect, by the names that its phrase uses."""
+
+    def __init__(self, machine: Description, effect: Effect, model: GraphModel):
+        super().__init__(here=here(machine, effect.node))
+        self.machine, self.effect, self.model = machine, effect, model
+        terms: list[Any] = list(model.terms)
+        self.term: Any = next((t for t in terms if (t.term, t.node) == (effect.name, effect.node)), None)
+
+    def __missing__(self, name: str) -> _Slot:
+        return _Slot(self, name)
+
+    def value(self, name: str) -> float:
+        """SI value; nan where nobody knows it."""
+        if name == "F_added":
+            name = "F_C"
+        if name in self.effect.parameters:
+            return float(self.effect.parameters[name].value)
+        found = getattr(self.term, name, math.nan)
+        return float(found) if isinstance(found, int | float) else math.nan
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter."""
+        return unit_at(self.machine, self.effect.name, self.effect.node, "F_C" if name == "F_added" else name)
+
+    def said(self, name: str) -> str:
+        """What a phrase leaves to words."""
+        phrase = phrase_of(self.effect.name)
+        if name == "sticking":
+            dry = self.model.base.get(f"bodies.{self.effect.node}.dry", 0.0)
+            start, keep = both(self.value("F_s"), dry, self.unit("F_s"))
+            return f"it needs {start} to start but {keep} to keep moving"
+        if name == "form" and phrase:
+            forms = phrase.forms
+            return forms.get(str(getattr(self.term, "form", "")), forms.get("", "")).format(command="command")
+        if name == "harmonics":
+            stem = next((p.amplitude for p in TERMS[self.effect.name].search if isinstance(p, Turn)), "")
+            found = [(f"{stem}{n}", w) for n, w in ((2, "twice"), (3, "three times")) if self.value(f"{stem}{n}") > 0]
+            again = phrase.again if phrase else ""
+            return "".join(f", {nice(self.value(k), self.unit(k))} {w}{again}" for k, w in found)
+        if name == "jumps":
+            return f"it jumps by {nice(abs(self.value('size')), self.unit('size'))}"
+        return ""
+
+
+def clause(machine: Description, effect: Effect, model: GraphModel) -> str:
+    """What an effect does and how much: "the carriage rubs: 3 N more dry friction than in the model, at any speed"."""
+    phrase = phrase_of(effect.name)
+    if phrase is None:
+        return f"{here(machine, effect.node)} shows {effect.name}"
+    slots = _Slots(machine, effect, model)
+    return f"{phrase.head.format_map(slots)}: {phrase.detail.format_map(slots)}"
+
+
+def called(machine: Description, entry: str) -> str:
+    """A hypothesis "name:node" in a few words: "dry friction at the carriage"."""
+    name, _, node = entry.partition(":")
+    return f"{noun(name)} at {here(machine, node)}" if node else noun(name)
