@@ -72,9 +72,17 @@ def prior(space: Space) -> np.ndarray:
 SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0}  # standard deviation of a size, in typical sizes
 
 
-def refit(like: Likelihood, space: Space, x: np.ndarray | None = None, rounds: int = 10) -> Fitted:
-    """The model of `space` from x, each time under the noise that it left the last time."""
+def refit(
+    like: Likelihood,
+    space: Space,
+    x: np.ndarray | None = None,
+    rounds: int = 10,
+    floor: Likelihood | None = None,
+) -> Fitted:
+    """The model of `space` from x, first under the noise `floor`, then under the noise that it left the last time."""
     x = space.start() if x is None else np.asarray(x, float)
+    if floor is not None:
+        x = fit(floor, space, x, rounds=rounds, enough=1e-2).x  # type: ignore[arg-type]
     e = like.raw(space.model(x))
     loss, own = like.loss(e), like.told(e)
     best = (loss, x, e, own)

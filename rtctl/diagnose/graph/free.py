@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from rtctl.diagnose.fit import bounded_step, parallel
 from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.measures import SMOOTH, Measures
-from rtctl.diagnose.graph.screen import _raw_jacobian
+from rtctl.diagnose.graph.screen import raw_jacobian
 from rtctl.diagnose.scales import spaced
 
 HATS = 10
@@ -38,7 +38,7 @@ class Free(NamedTuple):
 def free_forces(base: Fitted) -> list[Free]:
     """Free forces at every body along every axis, best first."""
     like, sim = base.like, base.like.sim
-    Jraw = _raw_jacobian(base)
+    Jraw = raw_jacobian(base)
     start = like.raw(base.model, True)
     measures = Measures(sim, base.model.base, {})
     out = []

@@ -28,8 +28,12 @@ class Noise(NamedTuple):
 
 
 def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
-    """Autoregression of `order` of a residual (n,), whose innovation is not below `least`."""
+    """Autoregression of `order` of a residual (n,) about its mean, whose innovation is not below `least`.
+
+    A constant is no noise: it stays in the innovations as the force that makes it.
+    """
     n = len(e)
+    e = e - e.mean()
     order = min(order, n // 20)
     f = np.fft.rfft(e, 2 * n)
     r = np.fft.irfft(np.abs(f) ** 2)[: order + 1] / n

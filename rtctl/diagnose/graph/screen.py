@@ -13,46 +13,85 @@ import numpy as np
 
 from rtctl.diagnose.fit import bounded_step, parallel
 from rtctl.diagnose.graph.fits import Fitted, prior
+from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import INVERSE, Hypothesis
 
 CLOSER = 40  # hypotheses that are judged under their own noise
 TRIES = 3
 TOO_FAR = 3.0  # times the residual: a step that changes more says little about what is missing
-STEPS = 2e-3
+RIDGE = 1e-6
 
 
 class Score(NamedTuple):
     """What a hypothesis promises."""
 
     hypothesis: Hypothesis
-    gain: float  # nats
+    gain: float  # nats, under the noise that it leaves; of the less likely ones as `power`
+    power: float  # nats, under the noise of what no hypothesis explains
     x: np.ndarray  # of the hypothesis
     norm: float  # of a typical size beside the base, in standard deviations: below 3 or so nothing is seen
 
 
-def screen(base: Fitted, candidates: list[Hypothesis]) -> list[Score]:
-    """Scores of all candidates, best first."""
+class Screened(NamedTuple):
+    """Scores, best first, and the likelihood under the noise of what no hypothesis explains."""
+
+    scores: list[Score]
+    floor: Likelihood
+
+    def promising(self, most: int) -> list[Score]:
+        """Scores in the order in which they deserve a fit: by what they gain, and by the power that they explain, in
+        turns."""
+        by_power = sorted(self.scores, key=lambda s: -s.power)
+        out: list[Score] = []
+        for one, other in zip(self.scores, by_power, strict=True):
+            out += [s for s in (one, other) if not any(s is t for t in out[-2 * most :])]
+        return out
+
+
+def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
+    """Scores of all candidates."""
     like = base.like
-    Jraw = _raw_jacobian(base)
+    Jraw = raw_jacobian(base)
     start = like.raw(base.model, True)
     changes = parallel([partial(_change, base, start, h) for h in candidates])
+    like = floor_noise(base, Jraw, [change for found in changes for change, _ in found])
     weight = prior(base.space)
     W, r = like.filtered(Jraw), like.white(base.e)
     A = W.T @ W + np.diag(weight)
     slope = W.T @ r + weight * base.x
     found = [
-        _solved(base, h, change, W, A, slope, r) for h, change in zip(candidates, changes, strict=True) if change
+        _solved(base, like, h, change, W, A, slope, r) for h, change in zip(candidates, changes, strict=True) if change
     ]
-    order = sorted(range(len(found)), key=lambda i: -found[i][0].gain)
+    order = sorted(range(len(found)), key=lambda i: -found[i][0].power)
     out = [found[i][0] for i in order[CLOSER:]]
     for i in order[:CLOSER]:
         score, dx, C = found[i]
         e = base.e + np.tensordot(Jraw, dx[: len(base.x)], axes=1) + np.tensordot(C, dx[len(base.x) :], axes=1)
         out.append(score._replace(gain=base.loss - like.loss(e)))
-    return sorted(out, key=lambda s: -s.gain)
+    return Screened(sorted(out, key=lambda s: -s.gain), like)
 
 
-def _raw_jacobian(base: Fitted) -> np.ndarray:
+def floor_noise(base: Fitted, Jraw: np.ndarray, changes: list[np.ndarray]) -> Likelihood:
+    """The likelihood with the noise of what neither a parameter nor any hypothesis explains.
+
+    A noise that is estimated under the base alone holds a large effect for noise.
+    """
+    least = base.like.least
+    columns = np.stack(changes, axis=2) if changes else np.zeros((*base.e.shape, 0))
+    own = np.linalg.norm(columns / least[:, None], axis=(0, 1))
+    columns = columns[:, :, own > 0.0]
+    M = np.concatenate([Jraw, columns], axis=2) / least[:, None]
+    M = M.reshape(-1, M.shape[2])
+    size = np.linalg.norm(M, axis=0)
+    M = M[:, size > 0.0] / size[size > 0.0]
+    e = (base.e / least).reshape(-1)
+    A = M.T @ M
+    A[np.diag_indices_from(A)] += RIDGE
+    left = (e - M @ np.linalg.solve(A, M.T @ e)).reshape(base.e.shape) * least
+    return base.like.told(left)
+
+
+def raw_jacobian(base: Fitted) -> np.ndarray:
     """Derivatives (blocks, sensors, unknowns) of the residual."""
     like, space = base.like, base.space
     start, steps, high = like.raw(base.model, True), space.steps(), space.bounds()[1]
@@ -89,12 +128,13 @@ def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.nda
 
 
 def _solved(
-    base: Fitted, h: Hypothesis, changes: list, W: np.ndarray, A: np.ndarray, slope: np.ndarray, r: np.ndarray
+    base: Fitted, like: Likelihood, h: Hypothesis, changes: list, W: np.ndarray, A: np.ndarray, slope: np.ndarray,
+    r: np.ndarray,
 ) -> tuple[Score, np.ndarray, np.ndarray]:
     """Score of a hypothesis under the noise of the base, the step of all unknowns and its raw directions."""
     n, k = len(base.x), len(changes)
     C = np.stack([change / step for change, step in changes], axis=2)
-    white = base.like.filtered(C)
+    white = like.filtered(C)
     cross = W.T @ white
     own = white.T @ white
     full = np.block([[A, cross], [cross.T, own + np.eye(k) / 9.0]])
@@ -115,4 +155,4 @@ def _solved(
         at[i] += value
     alone = np.linalg.solve(A + 1e-9 * np.diag(np.diag(A)) + 1e-300 * np.eye(n), cross) if n else cross[:0]
     norm = float(np.sqrt(max(own[0, 0] - (cross[:, 0] @ alone[:, 0] if n else 0.0), 0.0)))
-    return Score(h, float(gain), at, norm), dx, C
+    return Score(h, float(gain), float(gain), at, norm), dx, C

@@ -12,7 +12,7 @@ import numpy as np
 from rtctl.diagnose.graph.fits import Fitted, refit, with_term, without
 from rtctl.diagnose.graph.hypotheses import hints, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
-from rtctl.diagnose.graph.screen import Score, screen
+from rtctl.diagnose.graph.screen import Score, Screened, screen
 from rtctl.diagnose.space import Space
 
 MOST = 3  # effects
@@ -22,6 +22,7 @@ FIRST = 3
 LEAST = 6.0  # nats that screening must promise for a refit
 BEAM = 2
 WORTH = 3.0  # nats of evidence that a further effect must bring
+FORM = 0.05  # share of what the effects before it gained, which a further one must gain: no law is exact
 FAR = 30.0  # nats behind the best at which a combination is dropped
 
 Progress = Callable[[str], None]
@@ -51,35 +52,51 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     progress("fitting the nominal parameters")
     base = refit(like, space)
     progress("screening every hypothesis")
-    scores, odds = screened(base)
+    looked, odds = screened(base)
     known: dict[tuple[str, ...], Fitted] = {(): base}
 
     def merit(f: Fitted) -> float:
         return f.log_evidence - odds * len(f.space.hypotheses)
 
-    beam, first = [base], scores
+    beam, first = [base], looked
     for level in range(MOST):
         grown: list[Fitted] = []
         for parent in beam:
             progress(f"fitting effect {level + 1}" + (f" beside {', '.join(parent.names)}" if parent.names else ""))
             promising = first if level == 0 else screened(parent)[0]
             grown += step(like, parent, promising, known, NAMES[level])
-        better = [f for f in grown if merit(f) > merit(_parent(f, beam)) + WORTH]
+        better = [f for f in grown if adds(base, _parent(f, beam), f, merit)]
         if not better:
             break
         better.sort(key=merit, reverse=True)
         beam = [f for f in better if merit(f) > merit(better[0]) - FAR][:BEAM]
     progress("exchanging each effect")
-    best = max(known.values(), key=merit)
+    best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
     for index in range(len(best.space.hypotheses)):
         rest = refit(like, *without(best, index)) if len(best.names) > 1 else base
         known.setdefault(key(rest), rest)
         if len(best.names) > 1:
             step(like, rest, screened(rest)[0], known, NAMES[-1])
-    return Found(like, base, tuple(scores), tuple(sorted(known.values(), key=merit, reverse=True)), odds)
+    standing = [f for f in known.values() if stands(base, f, known, merit)]
+    return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
 
 
-def screened(parent: Fitted) -> tuple[list[Score], float]:
+def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], float]) -> bool:
+    """Whether a further effect is worth its numbers, and more than what the form of the others leaves."""
+    return merit(more) > merit(fewer) + WORTH and fewer.loss - more.loss > FORM * (base.loss - fewer.loss)
+
+
+def stands(
+    base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]
+) -> bool:
+    """Whether every effect of a combination adds to the combination without it, as far as that was fitted."""
+    if len(f.names) < 2:
+        return True
+    rest = (tuple(sorted(set(f.names) - {name})) for name in f.names)
+    return all(adds(base, known[names], f, merit) for names in rest if names in known)
+
+
+def screened(parent: Fitted) -> tuple[Screened, float]:
     """Scores beside a model, and the prior odds of one of them."""
     sim = parent.like.sim
     model = parent.model
@@ -93,12 +110,12 @@ def screened(parent: Fitted) -> tuple[list[Score], float]:
 
 
 def step(
-    like: Likelihood, parent: Fitted, scores: list[Score], known: dict[tuple[str, ...], Fitted], most: int
+    like: Likelihood, parent: Fitted, looked: Screened, known: dict[tuple[str, ...], Fitted], most: int
 ) -> list[Fitted]:
     """Refits of a model with each of the most promising hypotheses beside it."""
     top: dict[str, list[Score]] = {}
-    for score in scores:
-        if score.gain > LEAST and (len(top) < most or score.hypothesis.name in top):
+    for score in looked.promising(most):
+        if max(score.gain, score.power) > LEAST and (len(top) < most or score.hypothesis.name in top):
             top.setdefault(score.hypothesis.name, []).append(score)
     out = []
     for rank, chosen in enumerate(top.values()):
@@ -106,7 +123,7 @@ def step(
             out.append(known[tuple(sorted((*parent.names, chosen[0].hypothesis.name)))])
             continue
         starts = chosen[: STARTS if rank < FIRST else 1]
-        fits = [refit(like, *with_term(parent, s.hypothesis, s.x)) for s in starts]
+        fits = [refit(like, *with_term(parent, s.hypothesis, s.x), floor=looked.floor) for s in starts]
         best = max(fits, key=lambda f: f.log_evidence)
         known[key(best)] = best
         out.append(best)

@@ -11,6 +11,7 @@ from rtctl.diagnose.graph.search import WORTH, Found
 
 SURE = 0.9  # probability from which a name is given
 FORM = 0.12  # share of what a name explains that a free force may explain beside it: no law is exact
+HARDLY = 0.05  # the same, below which it is the noise that is not what it is taken for
 MOSTLY = 0.7  # share of the residual's power above the noise that a name has to take off
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 UNLISTED = 3.0  # nats: prior odds against a force that has no name
@@ -38,7 +39,7 @@ def verdict(found: Found) -> Verdict:
         sorted(((f.names, float(w)) for f, w in zip(found.fits, weights, strict=True)), key=lambda p: -p[1])
     )
     top = strongest(base, free)
-    if not best.names:
+    if not best.names or explained(base, best) < HARDLY:
         if top is not None and evidence(base, top) - UNLISTED > WORTH:
             return Verdict(UNNAMED, base, (), (), ranked, top, f"a force at {top.node} by {top.axis} has no name")
         return Verdict(NOTHING, base, (), (), ranked, top, "no effect is worth its numbers")
