@@ -20,8 +20,8 @@ from rtctl.plants.physics import (
     timing,
     transmission,
 )
-from rtctl.plants.physics.nodes import by_kind, elements, having, met, nodes, standing
 from rtctl.plants.physics.place import Place, place
+from rtctl.plants.physics.placement import by_kind, elements, having, met, nodes, standing
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Term
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from rtctl.idiom import Settings, interpreted
 from rtctl.plants import linear
-from rtctl.plants.physics.nodes import by_kind
 from rtctl.plants.physics.place import PLANTS, place
+from rtctl.plants.physics.placement import by_kind
 from rtctl.plants.physics.term import SITES, Term
 
 ROWS = 600

@@ -51,7 +51,7 @@ class Term:
     settings: type[Settings]
     build: Callable[[Any, float], Any]
     act: dict[str, str]  # site, or site:kind for one kind of plant -> line
-    stands: tuple[Stand, ...]  # elements at which it can stand; see plants/physics/nodes.py
+    stands: tuple[Stand, ...]  # elements at which it can stand; see plants/physics/placement.py
     look_alikes: dict[str, str]  # rival name -> the experiment that separates the two
     typical: dict[str, tuple[float, float]] = field(default_factory=dict)  # parameter -> range; see `scale`
     scale: dict[str, str] = field(default_factory=dict)  # parameter -> what its typical range is a multiple of

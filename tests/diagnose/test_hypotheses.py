@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.forms import EXTRAS
-from rtctl.diagnose.hypotheses import HINTED, SEARCH, At, Choice, Turn, hypotheses
+from rtctl.diagnose.hypotheses import hinted, hypotheses
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import SHAPE
-from rtctl.plants.physics import TERMS
-from rtctl.plants.physics.sensor import READINGS, missed_counts
+from rtctl.plants.physics import TERMS, nodes
+from rtctl.plants.physics.search import At, Choice, Turn
+from rtctl.plants.physics.sensor import missed_counts
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
+SEARCH = {name: term.search for name, term in TERMS.items() if term.search and term.offered}
+HINTED = {name for name in SEARCH if hinted(name)}
 HINTS = {
     "order": [2.0, 7.0], "wavelength": [0.01, 0.08], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
     "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
@@ -29,7 +31,7 @@ def names(parts):
 @pytest.mark.parametrize("term", SEARCH)
 def test_the_search_walks_along_settings_that_the_term_has(term):
     fields = TERMS[term].settings.model_fields
-    for name in names((*SEARCH[term], *EXTRAS.get(term, ()))):
+    for name in names((*SEARCH[term], *TERMS[term].richer, *TERMS[term].sliding)):
         assert name in fields, f"{term} has no {name}"
     given = set(names(SEARCH[term]))
     needed = {name for name, info in fields.items() if info.is_required() and name != "node"}
@@ -41,8 +43,8 @@ def test_every_one_stands_where_its_term_can_and_all_are_there(moved, kind):
     record, base = moved(kind)
     found = hypotheses(record, base, HINTS)
     for h in found:
-        assert h.node in TERMS[h.term].nodes[kind]
-    wanted = {name for name in SEARCH if TERMS[name].nodes.get(kind)}
+        assert h.node in nodes(TERMS[h.term], kind)
+    wanted = {name for name in SEARCH if nodes(TERMS[name], kind)}
     if kind == "axis":  # this one slides, and it has one sensor, which would have to disagree with itself
         wanted -= {"load.imbalance", "sensor.scale", "sensor.rectified", "guide.dirt"}
     assert wanted == {h.term for h in found}
@@ -94,8 +96,8 @@ def test_starts_of_a_shape_are_shares_of_what_the_node_does(moved):
 def test_without_hints_nothing_that_needs_one_is_asked(moved):
     record, base = moved("axis")
     asked = {h.term for h in hypotheses(record, base)}
-    assert {"sensor.missed_counts", "guide.dirt"} <= set(HINTED)
-    assert not asked & set(HINTED) - {"load.bump"}  # which has starts of its own besides
+    assert {"sensor.missed_counts", "guide.dirt"} <= HINTED
+    assert not asked & HINTED - {"load.bump"}  # which has starts of its own besides
 
 
 def test_jumps_of_a_sensor_are_one_hypothesis_with_one_size(moved):
@@ -110,7 +112,7 @@ def test_jumps_of_a_sensor_are_one_hypothesis_with_one_size(moved):
 @pytest.mark.parametrize("plant", ["axis", "ivu", "ldu"])
 def test_the_tick_that_sees_a_jump_first_sees_all_of_it(moved, plant):
     record, base = moved(plant)
-    sensor = READINGS[plant][0]
+    sensor = nodes(TERMS["sensor.scale"], plant)[0]
     told = {f"jump:{sensor}": [(40 * record.dt, 2e-3), (90 * record.dt, -1e-3)]}
     (h,) = hypotheses(record, base, told, only=("sensor.missed_counts",))
     term = TERMS["sensor.missed_counts"]

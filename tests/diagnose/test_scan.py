@@ -63,7 +63,7 @@ def recorded(empty, true):
 def test_reels_are_looked_at_beside_their_motors(kind, nodes, monkeypatch):
     """A heavy part on a reel rings at a frequency that the first look does not meet, and on its motor explains little.
     The nodes of the linear drive move as one."""
-    looked = [SimpleNamespace(hypothesis=SimpleNamespace(term=TERM, node=node)) for node in TERMS[TERM].nodes[kind]]
+    looked = [SimpleNamespace(hypothesis=SimpleNamespace(term=TERM, node=node)) for node in nodes(TERMS[TERM], kind)]
     problem = SimpleNamespace(sim=SimpleNamespace(record=SimpleNamespace(plant=kind)))
     tried = []
     monkeypatch.setattr(scan, "_tried", lambda problem, base, h: tried.append(h.node) or [])
