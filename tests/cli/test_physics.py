@@ -4,7 +4,7 @@ import sys
 import numpy as np
 import pytest
 
-from rtctl.plants.physics import TERMS, by_kind
+from rtctl.plants.physics import TERMS, anywhere, by_kind
 from rtctl.plants.physics.portrait import Curve
 
 
@@ -14,7 +14,7 @@ def quick(monkeypatch):
 
     def draw(term):
         x = np.linspace(0.0, 1.0, 200)
-        kind, nodes = next(iter(by_kind(term).items()))
+        kind, nodes = next(iter(anywhere(term).items()))
         settings = term.settings.model_construct(term=term.name, node=nodes[0])
         return Curve(x, np.sin(9 * x), 0 * x, "speed, m/s", "drag, N", settings, kind)
 
