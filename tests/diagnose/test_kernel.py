@@ -8,7 +8,7 @@ import pytest
 from rtctl.diagnose import kernel
 from rtctl.idiom import record_dtype
 from rtctl.plants import axis
-from rtctl.plants.physics import TERMS, by_kind, nodes
+from rtctl.plants.physics import TERMS, anywhere, nodes
 from rtctl.plants.physics.term import SITES
 
 PLANTS = ("ivu", "ldu", "axis")
@@ -66,7 +66,7 @@ def test_no_placeholder_is_left_in_the_text(kind):
 @pytest.mark.parametrize("term", TERMS.values(), ids=lambda t: t.name)
 def test_sample_params_have_the_layout_of_any_other(term):
     """A slot is laid out from a sample: a term whose layout hangs on its values would not fit in it."""
-    given = {"node": next(iter(by_kind(term).values()))[-1]}
+    given = {"node": next(iter(anywhere(term).values()))[-1]}
     for name, info in term.settings.model_fields.items():
         if info.is_required() and name != "node":
             given[name] = kernel._inside(info)
