@@ -6,7 +6,7 @@ from rtctl.config.load import load_settings, set_path
 from rtctl.config.yaml_file import find
 from rtctl.diagnose.conceal import TYPICAL, conceal, nodes, sized
 from rtctl.diagnose.ordinary import measure
-from rtctl.plants.physics import TERMS, having
+from rtctl.plants.physics import TERMS, anywhere, having
 from rtctl.plants.physics import nodes as where
 
 KINDS = ("ivu", "ldu", "axis")
@@ -71,7 +71,7 @@ def test_the_tables_speak_of_what_there_is(config):
         assert set(term.draws) | set(term.chosen) <= set(term.settings.model_fields)
         for span in term.draws.values():
             assert 0 <= span.low <= span.high
-            if where(term, config.machine):
-                assert measure(span.measure, where(term, config.machine)[0], config) > 0
+            if there := anywhere(term).get(config.machine):
+                assert measure(span.measure, there[0], config) > 0
     for term in (term for term in TERMS.values() if term.tabled):
         assert all(term.scale.get(key, "") in TYPICAL for key in term.typical if key not in term.draws)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.hypotheses import hinted, hypotheses
+from rtctl.diagnose.hypotheses import hinted, hypotheses, starts_of
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import SHAPE
-from rtctl.plants.physics import TERMS, met, nodes
+from rtctl.diagnose.yardstick import Measures
+from rtctl.plants.physics import TERMS, anywhere, by_kind, met, nodes
 from rtctl.plants.physics.search import At, Choice, Turn
 from rtctl.plants.physics.sensor import missed_counts
 
@@ -250,3 +251,22 @@ def test_less_lateness_than_the_owner_s_bandwidth_may_be_off_by_is_no_effect(mov
     for h in hypotheses(record, base, only=[term]):
         (size,) = h.coordinates
         assert size.slight * size.scale == pytest.approx(0.15 * record.case.drive.late)
+
+
+@pytest.mark.parametrize("name", [name for name, term in TERMS.items() if not by_kind(term)])
+def test_a_term_of_described_machines_has_starts(moved, name):
+    """Its measures are there, and its sizes are within its settings' bounds."""
+    record, base = moved("axis")
+    measures = Measures(record, base, node_scales(record, base), {"order": [6.0]})
+    node = anywhere(TERMS[name])["axis"][0] if "axis" in anywhere(TERMS[name]) else "carriage"
+    for parts in filter(None, (TERMS[name].search, TERMS[name].sliding, TERMS[name].richer)):
+        found = starts_of(name, node, parts, measures)
+        assert found
+        for h in found:
+            x = h.start()
+            x[h.sizes] = 0.5
+            assert all(np.isfinite(value) for value in h.values(x).values())
+    plain = starts_of(name, node, TERMS[name].search, measures)[0]
+    x = plain.start()
+    x[plain.sizes] = 0.5
+    TERMS[name].settings(**plain.settings(x).model_dump())

@@ -68,6 +68,15 @@ def test_the_first_stand_that_fits_counts():
     assert standing(TERMS["guide.dirt"], "ldu", "scale")[0].again
 
 
+def test_what_described_machines_are_asked_about_no_plant_is():
+    drag, fan = TERMS["friction.quadratic"], (element("fan", "body", "turns general"),)
+    assert standing(drag, fan, "fan")[0].offered
+    assert not any(standing(drag, kind, node)[0].offered for kind, there in by_kind(drag).items() for node in there)
+    assert {name for name, term in TERMS.items() if not by_kind(term) and nodes(term, fan)} == {
+        "friction.position", "load.gravity", "load.inertia"
+    }  # fmt: skip
+
+
 def test_elements_by_trait():
     assert having("ivu", "body", "reel") == ("reel1", "reel2")
     assert met((stand("sensor"), stand("body", "capstan")), "ldu") == ("encoder", "scale", "capstan")
