@@ -53,6 +53,9 @@ TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
     },
     "loop": {},
 }
+GENERAL = "general"  # trait of any element but a loop: described by what it is alone, so that no effect is left out
+for _kind in ("body", "joint", "drive", "sensor"):
+    TRAITS[_kind][GENERAL] = "described by what it is alone: no effect is left out for what is known of the machine"
 KINDS = tuple(TRAITS)
 NONE: frozenset[str] = frozenset()
 
@@ -72,6 +75,7 @@ class Stand(NamedTuple):
     needs: frozenset[str] = NONE
     usual: bool = True  # the typical sizes of the effect are those of a place like this
     again: bool = False  # the effect does here what it does at another node already: a search leaves it out
+    offered: bool = True  # every record is asked about it; else only where another name may stand for it
 
 
 LOOP = Element("loop", "loop")
@@ -82,9 +86,9 @@ def element(node: str, kind: str, traits: str = "") -> Element:
     return Element(node, kind, _traits(kind, traits))
 
 
-def stand(kind: str, needs: str = "", *, usual: bool = True, again: bool = False) -> Stand:
+def stand(kind: str, needs: str = "", *, usual: bool = True, again: bool = False, offered: bool = True) -> Stand:
     """Stand with the traits that it needs as words. Raises ValueError for a kind or a trait that there is not."""
-    return Stand(kind, _traits(kind, needs), usual, again)
+    return Stand(kind, _traits(kind, needs), usual, again, offered)
 
 
 def _traits(kind: str, words: str) -> frozenset[str]:

@@ -1,42 +1,34 @@
-"""Terms of physics, one file a family. Emulator, fit and diagnosis all use these and no others."""
+"""Terms of physics: every module here that is no tool holds one or a family. Emulator, fit and diagnosis use these.
+
+A term acts after those of a lower `order`: what asymmetry scales and presliding replaces must be there before, and so
+must all that stretches, lets go or slackens a spring, before anything rubs by its tension.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
 
 from rtctl.plants.element import Element, Stand, element, stand
-from rtctl.plants.physics import (
-    contact,
-    drive,
-    drive_dynamics,
-    friction,
-    friction_direction,
-    friction_load,
-    geometry,
-    guide,
-    load,
-    presliding,
-    ripple,
-    ripple_tape,
-    sensor,
-    structure,
-    tape,
-    timing,
-    transmission,
-)
-from rtctl.plants.physics.nodes import by_kind, elements, having, met, nodes, standing
 from rtctl.plants.physics.place import Place, place
+from rtctl.plants.physics.placement import anywhere, by_kind, elements, having, met, nodes, standing
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Term
 
-FAMILIES = (  # in the order in which they act: what asymmetry scales and presliding replaces must be there before, and
-    # so must all that stretches, lets go or slackens a spring, before anything rubs by its tension
-    timing, drive, drive_dynamics, ripple_tape, geometry, transmission, contact, structure, tape, friction,
-    friction_load, load, friction_direction, presliding, ripple, guide, sensor,
-)  # fmt: skip
-TERMS: dict[str, Term] = {
-    term.name: term for family in FAMILIES for term in vars(family).values() if isinstance(term, Term)
-}
+TOOLS = {"placement", "place", "portrait", "search", "story", "term"}  # modules that hold no term
+
+
+def _library() -> dict[str, Term]:
+    """Terms of all the modules beside this one, in the order in which they act."""
+    found = []
+    for module in sorted({info.name for info in iter_modules(__path__)} - TOOLS):
+        found += [t for t in vars(import_module(f"{__name__}.{module}")).values() if isinstance(t, Term)]
+    return {term.name: term for term in sorted(found, key=lambda term: term.order)}
+
+
+TERMS = _library()
 
 __all__ = [
-    "TERMS", "Draw", "Element", "Needs", "Phrase", "Place", "Stand", "Term", "by_kind", "element", "elements", "having",
-    "met", "nodes", "only", "ordered", "place", "stand", "standing",
+    "TERMS", "Draw", "Element", "Needs", "Phrase", "Place", "Stand", "Term", "anywhere", "by_kind", "element",
+    "elements", "having", "met", "nodes", "only", "ordered", "place", "stand", "standing",
 ]  # fmt: skip
 
 

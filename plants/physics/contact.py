@@ -183,6 +183,7 @@ SLIP = Term(
     typical={"F_max": (0.5, 0.9)},
     scale={"F_max": "contact"},
     axis="tension",
+    order=70,
     state=CONTACT_STATE,
     phrase=Phrase(
         noun="slip",
@@ -226,6 +227,8 @@ CREEP = Term(
     },
     typical={"kappa": (1e-3, 0.5)},
     axis="tension",
+    shown="taut",
+    order=70,
     state=CONTACT_STATE,
     phrase=Phrase(
         noun="creep",

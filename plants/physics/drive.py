@@ -160,15 +160,19 @@ def saturation(p, s, u):
     elif a > low:
         a -= 0.5 * (a - low) ** 2 / (high - low)
     target = math.copysign(a, u)
-    if p.step == 0.0:
-        return target
-    ahead = target - s.u
-    if abs(ahead) > p.step:
-        move = math.copysign(p.step, ahead)
+    return ramp(s, target, p.step) if p.step > 0.0 else target
+
+
+@tick
+def ramp(s, u, step):
+    """Mean of what goes to `u` volts by no more than `step` in a substep."""
+    ahead = u - s.u
+    if abs(ahead) > step:
+        move = math.copysign(step, ahead)
         s.u += move
         return s.u - 0.5 * move
-    s.u = target
-    return target - 0.5 * ahead * abs(ahead) / p.step
+    s.u = u
+    return u - 0.5 * ahead * abs(ahead) / step
 
 
 class SupplySagSettings(Settings):
@@ -233,6 +237,7 @@ OFFSET = Term(
     },
     typical={"offset": (0.02, 0.2)},
     axis="command",
+    order=20,
     passive=False,
     phrase=Phrase(
         noun="an offset",
@@ -263,6 +268,7 @@ DEADBAND = Term(
     },
     typical={"band": (0.02, 0.2)},
     axis="command",
+    order=20,
     phrase=Phrase(
         noun="a dead zone",
         head="{here} has a dead zone",
@@ -295,6 +301,7 @@ GAIN_ASYMMETRY = Term(
     },
     typical={"a": (0.03, 0.2)},
     axis="command",
+    order=20,
     passive=False,
     phrase=Phrase(
         noun="unequal gain",
@@ -327,6 +334,7 @@ SATURATION = Term(
     typical={"limit": (0.3, 0.9)},
     scale={"limit": "largest command"},
     axis="command",
+    order=20,
     state=SATURATION_STATE,
     phrase=Phrase(
         noun="a lower limit",
@@ -359,6 +367,7 @@ SUPPLY_SAG = Term(
     },
     typical={"k": (0.01, 0.08)},
     axis="command",
+    order=20,
     state=SUPPLY_SAG_STATE,
     phrase=Phrase(
         noun="a weak supply",

@@ -157,6 +157,7 @@ LAG = Term(
     typical={"tau": (0.3, 3.0)},
     scale={"tau": "sample period"},
     axis="frequency",
+    order=30,
     state=LAG_STATE,
     phrase=Phrase(
         noun="a lag",
@@ -194,6 +195,7 @@ THERMAL = Term(
     },
     typical={"a": (0.05, 0.4)},
     axis="time",
+    order=30,
     passive=False,
     state=THERMAL_STATE,
     phrase=Phrase(

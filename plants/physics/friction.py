@@ -1,6 +1,7 @@
 """Friction: what resists motion at a node, dry (up to a limit, opposing) or viscous (in proportion to speed).
 
-Drag by the square of speed has no name in the exchange format: it is here so that viscous friction is not named for it.
+Drag by the square of speed has no name in the first exchange format: there it is only looked for so that viscous
+friction is not named for it.
 
 Dry terms add to the limit of the node's dry friction and the solver finds the force, so that a node that sticks
 stands still; a sum of limits below zero counts as none. Viscous terms add a force. Sizes may be negative where the
@@ -156,6 +157,7 @@ COULOMB = Term(
         "drive.deadband": "push slowly both ways at standstill under a spring: the dead band shows in u, not in force",
     },
     typical={"F_C": (0.3, 1.0)},
+    order=100,
     scale={"F_C": "dry"},
     phrase=Phrase(
         noun="dry friction",
@@ -184,6 +186,7 @@ VISCOUS = Term(
         "drive.supply_sag": "load the other motor at constant speed: sag changes the gain, grease does not",
     },
     typical={"B": (0.1, 0.5)},
+    order=100,
     scale={"B": "force/speed"},
     phrase=Phrase(
         noun="viscous friction",
@@ -206,14 +209,15 @@ QUADRATIC = Term(
     settings=QuadraticSettings,
     build=build_quadratic,
     act={"force": "{m}.f[{i}] += {r} * friction.quadratic({p}, {r} * {m}.vm[{i}])"},
-    stands=(stand("body"),),
+    stands=(stand("body", "general"), stand("body", offered=False)),
     look_alikes={
         "friction.viscous": "constant speeds over a decade: viscous friction only doubles with speed",
         "friction.stribeck": "constant speeds from crawl to full: sticking falls at the start, this drag grows",
     },
     typical={"Q": (0.2, 1.0)},
+    order=100,
     scale={"Q": "force/speed^2"},
-    tabled=False,
+    since=2,
     phrase=Phrase(
         noun="drag by the square of speed",
         head="{here} drags by the square of its speed",
@@ -222,7 +226,6 @@ QUADRATIC = Term(
     ),
     check="Look for a fan, a cover or an open wheel that moves air or oil.",
     search=(Size("Q", "drag2", 0.1),),
-    offered=False,
     imitated=("friction.viscous", "friction.stribeck", "friction.coulomb", "drive.supply_sag"),
     static=True,
 )
@@ -242,6 +245,7 @@ STRIBECK = Term(
         "drive.deadband": "break away against a spring: sticking shows in force, the dead band in the command only",
     },
     typical={"F_s": (1.1, 2.0), "v_s": (0.02, 0.3)},
+    order=100,
     scale={"F_s": "dry", "v_s": "speed"},
     phrase=Phrase(
         noun="sticking",

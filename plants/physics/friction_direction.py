@@ -64,6 +64,7 @@ ASYMMETRY = Term(
         "friction.coulomb": "one constant speed both ways: the difference of the two forces is the asymmetry",
     },
     typical={"a": (0.1, 0.3), "B_a": (0.02, 0.1)},
+    order=130,
     scale={"B_a": "force/speed"},
     phrase=Phrase(
         noun="uneven friction",

@@ -86,6 +86,7 @@ LOAD = Term(
     },
     typical={"mu": (0.05, 0.3)},
     axis="tension",
+    order=110,
     phrase=Phrase(
         noun="friction from load",
         head="{here} drags by its load",

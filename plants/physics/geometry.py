@@ -125,6 +125,8 @@ RADIUS_CHANGE = Term(
     },
     typical={"d": (1e-4, 1e-3)},
     axis="position",
+    shown="turn",
+    order=50,
     phrase=Phrase(
         noun="a changing radius",
         head="{here} changes its radius",

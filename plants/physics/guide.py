@@ -145,6 +145,7 @@ THICKNESS = Term(
     },
     typical={"A": (2e-6, 5e-4), "wavelength": (0.02, 0.3)},
     axis="position",
+    order=160,
     phrase=Phrase(
         noun="uneven thickness",
         head="the guide at {here} is uneven",
@@ -179,6 +180,7 @@ STRIP = Term(
     },
     typical={"longer": (1e-6, 1e-4), "wavelength": (0.05, 0.3)},
     axis="position",
+    order=160,
     phrase=Phrase(
         noun="a wavy strip",
         head="the strip at {here} is wavy",
@@ -210,6 +212,7 @@ DIRT = Term(
     },
     typical={"A": (5e-6, 5e-5), "width": (5e-4, 5e-3)},
     axis="position",
+    order=160,
     phrase=Phrase(
         noun="dirt on the strip",
         head="there is dirt on the strip at {here}",

@@ -13,8 +13,8 @@ import numpy as np
 
 from rtctl.idiom import Settings, interpreted
 from rtctl.plants import linear
-from rtctl.plants.physics.nodes import by_kind
 from rtctl.plants.physics.place import PLANTS, place
+from rtctl.plants.physics.placement import anywhere
 from rtctl.plants.physics.term import SITES, Term
 
 ROWS = 600
@@ -34,14 +34,11 @@ MOTIONS = {  # by the term's axis
     "velocity": "speeds", "position": "to and fro", "angle": "turn", "command": "commands", "time": "wait",
     "frequency": "step", "tension": "pull",
 }  # fmt: skip
-OWN = {  # terms that show themselves better under another one
-    "transmission.backlash": "to and fro", "sensor.rectified": "to and fro", "transmission.creep": "taut",
-    "geometry.radius_change": "turn", "load.bump": "past",
-}  # fmt: skip
 SPAN = {  # how far a sweep goes, by the parameter that the shape hangs on
     "v_s": 4.0, "z_s": 6.0, "z_h": 4.0, "gap": 2.0, "offset": 3.0, "band": 3.0, "limit": 1.6, "wavelength": 1.25,
     "width": 4.0, "extra": 3.0, "tau": 5.0, "F_max": 2.0,
 }  # fmt: skip
+DRIVEN = ", driven"  # after a motion: under volts that are held
 CHANGES = "volts", "read", "pull", "dry", "force"  # in this order: the first that a term changes is what it shows
 
 TEXT = '''
@@ -111,7 +108,7 @@ class Hand(NamedTuple):
 def portrait(term: Term) -> Curve:
     """The curve of a term at a typical size, at the first node of the plant that shows its axis best."""
     order = ("ivu", *ORDER) if term.axis in IVU_FIRST else ORDER
-    where = by_kind(term)
+    where = anywhere(term)
     kind = next(k for k in order if k in where)
     return curve(term, typical(term, kind, where[kind][0]), kind)
 
@@ -136,8 +133,10 @@ def typical(term: Term, kind: str, node: str) -> Settings:
 
 def curve(term: Term, settings: Any, kind: str) -> Curve:
     """Move the stand as the term's axis asks for, and read off what the term makes of it."""
-    motion = OWN.get(term.name, MOTIONS[term.axis])
+    driven = term.shown.endswith(DRIVEN)
+    motion = term.shown.removesuffix(DRIVEN) or MOTIONS[term.axis]
     hand = motions(motion, settings, SCALES[kind])
+    hand = hand._replace(volts=hand.volts + STILL) if driven else hand
     spot, link = place(kind, settings.node), place(kind, settings.node).link
     if settings.node == "capstan" and kind == "ivu":
         link = 1
@@ -163,7 +162,7 @@ def curve(term: Term, settings: Any, kind: str) -> Curve:
         "dry": f"drag, {push}",
     }
     y_words = f"drag, {push}" if term.name.startswith("friction.") else words.get(shown, f"force, {push}")
-    if shown == "read" and term.name not in OWN:
+    if shown == "read" and not term.shown:
         y, without, y_words = y - without, 0.0 * y, f"reading off by, {way}"
     x, x_words = {
         "speeds": (hand.v, f"speed, {way}/s"), "commands": (hand.volts, "command, V"), "wait": (hand.t, "time, s"),

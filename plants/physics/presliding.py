@@ -135,6 +135,7 @@ PRESLIDING = Term(
     typical={"z_s": (0.01, 0.1)},
     scale={"z_s": "travel"},
     axis="position",
+    order=140,
     state=PRESLIDING_STATE,
     phrase=Phrase(
         noun="a spring before breakaway",

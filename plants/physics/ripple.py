@@ -124,6 +124,7 @@ COGGING = Term(
     typical={"A": (0.02, 0.3), "per_turn": (3, 48)},
     scale={"A": "force"},
     axis="angle",
+    order=150,
     phrase=Phrase(
         noun="cogging",
         head="{here} is notchy",
@@ -168,6 +169,7 @@ ENCODER = Term(
     },
     typical={"A": (3e-4, 1e-2)},
     axis="angle",
+    order=150,
     phrase=Phrase(
         noun="a disc off centre",
         head="the disc of {here} is off centre",

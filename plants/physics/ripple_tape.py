@@ -139,6 +139,7 @@ REEL = Term(
     },
     typical={"e": (5e-5, 5e-4)},
     axis="angle",
+    order=40,
     phrase=Phrase(
         noun="a reel off centre",
         head="{here} is off centre",
@@ -175,6 +176,7 @@ CAPSTAN = Term(
     },
     typical={"a": (2e-6, 2e-4)},
     axis="angle",
+    order=40,
     phrase=Phrase(
         noun="a capstan out of round",
         head="{here} is out of round",

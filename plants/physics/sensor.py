@@ -187,6 +187,7 @@ MISSED_COUNTS = Term(
     },
     typical={"size": (3e-3, 6e-2)},
     axis="time",
+    order=170,
     state=MISSED_COUNTS_STATE,
     phrase=Phrase(
         noun="lost counts",
@@ -222,6 +223,8 @@ RECTIFIED = Term(
     },
     typical={"share": (0.5, 1.0)},
     axis="velocity",
+    shown="to and fro",
+    order=170,
     state=RECTIFIED_STATE,
     phrase=Phrase(
         noun="a sensor without direction",
@@ -262,6 +265,7 @@ SCALE = Term(
     },
     typical={"relative": (1e-4, 5e-3)},
     axis="position",
+    order=170,
     phrase=Phrase(
         noun="a wrong factor",
         head="{here} has a wrong factor",

@@ -120,6 +120,7 @@ VISCOELASTIC = Term(
     typical={"c_branch": (0.3, 1.5), "tau": (0.01, 1.0)},
     scale={"c_branch": "stiffness"},
     axis="frequency",
+    order=90,
     state=VISCOELASTIC_STATE,
     phrase=Phrase(
         noun="slow give",
@@ -149,6 +150,7 @@ SLACK = Term(
         "transmission.slip": "the same moves at a higher tension: slack goes, slip goes too but leaves a lost way",
     },
     axis="tension",
+    order=90,
     phrase=Phrase(
         noun="slack",
         head="{here} goes slack",

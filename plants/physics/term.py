@@ -51,14 +51,16 @@ class Term:
     settings: type[Settings]
     build: Callable[[Any, float], Any]
     act: dict[str, str]  # site, or site:kind for one kind of plant -> line
-    stands: tuple[Stand, ...]  # elements at which it can stand; see plants/physics/nodes.py
+    stands: tuple[Stand, ...]  # elements at which it can stand; see plants/physics/placement.py
     look_alikes: dict[str, str]  # rival name -> the experiment that separates the two
     typical: dict[str, tuple[float, float]] = field(default_factory=dict)  # parameter -> range; see `scale`
     scale: dict[str, str] = field(default_factory=dict)  # parameter -> what its typical range is a multiple of
     axis: str = "velocity"  # where the effect shows: time, velocity, position, angle, command, tension, frequency
     passive: bool = True  # never feeds energy in
     moves: bool = False  # its reading line is where the carriage stands, not an error of a sensor
-    tabled: bool = True  # the exchange format has its name
+    since: int = 1  # first exchange format that has its name; 0: none has
+    order: int = 0  # in which terms act, the lowest first: what stretches or lets go a spring before what rubs
+    shown: str = ""  # motion of its portrait, where that of `axis` shows less (portrait.py)
     state: np.dtype | None = None
 
     # how it is spoken of
@@ -74,7 +76,6 @@ class Term:
     needs: Needs = NOTHING
     search: tuple[Part, ...] = ()  # of the plain form; without it the first of `typical` is the size
     sliding: tuple[Part, ...] = ()  # the same where its node slides, if that is another
-    offered: bool = True  # among the hypotheses; else only looked for in the place of those that imitate it
     imitated: tuple[str, ...] = ()  # names that a fit takes for it
     richer: tuple[Part, ...] = ()  # further parameters, tried once the plain form stands
     richer_at: str = ""  # kind of element at which it has its richer form; all of them without it
@@ -100,6 +101,15 @@ class Term:
     # how large one is hidden by `plant --conceal`
     draws: Mapping[str, Draw] = field(default_factory=dict)  # ranges in place of the typical ones
     chosen: Mapping[str, tuple] = field(default_factory=dict)  # settings that are chosen rather than sized
+
+    @property
+    def tabled(self) -> bool:
+        """Whether the first exchange format has its name."""
+        return self.in_format(1)
+
+    def in_format(self, number: int) -> bool:
+        """Whether an exchange format has its name."""
+        return 0 < self.since <= number
 
     def act_at(self, site: str, kind: str) -> str | None:
         """Its line at a site of a plant, None where it does nothing there."""

@@ -133,6 +133,8 @@ BACKLASH = Term(
     },
     typical={"gap": (2e-4, 4e-3)},
     axis="velocity",
+    shown="to and fro",
+    order=60,
     state=BACKLASH_STATE,
     phrase=Phrase(
         noun="play",

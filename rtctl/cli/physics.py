@@ -81,6 +81,7 @@ def speaks_braille() -> bool:
 
 def explain(term: Any) -> list[str]:
     """Lines about one term."""
+    from rtctl.plants.element import GENERAL
     from rtctl.plants.physics import by_kind
 
     lines = [
@@ -98,6 +99,10 @@ def explain(term: Any) -> list[str]:
     lines += ["", "  nodes"]
     for plant, nodes in by_kind(term).items():
         lines += _item(plant, ", ".join(nodes))
+    for stand in term.stands:
+        if GENERAL in stand.needs:
+            asked = " ".join(sorted(stand.needs - {GENERAL}))
+            lines += _item("described machines", f"each {stand.element}{f' with the traits: {asked}' if asked else ''}")
     if term.look_alikes:
         lines += ["", "  mistaken for, and the experiment that tells them apart"]
         for rival, experiment in term.look_alikes.items():

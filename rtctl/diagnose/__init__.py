@@ -11,7 +11,7 @@
     what is asked     hypotheses, yardstick (sizes to begin with), forms (richer ones), scan (closer looks), turn
     the search        screen, name (grows models), rework, rivals, rubbing, beyond, faint
     the judgement     decide, chances, anylaw, plausible; uncertainty (intervals), heldout and release (prediction)
-    the answer        diagnosis, words, phrases, numbers, figures, report, missing
+    the answer        diagnosis, words, numbers, figures, report, missing
                       shrink (to what predicts), export and carry (as a config)
     what comes next   experiment, motions, ordinary (which one to run); repair (record, diagnose, run it, again)
     many, concealed   folder; conceal, seal

@@ -55,6 +55,7 @@ def hypotheses(
                 slides = sliding(element, model)
                 if (
                     stand.again
+                    or not (stand.offered or name in only)
                     or (lone and term.needs.compared and not shows_alone(term, element, slides, blind))
                     or (slides and "turns" in stand.needs and not term.sliding)
                     or (term.falls_to and dry_with_terms(model, node) <= SLIGHT * measures.of("force", node))
@@ -66,8 +67,7 @@ def hypotheses(
 
 def searched(name: str) -> bool:
     """Whether a term is among the hypotheses that every record is asked about."""
-    term = TERMS[name]
-    return bool(sizes(name)) or (term.offered and bool(term.search))
+    return bool(sizes(name) or TERMS[name].search)
 
 
 def sliding(element: Element, model: Model) -> bool:

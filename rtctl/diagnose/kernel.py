@@ -15,7 +15,7 @@ import numpy as np
 
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
-from rtctl.plants.physics import TERMS, by_kind, nodes, place
+from rtctl.plants.physics import TERMS, anywhere, nodes, place
 from rtctl.plants.physics.place import PLANTS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
@@ -224,7 +224,7 @@ def job_dtype(ny: int, nu: int, nq: int) -> np.dtype:
 
 def sample(term: Term) -> Any:
     """Params of a term with any values, for their layout."""
-    values: dict[str, Any] = {"node": next(iter(by_kind(term).values()))[0]}
+    values: dict[str, Any] = {"node": next(iter(anywhere(term).values()))[0]}
     for name, info in term.settings.model_fields.items():
         if info.is_required() and name != "node":
             values[name] = _inside(info)

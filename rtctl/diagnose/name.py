@@ -300,6 +300,12 @@ def well(problem: Problem, trial: Fit, x: np.ndarray, best: float) -> Fit:
     return fit(problem, trial.space, x, rounds=16, J=trial.J, give_up=Hopeless(best))
 
 
+def more_starts(term: str) -> int:
+    """Starts of a term that are kept beyond the usual number: of orders that pass slowly at a few places only, a look
+    shows little."""
+    return TERMS[term].more_starts if term in TERMS else 0
+
+
 def best_starts(scores: Sequence[Score]) -> list[Hypothesis]:
     """The best few starts of each hypothesis."""
     count: dict[str, int] = {}
@@ -307,7 +313,7 @@ def best_starts(scores: Sequence[Score]) -> list[Hypothesis]:
     for score in scores:
         name = score.hypothesis.name
         count[name] = count.get(name, 0) + 1
-        if count[name] <= STARTS + TERMS[score.hypothesis.term].more_starts:
+        if count[name] <= STARTS + more_starts(score.hypothesis.term):
             out.append(score.hypothesis)
     return out
 
@@ -351,7 +357,7 @@ def shortlist(scores: Sequence[Score], count: int) -> list[Score]:
         h = score.hypothesis
         same = sum(s.hypothesis.name == h.name for s in out)
         nodes = len({s.hypothesis.node for s in out if s.hypothesis.term == h.term} - {h.node})
-        if same < 2 + TERMS[h.term].more_starts and nodes < 3 and score.gain > 0:
+        if same < 2 + more_starts(h.term) and nodes < 3 and score.gain > 0:
             out.append(score)
             more += same >= 2
         if len(out) - more == count:

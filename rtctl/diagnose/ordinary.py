@@ -39,6 +39,7 @@ def measure(what: str, node: str, config: Any) -> float:
         "cubic": stiffness**3 / u.force**2, "twist": u.force / stiffness if u.stiffness else 2e-3 * u.travel,
         "contact": u.contact, "per_contact": 1.0 / u.contact, "tick": dt, "hertz": 1.0 / dt,
         "rate": min(1.0 / dt, 1000.0), "volts": volts, "per_volt": 1.0 / volts, "peak": 2.5 * volts,
+        "pace": 2.5 * volts * 2 * pi * u.speed / u.travel,
         "turn": u.travel / 7.0 if u.slides else 2 * pi, "lever": u.travel / 50.0 if u.slides else 1.0,
     }  # fmt: skip
     return table[what]

@@ -89,8 +89,12 @@ def _physics() -> str:
         start = f"{PHYSICS}[{name}]."
         mine = [row._replace(path=row.path.removeprefix(start)) for row in rows if row.path.startswith(start)]
         there = [f"{kind} {', '.join(f'`{n}`' for n in nodes)}" for kind, nodes in by_kind(term).items()]
+        there = there or ["those of described machines"]
         text += [f"## {name} {{ #{name.replace('.', '-')} }}", sentences(term.words, about(term.settings))]
-        text += [f"```text\n{term.equation}\n```", f"Nodes: {'; '.join(there)}. Source: {cell(term.source)}."]
+        text += [
+            f"```text\n{term.equation}\n```",
+            f"Nodes: {'; '.join(there)}. Source: {cell(term.source)}.",
+        ]
         text += ["\n".join(table([row for row in mine if row.path not in ("term", "node")]))]
     return "\n\n".join(text) + "\n"
 

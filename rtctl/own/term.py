@@ -79,7 +79,7 @@ def own_term(source: Source) -> Term:
         )
     stem = re.escape(Path(source.file).stem)
     act = {site: re.sub(rf"(?<![\w.]){stem}\.", f"{module.__name__}.", lines) for site, lines in found.act.items()}
-    return replace(found, name=source.spec, settings=_named(found.settings, source.spec), act=act, tabled=False)
+    return replace(found, name=source.spec, settings=_named(found.settings, source.spec), act=act, since=0)
 
 
 def _named(settings: type[Settings], spec: str) -> type[Settings]:

@@ -4,7 +4,7 @@ import sys
 import numpy as np
 import pytest
 
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, anywhere, by_kind
 from rtctl.plants.physics.portrait import Curve
 
 
@@ -14,7 +14,7 @@ def quick(monkeypatch):
 
     def draw(term):
         x = np.linspace(0.0, 1.0, 200)
-        kind, nodes = next(iter(term.nodes.items()))
+        kind, nodes = next(iter(anywhere(term).items()))
         settings = term.settings.model_construct(term=term.name, node=nodes[0])
         return Curve(x, np.sin(9 * x), 0 * x, "speed, m/s", "drag, N", settings, kind)
 
@@ -32,7 +32,14 @@ def test_explains_a_term(rtctl, quick, name):
     code, out, _ = rtctl("physics", name)
     term, said = TERMS[name], " ".join(out.split())
     assert code == 0
-    for text in (term.words, term.equation, term.source, *term.nodes, *term.look_alikes.values()):
+    for text in (
+        term.words,
+        term.equation,
+        term.source,
+        *by_kind(term),
+        term.check,
+        *term.look_alikes.values(),
+    ):
         assert " ".join(text.split()) in said
     for parameter in set(term.settings.model_fields) - {"term", "node"}:
         assert f"{parameter} " in out

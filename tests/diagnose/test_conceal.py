@@ -4,9 +4,10 @@ import pytest
 from rtctl import machines
 from rtctl.config.load import load_settings, set_path
 from rtctl.config.yaml_file import find
-from rtctl.diagnose.conceal import FEEDBACK, OWN, TYPICAL, WORDS, conceal, nodes, sized
+from rtctl.diagnose.conceal import TYPICAL, conceal, nodes, sized
 from rtctl.diagnose.ordinary import measure
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, anywhere, having
+from rtctl.plants.physics import nodes as where
 
 KINDS = ("ivu", "ldu", "axis")
 SEEDS = range(200)
@@ -26,7 +27,7 @@ def test_what_is_drawn_is_valid_for_every_seed(config):
     for seed in SEEDS:
         hidden, entry = conceal(config, seed)
         TERMS[entry["term"]].settings.model_validate(entry)
-        assert entry["node"] in TERMS[entry["term"]].nodes[config.machine]
+        assert entry["node"] in where(TERMS[entry["term"]], config.machine)
         assert len(hidden.plant.physics) == len(config.plant.physics) + 1
         assert hidden.plant.physics[-1].term == entry["term"]
         assert hidden.model_copy(update={"plant": config.plant}) == config
@@ -45,7 +46,7 @@ def test_every_effect_can_be_hidden_at_every_node_that_it_has(config):
 
 
 def test_a_loop_keeps_the_sign_of_its_sensor(config):
-    assert not set(nodes("sensor.rectified", config)) & set(FEEDBACK[config.machine])
+    assert not set(nodes("sensor.rectified", config)) & set(having(config.machine, "sensor", "feedback"))
 
 
 def test_what_the_machine_believes_already_stays(config):
@@ -66,13 +67,11 @@ def test_sizes_follow_the_machine():
 
 
 def test_the_tables_speak_of_what_there_is(config):
-    for name, ranges in OWN.items():
-        assert set(ranges) <= set(TERMS[name].settings.model_fields)
-        for span in ranges.values():
+    for term in TERMS.values():
+        assert set(term.draws) | set(term.chosen) <= set(term.settings.model_fields)
+        for span in term.draws.values():
             assert 0 <= span.low <= span.high
-            if name in TERMS and TERMS[name].nodes.get(config.machine):
-                assert measure(span.measure, TERMS[name].nodes[config.machine][0], config) > 0
+            if there := anywhere(term).get(config.machine):
+                assert measure(span.measure, there[0], config) > 0
     for term in (term for term in TERMS.values() if term.tabled):
-        assert all(term.scale.get(key, "") in TYPICAL for key in term.typical if key not in OWN.get(term.name, {}))
-    for name, words in WORDS.items():
-        assert set(words) <= set(TERMS[name].settings.model_fields)
+        assert all(term.scale.get(key, "") in TYPICAL for key in term.typical if key not in term.draws)

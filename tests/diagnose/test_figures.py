@@ -13,7 +13,7 @@ from rtctl.diagnose.preflight import preflight
 from rtctl.diagnose.quantities import quantities
 from rtctl.diagnose.record import check, load_record
 from rtctl.diagnose.simulate import Simulator
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, nodes
 
 PRACTICE = Path(__file__).resolve().parents[3] / "shared" / "blind" / "practice"
 ALIKE = ("friction.stribeck", "friction.coulomb")
@@ -49,9 +49,9 @@ def found():
         Evidence(("friction.coulomb:carriage",), 0.6, True),
     ]
     evidence += [
-        Evidence((f"{n}:{t.nodes['axis'][0]}",), 0.02, False)
+        Evidence((f"{n}:{nodes(t, 'axis')[0]}",), 0.02, False)
         for n, t in TERMS.items()
-        if "axis" in t.nodes and n not in ALIKE
+        if nodes(t, "axis") and n not in ALIKE
     ]
     d = Diagnosis(
         record, checked, NAMED, (effect,), Located("x", "carriage", "velocity", "below 0.1 m/s", 0.0, 0.8),

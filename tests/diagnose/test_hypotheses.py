@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.forms import EXTRAS
-from rtctl.diagnose.hypotheses import HINTED, SEARCH, At, Choice, Turn, hypotheses
+from rtctl.diagnose.hypotheses import hinted, hypotheses, starts_of
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import SHAPE
-from rtctl.plants.physics import TERMS
-from rtctl.plants.physics.sensor import READINGS, missed_counts
+from rtctl.diagnose.yardstick import Measures
+from rtctl.plants.physics import TERMS, anywhere, by_kind, met, nodes
+from rtctl.plants.physics.search import At, Choice, Turn
+from rtctl.plants.physics.sensor import missed_counts
 
 JUMPS = [(0.3, 1e-3), (0.7, 5e-4)]
+SEARCH = {name: term.search for name, term in TERMS.items() if term.search and any(s.offered for s in term.stands)}
+HINTED = {name for name in SEARCH if hinted(name)}
 HINTS = {
     "order": [2.0, 7.0], "wavelength": [0.01, 0.08], "spot": [0.3], "grip:capstan": [0.02, 0.03], "grip:wheel": [0.001],
     "jump:encoder": JUMPS, "jump:scale": JUMPS, "jump:sensor": JUMPS,
@@ -29,7 +32,7 @@ def names(parts):
 @pytest.mark.parametrize("term", SEARCH)
 def test_the_search_walks_along_settings_that_the_term_has(term):
     fields = TERMS[term].settings.model_fields
-    for name in names((*SEARCH[term], *EXTRAS.get(term, ()))):
+    for name in names((*SEARCH[term], *TERMS[term].richer, *TERMS[term].sliding)):
         assert name in fields, f"{term} has no {name}"
     given = set(names(SEARCH[term]))
     needed = {name for name, info in fields.items() if info.is_required() and name != "node"}
@@ -41,8 +44,9 @@ def test_every_one_stands_where_its_term_can_and_all_are_there(moved, kind):
     record, base = moved(kind)
     found = hypotheses(record, base, HINTS)
     for h in found:
-        assert h.node in TERMS[h.term].nodes[kind]
-    wanted = {name for name in SEARCH if TERMS[name].nodes.get(kind)}
+        assert h.node in nodes(TERMS[h.term], kind)
+    offered = {n: [s for s in t.stands if s.offered] for n, t in TERMS.items()}
+    wanted = {name for name in SEARCH if met(offered[name], kind)}
     if kind == "axis":  # this one slides, and it has one sensor, which would have to disagree with itself
         wanted -= {"load.imbalance", "sensor.scale", "sensor.rectified", "guide.dirt"}
     assert wanted == {h.term for h in found}
@@ -94,8 +98,8 @@ def test_starts_of_a_shape_are_shares_of_what_the_node_does(moved):
 def test_without_hints_nothing_that_needs_one_is_asked(moved):
     record, base = moved("axis")
     asked = {h.term for h in hypotheses(record, base)}
-    assert {"sensor.missed_counts", "guide.dirt"} <= set(HINTED)
-    assert not asked & set(HINTED) - {"load.bump"}  # which has starts of its own besides
+    assert {"sensor.missed_counts", "guide.dirt"} <= HINTED
+    assert not asked & HINTED - {"load.bump"}  # which has starts of its own besides
 
 
 def test_jumps_of_a_sensor_are_one_hypothesis_with_one_size(moved):
@@ -110,7 +114,7 @@ def test_jumps_of_a_sensor_are_one_hypothesis_with_one_size(moved):
 @pytest.mark.parametrize("plant", ["axis", "ivu", "ldu"])
 def test_the_tick_that_sees_a_jump_first_sees_all_of_it(moved, plant):
     record, base = moved(plant)
-    sensor = READINGS[plant][0]
+    sensor = nodes(TERMS["sensor.scale"], plant)[0]
     told = {f"jump:{sensor}": [(40 * record.dt, 2e-3), (90 * record.dt, -1e-3)]}
     (h,) = hypotheses(record, base, told, only=("sensor.missed_counts",))
     term = TERMS["sensor.missed_counts"]
@@ -247,3 +251,22 @@ def test_less_lateness_than_the_owner_s_bandwidth_may_be_off_by_is_no_effect(mov
     for h in hypotheses(record, base, only=[term]):
         (size,) = h.coordinates
         assert size.slight * size.scale == pytest.approx(0.15 * record.case.drive.late)
+
+
+@pytest.mark.parametrize("name", [name for name, term in TERMS.items() if not by_kind(term)])
+def test_a_term_of_described_machines_has_starts(moved, name):
+    """Its measures are there, and its sizes are within its settings' bounds."""
+    record, base = moved("axis")
+    measures = Measures(record, base, node_scales(record, base), {"order": [6.0]})
+    node = anywhere(TERMS[name])["axis"][0] if "axis" in anywhere(TERMS[name]) else "carriage"
+    for parts in filter(None, (TERMS[name].search, TERMS[name].sliding, TERMS[name].richer)):
+        found = starts_of(name, node, parts, measures)
+        assert found
+        for h in found:
+            x = h.start()
+            x[h.sizes] = 0.5
+            assert all(np.isfinite(value) for value in h.values(x).values())
+    plain = starts_of(name, node, TERMS[name].search, measures)[0]
+    x = plain.start()
+    x[plain.sizes] = 0.5
+    TERMS[name].settings(**plain.settings(x).model_dump())

@@ -8,7 +8,7 @@ import pytest
 from rtctl.diagnose import kernel
 from rtctl.idiom import record_dtype
 from rtctl.plants import axis
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, anywhere, nodes
 from rtctl.plants.physics.term import SITES
 
 PLANTS = ("ivu", "ldu", "axis")
@@ -38,7 +38,7 @@ def test_every_term_that_can_stand_in_a_plant_acts_at_its_sites(kind, site):
 
 @pytest.mark.parametrize("kind", PLANTS)
 def test_no_term_with_a_node_there_is_left_out(kind):
-    wanted = {name for name, term in TERMS.items() if term.nodes.get(kind)}
+    wanted = {name for name, term in TERMS.items() if nodes(term, kind)}
     assert {term.name for term in kernel.terms_of(kind)} == wanted
     acting = set().union(*(numbers(functions(kind)[site]) for site in SITES))
     assert acting == set(range(1, len(wanted) + 1))
@@ -66,7 +66,7 @@ def test_no_placeholder_is_left_in_the_text(kind):
 @pytest.mark.parametrize("term", TERMS.values(), ids=lambda t: t.name)
 def test_sample_params_have_the_layout_of_any_other(term):
     """A slot is laid out from a sample: a term whose layout hangs on its values would not fit in it."""
-    given = {"node": next(iter(term.nodes.values()))[-1]}
+    given = {"node": next(iter(anywhere(term).values()))[-1]}
     for name, info in term.settings.model_fields.items():
         if info.is_required() and name != "node":
             given[name] = kernel._inside(info)

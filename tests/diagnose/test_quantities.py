@@ -25,9 +25,9 @@ from rtctl.diagnose.quantities import node_words, quantities
 from rtctl.diagnose.record import check
 from rtctl.diagnose.simulate import Simulator
 from rtctl.diagnose.uncertainty import plant_unit
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, nodes
 
-PLACES = [(name, node) for name, term in TERMS.items() for node in term.nodes.get("axis", ())]
+PLACES = [(name, node) for name, term in TERMS.items() for node in nodes(term, "axis")]
 NODE_IDS = re.compile(r"[\w.]+:carriage|\"?node\"?: \"?carriage|\"carriage\": |- carriage")  # as configs name the node
 NUMBER = r"(?:(?<=\d )|(?<=, )|(?<=in )|(?<=\[))"  # a unit stands behind a number, or at the end of a label
 SLIDES = re.compile(
@@ -54,7 +54,7 @@ def effect(name: str, node: str, value: float) -> Effect:
     """A term with a value for each of its numbers and all that it can be taken for on an axis."""
     fields = TERMS[name].settings.model_fields
     numbers = [n for n, f in fields.items() if f.annotation in (float, float | None)]
-    alike = [Rival(other, n, 0.1, 1.0) for other in TERMS[name].look_alikes for n in TERMS[other].nodes.get("axis", ())]
+    alike = [Rival(other, n, 0.1, 1.0) for other in TERMS[name].look_alikes for n in nodes(TERMS[other], "axis")]
     numbers += ["F_added"] * (name == "friction.coulomb")
     return Effect(name, node, 0.9, {n: Interval(value, 0.9 * value, 1.1 * value) for n in numbers}, tuple(alike))
 
@@ -138,7 +138,7 @@ def test_every_phrase_of_every_term_at_every_node(shape, value):
         text = [*words.effect_clause(found, d.after), words.at(entry, d.after.units), words.need(entry)]
         text += [words.entry_noun(entry, d.after.units), words.sentence(entry, units=d.after.units)]
         text += [words.hidden_size(d, entry), *called([entry, "nothing"], d.after.units)]
-        text += [t for other, t in TERMS[name].look_alikes.items() if "axis" in TERMS[other].nodes]
+        text += [t for other, t in TERMS[name].look_alikes.items() if nodes(TERMS[other], "axis")]
         text += [" ".join(map(str, row)) for row in report.effect_rows(d._replace(effects=(found,)))]
         assert wrong("\n".join(text), x, u) == [], name
 

@@ -17,7 +17,7 @@ from rtctl.diagnose.record import Record
 from rtctl.diagnose.scan import BUMP, PLACES, SLACK, TERM, bumps, resonances, slack
 from rtctl.diagnose.screen import screen
 from rtctl.diagnose.simulate import Simulator
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, nodes
 
 NARROW = {"term": BUMP, "node": "carriage", "F": 20.0, "at": 0.047, "width": 1.5e-3, "form": "hill"}
 HEAVY = {"term": TERM, "node": "carriage", "mass": 40.0, "f_Hz": 14.5, "zeta": 0.04}
@@ -58,17 +58,17 @@ def recorded(empty, true):
 
 
 @pytest.mark.parametrize(
-    ("kind", "nodes"), [("ivu", {"motor1", "reel1", "capstan", "reel2", "motor2"}), ("ldu", {"carriage"})]
+    ("kind", "there"), [("ivu", {"motor1", "reel1", "capstan", "reel2", "motor2"}), ("ldu", {"carriage"})]
 )
-def test_reels_are_looked_at_beside_their_motors(kind, nodes, monkeypatch):
+def test_reels_are_looked_at_beside_their_motors(kind, there, monkeypatch):
     """A heavy part on a reel rings at a frequency that the first look does not meet, and on its motor explains little.
     The nodes of the linear drive move as one."""
-    looked = [SimpleNamespace(hypothesis=SimpleNamespace(term=TERM, node=node)) for node in TERMS[TERM].nodes[kind]]
+    looked = [SimpleNamespace(hypothesis=SimpleNamespace(term=TERM, node=node)) for node in nodes(TERMS[TERM], kind)]
     problem = SimpleNamespace(sim=SimpleNamespace(record=SimpleNamespace(plant=kind)))
     tried = []
     monkeypatch.setattr(scan, "_tried", lambda problem, base, h: tried.append(h.node) or [])
     assert resonances(problem, None, looked) == []
-    assert sorted(tried) == sorted(nodes)
+    assert sorted(tried) == sorted(there)
 
 
 def test_a_slack_tape_is_met_from_values_all_over_their_tolerance(case_of):

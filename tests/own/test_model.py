@@ -161,8 +161,13 @@ def test_an_own_term_stands_beside_those_of_the_library(config_file):
     [
         ("MY_TERM = Term", "TERM = Term", "there is no term MY_TERM; did you mean ./my_term.py:TERM"),
         ('act={"force"', 'act={"push"', "there is no site 'push'; it is command, force, last, reading"),
-        ('("reel1", ', '("reel7", ', "the ivu has no node 'reel7'; did you mean 'reel"),
-        ('"axis": (', '"axes": (', "there is no plant 'axes'; there is ivu, ldu, axis"),
+        ('stand("body")', 'stand("gear")', "there is no element 'gear'; there is body, joint, drive, sensor, loop"),
+        ('stand("body")', 'stand("body", "lone")', "a body has no trait 'lone'; its traits are turns, slides"),
+        (
+            'stand("body")',
+            'stand("body", "reel slides")',
+            "no machine has an element for it; it asks for",
+        ),
         ("    node: str\n", "", "MyTermSettings has no key `node`"),
     ],
 )

@@ -22,6 +22,7 @@ from rtctl.plants.physics import (
     transmission,
 )
 from rtctl.plants.physics.place import place
+from rtctl.plants.physics.placement import nodes
 from rtctl.plants.physics.term import Term
 
 MODULES = (
@@ -101,7 +102,7 @@ class Run(NamedTuple):
 @cache
 def compiled(kind: str) -> tuple[Any, np.dtype, np.dtype]:
     """Run function, and records of params and state of a slot."""
-    terms = [term for term in TERMS.values() if kind in term.nodes]
+    terms = [term for term in TERMS.values() if nodes(term, kind)]
     names = {"p": "p.{}", "s": "s.{}", "m": "m", "i": "i", "r": "r", "l": "l", "c": "c"}
     sites = {}
     for site in ("force", "reading"):
@@ -150,7 +151,7 @@ def run(
     function, params, states = compiled(kind)
     substeps = substeps or SUBSTEPS[kind]
     p, s = plant(kind, tick / substeps, **parameters)
-    nq, known = len(s.m.r), [term for term in TERMS.values() if kind in term.nodes]
+    nq, known = len(s.m.r), [term for term in TERMS.values() if nodes(term, kind)]
     for node, speed in (speeds or {}).items():
         spot = place(kind, node)
         s.m.x[nq + spot.node] = s.m.v_before[spot.node] = speed / (getattr(p, spot.factor) if spot.factor else 1.0)
@@ -178,7 +179,7 @@ def kinetic(s: Any, v: np.ndarray) -> np.ndarray:
 
 def first(kind: str, term: str) -> str:
     """The first node where a term can stand."""
-    return TERMS[term].nodes[kind][0]
+    return nodes(TERMS[term], kind)[0]
 
 
 FORCE = {  # what moves each node, in its own unit; about its dry friction where it has some

@@ -10,7 +10,18 @@ import numpy as np
 
 from rtctl.idiom import Settings, fill_record, record_dtype, state
 from rtctl.plants import axis, ivu, ldu
-from rtctl.plants.physics import drive, drive_dynamics, geometry, guide, ordered, ripple, ripple_tape, sensor, timing
+from rtctl.plants.physics import (
+    drive,
+    drive_dynamics,
+    geometry,
+    guide,
+    nodes,
+    ordered,
+    ripple,
+    ripple_tape,
+    sensor,
+    timing,
+)
 from rtctl.plants.physics.place import place
 from rtctl.plants.physics.term import SITES, Term
 
@@ -93,7 +104,7 @@ class Run(NamedTuple):
 
 def of(kind: str) -> list[Term]:
     """Terms that can stand in a plant."""
-    return [term for term in TERMS.values() if kind in term.nodes]
+    return [term for term in TERMS.values() if nodes(term, kind)]
 
 
 def source(kind: str) -> str:
@@ -131,7 +142,7 @@ def compiled(kind: str) -> tuple[Any, np.dtype, np.dtype]:
 def make(name: str, kind: str, node: str | None = None, **values: Any) -> Any:
     """Settings of a term at a node, its first one where not told; what is not told has no effect."""
     term = TERMS[name]
-    return term.settings(node=node or term.nodes[kind][0], **{**REQUIRED[name], **values})
+    return term.settings(node=node or nodes(term, kind)[0], **{**REQUIRED[name], **values})
 
 
 def plant(kind: str, h: float, **parameters: float) -> tuple[Any, Any]:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from rtctl.idiom import tick
 from rtctl.plants import axis, linear
-from rtctl.plants.physics import TERMS, friction
+from rtctl.plants.physics import TERMS, by_kind, friction
 
 FORMS = ("gaussian", "exponential", "tustin")
 H = 1e-3
@@ -176,7 +176,7 @@ def test_every_term_is_explained():
     for name, term in TERMS.items():
         assert name == term.name == term.settings.model_fields["term"].default
         assert len(term.words) > 20 and len(term.equation) > 4 and len(term.source) > 4
-        assert term.nodes and all(term.nodes.values())
+        assert by_kind(term)
         assert term.look_alikes and name not in term.look_alikes
         for rival, experiment in term.look_alikes.items():
             assert re.fullmatch(r"[a-z]+\.[a-z_]+", rival), rival

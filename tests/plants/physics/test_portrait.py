@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics import TERMS, anywhere
 from rtctl.plants.physics.portrait import curve, portrait, typical
 
 
@@ -24,7 +24,7 @@ def test_every_term_draws_a_curve(name):
     assert added > 0.01 * max(np.ptp(c.y), np.ptp(c.without))  # it is seen beside what was there without it
     assert np.ptp(c.y) > 1e-3 * np.abs(c.y).max() > 0.0
     assert np.ptp(c.x) > 0.0 and c.x_words and c.y_words
-    assert c.settings.term == name and c.settings.node in TERMS[name].nodes[c.kind]
+    assert c.settings.term == name and c.settings.node in anywhere(TERMS[name])[c.kind]
 
 
 @pytest.mark.parametrize("name", TERMS)

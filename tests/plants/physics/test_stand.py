@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import stand
 
+from rtctl.plants.physics import by_kind, nodes
+
 USUAL: dict[str, dict[str, Any]] = {
     "drive.offset": {"offset": 0.02},
     "drive.deadband": {"band": 0.02},
@@ -34,7 +36,7 @@ BY_KIND: dict[tuple[str, str], dict[str, Any]] = {
     ("ripple.encoder", "axis"): {"A": 2e-6, "turn": 0.02},
 }
 OPTIONS: dict[str, dict[str, Any]] = {"axis": {}, "ivu": {"d_tape": 0.0}, "ldu": {"substeps": 8}}
-PLACES = [(t.name, kind, node) for kind in stand.PLANTS for t in stand.of(kind) for node in t.nodes[kind]]
+PLACES = [(t.name, kind, node) for kind in stand.PLANTS for t in stand.of(kind) for node in nodes(t, kind)]
 
 
 def usual(name: str, kind: str, node: str) -> Any:
@@ -69,7 +71,7 @@ def test_every_term_is_explained():
         fields = term.settings.model_fields
         assert name == term.name == fields["term"].default
         assert len(term.words) > 20 and len(term.equation) > 4 and len(term.source) > 4
-        assert term.nodes and all(term.nodes.values())
+        assert by_kind(term)
         assert term.look_alikes and name not in term.look_alikes
         for rival, experiment in term.look_alikes.items():
             assert re.fullmatch(r"[a-z]+\.[a-z_]+", rival), rival
@@ -83,7 +85,7 @@ def test_every_term_is_explained():
 def test_look_alikes_of_this_half_name_each_other():
     for name, term in stand.TERMS.items():
         for rival in term.look_alikes:
-            if rival in stand.TERMS and set(term.nodes) & set(stand.TERMS[rival].nodes):
+            if rival in stand.TERMS and set(by_kind(term)) & set(by_kind(stand.TERMS[rival])):
                 assert name in stand.TERMS[rival].look_alikes, f"{rival} does not know of {name}"
 
 

@@ -8,10 +8,12 @@ import bench
 import numpy as np
 import pytest
 
+from rtctl.plants.physics import by_kind, nodes
+
 EVERYWHERE = [
-    (name, kind, node) for name, term in bench.TERMS.items() for kind in term.nodes for node in term.nodes[kind]
+    (name, kind, node) for name, term in bench.TERMS.items() for kind, there in by_kind(term).items() for node in there
 ]
-ONCE = [(name, kind) for name, term in bench.TERMS.items() for kind in term.nodes]
+ONCE = [(name, kind) for name, term in bench.TERMS.items() for kind in by_kind(term)]
 UNDAMPED = {
     "axis": {"F_v": 0.0},
     "ivu": {"k_m1": 0.0, "k_m2": 0.0, "k1": 0.0, "k2": 0.0},
@@ -83,10 +85,10 @@ def test_no_term_allocates(allocations):
     kind, loop = "ivu", bench.moves("ivu", 0.01)
     function, params, states = bench.compiled(kind)
     p, s = bench.plant(kind, 5e-4)
-    known = [term for term in bench.TERMS.values() if kind in term.nodes]
+    known = [term for term in bench.TERMS.values() if nodes(term, kind)]
     slots, ps, ss = (np.zeros(len(known), d).view(np.recarray) for d in (bench.SLOT, params, states))
     for n, term in enumerate(known):
-        spot = bench.place(kind, term.nodes[kind][0])
+        spot = bench.place(kind, nodes(term, kind)[0])
         slots[n] = (n + 1, spot.node, spot.link, spot.channel, 1.0)
         bench.fill_record(ps[n][term.name.replace(".", "_")], term.build(bench.usual(term.name, kind), 5e-4))
     out: tuple[Any, ...] = (np.zeros((10, 5)), np.zeros((10, 5)), np.zeros((10, 3)), np.zeros(10))
@@ -99,7 +101,7 @@ def test_it_is_explained_to_a_mechanic(name):
     term = bench.TERMS[name]
     assert name == term.name == term.settings.model_fields["term"].default
     assert len(term.words) > 20 and len(term.equation) > 4 and len(term.source) > 4
-    assert term.nodes and all(term.nodes.values()) and set(term.nodes) <= set(bench.PLANTS)
+    assert term.stands and term.check.endswith(".") and term.phrase
     assert len(term.look_alikes) >= 2 and name not in term.look_alikes
     for rival, experiment in term.look_alikes.items():
         assert re.fullmatch(r"[a-z]+\.[a-z_]+", rival), rival

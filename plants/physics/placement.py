@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from functools import lru_cache
 
-from rtctl.plants.element import Element, Stand
+from rtctl.plants.element import GENERAL, Element, Stand
 from rtctl.plants.physics.place import PLANTS
 from rtctl.plants.physics.term import Term
 
@@ -31,6 +31,17 @@ def by_kind(term: Term) -> dict[str, tuple[str, ...]]:
     """Nodes by the kind of plant, of those on which the term can stand."""
     found = {kind: nodes(term, kind) for kind in PLANTS}
     return {kind: there for kind, there in found.items() if there}
+
+
+def anywhere(term: Term) -> dict[str, tuple[str, ...]]:
+    """As `by_kind`; of a term for described machines alone, where it could stand if these plants were such."""
+    return by_kind(term) or {
+        kind: there for kind in PLANTS if (there := nodes(term, tuple(map(_general, elements(kind)))))
+    }
+
+
+def _general(element: Element) -> Element:
+    return element._replace(traits=element.traits | {GENERAL})
 
 
 def having(plant: Plant, kind: str, trait: str) -> tuple[str, ...]:

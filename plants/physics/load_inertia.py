@@ -1,0 +1,107 @@
+"""Inertia that changes with the angle of its body, as of a crank or of a linkage that is out of balance.
+
+    d/dt ((J + D(q)) v) - D'(q) v^2 / 2 = torque,   D(q) = A cos(n q + phi)
+
+J is the inertia of the owner's model, which is the mean. All that turns the body turns J + D instead: what the linear
+model makes of it with J is put right by a force, and so is the limit of dry friction. The kinetic energy is
+(J + D) v^2 / 2, which no turn changes.
+
+Source: Goldstein, Classical Mechanics (2002), 1.6; Waldron & Kinzel, Kinematics, Dynamics and Design of Machinery
+(2004), ch. 14 for the inertia of slider-cranks.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Choice, Turn
+from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
+from rtctl.plants.physics.term import Node, Term
+
+SMALLEST = 0.05  # of the inertia: a body does not get lighter than this
+
+
+class InertiaSettings(Settings):
+    """A is the size."""
+
+    term: Literal["load.inertia"] = "load.inertia"
+    node: Node
+    A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude of the inertia about its mean, kg m^2 (kg)")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
+    order: float = quantity(1.0, unit="", gt=0, le=100, help="times a turn; 2 for a crank")
+
+
+class InertiaParams(NamedTuple):
+    A: float
+    phi: float
+    n: float
+
+
+def build_inertia(settings: InertiaSettings, h: float) -> InertiaParams:
+    """Nothing to discretise."""
+    return InertiaParams(settings.A, settings.phi, settings.order)
+
+
+@tick
+def acceleration(m, i):
+    """What the linear model makes of all that acts on node `i`, without dry friction, rad/s^2 or m/s^2."""
+    nq, nu, nx = m.r.shape[0], m.u.shape[0], m.x.shape[0]
+    a = 0.0
+    for j in range(nq):
+        a += m.A[nq + i, j] * m.qm[j] + m.A[nq + i, nq + j] * m.vm[j] + m.G[nq + i, nu + j] * m.f[j]
+    for j in range(2 * nq, nx):
+        a += m.A[nq + i, j] * m.x[j]
+    for j in range(nu):
+        a += m.G[nq + i, j] * m.u[j]
+    return a
+
+
+@tick
+def turned(p, m, i, r):
+    """Let all that turns node `i` turn its inertia at its angle; `r` takes its rotation to the unit of A."""
+    nq, nu = m.r.shape[0], m.u.shape[0]
+    J_0 = 1.0 / m.G[nq + i, nu + i]
+    x = p.n * r * m.qm[i] + p.phi
+    J = max(J_0 + r * r * p.A * math.cos(x), SMALLEST * J_0)
+    slope = -r * r * r * p.n * p.A * math.sin(x)
+    change = J_0 / J - 1.0
+    torque = J_0 * acceleration(m, i) * change - 0.5 * (1.0 + change) * slope * m.vm[i] * m.vm[i]
+    # A light body follows its springs within a substep; held over one, the full force would make it ring ever louder.
+    k, c = -m.A[nq + i, nq + i], -m.A[nq + i, i]
+    m.f[i] += torque / (1.0 + abs(change) * m.h * (max(k, 0.0) + m.h * max(c, 0.0)))
+    m.dry[i] *= 1.0 + change
+
+
+INERTIA = Term(
+    name="load.inertia",
+    words="it is heavier to turn at some angles than at others, like a crank",
+    equation="((J + D) v)' - D' v^2 / 2 = torque, D = A cos(n q + phi)",
+    source="Goldstein 2002, 1.6; Waldron & Kinzel 2004, ch. 14",
+    settings=InertiaSettings,
+    build=build_inertia,
+    act={"last": "load_inertia.turned({p}, {m}, {i}, {r})"},
+    stands=(stand("body", "general turns"),),
+    look_alikes={
+        "load.imbalance": "turn slowly, then fast: imbalance stays as it is, an inertia grows with the square of speed",
+        "ripple.cogging": "turn slowly by hand: cogging is felt, an inertia is not",
+        "ripple.torque": "turn fast with the power off: an inertia still makes the speed go up and down",
+    },
+    typical={"A": (0.05, 0.5)},
+    scale={"A": "inertia"},
+    axis="angle",
+    order=126,
+    since=2,
+    phrase=Phrase(
+        noun="uneven inertia",
+        head="{here} is heavier to turn at some angles",
+        detail="its inertia is up to {A} more and less",
+        need=f"{TURNS}, with strong acceleration",
+    ),
+    check="Look for a crank or a linkage behind it, and compare how fast it starts at several angles.",
+    units={"A": "inertia"},
+    needs=Needs(turns=0.25),
+    search=(Turn("A", "phi", "inertia", 0.1), Choice("order", (1.0, 2.0))),
+    draws={"A": Draw(0.1, 0.4, "inertia")},
+    chosen={"order": (1.0, 2.0)},
+)

@@ -1,0 +1,133 @@
+"""Ripple of a ratio: a transmission whose far end runs ahead and behind periodically, as of a pulley off centre.
+
+The elongation of the joint is longer by  A sin(n q + phi) + harmonics  in the angle q of one of its ends. Spring and
+damper of the joint feel it, and the joint pulls at the body that turns with the lever A n cos(n q + phi): both follow
+from one potential, so that a whole turn takes no work from the spring. The error is zero where the machine starts.
+
+Source: Tuttle & Seering, A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics and Automation
+12 (1996); Smith, Gear noise and vibration (2003), ch. 2 for transmission error; ISO 230-2 for the lead of screws.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from pydantic import Field
+
+from rtctl.idiom import Settings, quantity, tick
+from rtctl.plants import linear
+from rtctl.plants.element import stand
+from rtctl.plants.physics.ripple import TURN, harmonics
+from rtctl.plants.physics.search import Choice, Turn
+from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
+from rtctl.plants.physics.term import Node, Term
+
+ENDS = ("from", "to")
+
+
+class RatioSettings(Settings):
+    """A, A2, A3 are the sizes: errors once, twice, three times in a turn (or `order` times as often)."""
+
+    term: Literal["ripple.ratio"] = "ripple.ratio"
+    node: Node
+    A: float = quantity(unit="", ge=-10, le=10, help="amplitude, in the unit of the joint's elongation: rad or m")
+    phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at angle 0")
+    A2: float = quantity(0.0, unit="", ge=-10, le=10, help="amplitude of the second harmonic")
+    phi2: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    A3: float = quantity(0.0, unit="", ge=-10, le=10, help="amplitude of the third harmonic")
+    phi3: float = quantity(0.0, unit="rad", ge=-100, le=100, help="its phase")
+    end: Literal["from", "to"] = Field(default="from", description="end of the joint in whose angle it repeats")
+    order: float = quantity(1.0, unit="", gt=0, le=1e4, help="times a turn; 2 for a harmonic drive, or teeth")
+    turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where the end slides")
+
+
+class RatioParams(NamedTuple):
+    n: float  # periods a rad or m
+    A: float
+    phi: float
+    A2: float
+    phi2: float
+    A3: float
+    phi3: float
+    zero: float  # error at position 0
+    end: int
+
+
+def build_ratio(settings: RatioSettings, h: float) -> RatioParams:
+    """Error at position 0, which the joint starts without."""
+    s = settings
+    zero = harmonics.py_func(0.0, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3)
+    return RatioParams(s.order * TURN / s.turn, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3, zero, ENDS.index(s.end))
+
+
+@tick
+def end_of(p, m, j):
+    """Index of the body in whose angle the error of link `j` repeats."""
+    return m.link_i[j] if p.end == 0 else m.link_j[j]
+
+
+@tick
+def error(p, q):
+    """Elongation beyond the ratio at position `q`, rad or m."""
+    return harmonics(p.n * q, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3) - p.zero
+
+
+@tick
+def lever(p, q):
+    """Slope of the error at position `q`."""
+    x = p.n * q
+    one, two = p.A * math.cos(x + p.phi), 2.0 * p.A2 * math.cos(2.0 * x + p.phi2)
+    return p.n * (one + two + 3.0 * p.A3 * math.cos(3.0 * x + p.phi3))
+
+
+@tick
+def stretched(p, m, j):
+    """Stretch link `j` by its error."""
+    i = end_of(p, m, j)
+    linear.extend(m, j, error(p, m.qm[i]), lever(p, m.qm[i]) * m.vm[i])
+
+
+@tick
+def levered(p, m, j):
+    """Let link `j` pull at the lever of its error, with all that pulls in it."""
+    i = end_of(p, m, j)
+    m.f[i] -= lever(p, m.qm[i]) * linear.tension(m, j)
+
+
+RATIO = Term(
+    name="ripple.ratio",
+    words="a pulley, gear or screw that is out of true: the far end runs ahead and behind once a turn",
+    equation="e = q_b - n q_a + A sin(q + phi) + A2 sin(2 q + phi2) + A3 sin(3 q + phi3)",
+    source="Tuttle & Seering 1996; Smith 2003, ch. 2",
+    settings=RatioSettings,
+    build=build_ratio,
+    act={
+        "force": "ripple_ratio.stretched({p}, {m}, {l})",
+        "last": "ripple_ratio.levered({p}, {m}, {l})",
+    },
+    stands=(stand("joint", "general spring"),),
+    look_alikes={
+        "ripple.encoder": "sensors on both ends: a ratio moves the far end, a reading error only its own sensor",
+        "ripple.cogging": "slow and fast turns: a ratio moves the far end as far at any low speed, a force fades",
+        "load.imbalance": "lay the axis level: imbalance hangs on gravity, a ratio on nothing",
+        "ripple.torque": "turn by hand with the power off: a ratio is still there, a gain is not",
+    },
+    typical={"A": (1e-4, 1e-2)},
+    axis="angle",
+    order=45,
+    since=2,
+    phrase=Phrase(
+        noun="an uneven ratio",
+        head="{here} runs unevenly",
+        detail="its far end is up to {A} ahead and behind{harmonics:words}",
+        need=TURNS,
+    ),
+    check="Turn the near end slowly by hand through one turn and follow the far end with a dial gauge.",
+    units={"A": "position", "A2": "position", "A3": "position"},
+    needs=Needs(turns=0.5),
+    search=(Turn("A", "phi", "one", 1e-3), Choice("end", ENDS), Choice("order", (1.0, 2.0))),
+    richer=(Turn("A2", "phi2", "one", 3e-4), Turn("A3", "phi3", "one", 3e-4)),
+    stiff=True,
+    defined=True,
+    draws={"A": Draw(3e-4, 1e-2, "lever")},
+    chosen={"end": ENDS},
+)

@@ -1,0 +1,84 @@
+"""Lag of a sensor: it shows a filtered reading, which stays behind while the body moves.
+
+    tau y' = x - y
+
+What it shows is off by d = y - x with  d' = -d / tau - x',  stepped by its exponential: exact for a speed that is held
+over a substep, any tau. The memory is kept at the site of the forces, since a reading may be asked for at any time.
+
+Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3; Harris & Piersol, Shock and Vibration Handbook
+(2002), ch. 13 for the filters of sensors.
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants.element import stand
+from rtctl.plants.physics.search import Size
+from rtctl.plants.physics.story import Draw, Phrase
+from rtctl.plants.physics.term import Node, Term
+
+
+class SensorLagSettings(Settings):
+    """tau is the size."""
+
+    term: Literal["sensor.lag"] = "sensor.lag"
+    node: Node
+    tau: float = quantity(unit="s", ge=0, le=10, help="time constant of the filter")
+
+
+class SensorLagParams(NamedTuple):
+    tau: float
+    keep: float  # share of the error that is left after a substep
+
+
+SENSOR_LAG_STATE = state(d=float)
+
+
+def build_sensor_lag(settings: SensorLagSettings, h: float) -> SensorLagParams:
+    """Exact step of the filter over `h` s."""
+    tau = max(settings.tau, 0.0)
+    return SensorLagParams(tau, math.exp(-h / tau) if tau > 0.0 else 0.0)
+
+
+@tick
+def follow(p, s, v):
+    """Let the filter follow a body of speed `v` for a substep."""
+    s.d = s.d * p.keep - p.tau * (1.0 - p.keep) * v
+
+
+SENSOR_LAG = Term(
+    name="sensor.lag",
+    words="the reading comes late and soft: it stays behind while the body moves, and is right at rest",
+    equation="tau y' = x - y",
+    source="Astrom & Wittenmark 1997, 2.3",
+    settings=SensorLagSettings,
+    build=build_sensor_lag,
+    act={
+        "force": "sensor_lag.follow({p}, {s}, {r} * {m}.vm[{i}])",
+        "reading": "{m}.y[{c}] += {s}.d",
+    },
+    stands=(stand("sensor", "general position"),),
+    look_alikes={
+        "timing.delay": "two sensors on one body: a delay of the loop is late on both, a lag of one sensor on that one",
+        "drive.lag": "move it by hand with the power off: a sensor that lags still stays behind",
+        "sensor.scale": "stop and wait: a lag comes to the right value, a wrong factor does not",
+        "friction.viscous": "stop and wait, with a second sensor: friction moves both readings alike",
+    },
+    typical={"tau": (0.5, 5.0)},
+    scale={"tau": "sample period"},
+    axis="frequency",
+    order=175,
+    since=2,
+    state=SENSOR_LAG_STATE,
+    phrase=Phrase(
+        noun="a reading that lags",
+        head="{here} reads late and soft",
+        detail="it follows with a time constant of {tau}",
+        need="quick moves, with a second sensor or a known command",
+    ),
+    check="Look for a filter in the sensor, its converter or the input card, and at the averaging that is set there.",
+    search=(Size("tau", "tick", 1.0, blur="driver"),),
+    defined=True,
+    draws={"tau": Draw(0.5, 3.0, "tick")},
+)

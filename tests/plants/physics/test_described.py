@@ -1,0 +1,215 @@
+"""Terms of described machines: each is what its equation says, on an axis whose elements are taken for described ones.
+
+The axis runs uncompiled, substep by substep, with the lines of the term in their sites.
+"""
+
+import importlib
+import math
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from rtctl.idiom import interpreted
+from rtctl.plants import axis, linear
+from rtctl.plants.physics import TERMS, anywhere, by_kind
+from rtctl.plants.physics.term import SITES
+
+M, K, F_C, SPRING = 2.0, 5.0, 0.4, 300.0
+USUAL: dict[str, dict[str, Any]] = {
+    "transmission.hysteresis": {"F_h": 0.8, "z_h": 2e-3},
+    "ripple.ratio": {"A": 1e-3, "phi": 0.3, "turn": 0.02},
+    "ripple.torque": {"A": 0.2, "per_turn": 1.0, "phi": 0.5, "turn": 0.02},
+    "drive.slew": {"rate": 20.0},
+    "sensor.lag": {"tau": 4e-3},
+    "load.gravity": {"A": 0.8, "phi": 0.4},
+    "load.inertia": {"A": 0.5, "phi": 0.2, "order": 40.0},
+    "friction.position": {"A": 0.3, "length": 0.05},
+    "drive.back_emf": {"b": 4.0},
+}
+NOTHING = {"drive.slew": {"rate": 1e9}, "transmission.hysteresis": {"F_h": 0.0}, "sensor.lag": {"tau": 0.0}}
+NOTHING |= {"drive.back_emf": {"b": 0.0}}
+NAMES = tuple(USUAL)
+PASSIVE = ("transmission.hysteresis", "ripple.ratio", "load.gravity", "load.inertia", "friction.position")
+TEXT = """
+def run(P, S, p, s, i, r, l, c, volts, out):
+    m = s.m
+    for k in range(len(volts)):
+        m.volts[0] = volts[k]
+        {command}
+        m.u[0] = m.volts[0]
+        linear.midpoint(m)
+        {force}
+        {last}
+        linear.advance(m)
+        axis.read(s)
+        {reading}
+        out[k] = m.x[0], m.x[1], m.y[0], m.u[0], m.f[0], m.dry[0], m.r[0], m.volts[0]
+"""
+
+
+class Run(NamedTuple):
+    """Rows (n,) after each substep, and the machine."""
+
+    x: np.ndarray
+    v: np.ndarray
+    y: np.ndarray
+    u: np.ndarray
+    f: np.ndarray
+    dry: np.ndarray
+    r: np.ndarray
+    volts: np.ndarray
+    m: Any
+
+
+def run(name: str | None, volts: np.ndarray, h: float, v: float = 0.0, dry: float = F_C, **values: Any) -> Run:
+    """Drive the axis at rest, or with a speed, with a term or without."""
+    p = axis.build(axis.AxisSettings(parameters={"M": M, "K": K, "F_v": 0.0, "F_c": dry, "k": SPRING}), h)
+    s = np.zeros(1, axis.AXIS_STATE).view(np.recarray)[0]
+    axis.start(p, s)
+    s.m.x[1] = s.m.v_before[0] = v
+    lines, scope, params, memory = dict.fromkeys(SITES, "pass"), {"linear": linear, "axis": axis}, None, None
+    if name is not None:
+        term = TERMS[name]
+        fill = {"p": "P", "s": "S", "m": "m", "i": "i", "r": "r", "l": "l", "c": "c"}
+        lines = {site: (term.act_at(site, "axis") or "pass").format(**fill) for site in SITES}
+        module = importlib.import_module(term.build.__module__)
+        scope[module.__name__.rpartition(".")[2]] = module
+        params = term.build(term.settings(node=anywhere(term)["axis"][0], **values), h)
+        memory = np.zeros(1, term.state if term.state is not None else [("spare", "f8")]).view(np.recarray)[0]
+    exec(TEXT.format(**lines), scope)
+    out = np.zeros((len(volts), 8))
+    with interpreted():
+        scope["run"](params, memory, p, s, 0, 1.0, 0, 0, volts, out)
+    return Run(*out.T, s.m)
+
+
+def push(n: int = 240, h: float = 1e-3) -> np.ndarray:
+    """Volts (n,) that move the axis to and fro for n substeps of `h` s."""
+    t = np.arange(n) * h
+    return 1.2 * np.sign(np.sin(2 * np.pi * 5.0 * t) + 0.2) + 0.3 * np.sin(2 * np.pi * 11.0 * t)
+
+
+@cache
+def plain(times: int) -> np.ndarray:
+    """Readings of the axis without any term, in substeps that are so many times shorter."""
+    return run(None, np.repeat(push(), times), 1e-3 / times).y
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_size_zero_has_no_effect_and_the_usual_size_is_seen(name):
+    off = NOTHING.get(name, {"A": 0.0})
+    with_none, with_it = (run(name, push(), 1e-3, **{**USUAL[name], **change}) for change in (off, {}))
+    assert np.abs(with_none.y - plain(1)).max() < 1e-9
+    assert np.abs(with_it.y - plain(1)).max() > 2e-5
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_half_the_step_gives_the_same_effect(name):
+    def effect(times):
+        volts, h = np.repeat(push(), times), 1e-3 / times
+        return (run(name, volts, h, **USUAL[name]).y - plain(times))[times - 1 :: times]
+
+    one, two, exact = (effect(times) for times in (1, 2, 4))
+    size = np.abs(exact).max()
+    assert np.abs(two - exact).max() < 0.03 * size
+    assert np.abs(two - exact).max() < 0.6 * np.abs(one - exact).max() + 1e-4 * size
+
+
+@pytest.mark.parametrize("name", PASSIVE)
+def test_nothing_makes_the_axis_faster_than_it_was_pushed(name):
+    r = run(name, np.zeros(1500), 2e-4, v=0.15, dry=0.0 if name != "friction.position" else F_C, **USUAL[name])
+    energy = 0.5 * M * r.v**2 + 0.5 * SPRING * r.x**2
+    slack = 2 * USUAL[name]["A"] if name == "load.gravity" else 0.0  # of its potential
+    if name == "load.inertia":
+        term = USUAL[name]
+        energy = energy + 0.5 * term["A"] * np.cos(term["order"] * r.x + term["phi"]) * r.v**2
+        assert energy == pytest.approx(energy[0], rel=2e-3)
+    elif name == "ripple.ratio":
+        x = 2 * np.pi * r.x / 0.02
+        error = 1e-3 * (np.sin(x + 0.3) - np.sin(0.3))
+        energy = 0.5 * M * r.v**2 + 0.5 * SPRING * (r.x + error) ** 2
+        assert energy == pytest.approx(energy[0], rel=2e-3)
+    else:
+        assert energy.max() < (0.5 * M * 0.15**2 + slack) * 1.001
+
+
+def test_what_the_plants_of_today_have_is_as_it_was():
+    assert all(by_kind(TERMS[name]) == {} and TERMS[name].in_format(2) and not TERMS[name].tabled for name in NAMES)
+    assert TERMS["friction.quadratic"].in_format(2) and not TERMS["friction.quadratic"].tabled
+
+
+@pytest.mark.parametrize("form", ["dahl", "bouc_wen"])
+def test_a_loop_of_hysteresis_is_the_same_at_any_speed(form):
+    """The exact step follows the deflection: many small ones come to one large one."""
+    from rtctl.plants.physics.hysteresis import bend, bouc_wen
+
+    law = (bend if form == "dahl" else bouc_wen).py_func
+    with interpreted():
+        for start, way in ((0.0, 3e-3), (0.9, -5e-3), (-0.7, 1e-3)):
+            w = start
+            for _ in range(64):
+                w = law(w, way / 64, 2e-3)
+            assert w == pytest.approx(law(start, way, 2e-3), abs=1e-12)
+            assert -1.0 <= w <= 1.0
+        slope = law(0.3, 1e-9, 2e-3) - 0.3
+    assert slope == pytest.approx(1e-9 / 2e-3 * (1.0 - 0.3 ** (1 if form == "dahl" else 2)), rel=1e-4)
+
+
+def test_a_loop_of_hysteresis_takes_energy():
+    slow = 0.25 * np.sin(2 * np.pi * np.arange(2000) * 1e-3)
+    r = run("transmission.hysteresis", slow, 1e-3, dry=0.0, F_h=0.3, z_h=5e-4)
+    lost = float(np.sum(-r.f[1000:] * np.diff(r.x, prepend=0.0)[1000:]))
+    span = np.ptp(r.x[1000:])
+    assert 0.5 < lost / (2 * 0.3 * span) < 1.0  # at most the rectangle of a full turn either way
+
+
+def test_a_gain_follows_the_angle():
+    r = run("ripple.torque", np.full(300, 2.0), 1e-3, **USUAL["ripple.torque"])
+    x = np.concatenate([[0.0], r.x[:-1]])
+    v = np.concatenate([[0.0], r.v[:-1]])
+    q = 2 * np.pi * (x + 0.5e-3 * v) / 0.02
+    assert r.volts == pytest.approx(2.0 * (1 + 0.2 * np.sin(q + 0.5)))
+
+
+def test_a_rate_limit_is_a_ramp():
+    r = run("drive.slew", np.full(100, 1.0), 1e-3, rate=20.0)
+    assert r.volts[:50] == pytest.approx((np.arange(50) + 0.5) * 0.02)
+    assert r.volts[50:] == pytest.approx(1.0)
+
+
+def test_a_filtered_reading_stays_behind_by_its_time_constant():
+    r = run("sensor.lag", np.zeros(400), 1e-3, v=0.2, dry=0.0, tau=4e-3)
+    t, w = np.arange(1, 401) * 1e-3, math.sqrt(SPRING / M)
+    z = 1.0 / (1.0 + 4e-3j * w)  # of the filter at the frequency of the swing
+    steady = 0.2 / w * np.imag(z * np.exp(1j * w * t))
+    assert r.y[50:] == pytest.approx(steady[50:], abs=2e-6)
+    assert r.x == pytest.approx(0.2 / w * np.sin(w * t), abs=1e-9)
+
+
+def test_gravity_has_the_period_of_a_turn_and_pulls_a_slide_one_way():
+    r = run("load.gravity", push(), 1e-4, **USUAL["load.gravity"])
+    assert r.f == pytest.approx(-0.8 * np.sin(r.x + 0.4), abs=1e-4)
+    slide = run("load.gravity", push(), 1e-4, A=0.8, form="incline")
+    assert slide.f == pytest.approx(-0.8)
+
+
+def test_friction_along_the_way_adds_to_what_the_axis_has():
+    r = run("friction.position", push(), 1e-4, A=0.3, length=0.05, slope=2.0)
+    assert r.dry == pytest.approx(F_C + 2.0 * r.x + 0.3 * np.sin(2 * np.pi * r.x / 0.05), abs=1e-3)
+    assert (np.abs(r.r) <= np.maximum(r.dry, 0.0) + 1e-12).all()
+
+
+def test_a_drive_that_is_off_does_not_brake():
+    volts = np.concatenate([np.full(100, 1.5), np.zeros(100)])
+    r = run("drive.back_emf", volts, 1e-4, b=4.0)
+    assert r.f[1:100] == pytest.approx(-4.0 * r.v[1:100], rel=0.1, abs=1e-3)
+    assert (r.f[100:] == 0.0).all()
+
+
+def test_an_inertia_at_rest_starts_as_one_of_its_angle():
+    for phi in (0.0, math.pi / 2, math.pi):
+        r = run("load.inertia", np.full(20, 1.0), 1e-4, A=0.8, phi=phi, order=1.0)
+        heavy = M + 0.8 * math.cos(phi)
+        assert r.v[-1] == pytest.approx((K * 1.0 - F_C) / heavy * 2e-3, rel=5e-3)

@@ -1,0 +1,85 @@
+"""Nodes of the terms on the three plants, as they were before traits told them."""
+
+import pytest
+
+from rtctl.plants.element import element, stand
+from rtctl.plants.physics import TERMS, by_kind, having, met, nodes, only, standing
+
+SHAFTS = {"ivu": "motor1 motor2 reel1 reel2 capstan", "ldu": "motor wheel capstan carriage", "axis": "carriage"}
+PLACES = (
+    ("timing.delay timing.jitter", {"ivu": "loop", "ldu": "loop", "axis": "loop"}),
+    (
+        "drive.offset drive.deadband drive.gain_asymmetry drive.saturation drive.lag",
+        {"ivu": "drive1 drive2", "ldu": "drive", "axis": "drive"},
+    ),
+    ("drive.supply_sag", {"ivu": "drive1", "ldu": "drive", "axis": "drive"}),
+    ("drive.thermal", {"ivu": "drive1 drive2 motor1 motor2", "ldu": "drive carriage", "axis": "drive carriage"}),
+    ("ripple.reel geometry.radius_change", {"ivu": "reel1 reel2"}),
+    ("ripple.capstan", {"ivu": "capstan", "ldu": "capstan"}),
+    ("transmission.backlash", {"ivu": "motor1 motor2", "ldu": "motor wheel capstan", "axis": "sensor"}),
+    ("transmission.slip transmission.creep", {"ivu": "capstan", "ldu": "wheel capstan"}),
+    ("friction.coulomb friction.viscous friction.quadratic friction.stribeck", SHAFTS),
+    ("structure.resonance load.bump", SHAFTS),
+    ("structure.stiffening", {"ivu": "tape1 tape2 motor1 motor2", "ldu": "wheel capstan", "axis": "carriage"}),
+    ("tape.viscoelastic tape.slack", {"ivu": "tape1 tape2"}),
+    ("friction.load", {"ivu": "capstan reel1 reel2 motor1 motor2", "ldu": "wheel capstan", "axis": "carriage"}),
+    ("load.spring load.cable_chain", {"ldu": "carriage", "axis": "carriage"}),
+    ("load.imbalance", {**SHAFTS, "ldu": "wheel capstan"}),
+    ("friction.asymmetry friction.presliding", {"ivu": "motor1 motor2 capstan", "ldu": "carriage", "axis": "carriage"}),
+    ("ripple.cogging", {"ivu": "motor1 motor2", "ldu": "motor", "axis": "carriage"}),
+    ("ripple.encoder", {"ivu": "encoder", "ldu": "encoder", "axis": "sensor"}),
+    ("guide.thickness guide.strip guide.dirt", {"ldu": "carriage scale", "axis": "sensor"}),
+    (
+        "sensor.missed_counts sensor.rectified sensor.scale",
+        {"ivu": "encoder", "ldu": "encoder scale", "axis": "sensor"},
+    ),
+)
+FROZEN = {
+    name: {kind: tuple(n.split()) for kind, n in there.items()} for names, there in PLACES for name in names.split()
+}
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_a_term_stands_where_it_stood(name):
+    """What came later stands at no node of these plants."""
+    assert by_kind(TERMS[name]) == FROZEN.get(name, {})
+
+
+def test_the_traits_of_any_machine_say_where_a_term_stands():
+    belt = (
+        element("motor", "body", "turns driven dry"),
+        element("carriage", "body", "slides load dry bounded"),
+        element("belt", "joint", "spring shaft"),
+        element("scale", "sensor", "position slides load"),
+    )
+    assert nodes(TERMS["ripple.cogging"], belt) == ("motor",)
+    assert nodes(TERMS["load.spring"], belt) == ("carriage",)
+    assert nodes(TERMS["transmission.backlash"], belt) == ("belt",)
+    assert nodes(TERMS["ripple.encoder"], belt) == ()
+    assert nodes(TERMS["friction.coulomb"], "no plant") == ()
+
+
+def test_the_first_stand_that_fits_counts():
+    found = standing(TERMS["ripple.encoder"], "axis", "sensor")
+    assert found is not None and not found[0].usual and found[1].kind == "sensor"
+    found = standing(TERMS["ripple.encoder"], "ldu", "encoder")
+    assert found is not None and found[0].usual
+    assert standing(TERMS["ripple.encoder"], "ldu", "scale") is None
+    assert standing(TERMS["guide.dirt"], "ldu", "scale")[0].again
+
+
+def test_what_described_machines_are_asked_about_no_plant_is():
+    drag, fan = TERMS["friction.quadratic"], (element("fan", "body", "turns general"),)
+    assert standing(drag, fan, "fan")[0].offered
+    assert not any(standing(drag, kind, node)[0].offered for kind, there in by_kind(drag).items() for node in there)
+    assert {name for name, term in TERMS.items() if not by_kind(term) and nodes(term, fan)} == {
+        "friction.position", "load.gravity", "load.inertia"
+    }  # fmt: skip
+
+
+def test_elements_by_trait():
+    assert having("ivu", "body", "reel") == ("reel1", "reel2")
+    assert met((stand("sensor"), stand("body", "capstan")), "ldu") == ("encoder", "scale", "capstan")
+    assert only("slips") == "transmission.slip"
+    with pytest.raises(StopIteration):
+        only("slips", "never")
