@@ -13,6 +13,9 @@ from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
 from rtctl.proof import seal
 
+PLANTS = ("ivu", "ldu", "axis")
+MIX = "proof seed {0}"  # of the plants, in answers.json
+MACHINES_MIX = "proof of machines, seed {0}"
 DRAFT = ".unsealed"  # answers of the cases written so far; gone when they are sealed
 
 Progress = Callable[[int, int], None]

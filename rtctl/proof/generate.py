@@ -15,13 +15,12 @@ import numpy as np
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
 from rtctl.proof import draw, plants, solver
-from rtctl.proof.batch import DRAFT, Progress, batch
+from rtctl.proof.batch import DRAFT, MIX, PLANTS, Progress, batch
 from rtctl.proof.effects import TABLE
 from rtctl.proof.machine import NQ, NU, NY
 from rtctl.proof.setup import Setup, draws
 from rtctl.proof.unknown import UNKNOWN
 
-PLANTS = ("ivu", "ldu", "axis")
 ATTEMPTS, SIZES_TRIED = 6, 2  # machines, and draws of sizes for each
 WANT = {"unknown": 6.0}  # ratio that a case should reach, else 4, or 1 at a tenth of the size
 TOO_PLAIN, PLAIN = 120.0, 45.0  # ratio of unknown physics above which it is made smaller, and what for
@@ -303,4 +302,4 @@ def generate(
         raise UserError(f"plants: '{bad[0] if bad else ''}' is not one of {', '.join(PLANTS)}")
     which = tuple(p for p in PLANTS if p in plants)
     order = {"seed": seed, "plants": list(which), "heldout": heldout}
-    return batch(Path(folder), count, order, write_case, (seed, which, heldout), f"proof seed {seed}", 1, progress, jobs)
+    return batch(Path(folder), count, order, write_case, (seed, which, heldout), MIX.format(seed), 1, progress, jobs)

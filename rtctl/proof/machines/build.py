@@ -12,10 +12,9 @@ from rtctl.proof.machines.describe import believe, gravities, record
 from rtctl.proof.machines.draft import BUILD, Draft, between, pick
 from rtctl.proof.machines.kinematics import ratios, reflected
 from rtctl.proof.machines.law import law_record
-from rtctl.proof.machines.setup import Hidden, Play, Setup
+from rtctl.proof.machines.setup import Hidden, Setup
 
 Json = dict[str, Any]
-TOPOLOGIES = ("belt", "arm", "screw", "torsion", "pendulum", "hoist", "spindle", "gantry", "two-motor", "axis")
 SETTLE_S = 1.5  # under the law, before the first row
 OPEN = " Open loop: the command was played from a file."
 CLOSED = (
@@ -25,7 +24,8 @@ CLOSED = (
 
 
 def sound(topology: str, rng: np.random.Generator, how: str, need: frozenset[str], edge: bool) -> Setup:
-    """Setup of a machine of `topology`; `need` holds what an effect asks for, `edge` puts the owner at the tolerances."""
+    """Setup of a machine of `topology`; `need` holds what an effect asks for, `edge` sets the owner's values at the
+    edges of their tolerances."""
     d = BUILD[topology](rng, need)
     Ts = 1.0 / pick(rng, *d.rates)
     n = int(pick(rng, 8.0, 10.0, 12.0, 15.0, 20.0) / Ts)
@@ -169,7 +169,8 @@ def _law(
         voltage = m["d_kind"][k] == VOLTAGE
         per_unit += driver.share * g * float(m["d_gain"][k]) * (float(m["d_Kt"][k] / m["d_R"][k]) if voltage else 1.0)
         damp += g * g * float(m["d_Kt"][k] ** 2 / m["d_R"][k]) if voltage else 0.0
-    lag = float(m["Ts"]) * (delay + 1.0)
+    Ts = float(m["Ts"])
+    lag = Ts * (delay + 1.0)
     w = 2.0 * math.pi * between(rng, *d.loop_hz)
     w = min(w, 0.12 / lag)
     first = next(iter(machine["drives"].values()))
@@ -183,9 +184,10 @@ def _law(
         kd, ki = max(1.5 * J * w - damp, 0.1 * J * w), 0.15 * kp * w
     keep = d.speed_loop or "gravity" in str(machine["bodies"]) or rng.random() < 0.5
     return law_record(
-        tuple(pre), tuple(1.0 for _ in d.drivers), kp=kp / per_unit, kd=kd / per_unit, ki=ki / per_unit if keep else 0.0,
-        ki_settle=ki / per_unit, tau=max(0.15 / w, 1.5 * m["Ts"]), unit=unit, file=float(opened), limit=limit, step=step,
-        sensor=list(machine["sensors"]).index(d.control), top=first.get("dac_range", limit) - step, Ts=m["Ts"],
+        tuple(pre), tuple(1.0 for _ in d.drivers), kp=kp / per_unit, kd=kd / per_unit,
+        ki=ki / per_unit if keep else 0.0, ki_settle=ki / per_unit, tau=max(0.15 / w, 1.5 * Ts), unit=unit,
+        file=float(opened), limit=limit, step=step,
+        sensor=list(machine["sensors"]).index(d.control), top=first.get("dac_range", limit) - step, Ts=Ts,
         n=len(d.drivers),
     )  # fmt: skip
 
@@ -231,6 +233,3 @@ def _noise(rng: np.random.Generator, s: Setup, need: float) -> Hidden:
         if not counter and rng.random() < 0.5:
             s.case["machine"]["sensors"][name]["noise"] = float(f"{h.count_sd[k] * sensor.get('resolution', 1.0):.2g}")
     return h
-
-
-__all__ = ["TOPOLOGIES", "Play", "sound"]

@@ -66,7 +66,7 @@ def record(machine: Json, Ts: float, delay: float) -> np.ndarray:
     return m
 
 
-def numbers(machine: Json, path: str = "") -> Iterator[tuple[str, float]]:
+def numbers(machine: Json | list[Any], path: str = "") -> Iterator[tuple[str, float]]:
     """Dotted paths and values of all numbers of a description."""
     items = enumerate(machine) if isinstance(machine, list) else machine.items()
     for key, value in items:

@@ -4,18 +4,23 @@ A deck of 60 cases: 27 singles (sizes 1, 0.3, 0.1 as 15 to 9 to 3), 7 without mi
 edge of their tolerance, 3 decoys, 9 pairs, 9 of unknown physics. Singles go through every name before one comes again.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rtctl.proof.machines import (  # noqa: F401  (they fill the table)
-    effects_drive, effects_friction, effects_joint, effects_load, effects_sensor,
+    TOPOLOGIES,
+    effects_drive,
+    effects_friction,
+    effects_joint,
+    effects_load,
+    effects_sensor,
 )  # fmt: skip
-from rtctl.proof.machines.build import TOPOLOGIES
 from rtctl.proof.machines.effect import TABLE
 from rtctl.proof.machines.unknown import UNKNOWN
 
-DECK: list[tuple[str, float | None]] = (
+DECK: Sequence[tuple[str, float | None]] = (
     [("single", 1.0)] * 15 + [("single", 0.3)] * 9 + [("single", 0.1)] * 3 + [("null", None)] * 7
     + [("parameters", None)] * 5 + [("decoy", None)] * 3 + [("pair", 1.0)] * 7 + [("pair", 0.3)] * 2
     + [("unknown", 1.0)] * 9

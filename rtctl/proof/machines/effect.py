@@ -19,7 +19,7 @@ Maker = Callable[[Setup, str, float, np.random.Generator], Sizes]
 Where = Callable[[Setup], list[str]]
 
 
-class Unfit(Exception):
+class UnfitError(Exception):
     """The effect cannot show on this machine or in this motion; another machine is drawn."""
 
 
@@ -168,9 +168,7 @@ def names_ok(s: Setup, name: str, node: str) -> set[str]:
     driven = {drive["body"] for drive in s.machine["drives"].values()}
     if name == "load.gravity":
         out.add("load.imbalance" if rotary(s.machine, node) else "drive.offset")
-    elif name == "load.imbalance":
-        out.add("load.gravity")
-    elif name == "drive.offset" and linear:
+    elif name == "load.imbalance" or (name == "drive.offset" and linear):
         out.add("load.gravity")
     elif name == "drive.back_emf":
         out.add("friction.viscous")

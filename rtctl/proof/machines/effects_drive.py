@@ -6,7 +6,20 @@ import numpy as np
 
 from rtctl.proof.machines.arrays import FORCE
 from rtctl.proof.machines.effect import (
-    Setup, Sizes, Unfit, about, command, drives, effect, form, inertia_at, level, loop, sign, span, speed,
+    Setup,
+    Sizes,
+    UnfitError,
+    about,
+    command,
+    drives,
+    effect,
+    form,
+    inertia_at,
+    level,
+    loop,
+    sign,
+    span,
+    speed,
 )  # fmt: skip
 from rtctl.proof.machines.kinematics import rotary
 
@@ -28,7 +41,7 @@ def offset(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 @effect("drive.deadband", drives, ("command",))
 def deadband(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """No output around zero; hard or rounded edges. The band is where the output begins."""
-    d, band = s.drive(node), about(rng, 0.5 * command(s, node)) * size
+    d, band = s.drive(node), about(rng, 0.35 * command(s, node)) * size
     s.m["d_band"][d], s.m["d_bandsoft"][d] = band, (0.0, 0.3 * band)[form(rng, 2)]
     return {"band": band}
 
@@ -118,7 +131,7 @@ def commutation(s: Setup, node: str, size: float, rng: np.random.Generator) -> S
     d, wide = s.drive(node), span(s, _body(s, node))
     least = math.ceil(6.0 / max(wide, 1e-9))
     if least > 42:
-        raise Unfit("the motor hardly turns")
+        raise UnfitError("the motor hardly turns")
     n = float(rng.choice([k for k in (4, 6, 8, 12, 14, 18, 24, 42) if k >= least]))
     a = min(about(rng, 0.25) * size, 0.45)
     for h in range(1 + 2 * form(rng, 2)):

@@ -6,7 +6,19 @@ import numpy as np
 
 from rtctl.proof.machines import arrays
 from rtctl.proof.machines.effect import (
-    Setup, Sizes, Unfit, about, bodies, effect, form, inertia_at, joint_force, level, sign, span, speed,
+    Setup,
+    Sizes,
+    UnfitError,
+    about,
+    bodies,
+    effect,
+    form,
+    inertia_at,
+    joint_force,
+    level,
+    sign,
+    span,
+    speed,
 )  # fmt: skip
 from rtctl.proof.machines.kinematics import rotary
 
@@ -60,7 +72,7 @@ def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
     dry = min(about(rng, F / max(float(s.m["b_F"][i]), 1e-12)), 0.9) * size * sign(rng) if kind != 1 else 0.0
     B = about(rng, F / speed(s, node)) * size * sign(rng) if kind != 0 else 0.0
     if kind == 0 and abs(dry) * float(s.m["b_F"][i]) < 0.2 * F * size:
-        raise Unfit("too little dry friction for an asymmetry of it")
+        raise UnfitError("too little dry friction for an asymmetry of it")
     s.m["b_as"][i], s.m["b_Bas"][i] = dry, B
     return {"asymmetry": dry, "viscous_asymmetry": B}
 
@@ -80,13 +92,13 @@ def by_load(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
     weight = float(np.abs(s.m["b_g"][i]).max() + abs(s.m["b_gc"][i]))
     if weight > 0.0 and (not forces or form(rng, 2)):
         if s.m["b_gc"][i] != 0.0:
-            raise Unfit("a constant load gives constant friction")
+            raise UnfitError("a constant load gives constant friction")
         lean = float(np.std(np.abs(np.sin(s.seen["q"][:, i] + s.m["b_ga"][i, 0]))))
         mu = about(rng, 0.9 * level(s, node) / (weight * max(lean, 0.1))) * size
         s.m["b_mu_g"][i] = min(mu, 0.6)
         return {"mu": float(s.m["b_mu_g"][i])}
     if not forces:
-        raise Unfit("no force in a joint here")
+        raise UnfitError("no force in a joint here")
     mu = min(about(rng, 0.8 * level(s, node) / max(forces)), 0.5) * size
     s.m["b_mu"][i] = mu
     return {"mu": mu}

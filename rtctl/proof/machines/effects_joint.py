@@ -7,7 +7,19 @@ import numpy as np
 from rtctl.proof.machines import arrays
 from rtctl.proof.machines.draft import ELASTIC, RIGID
 from rtctl.proof.machines.effect import (
-    Setup, Sizes, Unfit, about, bodies, effect, form, inertia_at, joint_force, rotary_bodies, sign, span, springs,
+    Setup,
+    Sizes,
+    UnfitError,
+    about,
+    bodies,
+    effect,
+    form,
+    inertia_at,
+    joint_force,
+    rotary_bodies,
+    sign,
+    span,
+    springs,
 )  # fmt: skip
 from rtctl.proof.machines.kinematics import joint_hz, rotary
 
@@ -23,7 +35,7 @@ def backlash(s: Setup, node: str, size: float, rng: np.random.Generator) -> Size
     j = s.joint(node)
     T = s.seen["T"][:, j]
     if min(np.mean(T > 0.0), np.mean(T < 0.0)) < 0.05:
-        raise Unfit("the joint's force never changes its sign")
+        raise UnfitError("the joint's force never changes its sign")
     far = s.machine["joints"][node]["to"]
     gap = about(rng, max(3.0 * bend(s, node), 4e-4 * span(s, far)), 0.5) * size
     s.m["j_gap"][j], s.m["j_soft"][j] = gap, (0.0, 0.15 * gap)[form(rng, 2)]
@@ -47,7 +59,7 @@ def slip(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     j = s.joint(node)
     T = np.abs(s.seen["T"][:, j])
     if abs(float(np.mean(s.seen["T"][:, j]))) > 1.0 * joint_force(s, node):
-        raise Unfit("a joint under constant load would slide away")
+        raise UnfitError("a joint under constant load would slide away")
     limit = float(np.quantile(T, 1.0 - about(rng, 0.02, 0.5) * size))
     s.m["j_limit"][j] = limit
     s.m["j_eta"][j] = (0.0, about(rng, 0.01) * float(s.m["j_k"][j]))[form(rng, 2)]
@@ -82,9 +94,9 @@ def ratio(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     wide = float(np.ptp(s.seen["q"][:, i]))
     n = 1.0 if wide > 8.0 else float(math.ceil(12.0 / max(wide, 1e-9)))
     if n > 60.0:
-        raise Unfit("the body hardly turns")
+        raise UnfitError("the body hardly turns")
     k, fast = float(s.m["j_k"][j]), float(np.quantile(np.abs(s.seen["v"][:, i]), 0.9))
-    A = about(rng, max(1.2 * bend(s, node), 8e-4 * span(s, joint["to"]))) * size
+    A = about(rng, max(2.5 * bend(s, node), 1.2e-3 * span(s, joint["to"]))) * size
     A = min(A, 4.0 * joint_force(s, node) / k * max(1.0, (2 * math.pi * joint_hz(s.machine, node) / (n * fast)) ** 2))
     s.m["j_ripend"][j] = float(end == joint["to"])
     for h in range(1 + 2 * form(rng, 2)):
@@ -140,9 +152,6 @@ def resonance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
     return {"added": added, "f_Hz": f}
 
 
-
-
-
 @effect("load.inertia", rotary_bodies, ("angle", "position"))
 def inertia(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """Inertia over the angle of a crank or linkage: once or twice a turn."""
@@ -151,6 +160,6 @@ def inertia(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
     a = min(about(rng, 0.45 * share), 0.8) * size
     n = float(1 + form(rng, 2))
     if span(s, node) * n < 2.0:
-        raise Unfit("the body does not turn far enough")
+        raise UnfitError("the body does not turn far enough")
     s.m["b_Ja"][i], s.m["b_Jn"][i], s.m["b_Jp"][i] = a * sign(rng), n, rng.uniform(0.0, 2.0 * math.pi)
     return {"share": a, "per_turn": n}

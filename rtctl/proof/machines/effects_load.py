@@ -5,7 +5,18 @@ import math
 import numpy as np
 
 from rtctl.proof.machines.effect import (
-    Setup, Sizes, Unfit, about, bodies, crossed, effect, form, level, rotary_bodies, sign, span,
+    Setup,
+    Sizes,
+    UnfitError,
+    about,
+    bodies,
+    crossed,
+    effect,
+    form,
+    level,
+    rotary_bodies,
+    sign,
+    span,
 )  # fmt: skip
 from rtctl.proof.machines.kinematics import rotary
 
@@ -16,7 +27,7 @@ def cogging(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
     i, wide = s.body(node), span(s, node)
     least = math.ceil(6.0 / max(wide, 1e-9))
     if least > 48:
-        raise Unfit("the body hardly turns")
+        raise UnfitError("the body hardly turns")
     n = float(rng.choice([k for k in (4, 6, 7, 8, 12, 14, 24, 36, 48) if k >= least]))
     A = about(rng, 1.2 * level(s, node)) * size
     for h in range(1 + 2 * form(rng, 2)):
@@ -29,7 +40,7 @@ def cogging(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
 def imbalance(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """Gravity on a mass off the centre: a torque of one period a turn, at an angle nobody knows."""
     if span(s, node) < 1.2:
-        raise Unfit("less than a fifth of a turn")
+        raise UnfitError("less than a fifth of a turn")
     i, A = s.body(node), about(rng, 1.1 * level(s, node)) * size
     angle = rng.uniform(-math.pi, math.pi)
     if "gravity" in s.machine["bodies"][node] and abs(math.sin(angle)) < 0.5:
@@ -43,11 +54,11 @@ def gravity(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes
     """Gravity that the description lacks: a mass that hangs, or an incline."""
     i = s.body(node)
     if "gravity" in s.machine["bodies"][node]:
-        raise Unfit("gravity of this body is described")
+        raise UnfitError("gravity of this body is described")
     F = about(rng, 0.9 * level(s, node)) * size
     if rotary(s.machine, node):
         if span(s, node) < 1.0 or span(s, node) > 60.0:
-            raise Unfit("turns too little or as a spindle does")
+            raise UnfitError("turns too little or as a spindle does")
         angle = rng.uniform(-0.6, 0.6)
         s.m["b_gx"][i], s.m["b_gxa"][i] = F, angle
         return {"amplitude": F, "angle": angle}
@@ -60,7 +71,7 @@ def spring(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """Force that grows with the way: linear, hardening, or one that saturates (a cable chain)."""
     i, wide = s.body(node), span(s, node)
     if rotary(s.machine, node) and wide > 400.0:
-        raise Unfit("a spindle has no spring")
+        raise UnfitError("a spindle has no spring")
     k, kind = about(rng, 2.2 * level(s, node) / wide) * size, form(rng, 3)
     x0 = float(np.mean(s.seen["q"][:, i])) + 0.3 * wide * float(rng.uniform(-1.0, 1.0))
     s.m["b_k"][i], s.m["b_x0"][i] = k, x0
@@ -76,7 +87,7 @@ def bump(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """A force at one position: bell-shaped, or with ends."""
     i, wide = s.body(node), span(s, node)
     if rotary(s.machine, node) and wide > 400.0:
-        raise Unfit("a spindle passes one position once")
+        raise UnfitError("a spindle passes one position once")
     F, at = about(rng, 2.0 * level(s, node)) * size * sign(rng), crossed(s, node, rng)
     width = about(rng, 0.018 * wide)
     s.m["b_hump"][i], s.m["b_humpat"][i], s.m["b_humpw"][i] = F, at, width

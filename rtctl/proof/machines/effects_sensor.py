@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from rtctl.proof.machines.draft import TWO
-from rtctl.proof.machines.effect import Setup, Sizes, Unfit, about, effect, form, on_body, sign, span
+from rtctl.proof.machines.effect import Setup, Sizes, UnfitError, about, effect, form, on_body, sign, span
 from rtctl.proof.machines.kinematics import rotary
 
 
@@ -45,7 +45,7 @@ def ripple(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     wide = span(s, sensor["body"])
     n = 1.0 if wide > 7.0 else float(math.ceil(9.0 / max(wide, 1e-9)))
     if n > 40.0:
-        raise Unfit("the body hardly turns")
+        raise UnfitError("the body hardly turns")
     counts = about(rng, 12.0)
     if sensor["measures"] == "speed":
         fast = float(np.quantile(np.abs(s.seen["v"][:, s.body(sensor["body"])]), 0.5))
@@ -72,7 +72,8 @@ def missed(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
 @effect("sensor.lag", _readings, ("frequency", "time"))
 def lag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """Filter in the reading: first order, or two in a row."""
-    k, tau = s.sensor(node), about(rng, 5e-3) * size
+    k, sensor = s.sensor(node), s.machine["sensors"][node]
+    tau = about(rng, 0.02 if sensor["measures"] == "speed" else 6e-3) * size
     if form(rng, 2):
         s.m["s_lag"][k] = tau
     else:
@@ -89,9 +90,9 @@ def rectified(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
     """A counter that counts up in both directions, or a speed without a sign."""
     k, sensor = s.sensor(node), s.machine["sensors"][node]
     if sensor["measures"] == "position" and "counts_per_unit" not in sensor:
-        raise Unfit("a number of a position has a sign")
+        raise UnfitError("a number of a position has a sign")
     v = s.seen["v"][:, s.body(sensor["body"])]
     if min(np.mean(v > 0.0), np.mean(v < 0.0)) < 0.05:
-        raise Unfit("turns one way only")
+        raise UnfitError("turns one way only")
     s.m["s_rect"][k] = 1.0
     return {}

@@ -14,17 +14,15 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
-from rtctl.proof.batch import DRAFT, Progress, batch
-from rtctl.proof.machines import build, draw
-from rtctl.proof.machines.build import TOPOLOGIES
-from rtctl.proof.machines.effect import TABLE, Unfit, level, measure, names_ok, nodes_ok
+from rtctl.proof.batch import DRAFT, MACHINES_MIX, Progress, batch
+from rtctl.proof.machines import TOPOLOGIES, build, draw
+from rtctl.proof.machines.effect import TABLE, UnfitError, level, measure, names_ok, nodes_ok
 from rtctl.proof.machines.setup import Setup
 from rtctl.proof.machines.simulate import HIDDEN, Run, channels, floors, healthy, largest, simulate, visibility
 from rtctl.proof.machines.unknown import UNKNOWN
 
 ATTEMPTS, DRAWS = 5, 120  # machines that are simulated, and machines that are drawn, for one case
 WANT = {"unknown": 6.0}  # ratio that a case should reach, else 4, or 1 at a tenth of the size
-MIX = "proof of machines, seed {0}"
 
 Json = dict[str, Any]
 Found = tuple[float, Setup, Run, Json]  # worst ratio, setup, recording, answer
@@ -66,14 +64,14 @@ def _quiet(s: Setup, a: Run, b: Run) -> bool:
 def put(s: Setup, p: draw.Plan, seed: list[int], size: float, leave: int = -1) -> tuple[Setup, list[Json]]:
     """A copy of the machine with the plan's effects but number `leave`, and what the answers say of each.
 
-    Raises Unfit where an effect cannot show on this machine.
+    Raises UnfitError where an effect cannot show on this machine.
     """
     s, said = copy.deepcopy(s), []
     for k, name in enumerate(p.names):
         rng = np.random.default_rng([*seed, 3, k])
         places = _where(name, s)
         if not places:
-            raise Unfit(f"no place for {name}")
+            raise UnfitError(f"no place for {name}")
         node = places[rng.integers(len(places))]
         if k == leave:
             continue
@@ -110,7 +108,7 @@ def carry_out(p: draw.Plan, seed: list[int]) -> tuple[Setup, Run, Json]:
         simulated += 1
         try:
             tried = conceal(p, base, a, floors(base, a, b), root, lowered)
-        except Unfit:
+        except UnfitError:
             continue
         if tried is not None and (best is None or tried[0] > best[0]):
             best = tried
@@ -219,4 +217,6 @@ def generate(
         raise UserError(f"machines: '{bad[0] if bad else ''}' is not one of {', '.join(TOPOLOGIES)}")
     which = tuple(t for t in TOPOLOGIES if t in topologies)
     order = {"seed": seed, "machines": list(which), "heldout": heldout}
-    return batch(Path(folder), count, order, write_case, (seed, which, heldout), MIX.format(seed), 2, progress, jobs)
+    return batch(
+        Path(folder), count, order, write_case, (seed, which, heldout), MACHINES_MIX.format(seed), 2, progress, jobs
+    )

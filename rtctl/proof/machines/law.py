@@ -1,4 +1,4 @@
-"""Controller: PID on a position, or PI on a speed, shared out to the drives with a preload; or a command from a file."""
+"""Controller: PID on a position, or PI on a speed, shared out to the drives with a preload; or a played command."""
 
 from typing import Any
 

@@ -56,7 +56,7 @@ def largest(seen: dict[str, dict[str, float]]) -> float:
 
 
 def healthy(s: Setup, run: Run | None) -> bool:
-    """The loop holds: finite, follows its reference, not at its limits; an open loop turns no further than it should."""
+    """The loop holds: finite, follows its reference, not at its limits; in an open loop the machine moves."""
     if run is None:
         return False
     for c in s.commands:

@@ -6,15 +6,16 @@ first row the machine settles under the law with reference 0 and no excitation.
 
 import numpy as np
 
-from rtctl.proof.machines.arrays import ENDLESS, NB, ND, NE, NJ, NS
+from rtctl.proof.machines.arrays import NB, ND, NE, NJ, NS
 from rtctl.proof.machines.command import filtered, slewed, wanted
 from rtctl.proof.machines.compiled import compiled
-from rtctl.proof.machines.forces import NX, QV, elastic, hysteresis, rate, stretch
-from rtctl.proof.machines.friction import dry, level
+from rtctl.proof.machines.forces import NX, QV, rate
 from rtctl.proof.machines.law import law_tick
+from rtctl.proof.machines.memory import joint_begin, modes, remember
 from rtctl.proof.machines.reading import raw
 from rtctl.proof.solver import second_order
 
+FINER = 10  # parts of a step in which friction or a contact changes its state
 RUNAWAY = 1e7  # of any state: the loop is unstable
 
 
@@ -28,7 +29,8 @@ def run(m, law, start, settle, ref, w, played, push, spot, extra, lost, y, exact
     of the bodies; joints (n, NJ): joint forces; forces (n, ND): of the drives, volts for voltage drives.
     """
     n, nb, nj, nd, ns = len(ref), int(m.nb), int(m.nj), int(m.nd), int(m.ns)
-    x, x1 = np.zeros(NX), np.zeros(NX)
+    x, x0, x1 = np.zeros(NX), np.zeros(NX), np.zeros(NX)
+    G0, Gm, G1, mode = np.zeros(ND), np.zeros(ND), np.zeros(ND), np.zeros(NB + NJ)
     k1, k2, k3, k4 = np.zeros(NX), np.zeros(NX), np.zeros(NX), np.zeros(NX)
     x[:NB], x[QV : 2 * NB] = start[:NB], start[NB:]
     q0, e0, T, acc, zt = np.zeros(NB), np.zeros(NJ), np.zeros(NJ), np.zeros(NB), np.zeros(NE)
@@ -112,7 +114,7 @@ def run(m, law, start, settle, ref, w, played, push, spot, extra, lost, y, exact
             for d in range(nd):
                 ramp[d] = slewed(m, d, volts[d], ramp[d], h)
                 goal[d] = wanted(m, d, ramp[d], heat[d], drawn, now)
-                F0[d] = F1[d]
+                F0[d] = F1[d] if m.d_w[d] + m.d_lag[d] + m.d_lag2[d] > 0.0 else goal[d]
             filtered(m, goal, lag, lag2, F1, dF, D, 0.5 * h)
             for d in range(nd):
                 Fm[d] = F1[d]
@@ -122,68 +124,50 @@ def run(m, law, start, settle, ref, w, played, push, spot, extra, lost, y, exact
                     heat[d] += ((Fm[d] / m.d_heatref[d]) ** 2 - heat[d]) * h / m.d_heattau[d]
             for i in range(nb):
                 q0[i] = m.b_ratio[i] * x[int(m.b_coord[i])]
-            rate(m, x, now, q0, e0, z, zj, xs, loose, F0, noise, rub, k1, T, zt, acc)
             for i in range(NX):
-                x1[i] = x[i] + 0.5 * h * k1[i]
-            rate(m, x1, now + 0.5 * h, q0, e0, z, zj, xs, loose, Fm, noise, rub, k2, T, zt, acc)
-            for i in range(NX):
-                x1[i] = x[i] + 0.5 * h * k2[i]
-            rate(m, x1, now + 0.5 * h, q0, e0, z, zj, xs, loose, Fm, noise, rub, k3, T, zt, acc)
-            for i in range(NX):
-                x1[i] = x[i] + h * k3[i]
-            rate(m, x1, now + h, q0, e0, z, zj, xs, loose, F1, noise, rub, k4, T, zt, acc)
-            for i in range(NX):
-                x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-            remember(m, x, now + h, h, q0, e0, z, zj, xs, loose, last, rub, T)
+                x0[i] = x[i]
+            advance(m, x, now, h, q0, e0, z, zj, xs, loose, F0, Fm, F1, noise, rub, k1, k2, k3, k4, x1, T, zt, acc)
+            if modes(m, x, now + h, q0, e0, z, xs, loose, T, rub, mode):
+                for i in range(NX):  # something let go or took hold in this step: again in finer ones
+                    x[i] = x0[i]
+                for f in range(FINER):
+                    for d in range(nd):
+                        G0[d] = between(F0[d], Fm[d], F1[d], f / FINER)
+                        Gm[d] = between(F0[d], Fm[d], F1[d], (f + 0.5) / FINER)
+                        G1[d] = between(F0[d], Fm[d], F1[d], (f + 1.0) / FINER)
+                    for i in range(nb):
+                        q0[i] = m.b_ratio[i] * x[int(m.b_coord[i])]
+                    a, g = now + f * h / FINER, h / FINER
+                    advance(
+                        m, x, a, g, q0, e0, z, zj, xs, loose, G0, Gm, G1, noise, rub, k1, k2, k3, k4, x1, T, zt, acc
+                    )
+                    modes(m, x, a + g, q0, e0, z, xs, loose, T, rub, mode)
+                    remember(m, x, a + g, g, q0, e0, z, zj, xs, loose, last, rub, T)
+            else:
+                remember(m, x, now + h, h, q0, e0, z, zj, xs, loose, last, rub, T)
         if not np.abs(x[: 2 * NB]).max() < RUNAWAY:
             return max(k, 0)
     return n
 
 
 @compiled
-def joint_begin(m, x, e0):
-    """Fill e0 (NJ,): elongations at state `x`."""
-    for j in range(int(m.nj)):
-        a, b = int(m.j_a[j]), int(m.j_b[j])
-        e, _, _, _ = stretch(
-            m, j, m.b_ratio[a] * x[int(m.b_coord[a])], m.b_ratio[b] * x[int(m.b_coord[b])], 0.0, 0.0
-        )
-        e0[j] = e
+def between(a, b, c, r):
+    """Parabola through (0, a), (1/2, b), (1, c) at `r`."""
+    return a + r * (4.0 * b - 3.0 * a - c + 2.0 * r * (a - 2.0 * b + c))
 
 
 @compiled
-def remember(m, x, t, h, q0, e0, z, zj, xs, loose, last, spot, T):
-    """Move on what has a memory beyond the differential equations: bristles, hysteresis, slip, creep, loose screws."""
-    load = np.zeros(NB)
-    for j in range(int(m.nj)):
-        if m.j_rigid[j] != 0.0:
-            continue
-        a, b = int(m.j_a[j]), int(m.j_b[j])
-        ca, cb = int(m.b_coord[a]), int(m.b_coord[b])
-        e, _, _, _ = stretch(m, j, m.b_ratio[a] * x[ca], m.b_ratio[b] * x[cb], 0.0, 0.0)
-        load[a] += abs(m.j_n[j] * T[j])
-        load[b] += abs(T[j])
-        if m.j_H[j] != 0.0:
-            hysteresis(m, j, e - e0[j], zj[j])
-        f, _ = elastic(m, j, e - xs[j], t, loose[j])
-        if m.j_limit[j] < ENDLESS and abs(f) > m.j_limit[j]:
-            over = f - np.sign(f) * m.j_limit[j]
-            xs[j] += over * h / m.j_eta[j] if m.j_eta[j] > 0.0 else over / m.j_k[j]
-        if m.j_creep[j] != 0.0 or m.j_creepv[j] != 0.0:
-            xs[j] += f * h * (m.j_creep[j] + m.j_creepv[j] * abs(m.b_ratio[b] * x[QV + cb]))
-        if m.j_loose[j] != 0.0:
-            loose[j] *= np.exp(-h / m.j_loosetau[j])
-            if f * last[j] < 0.0:
-                loose[j] = m.j_loose[j]
-            if f != 0.0:
-                last[j] = f
-        e0[j] = e
-    for i in range(int(m.nb)):
-        c, r = int(m.b_coord[i]), m.b_ratio[i]
-        q, v = r * x[c], r * x[QV + c]
-        carried = 0.0
-        if m.b_mu_g[i] != 0.0:
-            carried = abs(m.b_gc[i] + m.b_gxc[i])
-            for g in range(m.b_g.shape[1]):
-                carried += abs(m.b_g[i, g] * np.sin(q + m.b_ga[i, g]))
-        dry(m, i, level(m, i, q, v, load[i], carried, t, spot[i]), v, q - q0[i], z[i])
+def advance(m, x, t, h, q0, e0, z, zj, xs, loose, F0, Fm, F1, noise, rub, k1, k2, k3, k4, x1, T, zt, acc):
+    """Move x (NX,) on by `h` s; F0, Fm, F1 (ND,) are the drives' forces at its begin, middle and end."""
+    rate(m, x, t, q0, e0, z, zj, xs, loose, F0, noise, rub, k1, T, zt, acc)
+    for i in range(NX):
+        x1[i] = x[i] + 0.5 * h * k1[i]
+    rate(m, x1, t + 0.5 * h, q0, e0, z, zj, xs, loose, Fm, noise, rub, k2, T, zt, acc)
+    for i in range(NX):
+        x1[i] = x[i] + 0.5 * h * k2[i]
+    rate(m, x1, t + 0.5 * h, q0, e0, z, zj, xs, loose, Fm, noise, rub, k3, T, zt, acc)
+    for i in range(NX):
+        x1[i] = x[i] + h * k3[i]
+    rate(m, x1, t + h, q0, e0, z, zj, xs, loose, F1, noise, rub, k4, T, zt, acc)
+    for i in range(NX):
+        x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])

@@ -5,7 +5,17 @@ import math
 import numpy as np
 
 from rtctl.proof.machines.draft import (
-    Draft, Driver, between, both, encoder, pick, scale, spring, topology, wants_rigid,
+    Draft,
+    Driver,
+    Json,
+    between,
+    both,
+    encoder,
+    pick,
+    scale,
+    spring,
+    topology,
+    wants_rigid,
 )  # fmt: skip
 
 
@@ -13,7 +23,7 @@ from rtctl.proof.machines.draft import (
 def belt(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     n = pick(rng, 0.00955, 0.0127, 0.0159, 0.0191)
     mass = between(rng, 0.6, 3.0)
-    bodies = {
+    bodies: dict[str, Json] = {
         "motor": {"inertia": between(rng, 0.15, 0.6) * mass * n * n, "dry": between(rng, 0.1, 0.3) * n * 15.0,
                   "viscous": between(rng, 0.8e-5, 4e-5)},
         "carriage": {"mass": mass, "dry": between(rng, 1.2, 4.5)},
@@ -34,7 +44,7 @@ def screw(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     lead = pick(rng, 0.005, 0.01, 0.016, 0.02) / (2.0 * math.pi)
     mass = between(rng, 4.0, 30.0)
     J = between(rng, 0.5, 2.5) * mass * lead * lead
-    bodies = {
+    bodies: dict[str, Json] = {
         "motor": {"inertia": between(rng, 0.5, 2.0) * J, "dry": between(rng, 2.0, 5.0) * lead * 4.0,
                   "viscous": between(rng, 2.0, 8.0) * lead * 0.02},
         "screw": {"inertia": J, "dry": between(rng, 2.0, 5.0) * lead * 4.0},
@@ -58,12 +68,11 @@ def screw(rng: np.random.Generator, need: frozenset[str]) -> Draft:
 def hoist(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     n = between(rng, 0.03, 0.06)
     mass = between(rng, 3.0, 12.0)
-    bodies = {
+    bodies: dict[str, Json] = {
         "drum": {"inertia": between(rng, 0.3, 1.2) * mass * n * n, "dry": between(rng, 0.02, 0.06) * mass * 9.81 * n,
                  "viscous": between(rng, 0.002, 0.01)},
-        "load": {"mass": mass, "dry": between(rng, 0.01, 0.04) * mass * 9.81, "gravity": {"incline": math.pi / 2.0}},
+        "load": {"mass": mass, "dry": between(rng, 0.01, 0.04) * mass * 9.81, "gravity": {"incline": 1.570796}},
     }  # fmt: skip
-    bodies["load"]["gravity"] = {"incline": 1.570796}
     joints = {"rope": spring(rng, bodies, "drum", "load", float(f"{n:.4g}"), (9.0, 40.0), False)}
     first, second = both(rng, need, (0.5, 0.5, 0.0))
     sensors = {"encoder": encoder(rng, "drum", "encoder_counts")} if first else {}
@@ -80,7 +89,7 @@ def gantry(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     n = pick(rng, 0.0127, 0.0159, 0.0191)
     mass = between(rng, 3.0, 9.0)
     J = between(rng, 0.1, 0.3) * mass * n * n
-    bodies = {
+    bodies: dict[str, Json] = {
         "motor1": {"inertia": J, "dry": between(rng, 0.5, 1.5) * n, "viscous": 0.02 * n},
         "motor2": {"inertia": J * between(rng, 0.9, 1.1), "dry": between(rng, 0.5, 1.5) * n, "viscous": 0.02 * n},
         "beam": {"mass": mass, "dry": between(rng, 3.0, 9.0)},
@@ -104,7 +113,7 @@ def gantry(rng: np.random.Generator, need: frozenset[str]) -> Draft:
 @topology("axis")
 def axis(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     mass = between(rng, 1.0, 60.0)
-    bodies = {"slide": {"mass": mass, "dry": between(rng, 0.2, 0.8) * mass**0.6 * 3.0,
+    bodies: dict[str, Json] = {"slide": {"mass": mass, "dry": between(rng, 0.2, 0.8) * mass**0.6 * 3.0,
                         "viscous": between(rng, 0.3, 2.0) * mass}}  # fmt: skip
     if rng.random() < 0.25:
         bodies["slide"]["gravity"] = {"incline": float(f"{rng.choice([-1, 1]) * rng.uniform(0.1, 0.6):.4g}")}

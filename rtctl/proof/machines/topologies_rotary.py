@@ -3,10 +3,18 @@
 import numpy as np
 
 from rtctl.proof.machines.draft import (
-    TWO, Draft, Driver, between, both, encoder, pick, spring, topology, wants_rigid,
+    TWO,
+    Draft,
+    Driver,
+    Json,
+    between,
+    both,
+    encoder,
+    pick,
+    spring,
+    topology,
+    wants_rigid,
 )  # fmt: skip
-
-Json = dict[str, object]
 
 
 def _hanging(rng: np.random.Generator, mass: float, arm: float, open_loop: bool) -> Json:
@@ -20,11 +28,18 @@ def arm(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     gear = pick(rng, 20.0, 30.0, 50.0, 80.0)
     mass, r = between(rng, 0.8, 3.0), between(rng, 0.12, 0.3)
     J = mass * r * r * rng.uniform(1.15, 1.7)
-    bodies = {
-        "motor": {"inertia": between(rng, 0.2, 1.2) * J / gear**2, "dry": between(rng, 0.05, 0.2) * mass * r * 9.81 / gear,
-                  "viscous": between(rng, 2e-5, 8e-5)},
-        "arm": {"inertia": J, "dry": between(rng, 0.03, 0.12) * mass * r * 9.81, "gravity": _hanging(rng, mass, r, False)},
-    }  # fmt: skip
+    bodies: dict[str, Json] = {
+        "motor": {
+            "inertia": between(rng, 0.2, 1.2) * J / gear**2,
+            "dry": between(rng, 0.05, 0.2) * mass * r * 9.81 / gear,
+            "viscous": between(rng, 2e-5, 8e-5),
+        },
+        "arm": {
+            "inertia": J,
+            "dry": between(rng, 0.03, 0.12) * mass * r * 9.81,
+            "gravity": _hanging(rng, mass, r, False),
+        },
+    }
     joints = {"gear": spring(rng, bodies, "motor", "arm", 1.0 / gear, (14.0, 45.0), wants_rigid(rng, need, 0.2))}
     first, second = both(rng, need, (0.5, 0.5, 0.0))
     sensors = {"encoder": encoder(rng, "motor", "encoder_counts")} if first else {}
@@ -37,11 +52,19 @@ def arm(rng: np.random.Generator, need: frozenset[str]) -> Draft:
 
 @topology("torsion")
 def torsion(rng: np.random.Generator, need: frozenset[str]) -> Draft:
-    bodies = {
-        "motor": {"inertia": between(rng, 1e-3, 3e-3), "dry": between(rng, 0.012, 0.03), "viscous": between(rng, 5e-4, 2e-3)},
+    bodies: dict[str, Json] = {
+        "motor": {
+            "inertia": between(rng, 1e-3, 3e-3),
+            "dry": between(rng, 0.012, 0.03),
+            "viscous": between(rng, 5e-4, 2e-3),
+        },
         "middle": {"inertia": between(rng, 1e-3, 3e-3), "dry": between(rng, 0.004, 0.01)},
-        "load": {"inertia": between(rng, 1e-3, 3e-3), "dry": between(rng, 0.004, 0.01), "viscous": between(rng, 2e-4, 8e-4)},
-    }  # fmt: skip
+        "load": {
+            "inertia": between(rng, 1e-3, 3e-3),
+            "dry": between(rng, 0.004, 0.01),
+            "viscous": between(rng, 2e-4, 8e-4),
+        },
+    }
     joints = {"shaft1": spring(rng, bodies, "motor", "middle", 1.0, (14.0, 40.0), False, (0.01, 0.03)),
               "shaft2": spring(rng, bodies, "middle", "load", 1.0, (14.0, 40.0), False, (0.01, 0.03))}  # fmt: skip
     sensors = {"encoder1": encoder(rng, "motor", "encoder1_counts")}
@@ -60,11 +83,15 @@ def pendulum(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     mass, r = between(rng, 0.3, 2.0), between(rng, 0.1, 0.35)
     weight = mass * r * 9.81
     g = _hanging(rng, mass, r, False)
-    body: dict[str, object] = {"inertia": mass * r * r * rng.uniform(1.1, 1.6), "dry": between(rng, 0.006, 0.03) * weight,
-                               "viscous": between(rng, 0.001, 0.006) * weight, "gravity": g}  # fmt: skip
+    body: Json = {
+        "inertia": mass * r * r * rng.uniform(1.1, 1.6),
+        "dry": between(rng, 0.006, 0.03) * weight,
+        "viscous": between(rng, 0.001, 0.006) * weight,
+        "gravity": g,
+    }
     if rng.random() < 0.3:
         body["gravity"] = [g, {"mass": -0.5 * mass, "arm": between(rng, 0.4, 0.7) * r, "angle": g["angle"]}]
-    bodies = {"pendulum": body}
+    bodies: dict[str, Json] = {"pendulum": body}
     sensors = {"encoder": encoder(rng, "pendulum", "encoder_counts", 2.0)}
     fast = between(rng, 2.0, 8.0)
     words = "Direct-drive pendulum under gravity."
@@ -75,8 +102,10 @@ def pendulum(rng: np.random.Generator, need: frozenset[str]) -> Draft:
 @topology("spindle")
 def spindle(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     J = between(rng, 1e-4, 6e-4)
-    bodies = {"rotor": {"inertia": J, "dry": between(rng, 0.004, 0.012), "viscous": between(rng, 1e-5, 4e-5)}}
-    joints = {}
+    bodies: dict[str, Json] = {
+        "rotor": {"inertia": J, "dry": between(rng, 0.004, 0.012), "viscous": between(rng, 1e-5, 4e-5)}
+    }
+    joints: dict[str, Json] = {}
     if rng.random() < 0.4 or "elastic" in need or "rigid" in need:
         bodies["impeller"] = {"inertia": between(rng, 0.6, 2.0) * J, "dry": between(rng, 0.002, 0.008),
                               "viscous": between(rng, 1e-5, 4e-5)}  # fmt: skip
@@ -86,8 +115,13 @@ def spindle(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     sensors: dict[str, Json] = {}
     by_speed = TWO not in need and rng.random() < 0.6
     if by_speed:
-        sensors["tacho"] = {"body": "rotor", "measures": "speed", "column": "rpm", "resolution": pick(rng, 0.1, 0.5, 1.0),
-                            "per_unit": 9.5492966}  # fmt: skip
+        sensors["tacho"] = {
+            "body": "rotor",
+            "measures": "speed",
+            "column": "rpm",
+            "resolution": pick(rng, 0.1, 0.5, 1.0),
+            "per_unit": 9.5492966,
+        }
     else:
         sensors["encoder"] = encoder(rng, "rotor", "encoder_counts")
     if TWO in need:
@@ -104,10 +138,13 @@ def spindle(rng: np.random.Generator, need: frozenset[str]) -> Draft:
 def two_motor(rng: np.random.Generator, need: frozenset[str]) -> Draft:
     gear = pick(rng, 6.0, 8.0, 10.0, 15.0)
     J = between(rng, 0.02, 0.2)
-    bodies: dict[str, dict[str, float]] = {}
+    bodies: dict[str, Json] = {}
     for k in (1, 2):
-        bodies[f"motor{k}"] = {"inertia": between(rng, 0.15, 0.5) * J / gear**2, "dry": between(rng, 0.02, 0.08) * J / gear * 20.0,
-                               "viscous": between(rng, 1e-5, 5e-5)}  # fmt: skip
+        bodies[f"motor{k}"] = {
+            "inertia": between(rng, 0.15, 0.5) * J / gear**2,
+            "dry": between(rng, 0.02, 0.08) * J / gear * 20.0,
+            "viscous": between(rng, 1e-5, 5e-5),
+        }
     bodies["table"] = {"inertia": J, "dry": between(rng, 0.5, 2.0) * J * 5.0}
     joints = {f"gear{k}": spring(rng, bodies, f"motor{k}", "table", 1.0 / gear, (35.0, 90.0), False) for k in (1, 2)}
     sensors = {"encoder1": encoder(rng, "motor1", "encoder1_counts")}

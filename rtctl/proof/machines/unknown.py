@@ -7,7 +7,19 @@ import numpy as np
 
 from rtctl.proof.machines import arrays
 from rtctl.proof.machines.effect import (
-    Setup, Unfit, about, bodies, command, crossed, drives, inertia_at, level, on_body, sign, span, speed,
+    Setup,
+    UnfitError,
+    about,
+    bodies,
+    command,
+    crossed,
+    drives,
+    inertia_at,
+    level,
+    on_body,
+    sign,
+    span,
+    speed,
     springs,
 )  # fmt: skip
 
@@ -44,7 +56,7 @@ def latch_wells(s: Setup, node: str, size: float, rng: np.random.Generator) -> d
 def cross_flow(s: Setup, node: str, size: float, rng: np.random.Generator) -> dict[str, float]:
     """Force by the product of two bodies' speeds, one way whichever way they go."""
     i = s.body(node)
-    other = [b for b in bodies(s) if b != node][0]
+    other = next(b for b in bodies(s) if b != node)
     c = sign(rng) * about(rng, 1.6 * level(s, node) / (speed(s, node) * speed(s, other))) * size
     s.m["b_cross"][i], s.m["b_crossj"][i] = c, s.body(other)
     return {"c": c}
@@ -94,7 +106,7 @@ def loose_screw(s: Setup, node: str, size: float, rng: np.random.Generator) -> d
     j = s.joint(node)
     T = s.seen["T"][:, j]
     if min(np.mean(T > 0.0), np.mean(T < 0.0)) < 0.05:
-        raise Unfit("the joint's force never changes its sign")
+        raise UnfitError("the joint's force never changes its sign")
     s.m["j_loose"][j], s.m["j_loosetau"][j] = 0.9, about(rng, 0.01) * size
     return {"tau_s": float(s.m["j_loosetau"][j])}
 
@@ -143,7 +155,5 @@ def crosstalk(s: Setup, node: str, size: float, rng: np.random.Generator) -> dic
 @unknown("sensor_walk", lambda s: on_body(s, "position"))
 def sensor_walk(s: Setup, node: str, size: float, rng: np.random.Generator) -> dict[str, float]:
     """Zero of the reading that walks at random."""
-    s.hidden.walk[s.sensor(node)] = about(rng, 12.0) * size
+    s.hidden.walk[s.sensor(node)] = about(rng, 30.0) * size
     return {"quanta_per_root_s": float(s.hidden.walk[s.sensor(node)])}
-
-
