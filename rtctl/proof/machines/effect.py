@@ -147,8 +147,9 @@ def nodes_ok(s: Setup, name: str, node: str) -> set[str]:
         out |= set(s.machine["drives"])
     if name in ("drive.offset", "drive.back_emf", "drive.thermal", "ripple.torque") and node in s.machine["drives"]:
         out |= alike(s.machine, s.machine["drives"][node]["body"], s.band_hz)
-    if name == "drive.supply_sag":
+    if name in ("drive.supply_sag", "drive.offset"):  # one supply; a constant force acts alike wherever it comes from
         out |= set(s.machine["drives"])
+        out |= {drive["body"] for drive in s.machine["drives"].values()} if name == "drive.offset" else set()
     if name == "structure.resonance":
         for joint_name, joint in s.machine["joints"].items():
             if node in (joint["from"], joint["to"]):

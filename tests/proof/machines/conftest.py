@@ -21,7 +21,7 @@ def machines():
     out = {}
     for k, name in enumerate(TOPOLOGIES):
         for again in range(8):
-            s = shorten(build.sound(name, np.random.default_rng([3, k, again]), "rich", frozenset(), False), 2.0)
+            s = shorten(build.sound(name, np.random.default_rng([3, k, again]), "rich", frozenset(), False), 1.6)
             run = sim.simulate(s, [1])
             if sim.healthy(s, run):
                 out[name] = s, run

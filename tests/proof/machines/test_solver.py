@@ -94,7 +94,7 @@ def test_half_the_step_changes_no_reading_by_a_tenth_of_a_count(machines):
         played = np.zeros((s.n, 2))
         for d, column in enumerate(s.commands):
             played[:, d] = run[column]
-        n = min(s.n, int(1.2 / s.Ts))
+        n = min(s.n, int(0.8 / s.Ts))
         s.ref, s.w, whole = s.ref[:n], s.w[:n], (s.ref, s.w)
         exact = []
         for sub in (1.0, 2.0):
