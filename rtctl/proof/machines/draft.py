@@ -37,7 +37,7 @@ class Draft:
     step: float  # typical move of it
     reach: float  # largest way from the start
     open_share: float = 0.0  # of cases without a controller
-    loop_hz: tuple[float, float] = (4.0, 9.0)
+    loop_hz: tuple[float, float] = (5.0, 11.0)
     rates: tuple[float, ...] = (500.0, 1000.0, 1000.0, 2000.0)
     speed_loop: bool = False
     one_way: bool = False  # turns one way only

@@ -107,7 +107,7 @@ def span(s: Setup, node: str) -> float:
 def level(s: Setup, node: str) -> float:
     """Force (N, Nm) by which an effect at a body is sized: of its dry friction and of what the drives do."""
     g = abs(ratios(s.machine, s.base)[node])
-    return max(float(s.m["b_F"][s.body(node)]), 0.3 * float(np.std(s.seen["base_force"])) / g)
+    return max(float(s.m["b_F"][s.body(node)]), 0.18 * float(np.std(s.seen["base_force"])) / g)
 
 
 def inertia_at(s: Setup, node: str) -> float:

@@ -33,7 +33,7 @@ def _body(s: Setup, node: str) -> str:
 @effect("drive.offset", drives, ("command", "time"))
 def offset(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """Constant error of the command."""
-    b = sign(rng) * about(rng, 0.5 * command(s, node)) * size
+    b = sign(rng) * about(rng, 0.3 * command(s, node)) * size
     s.m["d_offset"][s.drive(node)] = b
     return {"offset": b}
 
@@ -48,7 +48,7 @@ def deadband(s: Setup, node: str, size: float, rng: np.random.Generator) -> Size
 
 @effect("drive.gain_asymmetry", drives, ("command",))
 def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
-    a = sign(rng) * min(about(rng, 0.25) * size, 0.6)
+    a = sign(rng) * min(about(rng, 0.15) * size, 0.6)
     s.m["d_asym"][s.drive(node)] = a
     return {"asymmetry": a}
 
@@ -57,7 +57,7 @@ def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
 def saturation(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """Output limited below the command's limit: sharp, or bent."""
     d = s.drive(node)
-    top = float(np.quantile(np.abs(s.seen["command"][:, d]), 1.0 - about(rng, 0.05) * size))
+    top = float(np.quantile(np.abs(s.seen["command"][:, d]), 1.0 - about(rng, 0.03) * size))
     s.m["d_sat"][d], s.m["d_satsoft"][d] = top, (0.0, 0.15)[form(rng, 2)]
     return {"limit": top}
 
@@ -92,7 +92,7 @@ def sag(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """Gain that falls as all drives draw more: at once, or with the supply's time constant."""
     for d in range(int(s.m["nd"])):
         s.m["d_sagref"][d] = max(float(np.quantile(np.abs(s.seen["forces"][:, d]), 0.98)), 1e-12) * float(s.m["nd"])
-    s.m["d_sag"][:] = about(rng, 0.5) * size
+    s.m["d_sag"][:] = about(rng, 0.3) * size
     s.m["d_sagtau"][:] = (0.0, about(rng, 0.01))[form(rng, 2)]
     return {"share": float(s.m["d_sag"][0])}
 

@@ -33,7 +33,7 @@ def _second(s: Setup) -> list[str]:
 @effect("sensor.scale", _second, ("position",), TWO)
 def scale(s: Setup, node: str, size: float, rng: np.random.Generator) -> Sizes:
     """A constant factor in one of two readings."""
-    a = sign(rng) * about(rng, 0.015) * size
+    a = sign(rng) * about(rng, 0.012) * size
     s.m["s_rel"][s.sensor(node)] = 1.0 + a
     return {"relative": a}
 
