@@ -13,9 +13,15 @@ def prove(
     count: Annotated[int, typer.Option(metavar="N", min=1, help="How many cases.")] = 20,
     seed: Annotated[int, typer.Option(metavar="S", min=0, help="A case depends on the seed and its number alone.")] = 1,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the cases, diagnoses and scores go.")] = Path("proof"),
-    plants: Annotated[str, typer.Option(metavar="LIST", help="Of ivu, ldu, axis; separated by commas.")] = (
-        "ivu,ldu,axis"
-    ),
+    plants: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Of ivu, ldu, axis; separated by commas. All if not given.")
+    ] = None,
+    machines: Annotated[
+        bool, typer.Option("--machines", help="Described machines (belt, arm, hoist, ...) instead of the plants.")
+    ] = False,
+    topologies: Annotated[
+        str | None, typer.Option(metavar="LIST", help="With --machines: which, separated by commas. All if not given.")
+    ] = None,
     jobs: Annotated[int, typer.Option(metavar="N", min=1, help="Processes side by side.")] = 1,
     limit: Annotated[str, typer.Option("--limit", metavar="T", help="Longest time for a case, e.g. 600s.")] = "600s",
     generate_only: Annotated[bool, typer.Option("--generate-only", help="Write and seal the cases; stop.")] = False,
@@ -32,15 +38,24 @@ def prove(
       rtctl prove --count 20 --seed 7
 
       rtctl prove --count 300 --seed 2026 --out /tmp/proof --jobs 2
+
+      rtctl prove --machines --count 200 --seed 11 --out /tmp/machines --jobs 2
     """
     import json
 
     from rtctl.cli import common
+    from rtctl.config.errors import UserError
     from rtctl.proof import prove as proof
+    from rtctl.proof.batch import PLANTS
+    from rtctl.proof.machines import TOPOLOGIES
 
     longest = common.seconds(limit, "--limit")
-    which = tuple(p.strip() for p in plants.split(",") if p.strip())
-    sha = proof.prepare(out, count, seed, which, jobs, heldout, lambda n, of: _note("generated", n, of))
+    if machines and plants:
+        raise UserError("--plants and --machines: give one; with --machines the choice is --topologies")
+    if topologies and not machines:
+        raise UserError("--topologies chooses among described machines; it needs --machines")
+    which = _listed(topologies, TOPOLOGIES) if machines else _listed(plants, PLANTS)
+    sha = proof.prepare(out, count, seed, which, jobs, heldout, lambda n, of: _note("generated", n, of), machines)
     typer.echo(f"{count} cases in {out}, answers sealed: sha256 {sha}", err=True)
     if generate_only:
         if json_:
@@ -53,6 +68,11 @@ def prove(
     else:
         typer.echo(proof.words(result))
         typer.echo(f"report: {out / proof.REPORT}")
+
+
+def _listed(given: str | None, every: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of a list with commas; all where none is given."""
+    return every if given is None else tuple(name.strip() for name in given.split(",") if name.strip())
 
 
 def _note(word: str, n: int, of: int) -> None:

@@ -4,17 +4,24 @@ Numba looks at the file of a cached function alone, and would run an old equatio
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from numba import njit
 
 SOURCES = ("machine", "law", "forces", "solver")
-KEY = hashlib.sha256(b"".join(Path(__file__).with_name(f"{n}.py").read_bytes() for n in SOURCES)).hexdigest()[:10]
 
 
-def compiled(function: Callable[..., Any]) -> Any:
-    """IEEE arithmetic in program order, no Python lock, kept in the cache."""
-    function.__qualname__ = f"{function.__name__}_{KEY}"
-    return njit(cache=True, error_model="numpy", nogil=True)(function)
+def compiler(sources: Iterable[Path]) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator: IEEE arithmetic in program order, no Python lock, kept in the cache until one of `sources` changes."""
+    key = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:10]
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        function.__qualname__ = f"{function.__name__}_{key}"
+        return njit(cache=True, error_model="numpy", nogil=True)(function)
+
+    return compiled
+
+
+compiled = compiler(Path(__file__).with_name(f"{n}.py") for n in SOURCES)

@@ -7,11 +7,6 @@ the effect's; `ratio` is its rms over the rms that another noise makes, the larg
 import copy
 import json
 import math
-import os
-import shutil
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -19,19 +14,17 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
-from rtctl.proof import draw, plants, seal, solver
+from rtctl.proof import draw, plants, solver
+from rtctl.proof.batch import DRAFT, MIX, PLANTS, Progress, batch
 from rtctl.proof.effects import TABLE
 from rtctl.proof.machine import NQ, NU, NY
 from rtctl.proof.setup import Setup, draws
 from rtctl.proof.unknown import UNKNOWN
 
-PLANTS = ("ivu", "ldu", "axis")
 ATTEMPTS, SIZES_TRIED = 6, 2  # machines, and draws of sizes for each
 WANT = {"unknown": 6.0}  # ratio that a case should reach, else 4, or 1 at a tenth of the size
 TOO_PLAIN, PLAIN = 120.0, 45.0  # ratio of unknown physics above which it is made smaller, and what for
 SATURATED = 0.3  # share of ticks at the limit above which a case is redrawn
-
-DRAFT = ".unsealed"  # answers of the cases written so far; gone when they are sealed
 
 Run = dict[str, np.ndarray]
 
@@ -297,52 +290,16 @@ def write_case(folder: Path, seed: int, i: int, which: tuple[str, ...], heldout:
 
 def generate(
     folder: Path | str, count: int, seed: int, plants: tuple[str, ...] = PLANTS,
-    progress: Callable[[int, int], None] | None = None, jobs: int = 1, heldout: bool = False,
+    progress: Progress | None = None, jobs: int = 1, heldout: bool = False,
 ) -> Path:  # fmt: skip
     """Write `count` cases, their answers and the seal into `folder`, and return it. Goes on where it was stopped.
 
     `progress` is called with the cases done and `count`. Raises UserError for a folder that holds cases already, for no
     cases and for a plant that is not ivu, ldu or axis.
     """
-    folder = Path(folder)
     bad = [p for p in plants if p not in PLANTS]
     if bad or not plants:
         raise UserError(f"plants: '{bad[0] if bad else ''}' is not one of {', '.join(PLANTS)}")
-    if count < 1:
-        raise UserError(f"count is {count}; at least one case is needed")
     which = tuple(p for p in PLANTS if p in plants)
-    cases = _begin(folder, {"seed": seed, "plants": list(which), "heldout": heldout})
-    tasks = [(folder, seed, i, which, heldout) for i in range(count) if f"case-{i + 1:04d}" not in cases]
-    cases = {name: a for name, a in cases.items() if int(name[5:]) <= count}
-    if jobs <= 1:
-        for task in tasks:
-            name, answer = write_case(*task)
-            cases[name] = answer
-            if progress:
-                progress(len(cases), count)
-    else:
-        with ProcessPoolExecutor(min(jobs, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
-            for done in as_completed([pool.submit(write_case, *task) for task in tasks]):
-                name, answer = done.result()
-                cases[name] = answer
-                if progress:
-                    progress(len(cases), count)
-    answers = {"cases": dict(sorted(cases.items())), "format": 1, "mix": f"proof seed {seed}"}
-    seal.close_seal(folder, answers)
-    shutil.rmtree(folder / DRAFT)
-    return folder
-
-
-def _begin(folder: Path, order: dict[str, Any]) -> dict[str, Any]:
-    """Answers of an interrupted run of the same order, by case; starts a new one where the folder is empty."""
-    draft = folder / DRAFT
-    if any(folder.glob("case-*")) and not (draft / "order.json").is_file():
-        raise UserError(f"{folder} holds cases already; name another folder")
-    if (draft / "order.json").is_file():
-        begun = json.loads((draft / "order.json").read_text("utf-8"))
-        if begun != order:
-            raise UserError(f"{folder} holds cases of an interrupted run with {begun}; name another folder")
-        return {path.stem: json.loads(path.read_text("utf-8")) for path in sorted(draft.glob("case-*.json"))}
-    draft.mkdir(parents=True)
-    write_text(draft / "order.json", json.dumps(order))
-    return {}
+    order = {"seed": seed, "plants": list(which), "heldout": heldout}
+    return batch(Path(folder), count, order, write_case, (seed, which, heldout), MIX.format(seed), 1, progress, jobs)

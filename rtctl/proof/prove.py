@@ -9,6 +9,7 @@ from typing import Any
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
 from rtctl.proof import report, seal
+from rtctl.proof.batch import MACHINES_MIX, MIX
 
 SCORES, REPORT, RESULT = "scores.json", "report.md", "diagnosis.json"
 FAILED = "failed.json"  # beside a case: what went wrong, so that it is not tried again
@@ -24,23 +25,31 @@ def prepare(
     jobs: int,
     heldout: bool,
     progress: Progress | None,
+    machines: bool = False,
 ) -> str:
     """Generate and seal, unless the folder holds just these cases; returns the hash of the answers.
 
-    Raises UserError where the folder holds other cases or its answers are not the sealed ones.
+    With `machines` the cases are of described machines, and `plants` are topologies. Raises UserError where the folder
+    holds other cases or its answers are not the sealed ones.
     """
     folder = Path(folder)
+    mix = (MACHINES_MIX if machines else MIX).format(seed)
     if (folder / seal.SEAL).is_file():
         found = json.loads((folder / seal.SEAL).read_text("utf-8"))
         answers = seal.open_seal(folder)
-        if answers.get("mix") != f"proof seed {seed}" or len(answers["cases"]) != count:
+        if answers.get("mix") != mix or len(answers["cases"]) != count:
             raise UserError(
                 f"{folder} holds {len(answers['cases'])} cases of '{answers.get('mix')}'; name another --out"
             )
         return str(found["sha256"])
-    from rtctl.proof.generate import generate
+    if machines:
+        from rtctl.proof.machines import generate as described
 
-    generate(folder, count, seed, plants, progress, jobs, heldout)
+        described.generate(folder, count, seed, plants, progress, jobs, heldout)
+    else:
+        from rtctl.proof.generate import generate
+
+        generate(folder, count, seed, plants, progress, jobs, heldout)
     return str(json.loads((folder / seal.SEAL).read_text("utf-8"))["sha256"])
 
 

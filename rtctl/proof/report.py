@@ -49,6 +49,16 @@ def summary(R: Json) -> list[list[Any]]:
     return rows
 
 
+def by_plant(R: Json) -> list[list[Any]]:
+    """One row for every plant or topology; shares with the number of cases they are of."""
+    return [
+        [name, x["cases"], f"{_cell(x['single'])} ({x['singles']})", f"{_cell(x['typical'])} ({x['typicals']})",
+         x["node"], f"{x['false_alarms']} of {x['nulls']}", f"{x['false_names']} of {x['unknowns']}",
+         f"{_cell(x['pairs_found'])} ({x['pairs']})"]
+        for name, x in R["by_plant"].items()
+    ]  # fmt: skip
+
+
 def confusion(R: Json) -> str:
     """Truth by answer, as a list: most cells of the matrix are empty."""
     rows = []
@@ -61,6 +71,9 @@ def confusion(R: Json) -> str:
 def markdown(R: Json, title: str = "Concealed cases") -> str:
     """The whole report."""
     parts = [f"## {title}", table(["what", "figure", "of"], summary(R))]
+    if R.get("by_plant"):
+        parts += ["### By machine", table(["machine", "cases", "right name", "at typical size", "right node",
+                                           "false alarms", "unknown given a name", "pairs"], by_plant(R))]  # fmt: skip
     smallest = [[n, x["ratio"], x["found"], x["of"]] for n, x in R["smallest_ratio_found"].items()]
     parts += ["### Smallest size found", "Change in the recording over the noise floor, of effects named rightly.",
               table(["effect", "smallest ratio", "named", "of"], smallest)]  # fmt: skip

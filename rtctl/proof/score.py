@@ -57,6 +57,21 @@ def admits(d: Json | None, effect: Json) -> bool:
     return False
 
 
+def same(effect: Json, name: Any) -> bool:
+    """Whether `name` is the true one or an exact twin of it on this machine (`names_ok` of the answer)."""
+    return bool(name == effect["name"] or name in effect.get("names_ok", ()))
+
+
+def canonical(a: Json, names: list[str]) -> list[str]:
+    """Answered names, exact twins of a true effect read as that effect, each effect once."""
+    out: list[str] = []
+    for name in names:
+        true = [e["name"] for e in a["effects"]]
+        hits = [t for t in true if t == name] or [e["name"] for e in a["effects"] if same(e, name)]
+        out.append(hits[0] if hits and hits[0] not in out else name)
+    return out
+
+
 def row_of(a: Json) -> str:
     if a["kind"] in (*NOTHING_MISSING, "unknown"):
         return str(a["kind"])
@@ -128,17 +143,17 @@ def score(answers: Json, diagnoses: dict[str, Json | None], visible: float = 0.3
         S["missing"] += [case] * (d is None)
         effects = given(d)
         nameless = a["kind"] in (*NOTHING_MISSING, "unknown")
-        names, true = [e["name"] for e in effects], [] if nameless else [e["name"] for e in a["effects"]]
+        names, true = canonical(a, [e["name"] for e in effects]), [] if nameless else [e["name"] for e in a["effects"]]
         confusion[row_of(a)][column_of(a, verdict, names)] += 1
         if verdict == "named":
             right = [float(n in true) for n in names] or [0.0]
             S["named"] += right
-            judged = [(confidence(e), float(e["name"] in true)) for e in effects]
+            judged = [(confidence(e), float(n in true)) for e, n in zip(effects, names, strict=True)]
             S["calibration"] += judged
             S["calibration_named"] += [] if nameless else judged
         S["base_ci"] += _base_intervals(a, d)
         if a["kind"] in NOTHING_MISSING:
-            alarm = d is not None and verdict != "nothing"
+            alarm = d is not None and verdict != "nothing" and not (verdict == "unnamed" and a.get("unnamed_ok"))
             S["null"].append((a["kind"], alarm, verdict == "named"))
             if alarm or d is None:
                 failures.append(_failure(case, a, verdict, names))
@@ -174,9 +189,24 @@ def score(answers: Json, diagnoses: dict[str, Json | None], visible: float = 0.3
     result["recall_by_name"] = {n: round(sum(x) / len(x), 3) for n, x in sorted(by_name.items())}
     result["confusion"] = {row: dict(sorted(columns.items())) for row, columns in sorted(confusion.items())}
     result["failures"] = failures
+    if len(plants := sorted({a["plant"] for a in cases.values()})) > 1:
+        result["by_plant"] = {p: _brief({c: a for c, a in cases.items() if a["plant"] == p}, diagnoses) for p in plants}
     times = sorted(float(v) for v in (seconds or {}).values())
     result["seconds"] = {"median": times[len(times) // 2], "longest": times[-1], "sum": sum(times)} if times else None
     return result
+
+
+def _brief(cases: Json, diagnoses: dict[str, Json | None]) -> Json:
+    """Scores of the cases of one plant or topology: shares, and of how many."""
+    R = score(cases, diagnoses)
+    typical = R["single"]["by_size"].get("1.0", {"cases": 0, "top1": None})
+    return {
+        "cases": R["cases"], "missing": R["missing"], "single": R["single"]["top1"], "singles": R["single"]["cases"],
+        "typical": typical["top1"], "typicals": typical["cases"], "node": R["node_accuracy"],
+        "false_alarms": R["null"]["false_alarms"], "nulls": R["null"]["cases"],
+        "false_names": R["unknown"]["false_names"], "unknowns": R["unknown"]["cases"],
+        "pairs_found": R["pair"]["all_found"], "pairs": R["pair"]["cases"],
+    }  # fmt: skip
 
 
 def _single(S: Any, a: Json, d: Json | None, verdict: str, names: list[str], visible: float) -> float | None:
@@ -190,10 +220,11 @@ def _single(S: Any, a: Json, d: Json | None, verdict: str, names: list[str], vis
     everything = [e for e in (d or {}).get("effects") or [] if isinstance(e, dict)]
     if verdict == "named" and names[:1] == [effect["name"]]:
         points = 1.0
-    elif verdict == "ambiguous" and len(everything) <= 3 and effect["name"] in [e.get("name") for e in everything]:
+    elif verdict == "ambiguous" and len(everything) <= 3 and any(same(effect, e.get("name")) for e in everything):
         points = 0.5
     if points > 0:
-        hit = next(e for e in everything if e.get("name") == effect["name"])
+        exact = [e for e in everything if e.get("name") == effect["name"]]
+        hit = (exact or [e for e in everything if same(effect, e.get("name"))])[0]
         S["node"].append(float(hit.get("node") in effect["nodes_ok"]))
         axis = ((d or {}).get("located") or {}).get("axis")
         S["axis"].append(float(axis in effect["axes_ok"]) if effect["axes_ok"] else None)

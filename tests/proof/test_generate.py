@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from rtctl.config.errors import UserError
-from rtctl.proof import draw, law, plants, seal
+from rtctl.proof import batch, draw, law, plants, seal
 from rtctl.proof import generate as g
 from rtctl.proof.effects import TABLE
 from rtctl.proof.unknown import UNKNOWN
@@ -155,7 +155,7 @@ def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
 
 
 def test_goes_on_where_it_was_stopped(written, tmp_path):
-    g._begin(tmp_path, {"seed": 11, "plants": ["axis"], "heldout": False})
+    batch.begin(tmp_path, {"seed": 11, "plants": ["axis"], "heldout": False})
     g.write_case(tmp_path, 11, 0, ("axis",), False)
     before = (tmp_path / "case-0001" / "recording.parquet").stat().st_mtime_ns
     with pytest.raises(UserError, match="interrupted run"):
@@ -164,7 +164,7 @@ def test_goes_on_where_it_was_stopped(written, tmp_path):
     assert (tmp_path / "case-0001" / "recording.parquet").stat().st_mtime_ns == before
     found = seal.open_seal(tmp_path)["cases"]
     assert found == {name: seal.open_seal(written)["cases"][name] for name in ("case-0001", "case-0002")}
-    assert not (tmp_path / g.DRAFT).exists()
+    assert not (tmp_path / batch.DRAFT).exists()
 
 
 def test_wrong_requests_are_refused(written, tmp_path):

@@ -76,6 +76,27 @@ def test_other_cases_in_the_folder_are_refused(folder):
         prove.prepare(folder, 2, 7, ("axis",), 1, False, None)
 
 
+def test_cases_of_machines_are_told_from_those_of_the_plants(folder):
+    sealed = seal.open_seal(folder)
+    seal.close_seal(folder, sealed | {"mix": "proof of machines, seed 1", "format": 2})
+    assert len(prove.prepare(folder, 2, 1, ("belt",), 1, False, None, machines=True)) == 64
+    with pytest.raises(UserError, match="name another --out"):
+        prove.prepare(folder, 2, 1, ("axis",), 1, False, None)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [(["--machines", "--plants", "axis"], "--topologies"), (["--topologies", "belt"], "needs --machines"),
+     (["--machines", "--topologies", "boat"], "'boat' is not one of belt")],
+)  # fmt: skip
+def test_options_that_do_not_go_together_are_refused(tmp_path, options, said):
+    from rtctl.cli.prove import app
+
+    answer = CliRunner().invoke(app, [*options, "--count", "1", "--out", str(tmp_path / "new"), "--generate-only"])
+    assert answer.exit_code != 0
+    assert said in str(answer.exception)
+
+
 def test_command(folder):
     from rtctl.cli.prove import app
 
