@@ -285,12 +285,14 @@ def _site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
 def sources_hash(kind: str) -> str:
     """Hash over the sources that a kernel is compiled from."""
     import rtctl
+    import rtctl.drivers
     import rtctl.plants
 
     root = Path(rtctl.__file__).parent
     plants = Path(next(iter(rtctl.plants.__path__)))
     shared = [root / "idiom.py", root / "diagnose" / "law.py", plants / "linear.py", plants / f"{kind}.py"]
-    return hash_of([*shared, *sorted((plants / "physics").glob("*.py"))])
+    folders = (root / "laws", Path(next(iter(rtctl.drivers.__path__))), plants / "physics")
+    return hash_of([*shared, *(path for folder in folders for path in sorted(folder.glob("*.py")))])
 
 
 @cache
