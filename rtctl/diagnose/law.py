@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.case import MAX_SECTIONS
 from rtctl.drivers import at_mio_16de, ldu_amplifier
 from rtctl.drivers.at_mio_16de import AnalogOutputParams
 from rtctl.drivers.ldu_amplifier import LduAmplifierParams
@@ -51,8 +52,6 @@ from rtctl.laws.velocity import VelocityParams
 
 NONE, PD, SECTIONS, PI_VELOCITY = range(4)  # position laws
 EXACT, HALVES_UP, BOARD, AMPLIFIER = range(4)  # what an output makes of a voltage
-from rtctl.diagnose.case import MAX_SECTIONS
-
 SECTION = record_dtype(biquad.IDENTITY)
 
 
@@ -60,9 +59,7 @@ class LawParams(NamedTuple):
     kind: int  # of the position law
     tape: int  # 1: the command is shared out between two motors
     to_unit: float  # from the main sensor's count (or metre) to the reference's unit
-    count: (
-        float  # one count of the main sensor in that unit of its own, of which the law sees whole ones; 0 for no step
-    )
+    resolution: float  # one count of the main sensor, in counts or metres; 0 where the law sees no steps
     shift: float  # share of a count that is added before
     origin: float  # counts at which the main sensor began
     two_tap: int  # 1: the speed is that of the mean of two samples
@@ -93,14 +90,25 @@ class LawParams(NamedTuple):
 
 
 LAW_STATE = state(
-    started=int, pd=pd.PD_STATE, pi_velocity=pi_velocity.PI_VELOCITY_STATE, sections=(biquad.BIQUAD_STATE, MAX_SECTIONS),
-    two_tap=two_tap.TWO_TAP_STATE, velocity=velocity.VELOCITY_STATE, shaper=shaper.SHAPER_STATE,
-    friction1=friction_feedforward.FRICTION_FEEDFORWARD_STATE, friction2=friction_feedforward.FRICTION_FEEDFORWARD_STATE,
-    reference_speed=velocity.VELOCITY_STATE, hand_over=hand_over.HAND_OVER_STATE,
-    gain_schedule=gain_schedule.GAIN_SCHEDULE_STATE, reels=reel_growth.REEL_GROWTH_STATE, tension=tension.TENSION_STATE,
-    inertia=inertia_feedforward.INERTIA_FEEDFORWARD_STATE, allocation=allocation.ALLOCATION_STATE,
-    limit1=limit.LIMIT_STATE, limit2=limit.LIMIT_STATE,
-)  # fmt: skip
+    started=int,
+    pd=pd.PD_STATE,
+    pi_velocity=pi_velocity.PI_VELOCITY_STATE,
+    sections=(biquad.BIQUAD_STATE, MAX_SECTIONS),
+    two_tap=two_tap.TWO_TAP_STATE,
+    velocity=velocity.VELOCITY_STATE,
+    shaper=shaper.SHAPER_STATE,
+    friction1=friction_feedforward.FRICTION_FEEDFORWARD_STATE,
+    friction2=friction_feedforward.FRICTION_FEEDFORWARD_STATE,
+    reference_speed=velocity.VELOCITY_STATE,
+    hand_over=hand_over.HAND_OVER_STATE,
+    gain_schedule=gain_schedule.GAIN_SCHEDULE_STATE,
+    reels=reel_growth.REEL_GROWTH_STATE,
+    tension=tension.TENSION_STATE,
+    inertia=inertia_feedforward.INERTIA_FEEDFORWARD_STATE,
+    allocation=allocation.ALLOCATION_STATE,
+    limit1=limit.LIMIT_STATE,
+    limit2=limit.LIMIT_STATE,
+)
 
 
 @tick
