@@ -90,7 +90,11 @@ def load_record(folder: Path | str) -> Record:
     Raises UserError (exit 2) that names file, column and row and says what would be right, NoAnswer (exit 3) where
     the recording supports no verdict.
     """
-    bundle = load_bundle(folder)
+    return record_of(load_bundle(folder))
+
+
+def record_of(bundle: Bundle) -> Record:
+    """Check a bundle that is read already, as `load_record` does."""
     case = read_case(bundle.case, bundle.folder)
     columns = bundle.columns
     if isinstance(bundle.case.get("config"), dict) and "state" in columns:
