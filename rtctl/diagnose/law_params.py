@@ -12,6 +12,7 @@ from rtctl.diagnose.law import LawParams
 from rtctl.drivers import at_mio_16de, ldu_amplifier
 from rtctl.drivers.at_mio_16de import AnalogOutputParams
 from rtctl.drivers.ldu_amplifier import LduAmplifierParams
+from rtctl.idiom import fill_record, record_dtype
 from rtctl.laws import (
     allocation,
     friction_feedforward,
@@ -69,6 +70,20 @@ def began(p: LawParams, record: "Record") -> LawParams:
     if p.resolution == 0.0:
         return p
     return p._replace(origin=float(np.floor(next(iter(record.y.values()))[0] / p.resolution + p.shift)))
+
+
+def law_state(p: LawParams, record: "Record") -> np.ndarray:
+    """What the law remembers at the first row (1,), after the rows before it in which it ran already."""
+    s, earlier = np.zeros(1, law.LAW_STATE), record.armed
+    name, values = next(iter(record.y.items()))
+    if p.resolution == 0.0 or not earlier or not len(earlier["t"]) or name not in earlier:
+        return s
+    params, reading = np.zeros(1, record_dtype(p)), earlier[name] + (values[0] - record.columns[name][0])
+    fill_record(params[0], p._replace(origin=0.0))
+    law.play(params, s, earlier["ref"], earlier["w"], reading, np.zeros((len(reading), 2)))
+    x = np.floor(values[0] / p.resolution + p.shift) * p.resolution * p.to_unit
+    s["reels"]["R1_0"], s["reels"]["R2_0"], s["reels"]["phi_0"] = p.R1, p.R2, x
+    return s
 
 
 def _plain(case: Case, dt: float) -> LawParams:

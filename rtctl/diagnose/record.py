@@ -13,6 +13,7 @@ from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose import law
 from rtctl.diagnose.case import KNOWN_LAWS, Case, read_case
 from rtctl.diagnose.columns import (
+    armed,
     even_clock,
     is_counter,
     laid,
@@ -23,7 +24,7 @@ from rtctl.diagnose.columns import (
     unwrap_turns,
 )
 from rtctl.diagnose.config_law import ConfigLaw
-from rtctl.diagnose.law_params import law_params
+from rtctl.diagnose.law_params import law_params, law_state
 from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.replayed import LawReplay, replayed_law
 from rtctl.idiom import fill_record, record_dtype
@@ -48,7 +49,8 @@ class Record(NamedTuple):
     u: np.ndarray  # (n, nu) V, or what `case.drive.unit` says
     y: dict[str, np.ndarray]  # name -> (n,) in the sensor's own unit; counters without their wraps
     columns: dict[str, np.ndarray]  # as they stand in the file, `t` at its own uneven times
-    replay: LawReplay | None = None  # of our own recordings whose law `controller` cannot say
+    replay: LawReplay | None = None  # of our own recordings whose law LawParams do not hold
+    armed: dict[str, np.ndarray] | None = None  # columns of the rows before, in which the law ran already
 
     @property
     def closed_loop(self) -> bool:
@@ -96,20 +98,29 @@ def load_record(folder: Path | str) -> Record:
 def record_of(bundle: Bundle) -> Record:
     """Check a bundle that is read already, as `load_record` does."""
     case = read_case(bundle.case, bundle.folder)
-    columns = bundle.columns
+    columns, earlier = bundle.columns, None
     if isinstance(bundle.case.get("config"), dict) and "state" in columns:
         rows = running(columns["state"])
         if rows.stop - rows.start < len(columns["t"]):
             told = f"{bundle.folder / PARQUET}: rows {rows.start} to {rows.stop - 1} are taken, where the loop ran"
             case = case._replace(warnings=(*case.warnings, told))
+        before = armed(columns["state"], rows.start)
+        earlier = {name: values[before] for name, values in columns.items()}
         columns = {name: values[rows] for name, values in columns.items()}
         if case.plant == "ldu" and "u" in columns and measured_amplifier(bundle.case["config"]):
             columns["u"] = through_amplifier(columns["u"])
-    return check(columns, case, bundle.folder, bundle)
+    return check(columns, case, bundle.folder, bundle, earlier)
 
 
-def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".", whole: Bundle | None = None) -> Record:
-    """The Record of these columns, by the same rules as `load_record`; `whole` is the bundle that they are from."""
+def check(
+    columns: dict[str, np.ndarray],
+    case: Case,
+    folder: Path | str = ".",
+    whole: Bundle | None = None,
+    earlier: dict[str, np.ndarray] | None = None,
+) -> Record:
+    """The Record of these columns, by the same rules as `load_record`; `whole` is the bundle that they are from,
+    `earlier` the rows before, in which the law ran already."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
     if case.estimated and case.reaches.parameter_tolerance is not None:  # null: the owner says that nothing is known
@@ -144,7 +155,7 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".", 
         u = np.column_stack([laid(even, t, values) for values in u.T])
         t = even
     _supports(path, t, u, y, case, warnings)
-    record = Record(case.plant, case, t, dt, ref, w, u, y, columns)
+    record = Record(case.plant, case, t, dt, ref, w, u, y, columns, armed=earlier)
     agreement = law_agreement(record)
     if (record.closed_loop or case.unsaid) and (agreement is None or not agreement.holds):
         found = replayed_law(whole) if whole is not None else None
@@ -187,7 +198,7 @@ def recompute_law(record: Record) -> np.ndarray | None:
         return None
     volts, params = np.zeros_like(record.u), np.zeros(1, record_dtype(p))
     fill_record(params[0], p)
-    law.play(params, np.zeros(1, law.LAW_STATE), record.ref, record.w, reading, volts)
+    law.play(params, law_state(p, record), record.ref, record.w, reading, volts)
     return volts
 
 

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose import kernel, law
+from rtctl.diagnose import kernel
 from rtctl.diagnose.case import Case
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
-from rtctl.diagnose.law_params import began, law_params, per_unit
+from rtctl.diagnose.law_params import began, law_params, law_state, per_unit
 from rtctl.diagnose.model import Model, plant_params
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.tacho import noise
@@ -71,6 +71,7 @@ class Simulator:
         self.law = began(law_params(record), record)
         self.laws = np.zeros(1, record_dtype(self.law))
         fill_record(self.laws[0], self.law)
+        self.law_state = law_state(self.law, record)
         self.release = NEVER  # row at which the correction ends
         self.jolt = np.zeros(2)  # position and speed of the main sensor's body that are added there
 
@@ -171,7 +172,7 @@ class Simulator:
         written = np.zeros((n if mode == CLOSED else 1, self.volts.shape[1]))
         push = np.zeros(n)
         done = k.module.run(
-            job, p, np.zeros(1, k.state), slots, self.laws, np.zeros(1, law.LAW_STATE), self.lead, self.ref[:n],
+            job, p, np.zeros(1, k.state), slots, self.laws, self.law_state.copy(), self.lead, self.ref[:n],
             self.w[:n], self.volts[:n], self.seen[:n], out, written, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
