@@ -56,18 +56,19 @@ def simulate(
       rtctl simulate case emps --closed-loop --skip 20 --json
     """
     from rtctl.diagnose.kernel import CLOSED, OPEN
-    from rtctl.diagnose.measure import compare
-    from rtctl.diagnose.record import record_of
+    from rtctl.diagnose.measure import compare, default_mode
+    from rtctl.diagnose.record import INPUT, record_of
     from rtctl.own.files import give
     from rtctl.trace.bundle import load_bundle
 
     give(own or ())
     whole = load_bundle(bundle)
     record = record_of(whole)
-    mode = None if closed is None else (CLOSED if closed else OPEN)
+    mode = default_mode(record, whole) if closed is None else (CLOSED if closed else OPEN)
     if not json:
         for warning in record.case.warnings:
-            typer.echo(f"note: {warning}", err=True)
+            if mode == OPEN or INPUT not in warning:
+                typer.echo(f"note: {warning}", err=True)
     result = compare(record, _model(model, record), mode, skip, whole)
     if plot is not None:
         _draw(result, plot)

@@ -210,7 +210,10 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
         raise UserError(f"{where}: controller_known is {known!r}; it should be true or false")
     unsaid = ""
     if isinstance(own, UnsaidLaw):
-        known, unsaid = False, f"the law of the config has {', '.join(own.parts)}, which no simulation here computes"
+        known, unsaid = (
+            False,
+            f"the law of the config has {', '.join(own.parts)}, which the simulation of a diagnosis does not compute",
+        )
     elif known and isinstance(controller, UnknownLaw):
         known, unsaid = False, f"a law of kind '{controller.kind}' cannot be recomputed on this plant"
     notes = case.get("notes")

@@ -78,15 +78,25 @@ def law_state(p: LawParams, record: "Record") -> np.ndarray:
     name, values = next(iter(record.y.items()))
     if p.resolution == 0.0 or not earlier or not len(earlier["t"]) or name not in earlier:
         return s
-    params, reading = np.zeros(1, record_dtype(p)), earlier[name] + (values[0] - record.columns[name][0])
-    fill_record(params[0], p._replace(origin=0.0))
-    law.play(params, s, earlier["ref"], earlier["w"], reading, np.zeros((len(reading), 2)))
+    reading = earlier[name] + (values[0] - record.columns[name][0])
+    written(p._replace(origin=0.0), s, earlier["ref"], earlier["w"], reading, record.u.shape[1])
     x = np.floor(values[0] / p.resolution + p.shift) * p.resolution * p.to_unit
     s["reels"]["R1_0"], s["reels"]["R2_0"], s["reels"]["phi_0"] = p.R1, p.R2, x
     return s
 
 
-def _plain(case: Case, dt: float) -> LawParams:
+def written(
+    p: LawParams, s: np.ndarray, ref: np.ndarray, w: np.ndarray, reading: np.ndarray, drives: int
+) -> np.ndarray:
+    """The voltages (n, drives) that the law writes from state `s` (1,) on, which it alters, for columns (n,)."""
+    params, volts = np.zeros(1, record_dtype(p)), np.zeros((len(ref), drives))
+    fill_record(params[0], p)
+    columns = (np.array(c, float) for c in (ref, w, reading))  # those of a file cannot be written to: another type
+    law.play(params, s, *columns, volts)
+    return volts
+
+
+def plain(case: Case, dt: float) -> LawParams:
     """A law that writes nothing: every part in its neutral place."""
     return LawParams(
         kind=law.NONE,
@@ -125,7 +135,7 @@ def _plain(case: Case, dt: float) -> LawParams:
 
 def _of_format(c: Any, case: Case, dt: float) -> LawParams:
     """A law in the words of the exchange format."""
-    p, drive = _plain(case, dt), case.drive
+    p, drive = plain(case, dt), case.drive
     most, step = drive.limit_volt or LARGE, drive.step_volt
     p = p._replace(limit=LimitParams(-most, most, math.inf))
     if step is not None:
@@ -161,7 +171,7 @@ def _with_sections(p: LawParams, coefficients: Any) -> LawParams:
 def _of_config(config: Any, record: "Record") -> LawParams:
     """The law of one of our own machines."""
     case, dt = record.case, record.dt
-    p = _position(_plain(case, dt), config.law, dt)
+    p = _position(plain(case, dt), config.law, dt)
     p = p._replace(
         velocity=velocity.build(config.law.velocity, dt),
         limit=limit.build(config.law.limit, dt),

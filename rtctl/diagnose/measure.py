@@ -128,14 +128,15 @@ def between(record: Record, model: Model) -> Simulator:
     return smooth if error(smooth) < error(held) else held  # a model that runs away is held
 
 
-def default_mode(record: Record) -> int:
-    """CLOSED where the recorded machine's law is known, or could be replayed to the bit, else OPEN."""
-    return CLOSED if record.closed_loop or replays(record) else OPEN
+def default_mode(record: Record, bundle: Bundle | None = None) -> int:
+    """CLOSED where the law is known or the tick of the bundle's config gave the command to the bit, else OPEN."""
+    return CLOSED if record.closed_loop or ticks_again(record, bundle) else OPEN
 
 
-def replays(record: Record) -> bool:
-    """Whether the law of a config that LawParams do not hold was replayed to the bit."""
-    return record.replay is not None and record.replay.identical
+def ticks_again(record: Record, bundle: Bundle | None) -> bool:
+    """Whether the tick of the bundle's config can close the loop: its law gives the recorded command to the bit."""
+    replayed = record.replay is not None and record.replay.identical
+    return bundle is not None and (record.closed_loop or replayed) and can_emulate(bundle)
 
 
 def compare(
@@ -149,10 +150,10 @@ def compare(
     counter that shows n stands for n + 1/2 on average. Raises UserError where the law is not known or `skip` leaves
     less than two rows, NoAnswer where the model runs away.
     """
-    mode = default_mode(record) if mode is None else mode
+    mode = default_mode(record, bundle) if mode is None else mode
     n = len(record.t)
-    ticks = mode == CLOSED and bundle is not None and can_emulate(bundle)
-    if mode == CLOSED and not record.closed_loop and not (ticks and replays(record)):
+    ticks = mode == CLOSED and ticks_again(record, bundle)
+    if mode == CLOSED and not record.closed_loop and not ticks:
         reason = next((w for w in record.case.warnings if "taken as the input" in w), "the law is not known")
         raise UserError(f"the loop cannot be closed: {reason}; simulate it with --open-loop")
     if not 0 <= skip <= n - 2:
@@ -160,7 +161,7 @@ def compare(
     simulator = between(record, model)
     volts = np.zeros((n, 0))
     if ticks:
-        assert bundle is not None
+        assert bundle is not None  # ticks_again
         found = emulate(bundle, record, model)
         readings = np.column_stack([found[name] + simulator.half for name in simulator.channels])
         volts = np.column_stack([found[name] for name in record.commands])

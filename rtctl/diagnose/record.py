@@ -24,16 +24,16 @@ from rtctl.diagnose.columns import (
     unwrap_turns,
 )
 from rtctl.diagnose.config_law import ConfigLaw
-from rtctl.diagnose.law_params import law_params, law_state
+from rtctl.diagnose.law_params import law_params, law_state, written
 from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.replayed import LawReplay, replayed_law
-from rtctl.idiom import fill_record, record_dtype
 from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
 COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
 READINGS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts",), "axis": ()}
 COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
+INPUT = "the recorded command is taken as the input"
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
 AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
 AGREES_MEDIAN = 2e-3
@@ -160,7 +160,7 @@ def check(
     if (record.closed_loop or case.unsaid) and (agreement is None or not agreement.holds):
         found = replayed_law(whole) if whole is not None else None
         words = _replayed(case, found) if found is not None else case.unsaid or _disagrees(case, agreement)
-        warnings.append(f"{path.parent}: {words}; the recorded command is taken as the input")
+        warnings.append(f"{path.parent}: {words}; {INPUT}")
         case, record = case._replace(controller_known=False), record._replace(replay=found)
     return record._replace(case=case._replace(warnings=tuple(warnings)))
 
@@ -196,10 +196,7 @@ def recompute_law(record: Record) -> np.ndarray | None:
     reading = _reading(record)
     if p.kind == law.NONE or reading is None or np.isnan(record.ref).any():
         return None
-    volts, params = np.zeros_like(record.u), np.zeros(1, record_dtype(p))
-    fill_record(params[0], p)
-    law.play(params, law_state(p, record), record.ref, record.w, reading, volts)
-    return volts
+    return written(p, law_state(p, record), record.ref, record.w, reading, record.u.shape[1])
 
 
 def _reading(record: Record) -> np.ndarray | None:

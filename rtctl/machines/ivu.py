@@ -74,7 +74,8 @@ class IvuParams(NamedTuple):
 
 
 IVU_STATE = state(
-    R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float, k_run=int, gains=int, play=int, prepared=int, u_fb=float,
+    k_run=int, gains=int, play=int, prepared=int, u_fb=float,
+    R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float,  # as in REEL_GROWTH_STATE
     direction=int, phi_1=float, n1=int, n2=int,  # where the stretch in one direction began
     R1_given=float, R2_given=float,  # radii that these go back to
 )  # fmt: skip
