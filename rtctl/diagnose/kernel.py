@@ -149,7 +149,10 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
                 job.before[c] = y
             push[at] = job.correction
             if job.mode == 2:
-                law.step(the_law, law_state, ref[k], w[k], out[k, 0] - job.half, written[k])
+                law.step(the_law, law_state, ref[k], w[k], out[k, 0] - job.half)
+                written[k, 0] = law_state.u1
+                if drives > 1:
+                    written[k, 1] = law_state.u2
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0

@@ -51,13 +51,14 @@ from rtctl.laws.tension import TensionParams
 from rtctl.laws.velocity import VelocityParams
 
 NONE, PD, SECTIONS, PI_VELOCITY = range(4)  # position laws
+NO_TAPE, CONSTANT, TAPE = range(3)  # one motor; two with a constant pull; two with all of the laws for a tape
 EXACT, HALVES_UP, BOARD, AMPLIFIER = range(4)  # what an output makes of a voltage
 SECTION = record_dtype(biquad.IDENTITY)
 
 
 class LawParams(NamedTuple):
     kind: int  # of the position law
-    tape: int  # 1: the command is shared out between two motors
+    tape: int  # of NO_TAPE to TAPE: how the command is shared out between two motors
     to_unit: float  # from the main sensor's count (or metre) to the reference's unit
     resolution: float  # one count of the main sensor, in counts or metres; 0 where the law sees no steps
     shift: float  # share of a count that is added before
@@ -70,7 +71,7 @@ class LawParams(NamedTuple):
     sections: np.ndarray  # (8,) of SECTION
     shaper: ShaperParams  # that made the reference
     computed_torque: float  # V per m/s^2 of the reference
-    friction1: FrictionFeedforwardParams
+    friction1: FrictionFeedforwardParams  # of CONSTANT: of both motors
     friction2: FrictionFeedforwardParams
     reference_speed: VelocityParams
     hand_over: HandOverParams
@@ -78,7 +79,7 @@ class LawParams(NamedTuple):
     R1: float  # m, at the first tick
     R2: float
     reels: ReelGrowthParams
-    pull1: float  # V, constant pull of each motor
+    pull1: float  # V, of CONSTANT: pull of each motor
     pull2: float
     tension: TensionParams
     inertia: InertiaFeedforwardParams
@@ -90,6 +91,8 @@ class LawParams(NamedTuple):
 
 
 LAW_STATE = state(
+    u1=float,
+    u2=float,
     started=int,
     pd=pd.PD_STATE,
     pi_velocity=pi_velocity.PI_VELOCITY_STATE,
@@ -112,8 +115,8 @@ LAW_STATE = state(
 
 
 @tick
-def step(p, s, ref, w, reading, volts):
-    """Write the voltages of one tick into `volts`; `reading` is the main sensor's, in counts or metres."""
+def step(p, s, ref, w, reading):  # no array is passed on: counting its references would take as long as the law
+    """Write the voltages of one tick, V, into s.u1 and s.u2; `reading` is the main sensor's, in counts or metres."""
     if p.resolution > 0.0:
         reading = (np.floor(reading / p.resolution + p.shift) + p.origin) * p.resolution
     x = reading * p.to_unit
@@ -123,16 +126,24 @@ def step(p, s, ref, w, reading, volts):
         reel_growth.start(s.reels, p.R1, p.R2, x)
     if p.kind == NONE:
         return
-    shaper.follow(p.shaper, s.shaper, ref)
+    if p.shaper.w != 0.0:
+        shaper.follow(p.shaper, s.shaper, ref)
     u = _position(p, s, ref - x, x)
-    u_f1 = friction_feedforward.step(p.friction1, s.friction1, ref)
-    if p.tape != 0:
-        _tape(p, s, ref, w, x, u, u_f1, volts)
-        return
-    u_c = u + (u_f1 + p.computed_torque * s.shaper.acceleration) + w
-    u = limit.step(p.limit, s.limit1, u_c)
-    pi_velocity.track(p.pi_velocity, s.pi_velocity, u_c, u)
-    volts[0] = _written(p, u)
+    u_f1 = 0.0
+    if p.friction1.volts != 0.0 or p.tape == TAPE:  # which takes its direction from this one
+        u_f1 = friction_feedforward.step(p.friction1, s.friction1, ref)
+    if p.tape == TAPE:
+        _tape(p, s, ref, w, x, u, u_f1)
+    elif p.tape == CONSTANT:
+        allocation.step(p.allocation, s.allocation, u + w + u_f1, p.pull1, p.pull2)
+        s.u1 = _written(p, limit.step(p.limit, s.limit1, s.allocation.u1))
+        s.u2 = _written(p, limit.step(p.limit, s.limit2, s.allocation.u2))
+    else:
+        u_c = u + (u_f1 + p.computed_torque * s.shaper.acceleration) + w
+        u = limit.step(p.limit, s.limit1, u_c)
+        if p.kind == PI_VELOCITY:
+            pi_velocity.track(p.pi_velocity, s.pi_velocity, u_c, u)
+        s.u1 = _written(p, u)
 
 
 @tick
@@ -149,7 +160,7 @@ def _position(p, s, e, x):
 
 
 @tick
-def _tape(p, s, ref, w, x, u, u_f1, volts):
+def _tape(p, s, ref, w, x, u, u_f1):
     """Voltages of the two motors for the command `u` of the position law."""
     reel_growth.step(p.reels, s.reels, x)
     R1, R2 = s.reels.R1, s.reels.R2
@@ -159,11 +170,11 @@ def _tape(p, s, ref, w, x, u, u_f1, volts):
     hand_over.step(p.hand_over, s.hand_over, u_f1, u_f2, s.friction1.direction > 0.0, speed, R1, R2)
     tension.step(p.tension, s.tension, R1, R2)
     inertia_feedforward.step(p.inertia, s.inertia, s.shaper.acceleration, R1, R2)
-    T1 = p.pull1 + s.tension.V1 + s.inertia.u1 + s.hand_over.u1
-    T2 = p.pull2 + s.tension.V2 + s.inertia.u2 + s.hand_over.u2
+    T1 = s.tension.V1 + s.inertia.u1 + s.hand_over.u1
+    T2 = s.tension.V2 + s.inertia.u2 + s.hand_over.u2
     allocation.step(p.allocation, s.allocation, u + w + s.hand_over.u, T1, T2)
-    volts[0] = _written(p, limit.step(p.limit, s.limit1, s.allocation.u1))
-    volts[1] = _written(p, limit.step(p.limit, s.limit2, s.allocation.u2))
+    s.u1 = _written(p, limit.step(p.limit, s.limit1, s.allocation.u1))
+    s.u2 = _written(p, limit.step(p.limit, s.limit2, s.allocation.u2))
 
 
 @tick
@@ -185,4 +196,7 @@ def _written(p, u):
 def play(p, s, ref, w, reading, volts):
     """Write the voltages (n, drives) for recorded columns (n,), tick by tick."""
     for k in range(len(ref)):
-        step(p[0], s[0], ref[k], w[k], reading[k], volts[k])
+        step(p[0], s[0], ref[k], w[k], reading[k])
+        volts[k, 0] = s[0].u1
+        if volts.shape[1] > 1:
+            volts[k, 1] = s[0].u2

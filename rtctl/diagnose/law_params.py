@@ -100,7 +100,7 @@ def plain(case: Case, dt: float) -> LawParams:
     """A law that writes nothing: every part in its neutral place."""
     return LawParams(
         kind=law.NONE,
-        tape=0,
+        tape=law.NO_TAPE,
         to_unit=1 / per_unit(case)[0],
         resolution=0.0,
         shift=0.0,
@@ -148,8 +148,8 @@ def _of_format(c: Any, case: Case, dt: float) -> LawParams:
         volts = [1.0 / (believes[f"K_m{i}"] * drive.amp_per_volt[i - 1]) for i in (1, 2)]
         friction = FrictionFeedforwardParams(c.friction_Nm * volts[0], held=0)
         return p._replace(
-            kind=law.PD, tape=1, pd=pd.of_gains(c.P, c.D, c.derivative_filter_hz, dt),
-            friction1=friction, friction2=friction,
+            kind=law.PD, tape=law.CONSTANT, pd=pd.of_gains(c.P, c.D, c.derivative_filter_hz, dt),
+            friction1=friction,
             pull1=c.tension_N * believes["R1"] * volts[0], pull2=c.tension_N * believes["R2"] * volts[1],
             allocation=allocation.build(AllocationSettings(kind=c.allocation), dt),
         )  # fmt: skip
@@ -212,7 +212,7 @@ def _ivu(p: LawParams, config: Any, record: "Record") -> LawParams:
     settings, dt, radius = config.law, record.dt, config.radius
     R1, R2 = (float(record.columns[n][0]) if n in record.columns else getattr(radius, n) for n in ("R1", "R2"))
     return p._replace(
-        tape=1,
+        tape=law.TAPE,
         resolution=1.0,
         shift=0.5,
         friction1=friction_feedforward.build(settings.friction.motor1, dt),

@@ -39,7 +39,7 @@ def output(lsb: float, top: float) -> AnalogOutputParams:
 
 
 def tape(**values: Any) -> law.LawParams:
-    return params(kind=law.PD, tape=1, pd=PdParams(3.0, 0.0, 1.0, 1e-3), **values)
+    return params(kind=law.PD, tape=law.CONSTANT, pd=PdParams(3.0, 0.0, 1.0, 1e-3), **values)
 
 
 @pytest.mark.parametrize("name", BUNDLES)
@@ -99,7 +99,7 @@ def test_pull_gives_a_backward_command_to_the_other_motor():
 
 
 def test_friction_compensation_follows_the_step_of_the_reference():
-    p = tape(friction1=FrictionFeedforwardParams(0.25, held=0), friction2=FrictionFeedforwardParams(0.25, held=0))
+    p = tape(friction1=FrictionFeedforwardParams(0.25, held=0))
     p = p._replace(
         pd=PdParams(0.0, 0.0, 1.0, 1e-3), allocation=allocation.build(AllocationSettings(kind="motor1"), 1e-3)
     )
