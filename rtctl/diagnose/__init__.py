@@ -4,7 +4,7 @@
 
     the recording     record, columns, case, quantities (units, nouns)
                       rest (rows that tell something), scales, stretches, tacho
-    its law           law (the compiled step), law_params, config_law (of our own recordings), unsaid (what is not in it)
+    its law           law (the compiled step), law_params, config_law (of our own recordings), unsaid (not in it)
                       replayed (the recording's tick on its readings), emulate (the tick with a model as its plant)
     the simulation    model, kernel, simulate; solver (is it to be trusted?), measure (how far is it off?)
     the errors        problem (what they weigh), white (the same, made white), edges, jitter, hiss
