@@ -25,6 +25,19 @@ def test_the_shipped_axis_is_recomputed_to_the_bit(axis):
     assert np.ptp(record.u) > 0.5
 
 
+def test_friction_and_computed_torque_of_the_linear_drive_are_recomputed_from_the_shaped_reference(config, tmp_path):
+    slow = {"reference": {"steps": [{"at": 0.2, "to": 0.01, "ramp": 0.05}, {"at": 1.2, "to": 0.0, "ramp": 0.05}]}}
+    api.record(config("ldu", mode="fused", set={**slow, "law.inertia.volts": 0.08}), 2.1, tmp_path / "run")
+    record = load_record(tmp_path / "run")
+    p = law_params(record)
+    assert p.friction1.volts > 0.0 and p.computed_torque == 0.08
+    assert law_agreement(record).worst == 0.0
+    written_ = written(
+        p._replace(computed_torque=0.0), law_state(p, record), record.ref, record.w, record.y["encoder_counts"], 1
+    )
+    assert np.abs(without - record.u).max() > 0.01
+
+
 def test_the_law_begins_as_it_stood_when_the_machine_was_armed(axis):
     record = load_record(axis)
     p = law_params(record)
