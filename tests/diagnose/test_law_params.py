@@ -32,7 +32,7 @@ def test_friction_and_computed_torque_of_the_linear_drive_are_recomputed_from_th
     p = law_params(record)
     assert p.friction1.volts > 0.0 and p.computed_torque == 0.08
     assert law_agreement(record).worst == 0.0
-    written_ = written(
+    without = written(
         p._replace(computed_torque=0.0), law_state(p, record), record.ref, record.w, record.y["encoder_counts"], 1
     )
     assert np.abs(without - record.u).max() > 0.01
