@@ -14,7 +14,7 @@ enum { MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 };
     X(machine_trail_speed) \
     X(machine_hand_over) X(machine_R_c) X(machine_fast) X(reel1_radians_per_count) X(reel2_radians_per_count) X(velocity_a) X(velocity_dt) X(reference_speed_a) X(reference_speed_dt) \
     X(tension_estimate_torque_per_volt) X(tension_estimate_J) X(tension_estimate_tau_F) X(tension_estimate_R_c) \
-    X(tension_estimate_v_min) X(tension_estimate_a) X(shaper_a) X(shaper_w) X(position_gain) X(position_tau_d) X(position_a) \
+    X(tension_estimate_v_min) X(tension_estimate_a) X(shaper_a) X(shaper_w) X(position_gain) X(position_D) X(position_a) \
     X(position_dt) X(bumpless_decay) X(friction1_volts) X(friction2_volts) X(inertia_volts) X(tension_F_t) \
     X(tension_torque_per_volt) X(tension_ramp) X(limit_low) X(limit_high) X(limit_most) X(drive_amp_per_volt) \
     X(output1_volts_per_code) X(output2_volts_per_code) X(safety_frozen_effort) X(safety_following) \
@@ -210,7 +210,7 @@ static void tick(int64_t k)
     /* law */
     y->capstan_error = y->ref - y->capstan;
     double d = differentiate(p.position_a, p.position_dt, &loop.error, y->capstan_error);
-    double u_pd = p.position_gain * (y->capstan_error + p.position_tau_d * d);
+    double u_pd = p.position_gain * y->capstan_error + p.position_D * d;
     y->gain_factor = 1.0;
     loop.u_fb = fading(p.bumpless_decay, &loop.offset, y->gain_factor * u_pd, command.gains != loop.gains, loop.u_fb);
     loop.gains = command.gains;

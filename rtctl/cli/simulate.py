@@ -35,6 +35,10 @@ def simulate(
         ),
     ] = None,
     skip: Annotated[int, typer.Option("--skip", metavar="N", min=0, help="Rows at the start that do not count.")] = 0,
+    own: Annotated[
+        list[Path] | None,
+        typer.Option("--own", metavar="FILE", help="Own file of the recording, by path; its text has to be the same."),
+    ] = None,
     json: JsonOption = False,
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Draw recorded, simulated and error into a PNG.")
@@ -42,7 +46,8 @@ def simulate(
 ) -> None:
     """Simulate a recording freely by a model: the `plant` section of any config, with its `physics` list.
 
-    Exit code 3 where the model runs away.
+    A recording of rtctl closes the loop by the tick of its own config. Where the law is an own file, give the file with
+    --own; without it the recorded command is the input. Exit code 3 where the model runs away.
 
     Examples:
 
@@ -51,15 +56,20 @@ def simulate(
       rtctl simulate case emps --closed-loop --skip 20 --json
     """
     from rtctl.diagnose.kernel import CLOSED, OPEN
-    from rtctl.diagnose.measure import compare
-    from rtctl.diagnose.record import load_record
+    from rtctl.diagnose.measure import compare, default_mode
+    from rtctl.diagnose.record import INPUT, record_of
+    from rtctl.own.files import give
+    from rtctl.trace.bundle import load_bundle
 
-    record = load_record(bundle)
-    mode = None if closed is None else (CLOSED if closed else OPEN)
+    give(own or ())
+    whole = load_bundle(bundle)
+    record = record_of(whole)
+    mode = default_mode(record, whole) if closed is None else (CLOSED if closed else OPEN)
     if not json:
         for warning in record.case.warnings:
-            typer.echo(f"note: {warning}", err=True)
-    result = compare(record, _model(model, record), mode, skip)
+            if mode == OPEN or INPUT not in warning:
+                typer.echo(f"note: {warning}", err=True)
+    result = compare(record, _model(model, record), mode, skip, whole)
     if plot is not None:
         _draw(result, plot)
     if json:

@@ -130,7 +130,7 @@ def law_response(parts: Loop, f: np.ndarray, path: str = "feedback") -> np.ndarr
     if parts.kind == "sections":
         K = np.prod([biquad_response(section, back) for section in p], axis=0)
     elif parts.kind == "pd":
-        K = p.gain * (1 + p.tau_d * difference(p.a, p.dt, back))
+        K = p.gain + p.D * difference(p.a, p.dt, back)
     else:
         K = p.gain + p.integral / (1 - back)
         if path == "feedback":
@@ -144,7 +144,7 @@ def printed_law(parts: Loop, f: np.ndarray) -> np.ndarray:
     if parts.kind != "pd":
         raise UserError(f"law.position: the response of 5.4 is that of a pd, not of {parts.kind}")
     s, p = 2j * np.pi * np.atleast_1d(np.asarray(f, float)), parts.blocks["position"]
-    return parts.factor * p.gain * (1 + p.tau_d * s) * np.exp(-s * parts.dt * (0.5 + parts.delay))
+    return parts.factor * (p.gain + p.D * s) * np.exp(-s * parts.dt * (0.5 + parts.delay))
 
 
 def difference(a: float, dt: float, back: np.ndarray) -> np.ndarray:

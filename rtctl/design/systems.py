@@ -51,7 +51,7 @@ def law_system(parts: Loop, path: str = "feedback") -> Any:
         for section in p:
             K = _system([section.b0, section.b1, section.b2], [1.0, section.a1, section.a2], dt) * K
     elif parts.kind == "pd":
-        K = p.gain * (1 + p.tau_d * _difference(p.a, dt))
+        K = p.gain + p.D * _difference(p.a, dt)
     else:
         K = _system([p.gain], [1.0], dt)
         if p.integral:

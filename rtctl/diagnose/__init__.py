@@ -2,8 +2,10 @@
 
 `chain` is the whole of it, stage by stage. What the other files are for:
 
-    the recording     record, columns, case, law, replayed (law of our own), quantities (units, nouns)
-                      unsaid (what no key of case says), rest (rows that tell something), scales, stretches, tacho
+    the recording     record, columns, case, quantities (units, nouns)
+                      rest (rows that tell something), scales, stretches, tacho
+    its law           law (the compiled step), law_params, config_law (of our own recordings), unsaid (not in it)
+                      replayed (the recording's tick on its readings), emulate (the tick with a model as its plant)
     the simulation    model, kernel, simulate; solver (is it to be trusted?), measure (how far is it off?)
     the errors        problem (what they weigh), white (the same, made white), edges, jitter, hiss
     a fit             space (what may move), fit

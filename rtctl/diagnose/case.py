@@ -14,12 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
+from rtctl.diagnose.config_law import ConfigLaw, UnsaidLaw, config_law
 from rtctl.diagnose.quantities import EFFORT, Quantities, quantities, settings_in
-from rtctl.diagnose.unsaid import beyond_format
 from rtctl.idiom import Settings
 from rtctl.own.files import refuse_plant
 from rtctl.plants import axis, ivu, ldu
 
+MAX_SECTIONS = 8
 DAMPING = math.sqrt(0.5)  # of a drive of which the owner says nothing
 
 Plant = Literal["ivu", "ldu", "axis"]
@@ -106,7 +107,7 @@ class SectionsLaw(_Part):
     """u = sections(e) + w; each section is (b0, b1, b2, a1, a2). `kind` is what the owner calls it."""
 
     kind: str
-    sections: tuple[tuple[float, float, float, float, float], ...] = Field(min_length=1)
+    sections: tuple[tuple[float, float, float, float, float], ...] = Field(min_length=1, max_length=MAX_SECTIONS)
 
 
 class CascadeLaw(_Part):
@@ -127,7 +128,8 @@ class UnknownLaw(_Part):
     kind: str = "unknown"
 
 
-Law = PdLaw | SectionsLaw | CascadeLaw | NoLaw | UnknownLaw
+Law = PdLaw | SectionsLaw | CascadeLaw | ConfigLaw | NoLaw | UnknownLaw
+KNOWN_LAWS = (PdLaw, SectionsLaw, CascadeLaw, ConfigLaw)  # that can be computed
 
 
 class Reaches(_Part):
@@ -147,7 +149,6 @@ class Case(NamedTuple):
     reaches: Reaches
     notes: str
     warnings: tuple[str, ...]
-    beyond: tuple[str, ...]  # what the law in `config` has that the exchange format cannot say
     file: Path = Path("case.json")
     unsaid: str = ""  # why a law that the owner knows cannot be recomputed from `controller`; "" where it can
 
@@ -197,15 +198,24 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     sensors = _part(where, "sensors", Sensors, case.get("sensors"), warnings)
     drive = _part(where, "drive", Drive, _listed(case.get("drive")), warnings)
     _check_gains(where, plant, drive)
-    controller = _controller(where, plant, case.get("controller"), rate, warnings)
+    own = config_law(case.get("config"))
+    if isinstance(own, ConfigLaw):
+        controller: Law = own
+    elif isinstance(own, UnsaidLaw):
+        controller = UnknownLaw(kind=own.kind)
+    else:
+        controller = _controller(where, plant, case.get("controller"), rate, warnings)
     known = case.get("controller_known", not isinstance(controller, UnknownLaw))
     if not isinstance(known, bool):
         raise UserError(f"{where}: controller_known is {known!r}; it should be true or false")
-    beyond, unsaid = beyond_format(case.get("config")), ""
-    if known and isinstance(controller, UnknownLaw):
-        has = f" (it has {', '.join(beyond)})" if beyond else ""
-        unsaid = f"a law of kind '{controller.kind}' cannot be recomputed on this plant{has}"
-        known = False
+    unsaid = ""
+    if isinstance(own, UnsaidLaw):
+        known, unsaid = (
+            False,
+            f"the law of the config has {', '.join(own.parts)}, which the simulation of a diagnosis does not compute",
+        )
+    elif known and isinstance(controller, UnknownLaw):
+        known, unsaid = False, f"a law of kind '{controller.kind}' cannot be recomputed on this plant"
     notes = case.get("notes")
     reaches = _part(where, "reaches", Reaches, case.get("reaches"), warnings)
     if case.get("parameters") and "parameter_tolerance" not in reaches.model_fields_set:
@@ -223,7 +233,6 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
         reaches=reaches,
         notes=notes if isinstance(notes, str) else "",
         warnings=tuple(warnings),
-        beyond=beyond,
         file=where,
         unsaid=unsaid,
     )

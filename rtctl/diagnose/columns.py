@@ -7,7 +7,7 @@ import numpy as np
 from rtctl.drivers import ldu_amplifier
 
 WRAPS = (16, 24, 32)  # bits of the counters in use
-RUNNING = 2  # in the column `state` of our own recordings
+ARMED, RUNNING = 1, 2  # in the column `state` of our own recordings
 
 
 def running(state: np.ndarray) -> slice:
@@ -18,6 +18,12 @@ def running(state: np.ndarray) -> slice:
         return slice(0, 0)
     longest = int(np.argmax(last - first))
     return slice(int(first[longest]), int(last[longest]))
+
+
+def armed(state: np.ndarray, start: int) -> slice:
+    """The rows before row `start` in which the law ran, on the way to running."""
+    others = np.flatnonzero(state[:start] != ARMED)
+    return slice(int(others[-1]) + 1 if len(others) else 0, start)
 
 
 def through_amplifier(u: np.ndarray) -> np.ndarray:

@@ -149,7 +149,10 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
                 job.before[c] = y
             push[at] = job.correction
             if job.mode == 2:
-                law.step(the_law, law_state, ref[k], w[k], out[k, 0] - job.half, written[k])
+                law.step(the_law, law_state, ref[k], w[k], out[k, 0] - job.half)
+                written[k, 0] = law_state.u1
+                if drives > 1:
+                    written[k, 1] = law_state.u2
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0
@@ -285,12 +288,14 @@ def _site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
 def sources_hash(kind: str) -> str:
     """Hash over the sources that a kernel is compiled from."""
     import rtctl
+    import rtctl.drivers
     import rtctl.plants
 
     root = Path(rtctl.__file__).parent
     plants = Path(next(iter(rtctl.plants.__path__)))
     shared = [root / "idiom.py", root / "diagnose" / "law.py", plants / "linear.py", plants / f"{kind}.py"]
-    return hash_of([*shared, *sorted((plants / "physics").glob("*.py"))])
+    folders = (root / "laws", Path(next(iter(rtctl.drivers.__path__))), plants / "physics")
+    return hash_of([*shared, *(path for folder in folders for path in sorted(folder.glob("*.py")))])
 
 
 @cache

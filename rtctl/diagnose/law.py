@@ -1,92 +1,202 @@
 """The recorded machine's own law, so that a simulation can close the loop as the machine did.
 
-    ivu   e = ref - capstan angle;  d += a ((e - e_prev)/Ts - d),  a = 1 - exp(-2 pi f Ts)
-          uc = P e + D d + friction sign(ref step) + w,  shared out between two motors with a constant pull on each
-    ldu   e = ref - R_c encoder angle, through biquads in order;  u = y + w
-    axis  u = kp kv (ref - x) - kv v + w,  v the backward difference of the two-tap mean of x
+The steps are those of rtctl/laws, in the order of the loop's tick; here stands only which of them a law has:
 
-Each clips and rounds to the steps of the DAC where it has one.
+    e = ref - x,  u = position law(e, v)
+    one motor     u + friction + computed torque + w
+    a tape        gain factor u + w + friction, shared out between two motors that pull at the tape
 
-Source: the `notes` of the exchange format's case.json; Janot, Gautier & Brunot 2019 for the cascade.
+Each is limited, rounded to the steps of the DAC where there is one, and told to the position law if it asks. One
+record serves all laws, so that no kernel is compiled for another law.
+
+Source: the `notes` of the exchange format's case.json; rtctl/machines for the laws of our own machines.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.idiom import state, tick
+from rtctl.diagnose.case import MAX_SECTIONS
+from rtctl.drivers import at_mio_16de, ldu_amplifier
+from rtctl.drivers.at_mio_16de import AnalogOutputParams
+from rtctl.drivers.ldu_amplifier import LduAmplifierParams
+from rtctl.idiom import record_dtype, state, tick
+from rtctl.laws import (
+    allocation,
+    biquad,
+    friction_feedforward,
+    gain_schedule,
+    hand_over,
+    inertia_feedforward,
+    limit,
+    pd,
+    pi_velocity,
+    reel_growth,
+    shaper,
+    tension,
+    two_tap,
+    velocity,
+)
+from rtctl.laws.allocation import AllocationParams
+from rtctl.laws.friction_feedforward import FrictionFeedforwardParams
+from rtctl.laws.gain_schedule import GainScheduleParams
+from rtctl.laws.hand_over import HandOverParams
+from rtctl.laws.inertia_feedforward import InertiaFeedforwardParams
+from rtctl.laws.limit import LimitParams
+from rtctl.laws.pd import PdParams
+from rtctl.laws.pi_velocity import PiVelocityParams
+from rtctl.laws.reel_growth import ReelGrowthParams
+from rtctl.laws.shaper import ShaperParams
+from rtctl.laws.tension import TensionParams
+from rtctl.laws.velocity import VelocityParams
 
-NONE, PD, SECTIONS, CASCADE = range(4)
-ALLOCATIONS = ("pull", "differential", "motor1", "motor2")
-MAX_SECTIONS = 8
+NONE, PD, SECTIONS, PI_VELOCITY = range(4)  # position laws
+NO_TAPE, CONSTANT, TAPE = range(3)  # one motor; two with a constant pull; two with all of the laws for a tape
+EXACT, HALVES_UP, BOARD, AMPLIFIER = range(4)  # what an output makes of a voltage
+SECTION = record_dtype(biquad.IDENTITY)
 
 
 class LawParams(NamedTuple):
-    kind: int
-    Ts: float  # s
-    to_unit: float  # from the sensor's count (or metre) to the reference's unit
-    limit: float  # V
-    lsb: float  # V, step of the DAC; 0 for none
-    top: float  # V, its highest
-    P: float  # V/rad
-    D: float  # V s/rad
-    a: float  # share by which the derivative filter follows in a tick
-    pull1: float  # V, constant pull of each motor
-    pull2: float
-    friction: float  # V, in the direction of the reference's step
-    allocation: int
-    kp: float  # 1/s
-    kv: float  # V s/m
+    kind: int  # of the position law
+    tape: int  # of NO_TAPE to TAPE: how the command is shared out between two motors
+    to_unit: float  # from the main sensor's count (or metre) to the reference's unit
+    resolution: float  # one count of the main sensor, in counts or metres; 0 where the law sees no steps
+    shift: float  # share of a count that is added before
+    origin: float  # counts at which the main sensor began
+    two_tap: int  # 1: the speed is that of the mean of two samples
+    velocity: VelocityParams
+    pd: PdParams
+    pi_velocity: PiVelocityParams
     n_sections: int
-    sections: np.ndarray  # (8, 5) b0 b1 b2 a1 a2
+    sections: np.ndarray  # (8,) of SECTION
+    shaper: ShaperParams  # that made the reference
+    computed_torque: float  # V per m/s^2 of the reference
+    friction1: FrictionFeedforwardParams  # of CONSTANT: of both motors
+    friction2: FrictionFeedforwardParams
+    reference_speed: VelocityParams
+    hand_over: HandOverParams
+    gain_schedule: GainScheduleParams
+    R1: float  # m, at the first tick
+    R2: float
+    reels: ReelGrowthParams
+    pull1: float  # V, of CONSTANT: pull of each motor
+    pull2: float
+    tension: TensionParams
+    inertia: InertiaFeedforwardParams
+    allocation: AllocationParams
+    limit: LimitParams
+    output: AnalogOutputParams
+    rounds: int  # EXACT to AMPLIFIER
+    amplifier: LduAmplifierParams
 
 
-LAW_STATE = state(started=int, ref=float, e=float, d=float, x1=float, x2=float, z=(float, (MAX_SECTIONS, 4)))
+LAW_STATE = state(
+    u1=float,
+    u2=float,
+    started=int,
+    pd=pd.PD_STATE,
+    pi_velocity=pi_velocity.PI_VELOCITY_STATE,
+    sections=(biquad.BIQUAD_STATE, MAX_SECTIONS),
+    two_tap=two_tap.TWO_TAP_STATE,
+    velocity=velocity.VELOCITY_STATE,
+    shaper=shaper.SHAPER_STATE,
+    friction1=friction_feedforward.FRICTION_FEEDFORWARD_STATE,
+    friction2=friction_feedforward.FRICTION_FEEDFORWARD_STATE,
+    reference_speed=velocity.VELOCITY_STATE,
+    hand_over=hand_over.HAND_OVER_STATE,
+    gain_schedule=gain_schedule.GAIN_SCHEDULE_STATE,
+    reels=reel_growth.REEL_GROWTH_STATE,
+    tension=tension.TENSION_STATE,
+    inertia=inertia_feedforward.INERTIA_FEEDFORWARD_STATE,
+    allocation=allocation.ALLOCATION_STATE,
+    limit1=limit.LIMIT_STATE,
+    limit2=limit.LIMIT_STATE,
+)
 
 
 @tick
-def step(p, s, ref, w, reading, volts):
-    """Write the voltages of one tick into `volts`; `reading` is the main sensor's, in counts or metres."""
+def step(p, s, ref, w, reading):  # no array is passed on: counting its references would take as long as the law
+    """Write the voltages of one tick, V, into s.u1 and s.u2; `reading` is the main sensor's, in counts or metres."""
+    if p.resolution > 0.0:
+        reading = (np.floor(reading / p.resolution + p.shift) + p.origin) * p.resolution
     x = reading * p.to_unit
-    e = ref - x
     if s.started == 0:
         s.started = 1
-        s.e, s.ref, s.x1, s.x2 = e, ref, x, x
-    u = 0.0
+        shaper.reset(p.shaper, s.shaper, ref)
+        reel_growth.start(s.reels, p.R1, p.R2, x)
+    if p.kind == NONE:
+        return
+    if p.shaper.w != 0.0:
+        shaper.follow(p.shaper, s.shaper, ref)
+    u = _position(p, s, ref - x, x)
+    u_f1 = 0.0
+    if p.friction1.volts != 0.0 or p.tape == TAPE:  # which takes its direction from this one
+        u_f1 = friction_feedforward.step(p.friction1, s.friction1, ref)
+    if p.tape == TAPE:
+        _tape(p, s, ref, w, x, u, u_f1)
+    elif p.tape == CONSTANT:
+        allocation.step(p.allocation, s.allocation, u + w + u_f1, p.pull1, p.pull2)
+        s.u1 = _written(p, limit.step(p.limit, s.limit1, s.allocation.u1))
+        s.u2 = _written(p, limit.step(p.limit, s.limit2, s.allocation.u2))
+    else:
+        u_c = u + (u_f1 + p.computed_torque * s.shaper.acceleration) + w
+        u = limit.step(p.limit, s.limit1, u_c)
+        if p.kind == PI_VELOCITY:
+            pi_velocity.track(p.pi_velocity, s.pi_velocity, u_c, u)
+        s.u1 = _written(p, u)
+
+
+@tick
+def _position(p, s, e, x):
+    """Command in V of the position law for the error `e` at the position `x`."""
     if p.kind == PD:
-        s.d += p.a * ((e - s.e) / p.Ts - s.d)
-        u = p.P * e + p.D * s.d + w
-        if ref > s.ref:
-            u += p.friction
-        elif ref < s.ref:
-            u -= p.friction
-        if p.allocation == 0:
-            volts[0] = p.pull1 + max(u, 0.0)
-            volts[1] = p.pull2 + max(-u, 0.0)
-        elif p.allocation == 1:
-            volts[0] = p.pull1 + u / 2
-            volts[1] = p.pull2 - u / 2
-        elif p.allocation == 2:
-            volts[0] = p.pull1 + u
-            volts[1] = p.pull2
-        else:
-            volts[0] = p.pull1
-            volts[1] = p.pull2 - u
-    elif p.kind == SECTIONS:
-        u = e
+        return pd.step(p.pd, s.pd, e)
+    if p.kind == SECTIONS:
         for i in range(p.n_sections):
-            z, c = s.z[i], p.sections[i]
-            y = c[0] * u + c[1] * z[0] + c[2] * z[1] - c[3] * z[2] - c[4] * z[3]
-            z[1], z[0] = z[0], u
-            z[3], z[2] = z[2], y
-            u = y
-        volts[0] = u + w
-    elif p.kind == CASCADE:
-        v = (0.5 * (x + s.x1) - 0.5 * (s.x1 + s.x2)) / p.Ts
-        volts[0] = p.kp * p.kv * e - p.kv * v + w
-        s.x2, s.x1 = s.x1, x
-    s.e, s.ref = e, ref
-    for c in range(volts.shape[0]):
-        volts[c] = min(max(volts[c], -p.limit), p.limit)
-        if p.lsb > 0.0:
-            volts[c] = min(np.floor(volts[c] / p.lsb + 0.5) * p.lsb, p.top)  # halves go up
+            e = biquad.step(p.sections[i], s.sections[i], e)
+        return e
+    v = velocity.step(p.velocity, s.velocity, two_tap.step(s.two_tap, x) if p.two_tap != 0 else x)
+    return pi_velocity.step(p.pi_velocity, s.pi_velocity, e, v)
+
+
+@tick
+def _tape(p, s, ref, w, x, u, u_f1):
+    """Voltages of the two motors for the command `u` of the position law."""
+    reel_growth.step(p.reels, s.reels, x)
+    R1, R2 = s.reels.R1, s.reels.R2
+    u *= gain_schedule.step(p.gain_schedule, s.gain_schedule, R1, R2, u)
+    u_f2 = friction_feedforward.step(p.friction2, s.friction2, ref)
+    speed = velocity.step(p.reference_speed, s.reference_speed, ref)
+    hand_over.step(p.hand_over, s.hand_over, u_f1, u_f2, s.friction1.direction > 0.0, speed, R1, R2)
+    tension.step(p.tension, s.tension, R1, R2)
+    inertia_feedforward.step(p.inertia, s.inertia, s.shaper.acceleration, R1, R2)
+    T1 = s.tension.V1 + s.inertia.u1 + s.hand_over.u1
+    T2 = s.tension.V2 + s.inertia.u2 + s.hand_over.u2
+    allocation.step(p.allocation, s.allocation, u + w + s.hand_over.u, T1, T2)
+    s.u1 = _written(p, limit.step(p.limit, s.limit1, s.allocation.u1))
+    s.u2 = _written(p, limit.step(p.limit, s.limit2, s.allocation.u2))
+
+
+@tick
+def _written(p, u):
+    """The voltage in V that an output holds where `u` V is wanted."""
+    if p.rounds == HALVES_UP:  # as the exchange format has it; the board rounds halves to even
+        code = np.floor(u / p.output.volts_per_code + 0.5)
+        return min(max(code, float(p.output.code_min)), float(p.output.code_max)) * p.output.volts_per_code
+    if p.rounds == BOARD:
+        return at_mio_16de.codes_to_volts(p.output, at_mio_16de.volts_to_codes(p.output, u))
+    if p.rounds == AMPLIFIER:
+        codes = at_mio_16de.volts_to_codes(p.output, ldu_amplifier.encode(p.amplifier, u))
+        volts = at_mio_16de.codes_to_volts(p.output, codes)
+        return volts if ldu_amplifier.direction(p.amplifier, u) != 0 else -volts
+    return u
+
+
+@tick
+def play(p, s, ref, w, reading, volts):
+    """Write the voltages (n, drives) for recorded columns (n,), tick by tick."""
+    for k in range(len(ref)):
+        step(p[0], s[0], ref[k], w[k], reading[k])
+        volts[k, 0] = s[0].u1
+        if volts.shape[1] > 1:
+            volts[k, 1] = s[0].u2

@@ -11,10 +11,12 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError
+from rtctl.diagnose.emulate import can_emulate, emulate
 from rtctl.diagnose.kernel import CLOSED, OPEN
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator
+from rtctl.trace.bundle import Bundle
 
 RECTIFIED = ("reel1_counts", "reel2_counts")  # where their first edge lies is chance: compared up to a constant
 FIRST = 20  # rows that the first position and speed of an axis are taken from
@@ -126,29 +128,44 @@ def between(record: Record, model: Model) -> Simulator:
     return smooth if error(smooth) < error(held) else held  # a model that runs away is held
 
 
-def default_mode(record: Record) -> int:
-    """CLOSED where the recorded machine's law is known, else OPEN."""
-    return CLOSED if record.closed_loop else OPEN
+def default_mode(record: Record, bundle: Bundle | None = None) -> int:
+    """CLOSED where the law is known or the tick of the bundle's config gave the command to the bit, else OPEN."""
+    return CLOSED if record.closed_loop or ticks_again(record, bundle) else OPEN
 
 
-def compare(record: Record, model: Model, mode: int | None = None, skip: int = 0) -> Comparison:
+def ticks_again(record: Record, bundle: Bundle | None) -> bool:
+    """Whether the tick of the bundle's config can close the loop: its law gives the recorded command to the bit."""
+    replayed = record.replay is not None and record.replay.identical
+    return bundle is not None and (record.closed_loop or replayed) and can_emulate(bundle)
+
+
+def compare(
+    record: Record, model: Model, mode: int | None = None, skip: int = 0, bundle: Bundle | None = None
+) -> Comparison:
     """Simulate the whole recording freely and compare it from row `skip` on.
 
     OPEN runs on the recorded command, an axis from the position and speed that its first 20 rows show (the first `skip`
-    if those are more); CLOSED on the reference with the known law, and then what the law writes is compared too. A
+    if those are more); CLOSED on the reference with the known law, and then what the law writes is compared too. With
+    the `bundle` of a recording of our own, CLOSED is the machine of its config with the model as its plant. A
     counter that shows n stands for n + 1/2 on average. Raises UserError where the law is not known or `skip` leaves
     less than two rows, NoAnswer where the model runs away.
     """
-    mode = default_mode(record) if mode is None else mode
+    mode = default_mode(record, bundle) if mode is None else mode
     n = len(record.t)
-    if mode == CLOSED and not record.closed_loop:
+    ticks = mode == CLOSED and ticks_again(record, bundle)
+    if mode == CLOSED and not record.closed_loop and not ticks:
         reason = next((w for w in record.case.warnings if "taken as the input" in w), "the law is not known")
         raise UserError(f"the loop cannot be closed: {reason}; simulate it with --open-loop")
     if not 0 <= skip <= n - 2:
         raise UserError(f"--skip {skip}: the recording has {n} rows, and at least two must be left")
     simulator = between(record, model)
     volts = np.zeros((n, 0))
-    if mode == OPEN:
+    if ticks:
+        assert bundle is not None  # ticks_again
+        found = emulate(bundle, record, model)
+        readings = np.column_stack([found[name] + simulator.half for name in simulator.channels])
+        volts = np.column_stack([found[name] for name in record.commands])
+    elif mode == OPEN:
         readings = free_run(simulator, model, begin(simulator, model, max(FIRST, skip)))
     else:
         readings, volts, _ = simulator.everything(model, mode)

@@ -4,16 +4,16 @@ Row k holds what the loop read at the start of tick k and what it wrote at its e
 it from the recorded columns must give the recorded voltages; where it does not, the recorded command is the input.
 """
 
-import math
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
-from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed, read_case
+from rtctl.diagnose import law
+from rtctl.diagnose.case import KNOWN_LAWS, Case, read_case
 from rtctl.diagnose.columns import (
+    armed,
     even_clock,
     is_counter,
     laid,
@@ -23,6 +23,8 @@ from rtctl.diagnose.columns import (
     unwrap,
     unwrap_turns,
 )
+from rtctl.diagnose.config_law import ConfigLaw
+from rtctl.diagnose.law_params import law_params, law_state, written
 from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.replayed import LawReplay, replayed_law
 from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
@@ -31,6 +33,7 @@ from rtctl.trace.clock import even_rows, increasing
 COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
 READINGS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts",), "axis": ()}
 COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
+INPUT = "the recorded command is taken as the input"
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
 AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
 AGREES_MEDIAN = 2e-3
@@ -46,12 +49,13 @@ class Record(NamedTuple):
     u: np.ndarray  # (n, nu) V, or what `case.drive.unit` says
     y: dict[str, np.ndarray]  # name -> (n,) in the sensor's own unit; counters without their wraps
     columns: dict[str, np.ndarray]  # as they stand in the file, `t` at its own uneven times
-    replay: LawReplay | None = None  # of our own recordings whose law `controller` cannot say
+    replay: LawReplay | None = None  # of our own recordings whose law LawParams do not hold
+    armed: dict[str, np.ndarray] | None = None  # columns of the rows before, in which the law ran already
 
     @property
     def closed_loop(self) -> bool:
         """Whether the law is known, so that the reference is the input; otherwise the recorded command is."""
-        return self.case.controller_known and isinstance(self.case.controller, PdLaw | SectionsLaw | CascadeLaw)
+        return self.case.controller_known and isinstance(self.case.controller, KNOWN_LAWS)
 
     @property
     def shows_speed(self) -> bool:
@@ -88,22 +92,35 @@ def load_record(folder: Path | str) -> Record:
     Raises UserError (exit 2) that names file, column and row and says what would be right, NoAnswer (exit 3) where
     the recording supports no verdict.
     """
-    bundle = load_bundle(folder)
+    return record_of(load_bundle(folder))
+
+
+def record_of(bundle: Bundle) -> Record:
+    """Check a bundle that is read already, as `load_record` does."""
     case = read_case(bundle.case, bundle.folder)
-    columns = bundle.columns
+    columns, earlier = bundle.columns, None
     if isinstance(bundle.case.get("config"), dict) and "state" in columns:
         rows = running(columns["state"])
         if rows.stop - rows.start < len(columns["t"]):
             told = f"{bundle.folder / PARQUET}: rows {rows.start} to {rows.stop - 1} are taken, where the loop ran"
             case = case._replace(warnings=(*case.warnings, told))
+        before = armed(columns["state"], rows.start)
+        earlier = {name: values[before] for name, values in columns.items()}
         columns = {name: values[rows] for name, values in columns.items()}
         if case.plant == "ldu" and "u" in columns and measured_amplifier(bundle.case["config"]):
             columns["u"] = through_amplifier(columns["u"])
-    return check(columns, case, bundle.folder, bundle)
+    return check(columns, case, bundle.folder, bundle, earlier)
 
 
-def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".", whole: Bundle | None = None) -> Record:
-    """The Record of these columns, by the same rules as `load_record`; `whole` is the bundle that they are from."""
+def check(
+    columns: dict[str, np.ndarray],
+    case: Case,
+    folder: Path | str = ".",
+    whole: Bundle | None = None,
+    earlier: dict[str, np.ndarray] | None = None,
+) -> Record:
+    """The Record of these columns, by the same rules as `load_record`; `whole` is the bundle that they are from,
+    `earlier` the rows before, in which the law ran already."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
     if case.estimated and case.reaches.parameter_tolerance is not None:  # null: the owner says that nothing is known
@@ -118,7 +135,7 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".", 
     w = _column(path, columns, "w", "V, excitation, 0 where there is none")
     raw = _readings(path, columns, case, warnings)
     t, dt = _clock(path, t, case, warnings)
-    if isinstance(case.controller, PdLaw | SectionsLaw | CascadeLaw) and np.isnan(ref).any():
+    if isinstance(case.controller, KNOWN_LAWS) and np.isnan(ref).any():
         case = case._replace(controller_known=False)
     y = {}
     for name, values in raw.items():
@@ -138,12 +155,12 @@ def check(columns: dict[str, np.ndarray], case: Case, folder: Path | str = ".", 
         u = np.column_stack([laid(even, t, values) for values in u.T])
         t = even
     _supports(path, t, u, y, case, warnings)
-    record = Record(case.plant, case, t, dt, ref, w, u, y, columns)
+    record = Record(case.plant, case, t, dt, ref, w, u, y, columns, armed=earlier)
     agreement = law_agreement(record)
     if (record.closed_loop or case.unsaid) and (agreement is None or not agreement.holds):
         found = replayed_law(whole) if whole is not None else None
         words = _replayed(case, found) if found is not None else case.unsaid or _disagrees(case, agreement)
-        warnings.append(f"{path.parent}: {words}; the recorded command is taken as the input")
+        warnings.append(f"{path.parent}: {words}; {INPUT}")
         case, record = case._replace(controller_known=False), record._replace(replay=found)
     return record._replace(case=case._replace(warnings=tuple(warnings)))
 
@@ -175,90 +192,20 @@ def law_agreement(record: Record) -> Agreement | None:
 
 def recompute_law(record: Record) -> np.ndarray | None:
     """The voltages (n, nu) that the law writes for the recorded columns; None where the law or its input is unknown."""
-    case, law = record.case, record.case.controller
-    p, drive = believed(case), case.drive
-    if np.isnan(record.ref).any():
+    p = law_params(record)
+    reading = _reading(record)
+    if p.kind == law.NONE or reading is None or np.isnan(record.ref).any():
         return None
-    if isinstance(law, PdLaw) and case.plant == "ivu":
-        if not case.sensors.capstan_counts_per_rev:
-            return None
-        e = record.ref - 2 * math.pi * record.y["capstan_counts"] / case.sensors.capstan_counts_per_rev
-        a = 1.0
-        if law.derivative_filter_hz is not None:
-            a = 1.0 - math.exp(-2 * math.pi * law.derivative_filter_hz * record.dt)
-        gain1, gain2 = p["K_m1"] * drive.amp_per_volt[0], p["K_m2"] * drive.amp_per_volt[1]
-        step = np.sign(np.diff(record.ref, prepend=record.ref[0]))
-        u_c = law.P * e + law.D * _filtered_slope(e, a, record.dt) + law.friction_Nm * step / gain1 + record.w
-        T1, T2 = law.tension_N * p["R1"] / gain1, law.tension_N * p["R2"] / gain2
-        u = _allocate(law.allocation, u_c, T1, T2)
-    elif isinstance(law, SectionsLaw):
-        x = _position(record)
-        if x is None:
-            return None
-        u = (_sections(record.ref - x, np.array(law.sections)) + record.w)[:, None]
-    elif isinstance(law, CascadeLaw):
-        x = _position(record)
-        if x is None:
-            return None
-        mean = 0.5 * (x + np.concatenate((x[:1], x[:-1])))
-        v = np.diff(mean, prepend=mean[0]) / record.dt
-        u = (law.kp * law.kv * (record.ref - x) - law.kv * v + record.w)[:, None]
-    else:
+    return written(p, law_state(p, record), record.ref, record.w, reading, record.u.shape[1])
+
+
+def _reading(record: Record) -> np.ndarray | None:
+    """Main sensor (n,) in its own unit, as the loop compares it with `ref`; None where that shows a speed."""
+    if record.shows_speed:
         return None
-    return to_dac(u, case)
-
-
-def to_dac(u: np.ndarray, case: Case) -> np.ndarray:
-    """Clip at the drive's limit and round to the nearest step of its DAC, halves upwards; V."""
-    drive = case.drive
-    if drive.limit_volt is not None:
-        u = np.clip(u, -drive.limit_volt, drive.limit_volt)
-    step = drive.step_volt
-    if step is None:
-        return u
-    return np.clip(np.floor(u / step + 0.5) * step, -drive.dac_range_volt, drive.dac_range_volt - step)
-
-
-def _position(record: Record) -> np.ndarray | None:
-    """What the loop compares with `ref`, m (or rad)."""
-    case = record.case
-    if case.plant == "ldu":
-        per_rev, R_c = case.sensors.encoder_counts_per_rev, believed(case)["R_c"]
-        if not per_rev:
-            return None
-        return R_c * 2 * math.pi * record.y["encoder_counts"] / per_rev
-    return record.columns["x"] if COUNTED in record.columns and "x" in record.y else record.y.get("x")
-
-
-def _allocate(kind: str, u_c: np.ndarray, T1: float, T2: float) -> np.ndarray:
-    if kind == "pull":
-        return np.column_stack((T1 + np.maximum(u_c, 0.0), T2 + np.maximum(-u_c, 0.0)))
-    if kind == "differential":
-        return np.column_stack((T1 + u_c / 2, T2 - u_c / 2))
-    if kind == "motor1":
-        return np.column_stack((T1 + u_c, np.full_like(u_c, T2)))
-    return np.column_stack((np.full_like(u_c, T1), T2 - u_c))
-
-
-@njit(cache=True)  # called outside a generated module, which would keep it
-def _filtered_slope(e, a, dt):
-    d = np.zeros_like(e)
-    for k in range(1, len(e)):
-        d[k] = d[k - 1] + a * ((e[k] - e[k - 1]) / dt - d[k - 1])
-    return d
-
-
-@njit(cache=True)  # called outside a generated module, which would keep it
-def _sections(e, sections):
-    y = e.copy()
-    for j in range(len(sections)):
-        b0, b1, b2, a1, a2 = sections[j]
-        x1 = x2 = y1 = y2 = 0.0
-        for k in range(len(y)):
-            x = y[k]
-            y[k] = b0 * x + b1 * x1 + b2 * x2 - a1 * y1 - a2 * y2
-            x2, x1, y2, y1 = x1, x, y1, y[k]
-    return y
+    name, values = next(iter(record.y.items()))
+    counted = name == "x" and COUNTED in record.columns and not isinstance(record.case.controller, ConfigLaw)
+    return record.columns["x"] if counted else values
 
 
 def _column(path: Path, columns: dict, name: str, meaning: str, missing: bool = False) -> np.ndarray:
@@ -348,24 +295,15 @@ def _supports(
 
 
 def _replayed(case: Case, found: LawReplay) -> str:
-    has = f"has {', '.join(case.beyond)}, which 'controller' of case.json cannot say" if case.beyond else ""
-    if found.identical:
-        return f"{found.words}: nothing is wrong with it. It {has or 'is more than the controller of case.json says'}"
-    return f"{found.words}; it {has}" if has else found.words
+    why = case.unsaid or "the law of the config alone does not give it: it was changed while the recording ran"
+    return f"{found.words}: nothing is wrong with it, but {why}" if found.identical else f"{found.words}; {why}"
 
 
 def _disagrees(case: Case, agreement: Agreement | None) -> str:
-    unit = of_case(case).command
-    if case.beyond and agreement is not None:
-        return (
-            f"the law of the config has {', '.join(case.beyond)}, which 'controller' of case.json does not say; "
-            f"'{case.controller.kind}' alone is off the recorded command by up to {agreement.worst:.3g} {unit} (row "
-            f"{agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
-        )
-    has = f"; in its config the law has {', '.join(case.beyond)}" if case.beyond else ""
+    unit, kind = of_case(case).command, case.controller.kind
     if agreement is None:
-        return f"the law '{case.controller.kind}' cannot be recomputed from this recording{has}"
+        return f"the law '{kind}' cannot be recomputed from this recording"
     return (
-        f"the law '{case.controller.kind}' does not give the recorded command (off by {agreement.worst:.3g} {unit} "
+        f"the law '{kind}' does not give the recorded command (off by {agreement.worst:.3g} {unit} "
         f"in row {agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
     )

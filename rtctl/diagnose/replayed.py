@@ -1,8 +1,7 @@
 """The law of a recording by our own daemon, replayed: whether the config in case.json gives the recorded command.
 
-`controller` of case.json says the law in the words of the exchange format, which has none for friction compensation,
-inertia feedforward or a tension that is ramped. The config beside it says all, and `rtctl replay` recomputes its tick
-to the bit. Code that came with the recording is never run.
+What the simulation of a diagnosis cannot compute (see `unsaid`), or what changed while the recording ran, is checked by
+the tick of the config, as `rtctl replay` recomputes it to the bit. Code that came with the recording is never run.
 """
 
 from typing import NamedTuple

@@ -15,9 +15,10 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose import kernel, law
-from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed
+from rtctl.diagnose import kernel
+from rtctl.diagnose.case import Case
 from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
+from rtctl.diagnose.law_params import began, law_params, law_state, per_unit
 from rtctl.diagnose.model import Model, plant_params
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.tacho import noise
@@ -66,7 +67,10 @@ class Simulator:
         self.volts = np.ascontiguousarray(volts if held else half_a_tick_on(volts))
         self.ref = np.nan_to_num(np.ascontiguousarray(record.ref))
         self.w = np.array(record.w, float)  # of a file it cannot be written to, which would be compiled for anew
-        self.law = law_params(record)
+        self.law = began(law_params(record), record)
+        self.laws = np.zeros(1, record_dtype(self.law))
+        fill_record(self.laws[0], self.law)
+        self.law_state = law_state(self.law, record)
         self.release = NEVER  # row at which the correction ends
         self.jolt = np.zeros(2)  # position and speed of the main sensor's body that are added there
 
@@ -163,16 +167,16 @@ class Simulator:
             job["share"] = 0.0
             for node, torque in pushes(self.record, model.base, at).items():
                 job["push"][0, PLANTS[self.record.plant].NODES[node]] = torque
-        laws = np.zeros(1, record_dtype(self.law))
-        fill_record(laws[0], self.law)
         out = np.zeros((n, len(job["per_unit"][0])))
         written = np.zeros((n if mode == CLOSED else 1, self.volts.shape[1]))
         push = np.zeros(n)
         done = k.module.run(
-            job, p, np.zeros(1, k.state), slots, laws, np.zeros(1, law.LAW_STATE), self.lead, self.ref[:n],
+            job, p, np.zeros(1, k.state), slots, self.laws, self.law_state.copy(), self.lead, self.ref[:n],
             self.w[:n], self.volts[:n], self.seen[:n], out, written, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
+        if mode == CLOSED and self.law.origin:
+            out[:, 0] += self.law.origin * self.law.resolution
         return out, written, push
 
     def _job(self, params: Any, mode: int, follow: float, substeps: int, stride: int) -> np.ndarray:
@@ -221,18 +225,6 @@ def channels(record: Record) -> tuple[str, ...]:
     """Recorded sensors in the order of the plant's, those that are missing left out at the end."""
     wanted = CHANNELS.get(record.plant, tuple(record.y))
     return tuple(name for name in wanted if name in record.y)
-
-
-def per_unit(case: Case) -> Any:
-    """Counts of each sensor a rad or m."""
-    s = case.sensors
-    turn = 2 * np.pi
-    if case.plant == "ivu":
-        reel = (s.reel_counts_per_rev or 209) / turn
-        return [(s.capstan_counts_per_rev or 10000) / turn, reel, reel]
-    if case.plant == "ldu":
-        return [(s.encoder_counts_per_rev or 20000) / turn, 1.0 / (s.scale_m_per_count or 0.5e-6)]
-    return [1.0]
 
 
 def way(record: Record) -> np.ndarray:
@@ -296,34 +288,3 @@ def rigid_gain(params: Any, kind: str) -> float:
     sensor = {"ivu": ivu.CAPSTAN, "ldu": ldu.ENCODER, "axis": 0}[kind]
     x = np.linalg.solve(1j * w * np.eye(len(A)) - A, B @ np.array(SHARE[kind]))
     return float(np.abs(x[sensor]) * w**2)
-
-
-def law_params(record: Record) -> law.LawParams:
-    """The recorded machine's law for the compiled loop; kind NONE where it is not known."""
-    case, dt = record.case, record.dt
-    c, drive = case.controller, case.drive
-    values: dict[str, Any] = dict.fromkeys(law.LawParams._fields, 0.0)
-    values |= {"kind": law.NONE, "Ts": dt, "limit": drive.limit_volt or 1e9, "lsb": drive.step_volt or 0.0}
-    values["top"] = drive.dac_range_volt - values["lsb"]
-    values |= {
-        "allocation": 0,
-        "n_sections": 0,
-        "sections": np.zeros((law.MAX_SECTIONS, 5)),
-        "to_unit": 1 / per_unit(case)[0],
-    }
-    if isinstance(c, PdLaw):
-        p, amp = believed(case), drive.amp_per_volt
-        volts = [1.0 / (p[f"K_m{i}"] * amp[i - 1]) for i in (1, 2)]
-        f = c.derivative_filter_hz
-        values |= {
-            "kind": law.PD, "P": c.P, "D": c.D, "a": 1.0 if f is None else -np.expm1(-2 * np.pi * f * dt),
-            "pull1": c.tension_N * p["R1"] * volts[0], "pull2": c.tension_N * p["R2"] * volts[1],
-            "friction": c.friction_Nm * volts[0], "allocation": law.ALLOCATIONS.index(c.allocation),
-        }  # fmt: skip
-    elif isinstance(c, SectionsLaw):
-        values["to_unit"] *= believed(case)["R_c"] if case.plant == "ldu" else 1.0
-        values |= {"kind": law.SECTIONS, "n_sections": len(c.sections)}
-        values["sections"][: len(c.sections)] = c.sections
-    elif isinstance(c, CascadeLaw):
-        values |= {"kind": law.CASCADE, "kp": c.kp, "kv": c.kv}
-    return law.LawParams(**values)

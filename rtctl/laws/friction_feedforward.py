@@ -3,7 +3,8 @@
     u = tau_C sign(d ref) / (K_m amp_per_volt)
 
 The sign is that of the last change of the reference and is held while the reference stands still; it is 0 until the
-reference has moved once. Take the lowest friction measured: compensating too much overshoots (thesis 8.3).
+reference has moved once. The law of the exchange format holds nothing: its sign is 0 at rest. Take the lowest friction
+measured: compensating too much overshoots (thesis 8.3).
 
 Source: thesis 5.5 and 8.4.
 """
@@ -20,6 +21,7 @@ class FrictionFeedforwardSettings(DriveSettings):
 
 class FrictionFeedforwardParams(NamedTuple):
     volts: float  # V that overcome the friction
+    held: int = 1  # 0: the direction is forgotten while the reference stands still
 
 
 FRICTION_FEEDFORWARD_STATE = state(ref=float, direction=float, primed=int)  # reference, -1 0 1, 1 once ref is known
@@ -40,6 +42,8 @@ def step(p, s, ref):
         s.direction = 1.0
     elif ref < s.ref:
         s.direction = -1.0
+    elif p.held == 0:
+        s.direction = 0.0
     s.ref = ref
     return p.volts * s.direction
 

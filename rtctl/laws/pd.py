@@ -1,7 +1,7 @@
 """PD position law with a filtered derivative.
 
     d += a ((e - e_prev) / dt - d)        a = 1 - exp(-2 pi f dt), or 1 without a filter
-    u  = gain (e + tau_d d)
+    u  = gain e + D d                     D = gain tau_d
 
 The derivative acts on the error, as in the thesis, so a step of the reference gives a kick of gain tau_d a / dt per
 unit of step; the first step after a start or a reset gives none. A feedforward is added to what `step` returns.
@@ -29,7 +29,7 @@ class PdMetreSettings(PdSettings):
 
 class PdParams(NamedTuple):
     gain: float  # V per unit of error
-    tau_d: float  # s
+    D: float  # V s per unit of error
     a: float  # share of the new difference that enters d each tick
     dt: float  # s
 
@@ -39,9 +39,13 @@ PD_STATE = state(e=float, d=float, primed=int)  # error, its filtered derivative
 
 def build(settings: PdSettings, dt: float) -> PdParams:
     """Coefficients for a tick of `dt` s."""
-    f = settings.derivative_filter
-    a = 1.0 if f is None else 1.0 - exp(-2 * pi * f * dt)
-    return PdParams(settings.gain, settings.tau_d, a, dt)
+    return of_gains(settings.gain, settings.gain * settings.tau_d, settings.derivative_filter, dt)
+
+
+def of_gains(P: float, D: float, filter_hz: float | None, dt: float) -> PdParams:
+    """Coefficients by gains as the exchange format writes them: `P` in V and `D` in V s, per unit of error."""
+    a = 1.0 if filter_hz is None else 1.0 - exp(-2 * pi * filter_hz * dt)
+    return PdParams(P, D, a, dt)
 
 
 def design(K_p: float, w_n: float, zeta: float = 1.0) -> tuple[float, float]:
@@ -65,7 +69,7 @@ def step(p, s, e):
         s.primed = 1
     s.d += p.a * ((e - s.e) / p.dt - s.d)
     s.e = e
-    return p.gain * (e + p.tau_d * s.d)
+    return p.gain * e + p.D * s.d
 
 
 @tick

@@ -47,6 +47,17 @@ def step(p, s, target):
 
 
 @tick
+def follow(p, s, ref):
+    """State of the shaper, its speed and acceleration too, whose output was `ref`: three lags have no other input."""
+    x2 = s.ref + (ref - s.ref) / p.a
+    s.x1 = s.x2 + (x2 - s.x2) / p.a
+    s.x2 = x2
+    s.ref = ref
+    s.speed = p.w * (s.x2 - s.ref)
+    s.acceleration = p.w * (p.w * (s.x1 - s.x2) - s.speed)
+
+
+@tick
 def reset(p, s, position):
     """Stand at `position`."""
     s.x1 = position

@@ -16,8 +16,10 @@ from rtctl.laws import (
     bumpless,
     friction_feedforward,
     gain_schedule,
+    hand_over,
     inertia_feedforward,
     limit,
+    reel_growth,
     reel_radius,
     reference,
     shaper,
@@ -72,7 +74,8 @@ class IvuParams(NamedTuple):
 
 
 IVU_STATE = state(
-    R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float, k_run=int, gains=int, play=int, prepared=int, u_fb=float,
+    k_run=int, gains=int, play=int, prepared=int, u_fb=float,
+    R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float,  # as in REEL_GROWTH_STATE
     direction=int, phi_1=float, n1=int, n2=int,  # where the stretch in one direction began
     R1_given=float, R2_given=float,  # radii that these go back to
 )  # fmt: skip
@@ -99,12 +102,7 @@ def switch_on(p, s, phi):
     m = s.machine
     if m.R1_given != p.machine.R1 or m.R2_given != p.machine.R2:  # else they have been followed since
         m.R1_given, m.R2_given = p.machine.R1, p.machine.R2
-        _set_radii(m, p.machine.R1, p.machine.R2, phi)
-
-
-@tick
-def _set_radii(m, R1, R2, phi):
-    m.R1_0, m.R2_0, m.phi_0 = R1, R2, phi
+        reel_growth.start(m, p.machine.R1, p.machine.R2, phi)
 
 
 @tick
@@ -118,7 +116,7 @@ def prepare(p, s, phi, n1_counts, n2_counts, k):
         if s.reel_radius.failed != 0:
             safety.trip(s.safety, safety.START_UP, k)
             return
-        _set_radii(s.machine, s.reel_radius.R1, s.reel_radius.R2, phi)
+        reel_growth.start(s.machine, s.reel_radius.R1, s.reel_radius.R2, phi)
         reference.hold(0, s.reference, phi)
         shaper.reset(p.shaper, s.shaper, phi)
         s.safety.armed_for = 0
@@ -126,23 +124,6 @@ def prepare(p, s, phi, n1_counts, n2_counts, k):
     if s.safety.armed_for > p.machine.settle:
         s.safety.state = safety.RUNNING
         s.machine.k_run = k
-
-
-@tick
-def follow_radii(p, m, phi):
-    """Radii now: the area of paper on a reel grows with the tape that it wound, R^2 = R_0^2 + d_tape x / pi.
-
-    A reel that has no paper left has the radius of its core.
-    """
-    m.R1 = _grown(m.R1_0, p.grow * (phi - m.phi_0), p.core)
-    m.R2 = _grown(m.R2_0, -p.grow * (phi - m.phi_0), p.core)
-
-
-@tick
-def _grown(R_0, area, core):
-    """Radius in m of a reel of `R_0` m whose paper has grown by `area` pi m^2, and at least that of the `core`."""
-    least = min(core, R_0) if R_0 > 0.0 else core  # none is known before the first arming
-    return np.sqrt(max(R_0 * R_0 + area, least * least))
 
 
 @tick
@@ -228,7 +209,7 @@ STAGES = (
     (
         "estimate",
         (
-            "machine.follow_radii(p.machine, s.machine, y.capstan)",
+            "reel_growth.step(p.machine, s.machine, y.capstan)",
             "y.R1 = s.machine.R1",
             "y.R2 = s.machine.R2",
             "y.capstan_speed = velocity.step(p.velocity, s.velocity, y.capstan)",
@@ -261,15 +242,13 @@ STAGES = (
             "s.machine.gains = c.gains",
             "u_f1 = friction_feedforward.step(p.friction1, s.friction1, y.ref)",
             "u_f2 = friction_feedforward.step(p.friction2, s.friction2, y.ref)",
-            "trail = min(abs(speed) / p.machine.trail_speed, 1.0)",
-            "rest = p.machine.hand_over * (1.0 - trail)  # is for the winding motor to compensate",
             "forward = s.friction1.direction > 0.0",
-            "friction = u_f1 + rest * u_f2 * y.R1 / y.R2 if forward else u_f2 + rest * u_f1 * y.R2 / y.R1",
-            "y.u_c = s.machine.u_fb + y.w + friction",
+            "hand_over.step(p.machine, s.hand_over, u_f1, u_f2, forward, speed, y.R1, y.R2)",
+            "y.u_c = s.machine.u_fb + y.w + s.hand_over.u",
             "tension.step(p.tension, s.tension, y.R1, y.R2)",
             "inertia_feedforward.step(p.inertia, s.inertia, s.shaper.acceleration, y.R1, y.R2)",
-            "T1 = s.tension.V1 + s.inertia.u1 + (0.0 if forward else trail * u_f1)",
-            "T2 = s.tension.V2 + s.inertia.u2 - (trail * u_f2 if forward else 0.0)",
+            "T1 = s.tension.V1 + s.inertia.u1 + s.hand_over.u1",
+            "T2 = s.tension.V2 + s.inertia.u2 + s.hand_over.u2",
             "allocation.step(p.allocation, s.allocation, y.u_c, T1, T2)",
             "measuring = p.machine.measure != 0 and s.safety.state == safety.ARMED and s.machine.prepared == 0",
             "u1 = limit.step(p.limit, s.limit1, s.reel_radius.u1 if measuring else s.allocation.u1)",
@@ -334,6 +313,7 @@ def diagram(config: IvuConfig, dt: float) -> Diagram:
             Block(name, friction_feedforward.build(settings, dt), friction_feedforward.FRICTION_FEEDFORWARD_STATE)
             for name, settings in (("friction1", law.friction.motor1), ("friction2", law.friction.motor2))
         ),
+        Block("hand_over", None, hand_over.HAND_OVER_STATE),
         Block("inertia", inertia_feedforward.build(law.inertia, dt), inertia_feedforward.INERTIA_FEEDFORWARD_STATE),
         Block("tension", tension.build(law.tension, dt), tension.TENSION_STATE),
         Block("allocation", allocation.build(law.allocation, dt), allocation.ALLOCATION_STATE),
@@ -364,8 +344,10 @@ USES = (
     "rtctl.laws.excitation",
     "rtctl.laws.friction_feedforward",
     "rtctl.laws.gain_schedule",
+    "rtctl.laws.hand_over",
     "rtctl.laws.inertia_feedforward",
     "rtctl.laws.limit",
+    "rtctl.laws.reel_growth",
     "rtctl.laws.reference",
     "rtctl.laws.shaper",
     "rtctl.laws.tension",

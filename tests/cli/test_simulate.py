@@ -1,6 +1,8 @@
 """Models against recordings, from the command line."""
 
 import json
+import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,16 +11,20 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 
+from rtctl import api
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.export import write_model
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import Record, load_record
 from rtctl.diagnose.simulate import Simulator
+from rtctl.own import files
+from rtctl.own import model as own_model
 from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import save_case
 
-SHARED = Path(__file__).parents[2].parent / "shared"
+ROOT = Path(__file__).parents[2]
+SHARED = ROOT.parent / "shared"
 CASE = {
     "format": 1,
     "plant": "axis",
@@ -179,3 +185,24 @@ def test_a_real_axis(rtctl):
     assert found["skipped"] == 20
     assert found["rmse"]["x"] < 1e-4
     assert 0 < found["nrmse"]["u"] < 0.2
+
+
+def test_the_loop_is_closed_by_an_own_law_where_its_file_is_given(rtctl, tmp_path, monkeypatch):
+    (tmp_path / "my_law.py").write_text((ROOT / "rtctl/own/templates/my_law.py").read_text())
+    settings = yaml.safe_load((ROOT / "configs/axis.yaml").read_text())
+    settings["law"]["position"] = {"kind": "./my_law.py:MyLaw", "gain": 8000.0, "tau_d": 0.02}
+    settings["reference"] = {"steps": [{"at": 0.2, "to": 0.02, "ramp": 0.2}]}
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(settings))
+    changes = {"loop.mode": "fused", "name": f"own-{os.getpid()}"}
+    api.record(api.load_config(tmp_path / "own.yaml", changes), 2.2, tmp_path / "run")
+    monkeypatch.setattr(files, "_trusted", set())
+    own_model._model.cache_clear()
+    own_model._law.cache_clear()
+    code, out, err = rtctl("simulate", "case", tmp_path / "run")
+    assert code == 0 and out.startswith("open loop")
+    assert (
+        "position law of an own file, ./my_law.py:MyLaw" in err and "the recorded command is taken as the input" in err
+    )
+    code, out, err = rtctl("simulate", "case", tmp_path / "run", "--own", tmp_path / "my_law.py")
+    assert code == 0 and "is taken as the input" not in err
+    assert re.match(r"closed loop, .*\n.*\nx +0 m +0\nu +0 V +0\n", out)

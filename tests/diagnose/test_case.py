@@ -17,7 +17,6 @@ from rtctl.diagnose.case import (
     pd_section,
     read_case,
 )
-from rtctl.diagnose.unsaid import beyond_format
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 
@@ -50,6 +49,11 @@ def test_reads_what_the_owner_believes(case_of):
     assert isinstance(case.controller, PdLaw)
     assert case.controller_known
     assert (case.tolerance("J_m1"), case.tolerance("R1"), case.tolerance("R_c")) == (0.15, 0.02, 0.0)
+
+
+def test_sections_beyond_those_that_a_simulation_holds_are_refused(case_of):
+    controller = {"kind": "long", "sections": [[1.0, 0.0, 0.0, 0.0, 0.0]] * 9}
+    assert "controller: sections: has 9 items" in refused(case_of("ldu", controller=controller))
 
 
 def test_takes_each_kind_of_controller(case_of):
@@ -90,19 +94,6 @@ def test_unknown_keys_are_warned_of_with_the_nearest_name(case_of):
 def test_the_daemons_own_keys_are_no_surprise(case_of):
     case = case_of("axis", config={}, seed=1, versions={}, run={}, changes=[], rows=5, losses={}, complete=True)
     assert read_case(case, "bundle").warnings == ()
-
-
-def test_says_what_the_law_of_a_config_has_beyond_the_format(case_of):
-    law = {"friction": {"motor1": {"tau_C": 1}}, "gain_schedule": {"mode": "on"}, "limit": {"slew": 3.0}}
-    beyond = " ".join(read_case(case_of("ivu", config={"machine": "ivu", "law": law}), "bundle").beyond)
-    assert "friction" in beyond
-    assert "gain schedule" in beyond
-    assert "slew" in beyond
-    assert "inertia" in beyond
-    assert "inertia" not in " ".join(beyond_format({"machine": "ivu", "law": {"inertia": {"share": 0}}}))
-    law = {"position": {"kind": "pi_velocity"}}
-    own = case_of("axis", controller={"kind": "pi_velocity"}, config={"machine": "axis", "law": law})
-    assert "filtered speed" in read_case(own, "bundle").unsaid
 
 
 def test_a_rotary_axis_has_an_inertia_for_a_mass(case_of):

@@ -1,4 +1,4 @@
-"""The law of our own recordings, replayed where `controller` of case.json cannot say it."""
+"""The law of our own recordings: recomputed, and replayed where it does not give the command."""
 
 import json
 import shutil
@@ -11,7 +11,7 @@ import pytest
 
 from rtctl import api
 from rtctl.diagnose.preflight import preflight
-from rtctl.diagnose.record import load_record
+from rtctl.diagnose.record import law_agreement, load_record
 from rtctl.diagnose.replayed import replayed_law
 from rtctl.trace.bundle import load_bundle
 
@@ -39,19 +39,13 @@ def law_words(folder: Path) -> str:
     return next(w for w in load_record(folder).case.warnings if "the law" in w)
 
 
-def test_the_law_of_the_config_gives_the_command_where_the_controller_of_the_case_does_not(ran):
+def test_the_law_of_the_config_closes_the_loop(ran):
+    """Friction that is handed over, inertia feedforward, tension that follows the radii: all of it recomputed."""
     record = load_record(ran)
-    assert record.replay is not None and record.replay.identical and record.replay.rows == ROWS
-    said = law_words(ran)
-    assert f"gives the recorded command to the bit ({ROWS} rows): nothing is wrong with it. It has friction" in said
-    assert "does not give" not in said and " off " not in said and said.endswith("is taken as the input")
-    assert not record.closed_loop  # what the simulation has is the controller of the case
-
-
-def test_preflight_tells_the_replay(ran):
-    found = preflight(load_record(ran))
-    assert f"The law of the config, replayed, gives the recorded command to the bit ({ROWS} rows)." in found.findings
-    assert found.numbers["law"] == {"replayed": ROWS, "exact": True, "holds": True}
+    assert record.closed_loop and record.replay is None and law_agreement(record).worst == 0.0
+    found = preflight(record)
+    assert "The law recomputed from the recorded columns gives the recorded command exactly." in found.findings
+    assert not any("law" in warning for warning in record.case.warnings)
 
 
 def test_a_command_that_the_law_did_not_write_is_told_with_its_tick(copy):

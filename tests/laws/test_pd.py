@@ -76,3 +76,9 @@ def test_units_follow_the_machine():
     assert pd.PdSettings(gain=1.0, tau_d="160 ms").tau_d == pytest.approx(0.16)
     with pytest.raises(ValidationError):
         pd.PdSettings(gain="5 V/mm")
+
+
+def test_gains_of_the_exchange_format_need_no_proportional_part(zero):
+    s = zero(pd.PD_STATE)
+    p = pd.of_gains(0.0, 0.5, None, DT)
+    assert list(run(p, s, [0.0, 3.0 * DT])) == pytest.approx([0.0, 1.5])

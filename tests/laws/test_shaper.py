@@ -52,3 +52,19 @@ def test_never_leaves_the_range_of_its_targets(targets):
     ref = run(np.repeat(targets, 20))[:, 0]
     assert ref.max() <= max(0.0, *targets) + 1e-12
     assert ref.min() >= min(0.0, *targets) - 1e-12
+
+
+def test_follows_its_own_output_backwards(zero):
+    p = shaper.build(shaper.ShaperSettings(bandwidth=60.0), 1e-4)
+    made, again = zero(shaper.SHAPER_STATE), zero(shaper.SHAPER_STATE)
+    for k in range(2000):
+        shaper.follow(p, again, shaper.step(p, made, 0.01 if k > 5 else 0.0))
+    assert made.acceleration != 0.0
+    assert again.acceleration == pytest.approx(made.acceleration, rel=1e-6)
+    assert again.speed == pytest.approx(made.speed, rel=1e-9)
+
+
+def test_without_a_shaper_what_follows_has_no_speed(zero):
+    p, s = shaper.build(shaper.ShaperSettings(), 1e-4), zero(shaper.SHAPER_STATE)
+    shaper.follow(p, s, 1.0)
+    assert (s.ref, s.speed, s.acceleration) == (1.0, 0.0, 0.0)
