@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from rtctl.plants.element import LOOP, Element, element
+from rtctl.plants.element import GENERAL, LOOP, Element, element
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.params import joint_place, place
 from rtctl.plants.physics import Term, standing
@@ -27,16 +27,17 @@ def elements(layout: Layout) -> tuple[Element, ...]:
     out: list[Element] = []
     for name, body in machine.bodies.items():
         if layout.bodies[name].coordinate != NOWHERE:
-            traits = ["turns rotor" if body.turns else "slides", "driven" if name in driven else "load", "bounded"]
+            traits = ["general", "turns rotor" if body.turns else "slides", "bounded"]
+            traits += ["driven" if name in driven else "load"]
             traits += ["dry"] if body.dry > 0.0 else []
             out.append(element(name, "body", " ".join(traits)))
-    out += [element(name, "joint", "spring shaft") for name in layout.links]
+    out += [element(name, "joint", "general spring shaft") for name in layout.links]
     for number, (name, drive) in enumerate(machine.drives.items()):
-        out.append(element(name, "drive", f"{drive.kind} supply" if number == 0 else drive.kind))
+        out.append(element(name, "drive", f"general {drive.kind}" + (" supply" if number == 0 else "")))
     for name, sensor in machine.sensors.items():
         if sensor.body is None or sensor.measures not in ("position", "speed"):
             continue
-        traits = [sensor.measures, "turns" if machine.turns(sensor.body) else "slides"]
+        traits = ["general", sensor.measures, "turns" if machine.turns(sensor.body) else "slides"]
         traits += ["driven" if sensor.body in driven else "load"]
         traits += ["counts"] if sensor.counts_per_unit is not None else []
         out.append(element(name, "sensor", " ".join(traits)))

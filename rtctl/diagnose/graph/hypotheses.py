@@ -43,6 +43,7 @@ def hypotheses(
             rubs = measures.dry(node) > SLIGHT * measures.of("force", node) or node in dry_too
             if (
                 stand.again
+                or not stand.offered
                 or (term.needs.compared and len(sim.channels) < 2)
                 or (term.falls_to and not rubs)
                 or (term.replaces and not rubs)
