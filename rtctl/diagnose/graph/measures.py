@@ -103,9 +103,17 @@ class Measures:
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
             "duration": len(self.way) * self.sim.record.dt, "volts": max(self.volts(node), 0.05 * volts),
             "grain": self.grain(node), "per_volt": 1.0 / volts, "peak": max(float(np.abs(self.sim.volts).max(initial=0.0)), LITTLE),
-            "counts": self.grain(node), "grip": s.force, "contact": s.force,
+            "counts": self.grain(node), "pace": self.pace(node), "grip": s.force, "contact": s.force,
         }  # fmt: skip
         return table[measure]
+
+    def pace(self, node: str) -> float:
+        """Fastest rate of the command of a drive, in its unit a second."""
+        u = self.sim.volts
+        u = u[:, [self.layout.drives[node]]] if node in self.layout.drives else u
+        if not u.size:
+            return LITTLE
+        return max(float(np.abs(np.diff(u, axis=0)).max()) / self.sim.record.dt, LITTLE)
 
     def volts(self, node: str) -> float:
         """Rms command of the drive that the node names, or of all."""
