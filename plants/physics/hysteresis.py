@@ -109,7 +109,7 @@ HYSTERESIS = Term(
     ),
     check="Block the far side, load the joint slowly by hand both ways and watch whether it comes back.",
     needs=Needs(ways="push"),
-    search=(Size("F_h", "force", 0.1), Shape("z_h", "twist", (0.3, 3.0)), Choice("form", FORMS)),
+    search=(Size("F_h", "force", 0.1), Shape("z_h", "twist", (0.05, 0.3, 3.0)), Choice("form", FORMS)),
     variants=Choice("form", FORMS),
     stiff=True,
     draws={"F_h": Draw(0.1, 0.5, "force"), "z_h": Draw(0.3, 3.0, "twist")},

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.graph.enrich import enriched
 from rtctl.diagnose.graph.fits import Fitted, refit, with_term, without
 from rtctl.diagnose.graph.hypotheses import hints, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
@@ -77,6 +78,10 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         known.setdefault(key(rest), rest)
         if len(best.names) > 1:
             step(like, rest, screened(rest)[0], known, NAMES[-1])
+    progress("asking for other forms of what was found")
+    best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
+    if best.names:
+        known[key(best)] = enriched(best)
     standing = [f for f in known.values() if stands(base, f, known, merit)]
     return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
 

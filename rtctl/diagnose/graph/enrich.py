@@ -1,0 +1,60 @@
+"""Richer and other forms of the effects that were found: harmonics, a second branch, another shape of the same law."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from rtctl.diagnose.forms import forms, is_rich
+from rtctl.diagnose.graph.fits import Fitted, refit
+from rtctl.diagnose.graph.measures import Measures
+from rtctl.diagnose.hypotheses import starts_of
+from rtctl.diagnose.space import Hypothesis
+from rtctl.plants.graph.elements import elements
+from rtctl.plants.physics import TERMS, standing
+
+WORTH = 2.0  # nats of evidence that another form must bring
+
+
+def enriched(best: Fitted) -> Fitted:
+    """The model with each effect in the form that the record asks for."""
+    for index in range(len(best.space.hypotheses)):
+        for other in others(best, index):
+            space, x = exchanged(best, index, other)
+            trial = refit(best.like, space, x)
+            if trial.log_evidence > best.log_evidence + WORTH:
+                best = trial
+    return best
+
+
+def others(f: Fitted, index: int) -> list[Hypothesis]:
+    """Other forms of one effect: with more parameters, and with each other setting."""
+    h = f.space.hypotheses[index]
+    return [*forms(h), *richer(f, h)]
+
+
+def richer(f: Fitted, h: Hypothesis) -> list[Hypothesis]:
+    """The effect with the further parameters of its richer form; none where it has none."""
+    term, sim = TERMS[h.term], f.like.sim
+    there = elements(sim.layout)
+    found = standing(term, there, h.node)
+    if not term.richer or is_rich(h) or (term.richer_at and (found is None or found[1].kind != term.richer_at)):
+        return []
+    measures = Measures(sim, f.model.base, {})
+    measures.record = SimpleNamespace(plant=there, dt=sim.record.dt)  # type: ignore[attr-defined]
+    own = {c.name for c in h.coordinates}
+    out = []
+    for more in starts_of(h.term, h.node, term.richer, measures):  # type: ignore[arg-type]
+        added = tuple(c for c in more.coordinates if c.name not in own)
+        if added:
+            out.append(h._replace(coordinates=(*h.coordinates, *added), fixed={**h.fixed, **more.fixed}))
+    return out
+
+
+def exchanged(f: Fitted, index: int, other: Hypothesis) -> tuple[object, np.ndarray]:
+    """Space and start with one effect in another form, which begins where its coordinates were."""
+    old, parts = f.space.hypotheses[index], f.space.parts(f.x)
+    start = other.start()
+    start[: len(old.coordinates)] = parts[index]
+    parts[index] = start
+    hypotheses = tuple(other if i == index else h for i, h in enumerate(f.space.hypotheses))
+    return f.space._replace(hypotheses=hypotheses), np.concatenate([f.x[: f.space.nb], *parts])
