@@ -69,5 +69,6 @@ BACK_EMF = Term(
     needs=Needs(speeds=True),
     search=(Size("b", "drag", 0.2),),
     makes_up=True,
+    seldom=3.0,
     draws={"b": Draw(0.2, 1.0, "drag")},
 )

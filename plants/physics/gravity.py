@@ -81,5 +81,6 @@ GRAVITY = Term(
     search=(Turn("A", "phi", "force", 0.3),),
     sliding=(Size("A", "force", 0.2, signed=True), Choice("form", ("incline",))),
     static=True,
+    seldom=3.0,
     draws={"A": Draw(0.2, 1.0, "force")},
 )

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
+from rtctl.diagnose.graph.case import START
 from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import nominal
@@ -182,6 +183,8 @@ def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
     for i, path in enumerate(f.space.names):
         value = f.model.base[path]
         low, high = sorted((value * float(np.exp(-spread[i])), value * float(np.exp(spread[i]))))
+        if path == START:  # kept as its exponential
+            value, low, high = (float(np.log(v)) for v in (value, low, high))
         out[path] = Interval(value, low, high, words.value_unit(machine, path))
     return out
 

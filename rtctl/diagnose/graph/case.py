@@ -19,6 +19,8 @@ KEYS = (
 PROBLEMS = ("driven", "free", "kinematic", "static")
 DEFAULT_TOLERANCE = 0.15
 EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise", "bandwidth_hz")
+START = "start.angle"  # e to the angle, rad, that the first row of a counter has before the weight of a body
+START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
 NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
 
 
@@ -43,6 +45,8 @@ class GraphCase(NamedTuple):
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
+        if path == START and path not in self.tolerances:
+            return START_TOLERANCE
         for end in (path, *(path.rsplit(".", n)[0] for n in range(1, path.count(".") + 1))):
             if end in self.tolerances:
                 found = self.tolerances[end]
@@ -63,6 +67,8 @@ class GraphCase(NamedTuple):
 
     def _acts(self, path: str) -> bool:
         """Whether a number has a part in the motion: the damping of a drive without a bandwidth has none."""
+        if path == START:
+            return True
         group, name, *rest = path.split(".")
         if group == "drives" and rest == ["damping"]:
             return self.machine.drives[name].bandwidth_hz is not None
@@ -84,6 +90,9 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         raise UserError(sentences(error, Description, given, lambda _: f"{where}: machine").splitlines()[0]) from None
     placed = layout(machine)
     values = dict(machine.paths())
+    counters = any(s.counts_per_unit is not None for s in machine.sensors.values())
+    if counters and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
+        values[START] = 1.0
     tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
     problem = case.get("problem", "driven")
     if problem not in PROBLEMS:

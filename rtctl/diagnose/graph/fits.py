@@ -16,6 +16,7 @@ import numpy as np
 from rtctl.diagnose.fit import fit, jacobian
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Hypothesis, Space
+from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
 ENOUGH = 2.0  # nats, that a further round must gain
@@ -33,7 +34,7 @@ class Fitted(NamedTuple):
     loss: float  # negative logarithm of the likelihood, nats
 
     @property
-    def model(self):  # noqa: ANN201
+    def model(self):
         """The model itself."""
         return self.space.model(self.x)
 
@@ -41,6 +42,11 @@ class Fitted(NamedTuple):
     def names(self) -> tuple[str, ...]:
         """term:node of each hypothesis."""
         return tuple(h.name for h in self.space.hypotheses)
+
+    @property
+    def seldom(self) -> float:
+        """Prior odds against the names, nats, beside that each is one of many."""
+        return sum(TERMS[h.term].seldom for h in self.space.hypotheses)
 
     @property
     def power(self) -> float:

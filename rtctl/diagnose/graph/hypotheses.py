@@ -44,6 +44,7 @@ def hypotheses(
             if (
                 stand.again
                 or not stand.offered
+                or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
                 or (term.needs.compared and len(sim.channels) < 2)
                 or (term.falls_to and not rubs)
                 or (term.replaces and not rubs)

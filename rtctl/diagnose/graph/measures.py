@@ -103,7 +103,7 @@ class Measures:
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
             "duration": len(self.way) * self.sim.record.dt, "volts": max(self.volts(node), 0.05 * volts),
             "grain": self.grain(node), "per_volt": 1.0 / volts, "peak": max(float(np.abs(self.sim.volts).max(initial=0.0)), LITTLE),
-            "counts": self.grain(node), "pace": self.pace(node), "grip": s.force, "contact": s.force,
+            "counts": self.grain(node), "swell": s.force / (s.speed * s.span**2), "pace": self.pace(node), "grip": s.force, "contact": s.force,
         }  # fmt: skip
         return table[measure]
 

@@ -40,7 +40,7 @@ class Found(NamedTuple):
 
     def merit(self, f: Fitted) -> float:
         """Logarithm of the posterior, up to a constant."""
-        return f.log_evidence - self.odds * len(f.space.hypotheses)
+        return f.log_evidence - self.odds * len(f.space.hypotheses) - f.seldom
 
     @property
     def best(self) -> Fitted:
@@ -57,7 +57,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     known: dict[tuple[str, ...], Fitted] = {(): base}
 
     def merit(f: Fitted) -> float:
-        return f.log_evidence - odds * len(f.space.hypotheses)
+        return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
 
     beam, first = [base], looked
     for level in range(MOST):
@@ -71,6 +71,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
             break
         better.sort(key=merit, reverse=True)
         beam = [f for f in better if merit(f) > merit(better[0]) - FAR][:BEAM]
+        beam[0] = known[key(beam[0])] = enriched(beam[0])
     progress("exchanging each effect")
     best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
     for index in range(len(best.space.hypotheses)):

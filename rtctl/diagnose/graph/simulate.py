@@ -12,6 +12,7 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
+from rtctl.diagnose.graph.case import START
 from rtctl.diagnose.graph.kernel import OPEN, TRACK
 from rtctl.diagnose.graph.model import GraphModel, nominal, rigid
 from rtctl.diagnose.graph.record import GraphRecord
@@ -118,21 +119,25 @@ class Simulator:
             kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s.node, self.layout, self.elements, model.base), h)
         job = self._job(model, params, mode, substeps)
         states = np.zeros(1, GRAPH_STATE)
-        self._begin(states, model)
+        start = float(np.log(model.base.get(START, 1.0)))
+        seen = self.seen[:n] + start if start else self.seen[:n]
+        self._begin(states, model, float(seen[0]))
         out, push = np.full((n, params.ny), np.nan), np.zeros(n)
         done = k.module.run(
             job, p, states, slots, self.volts[:n], self.forces[:n] if len(self.forces) > 1 else self.forces,
-            self.seen[:n], out, push,
+            seen, out, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
+        if start:
+            out[:, self.layout.sensors[self.main]] -= start
         return out, push
 
-    def _begin(self, states: np.ndarray, model: GraphModel) -> None:
+    def _begin(self, states: np.ndarray, model: GraphModel, first: float) -> None:
         """Put every coordinate where the first row of the main sensor has it, the joints unstretched."""
         x = states["m"]["x"][0]
         for name, ratio in self.ratios.items():
             own = self.layout.ratio(name, model.base)
-            value = ratio * self.seen[0] / own
+            value = ratio * first / own
             at = self.layout.coordinate(name)
             if self.shows_speed:
                 x[self.layout.nq + at] = value

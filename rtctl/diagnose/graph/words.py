@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from rtctl.diagnose.diagnosis import Effect
+from rtctl.diagnose.graph.case import START
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.numbers import both, nice, percent
 from rtctl.diagnose.quantities import DIMENSIONS
@@ -51,6 +52,8 @@ def value_unit(machine: Description, path: str) -> str:
     """Unit of a number of the description by its dotted path."""
     from rtctl.plants.graph.units import BODY, GRAVITY, drive_units, joint_units
 
+    if path == START:
+        return "rad"
     group, name, *rest = path.split(".")
     key = rest[-1]
     if group == "bodies" and "gravity" in rest:
