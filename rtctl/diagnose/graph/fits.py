@@ -20,6 +20,7 @@ from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
 ENOUGH = 2.0  # nats, that a further round must gain
+FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 COARSE = 2000.0  # innovations that a recording counts for at most: no model is exact
 
 
@@ -114,3 +115,18 @@ def with_term(base: Fitted, h: Hypothesis, x: Sequence[float] | np.ndarray) -> t
 def without(base: Fitted, index: int) -> tuple[Space, np.ndarray]:
     """Space and start of a model without one of its hypotheses."""
     return base.space.without(index), np.delete(base.x, base.space.columns(index))
+
+
+def explained(base: Fitted, best: Fitted) -> float:
+    """Share of the power of the residual, above the noise of counting, that the best model takes off.
+
+    The sensor in which most is missing counts.
+    """
+    least = FLOOR * base.like.least * np.sqrt(base.like.mean)
+    before = np.sqrt(np.mean(base.e**2, axis=0))
+    after = np.sqrt(np.mean(best.e**2, axis=0))
+    c = int(np.argmax(before / base.like.least))
+    excess = before[c] ** 2 - least[c] ** 2
+    if excess <= 0.0 or after[c] <= least[c]:
+        return 1.0
+    return float((before[c] ** 2 - after[c] ** 2) / excess)

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.graph.enrich import enriched
-from rtctl.diagnose.graph.fits import Fitted, refit, with_term, without
+from rtctl.diagnose.graph.enrich import enriched, restarted
+from rtctl.diagnose.graph.fits import Fitted, explained, refit, with_term, without
 from rtctl.diagnose.graph.hypotheses import hints, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened, screen
@@ -23,6 +23,7 @@ FIRST = 3
 LEAST = 6.0  # nats that screening must promise for a refit
 BEAM = 2
 WORTH = 3.0  # nats of evidence that a further effect must bring
+PART = 0.3  # share of the power that the others leave, which a further effect must take off
 FORM = 0.05  # share of what the effects before it gained, which a further one must gain: no law is exact
 FAR = 30.0  # nats behind the best at which a combination is dropped
 
@@ -71,7 +72,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
             break
         better.sort(key=merit, reverse=True)
         beam = [f for f in better if merit(f) > merit(better[0]) - FAR][:BEAM]
-        beam[0] = known[key(beam[0])] = enriched(beam[0])
+        beam[0] = known[key(beam[0])] = restarted(enriched(beam[0]))
     progress("exchanging each effect")
     best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
     for index in range(len(best.space.hypotheses)):
@@ -89,7 +90,9 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
 
 def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], float]) -> bool:
     """Whether a further effect is worth its numbers, and more than what the form of the others leaves."""
-    return merit(more) > merit(fewer) + WORTH and fewer.loss - more.loss > FORM * (base.loss - fewer.loss)
+    if merit(more) < merit(fewer) + WORTH or fewer.loss - more.loss < FORM * (base.loss - fewer.loss):
+        return False
+    return not fewer.names or explained(fewer, more) > PART
 
 
 def stands(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
-from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.fits import Fitted, explained
 from rtctl.diagnose.graph.free import Free, free_forces
 from rtctl.diagnose.graph.search import WORTH, Found
 
@@ -13,7 +13,6 @@ SURE = 0.9  # probability from which a name is given
 FORM = 0.12  # share of what a name explains that a free force may explain beside it: no law is exact
 HARDLY = 0.05  # the same, below which it is the noise that is not what it is taken for
 MOSTLY = 0.7  # share of the residual's power above the noise that a name has to take off
-FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 UNLISTED = 3.0  # nats: prior odds against a force that has no name
 ALIKE = 3  # names of an ambiguous answer
 
@@ -80,21 +79,6 @@ def evidence(base: Fitted, free: Free) -> float:
 def strongest(base: Fitted, free: list[Free]) -> Free | None:
     """The free force with the most evidence."""
     return max(free, key=lambda f: evidence(base, f), default=None)
-
-
-def explained(base: Fitted, best: Fitted) -> float:
-    """Share of the power of the residual, above the noise of counting, that the best model takes off.
-
-    The sensor in which most is missing counts.
-    """
-    least = FLOOR * base.like.least * np.sqrt(base.like.mean)
-    before = np.sqrt(np.mean(base.e**2, axis=0))
-    after = np.sqrt(np.mean(best.e**2, axis=0))
-    c = int(np.argmax(before / base.like.least))
-    excess = before[c] ** 2 - least[c] ** 2
-    if excess <= 0.0 or after[c] <= least[c]:
-        return 1.0
-    return float((before[c] ** 2 - after[c] ** 2) / excess)
 
 
 def terms(f: Fitted) -> list[str]:
