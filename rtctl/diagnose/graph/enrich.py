@@ -14,8 +14,8 @@ from rtctl.plants.physics import TERMS, standing
 
 WORTH = 2.0  # nats of evidence that another form must bring
 QUIET = 3.0  # times the least noise, below which one maximum is enough
-SHARES = (0.5, 1.7)  # of a size, at other starts
-DRAWS = 3  # starts with other nominal values
+SHARES = (0.4, 2.5, 7.0)  # of a size, at other starts
+DRAWS = 2  # starts with other nominal values
 
 
 def enriched(best: Fitted) -> Fitted:
@@ -41,7 +41,7 @@ def restarted(best: Fitted) -> Fitted:
     sizes = np.array([c.kind == SIZE for h in space.hypotheses for c in h.coordinates], bool)
     starts = [np.concatenate([np.zeros(nb), best.x[nb:]])]
     for share in SHARES:
-        x = best.x.copy()
+        x = np.concatenate([np.zeros(nb), best.x[nb:]])
         x[nb:] = np.where(sizes, share * x[nb:], x[nb:])
         starts.append(x)
     for _ in range(DRAWS):
