@@ -14,12 +14,13 @@ import numpy as np
 from rtctl.diagnose.fit import bounded_step, parallel
 from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.likelihood import Likelihood
-from rtctl.diagnose.space import INVERSE, Hypothesis
+from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis
 
 CLOSER = 40  # hypotheses that are judged under their own noise
 TRIES = 3
 TOO_FAR = 3.0  # times the residual: a step that changes more says little about what is missing
 RIDGE = 1e-6
+FACTORS = (0.2, 5.0, 25.0)  # of the size that a secant promises
 
 
 class Score(NamedTuple):
@@ -37,6 +38,31 @@ class Screened(NamedTuple):
 
     scores: list[Score]
     floor: Likelihood
+    Jraw: np.ndarray  # (blocks, sensors, unknowns of the base)
+
+    def starts(self, base: Fitted, score: Score, most: int) -> list[np.ndarray]:
+        """Places (unknowns of the base and the hypothesis) to fit from: sizes far from what a secant says as well, the
+        base moved along with each; the best first."""
+        h, like = score.hypothesis, base.like
+        space = base.space.add(h)
+        sizes = np.array([c.kind == SIZE for c in h.coordinates], bool)
+        xs = [score.x, *(np.where(sizes, k * score.x, score.x) for k in (FACTORS if sizes.any() else ()))]
+        low, high = space.bounds()
+        weight = prior(base.space)
+        W = self.floor.filtered(self.Jraw)
+        A = W.T @ W + np.diag(weight)
+        n = len(base.x)
+        start = like.raw(base.model, True)
+
+        def placed(x: np.ndarray) -> tuple[float, np.ndarray]:
+            at = np.clip(np.concatenate([base.x, x]), low, high)
+            e = base.e + like.raw(space.model(at), True) - start
+            slope = W.T @ self.floor.white(e) + weight * base.x
+            dx = bounded_step(A, slope, base.x, low[:n], high[:n], 1e-9)
+            return like.loss(e + np.tensordot(self.Jraw, dx, axes=1)), np.concatenate([base.x + dx, at[n:]])
+
+        found = sorted(parallel([partial(placed, x) for x in xs]), key=lambda pair: pair[0])
+        return [x for _, x in found[:most]]
 
     def promising(self, most: int) -> list[Score]:
         """Scores in the order in which they deserve a fit: by what they gain, and by the power that they explain, in
@@ -68,7 +94,7 @@ def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
         score, dx, C = found[i]
         e = base.e + np.tensordot(Jraw, dx[: len(base.x)], axes=1) + np.tensordot(C, dx[len(base.x) :], axes=1)
         out.append(score._replace(gain=base.loss - like.loss(e)))
-    return Screened(sorted(out, key=lambda s: -s.gain), like)
+    return Screened(sorted(out, key=lambda s: -s.gain), like, Jraw)
 
 
 def floor_noise(base: Fitted, Jraw: np.ndarray, changes: list[np.ndarray]) -> Likelihood:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
-from rtctl.diagnose.graph.fits import Fitted, explained, refit, with_term, without
+from rtctl.diagnose.graph.fits import Fitted, explained, refit, without
 from rtctl.diagnose.graph.hypotheses import hints, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened, screen
@@ -131,8 +131,12 @@ def step(
         if tuple(sorted((*parent.names, chosen[0].hypothesis.name))) in known:
             out.append(known[tuple(sorted((*parent.names, chosen[0].hypothesis.name)))])
             continue
-        starts = chosen[: STARTS if rank < FIRST else 1]
-        fits = [refit(like, *with_term(parent, s.hypothesis, s.x), floor=looked.floor) for s in starts]
+        scores = chosen[: STARTS if rank < FIRST else 1]
+        fits = [
+            refit(like, parent.space.add(s.hypothesis), x, floor=looked.floor)
+            for s in scores
+            for x in looked.starts(parent, s, STARTS if rank < FIRST else 1)
+        ]
         best = max(fits, key=lambda f: f.log_evidence)
         known[key(best)] = best
         out.append(best)
