@@ -31,7 +31,8 @@ def elements(layout: Layout) -> tuple[Element, ...]:
             traits += ["driven" if name in driven else "load"]
             traits += ["dry"] if body.dry > 0.0 else []
             out.append(element(name, "body", " ".join(traits)))
-    out += [element(name, "joint", "general spring shaft") for name in layout.links]
+    for name, joint in machine.joints.items():
+        out.append(element(name, "joint", "general rigid" if joint.stiffness is None else "general spring shaft"))
     for number, (name, drive) in enumerate(machine.drives.items()):
         out.append(element(name, "drive", f"general {drive.kind}" + (" supply" if number == 0 else "")))
     for name, sensor in machine.sensors.items():
@@ -54,7 +55,7 @@ def spot(term: Term, node: str, layout: Layout, there: tuple[Element, ...], valu
         return Spot(layout.coordinate(node), 0, 0, layout.ratio(node, values))
     if kind == "joint":
         i, a, _, _ = joint_place(layout, node, values)
-        return Spot(i, layout.links[node], 0, a)
+        return Spot(i, layout.links.get(node, 0), 0, a)
     if kind == "drive":
         i, a, _, _ = place(layout, machine.drives[node], values)
         return Spot(i, 0, layout.drives[node], a)

@@ -8,7 +8,7 @@ from rtctl.diagnose.forms import forms, is_rich
 from rtctl.diagnose.graph.fits import Fitted, refit
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.hypotheses import starts_of
-from rtctl.diagnose.space import SIZE, Hypothesis
+from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis
 from rtctl.plants.graph.elements import elements
 from rtctl.plants.physics import TERMS, standing
 
@@ -38,7 +38,7 @@ def restarted(best: Fitted) -> Fitted:
     nb, space = best.space.nb, best.space
     low, high = space.bounds()
     width = np.minimum(high - low, 2.0)[:nb]
-    sizes = np.array([c.kind == SIZE for h in space.hypotheses for c in h.coordinates], bool)
+    sizes = np.array([c.kind in (SIZE, INVERSE) for h in space.hypotheses for c in h.coordinates], bool)
     starts = [np.concatenate([np.zeros(nb), best.x[nb:]])]
     for share in SHARES:
         x = np.concatenate([np.zeros(nb), best.x[nb:]])

@@ -33,7 +33,7 @@ def hypotheses(
     dry_too = {str(getattr(s, "node", "")) for s in beside if TERMS[str(getattr(s, "term", ""))].friction == "dry"}
     out: list[Hypothesis] = []
     for name, term in TERMS.items():
-        if name not in known or not searched(name):
+        if not (name in known or term.joint) or not searched(name):
             continue
         for node in nodes(term, there):
             found = standing(term, there, node)

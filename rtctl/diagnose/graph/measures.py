@@ -103,7 +103,7 @@ class Measures:
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
             "duration": len(self.way) * self.sim.record.dt, "volts": max(self.volts(node), 0.05 * volts),
             "grain": self.grain(node), "per_volt": 1.0 / volts, "peak": max(float(np.abs(self.sim.volts).max(initial=0.0)), LITTLE),
-            "counts": self.grain(node), "swell": s.force / (s.speed * s.span**2), "pace": self.pace(node), "grip": s.force, "contact": s.force,
+            "counts": self.grain(node), "swell": s.force / (s.speed * s.span**2), "pace": self.pace(node), "firm": self.firm(node), "grip": s.force, "contact": s.force,
         }  # fmt: skip
         return table[measure]
 
@@ -161,6 +161,20 @@ class Measures:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""
         s = self.scale(node)
         return self.values.get(f"joints.{node}.stiffness", s.force / s.span)
+
+    def firm(self, node: str) -> float:
+        """Stiffness of a joint with which the lighter of its two sides rings at a tenth of the sample rate."""
+        if node not in self.machine.joints:
+            return self.stiffness(node)
+        far = self.machine.joints[node].to
+        near = getattr(self.machine.joints[node], "from")
+        sides = [self._own(name) * (self.ratios.get(name, 1.0) / (self.ratios.get(far, 1.0) or 1.0)) ** 2
+                 for name in (near, far) if name in self.machine.bodies]  # fmt: skip
+        return (2 * np.pi * 0.02 / self.sim.record.dt) ** 2 * min(sides)
+
+    def _own(self, name: str) -> float:
+        """Inertia or mass of one body."""
+        return self.values[f"bodies.{name}.{'inertia' if self.machine.bodies[name].turns else 'mass'}"]
 
     def most(self, parameter: str) -> float:
         """The highest value that the term's settings allow."""

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from rtctl.diagnose.graph.case import GraphCase
 from rtctl.idiom import Settings
-from rtctl.plants.graph.layout import Layout
+from rtctl.plants.graph.layout import Layout, layout
 from rtctl.plants.graph.params import GraphParams, build
 from rtctl.plants.physics import TERMS
 
@@ -19,6 +19,22 @@ class GraphModel(NamedTuple):
     def add(self, *terms: Settings) -> "GraphModel":
         """The same with more terms."""
         return self._replace(terms=(*self.terms, *terms))
+
+    def built(self) -> "GraphModel":
+        """The same with the joints that its terms make springs as springs of the description."""
+        base, machine = dict(self.base), self.layout.machine
+        found: dict[str, Any] = {}
+        for settings in self.terms:
+            s: Any = settings
+            made = TERMS[s.term].joint
+            if made is not None and s.node in machine.joints:
+                numbers = made(s)
+                base |= {f"joints.{s.node}.{key}": value for key, value in numbers.items()}
+                found[s.node] = machine.joints[s.node].model_copy(update={key: 1.0 for key in numbers})
+        if not found:
+            return self
+        elastic = machine.model_copy(update={"joints": {**machine.joints, **found}})
+        return self._replace(layout=layout(elastic), base=base)
 
     def params(self, h: float) -> GraphParams:
         """Params of the plant for substeps of `h` s."""

@@ -45,7 +45,7 @@ class Screened(NamedTuple):
         base moved along with each; the best first."""
         h, like = score.hypothesis, base.like
         space = base.space.add(h)
-        sizes = np.array([c.kind == SIZE for c in h.coordinates], bool)
+        sizes = np.array([c.kind in (SIZE, INVERSE) for c in h.coordinates], bool)
         xs = [score.x, *(np.where(sizes, k * score.x, score.x) for k in (FACTORS if sizes.any() else ()))]
         low, high = space.bounds()
         weight = prior(base.space)

@@ -103,6 +103,7 @@ class Simulator:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings, and the correction (n,), in N or Nm at the main sensor's body."""
         record, k = self.record, self.kernel
+        model = model.built()
         n = len(self.seen) if n is None else n
         stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
         substeps = self.substeps * (2 if stiff else 1)
@@ -114,9 +115,11 @@ class Simulator:
         if len(model.terms) > SLOTS:
             raise UserError(f"physics: has {len(model.terms)} terms; {SLOTS} is the most that can be simulated")
         slots = np.zeros(1, k.slots)
-        for slot, settings in zip(slots[0]["q"], ordered(list(model.terms)), strict=False):
+        acting = [t for t in ordered(list(model.terms)) if TERMS[str(getattr(t, "term", ""))].joint is None]
+        there = self.elements if model.layout is self.layout else elements(model.layout)
+        for slot, settings in zip(slots[0]["q"], acting, strict=False):
             s: Any = settings
-            kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s.node, self.layout, self.elements, model.base), h)
+            kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s.node, model.layout, there, model.base), h)
         job = self._job(model, params, mode, substeps)
         states = np.zeros(1, GRAPH_STATE)
         start = float(np.log(model.base.get(START, 1.0)))
@@ -124,7 +127,7 @@ class Simulator:
         self._begin(states, model, float(seen[0]))
         out, push = np.full((n, params.ny), np.nan), np.zeros(n)
         done = k.module.run(
-            job, p, states, slots, self.volts[:n], self.forces[:n] if len(self.forces) > 1 else self.forces,
+            job, p, states, slots, self.volts[:n], self._pushing(model)[:n],
             seen, out, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
@@ -132,15 +135,28 @@ class Simulator:
             out[:, self.layout.sensors[self.main]] -= start
         return out, push
 
+    def _pushing(self, model: GraphModel) -> np.ndarray:
+        """Forces by the coordinates of a model that may have more of them than the description."""
+        if len(self.forces) < 2 or model.layout is self.layout:
+            return self.forces
+        out = np.zeros((len(self.forces), model.layout.nq))
+        first: dict[int, str] = {}
+        for name, body in self.layout.bodies.items():
+            first.setdefault(body.coordinate, name)
+        for at, name in first.items():
+            if at != NOWHERE:
+                out[:, model.layout.coordinate(name)] += self.forces[:, at]
+        return out
+
     def _begin(self, states: np.ndarray, model: GraphModel, first: float) -> None:
         """Put every coordinate where the first row of the main sensor has it, the joints unstretched."""
         x = states["m"]["x"][0]
         for name, ratio in self.ratios.items():
-            own = self.layout.ratio(name, model.base)
+            own = model.layout.ratio(name, model.base)
             value = ratio * first / own
-            at = self.layout.coordinate(name)
+            at = model.layout.coordinate(name)
             if self.shows_speed:
-                x[self.layout.nq + at] = value
+                x[model.layout.nq + at] = value
                 states["m"]["v_before"][0, at] = value
             else:
                 x[at] = value
@@ -152,13 +168,13 @@ class Simulator:
         j["mode"], j["substeps"], j["rate"], j["release"] = mode, substeps, 1.0 / dt, self.release
         j["lead"] = self.lead if mode == TRACK else 0
         j["part"], j["delay"] = np.modf(self.case.delay_samples * substeps)
-        j["main"], j["speed"] = self.layout.sensors[self.main], self.shows_speed
+        j["main"], j["speed"] = model.layout.sensors[self.main], self.shows_speed
         inertia = 0.0
         push = np.zeros(len(j["push"]))
         for name, ratio in self.ratios.items():
-            at, own = self.layout.coordinate(name), self.layout.ratio(name, model.base)
+            at, own = model.layout.coordinate(name), model.layout.ratio(name, model.base)
             push[at] = params.inertia[at] * ratio / own
-        for at in range(self.layout.nq):
+        for at in range(model.layout.nq):
             inertia += push[at] ** 2 / params.inertia[at]
         j["push"] = push / inertia  # a unit of correction is a unit of force at the main body
         j["P"], j["D"] = self.follow**2 * inertia, 1.4 * self.follow * inertia
