@@ -86,7 +86,7 @@ class Term:
     closer: str = ""  # a closer look: at all "frequencies", all over the "tolerance", at the likeliest "places"
     static: bool = False  # a function of what `axis` says, without memory
     defined: bool = False  # its sizes are numbers by definition: constants, factors, times, waves
-    joint: Callable[[Any], dict[str, float]] | None = None  # numbers that the joint of its node has, in place of a force
+    joint: Callable[[Any], dict[str, float]] | None = None  # numbers of the joint at its node
     seldom: float = 0.0  # nats of prior odds against it: another name of the same law is the usual one
     late: str = ""  # "delay" of what is commanded, or what "bends" to one
     stiff: bool = False  # alters a spring: simulated in shorter steps

@@ -11,12 +11,12 @@ prediction error in closed loop.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.problem import TOGETHER, Problem
+from rtctl.diagnose.problem import TOGETHER
 from rtctl.diagnose.space import Space
 from rtctl.diagnose.stretches import rms
 
@@ -25,6 +25,16 @@ THREADS = 2
 IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
 
 Result = TypeVar("Result")
+
+
+class Judge(Protocol):
+    """What a fit asks of a recording: weighed errors of a model, and how many of them go together as one."""
+
+    together: float
+
+    def residual(self, model: Any, coarse: bool = False) -> np.ndarray:
+        """Errors (rows,) of a model."""
+        ...
 
 
 class Fit(NamedTuple):
@@ -67,7 +77,7 @@ def parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
 
 
 def jacobian(
-    problem: Problem, space: Space, x: np.ndarray, columns: Sequence[int] | None = None, old: np.ndarray | None = None
+    problem: Judge, space: Space, x: np.ndarray, columns: Sequence[int] | None = None, old: np.ndarray | None = None
 ) -> np.ndarray:
     """Forward differences (rows, columns) of the residual by x, away from the upper bound.
 
@@ -96,7 +106,7 @@ def jacobian(
 
 
 def fit(
-    problem: Problem,
+    problem: Judge,
     space: Space,
     x: np.ndarray | None = None,
     rounds: int = 20,

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import qmc
 
-from rtctl.diagnose.model import Model
 from rtctl.idiom import Settings
 from rtctl.plants.physics import TERMS
 
@@ -96,7 +95,7 @@ def _defaults(term: str) -> dict[str, Any]:
 class Space(NamedTuple):
     """A model with all that may move in it."""
 
-    owner: Model
+    owner: Any  # the nominal model: of a plant (model.py) or of a described machine (graph/model.py)
     names: tuple[str, ...]  # plant parameters
     tolerance: Callable[[str], float]
     hypotheses: tuple[Hypothesis, ...] = ()
@@ -106,7 +105,7 @@ class Space(NamedTuple):
         """Number of plant parameters, which come first in x."""
         return len(self.names)
 
-    def model(self, x: np.ndarray) -> Model:
+    def model(self, x: np.ndarray) -> Any:
         """The model at x."""
         base = dict(self.owner.base)
         for name, value in zip(self.names, x[: self.nb], strict=True):

@@ -114,7 +114,7 @@ def diagnose_record(record: GraphRecord, progress: Progress = lambda _: None) ->
     with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
         sim = Simulator(record)
         like = Likelihood(sim)
-        found = search(like, Space(nominal(record.case), record.case.fitted, record.case.tolerance), progress)  # type: ignore[arg-type]
+        found = search(like, Space(nominal(record.case), record.case.fitted, record.case.tolerance), progress)
         progress("weighing names against forces without one")
         decided = verdict(found)
         progress("predicting rows that were not fitted")

@@ -172,8 +172,7 @@ def _inputs(where: Path, machine: Description, given: Any) -> dict[str, Input]:
         try:
             out[name] = Input.model_validate(entry)
         except ValidationError as error:
-            said = sentences(error, Input, entry, lambda _, n=name: f"{where}: inputs.{n}")
-            raise UserError(said.splitlines()[0]) from None
+            raise UserError(f"{where}: inputs.{name}: {sentences(error, Input, entry).splitlines()[0]}") from None
         if out[name].body not in machine.bodies:
             hint = nearest(out[name].body, machine.bodies)
             raise UserError(

@@ -8,7 +8,7 @@ from rtctl.diagnose.forms import forms, is_rich
 from rtctl.diagnose.graph.fits import Fitted, refit
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.hypotheses import starts_of
-from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis
+from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis, Space
 from rtctl.plants.graph.elements import elements
 from rtctl.plants.physics import TERMS, standing
 
@@ -82,7 +82,7 @@ def richer(f: Fitted, h: Hypothesis) -> list[Hypothesis]:
     return out
 
 
-def exchanged(f: Fitted, index: int, other: Hypothesis) -> tuple[object, np.ndarray]:
+def exchanged(f: Fitted, index: int, other: Hypothesis) -> tuple[Space, np.ndarray]:
     """Space and start with one effect in another form, which begins where its coordinates were."""
     old, parts = f.space.hypotheses[index], f.space.parts(f.x)
     start = other.start()

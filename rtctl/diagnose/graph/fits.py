@@ -1,8 +1,8 @@
 """Fit of a model to a recording under a noise of its own, with its evidence.
 
-The noise is estimated from the residual of the fit and the fit made again, since a noise that was estimated without an
-effect holds the effect for noise. The evidence is Laplace's: the likelihood at its maximum, times the prior there, times
-the volume of the posterior.
+The noise is estimated from the residual of the fit, and the fit made again: a noise that was estimated without an
+effect holds the effect for noise. The evidence is Laplace's: the likelihood at its maximum, times the prior there, times the
+volume of the posterior.
 
 Source: MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28; Miller & Dunson, Robust Bayesian
 inference via coarsening, JASA 114 (2019) for the power of the likelihood.
@@ -15,6 +15,7 @@ import numpy as np
 
 from rtctl.diagnose.fit import fit, jacobian
 from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Hypothesis, Space
 from rtctl.plants.physics import TERMS
 
@@ -37,7 +38,8 @@ class Fitted(NamedTuple):
     @property
     def model(self):
         """The model itself."""
-        return self.space.model(self.x)
+        model: GraphModel = self.space.model(self.x)
+        return model
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -60,7 +62,7 @@ class Fitted(NamedTuple):
         weight = prior(self.space)
         H = self.power * self.J.T @ self.J + np.diag(weight)
         keep = weight > 0.0
-        sign, volume = np.linalg.slogdet(H[np.ix_(keep, keep)])
+        _, volume = np.linalg.slogdet(H[np.ix_(keep, keep)])
         volume -= float(np.sum(np.log(weight[keep])))
         fitness = -self.power * self.loss - 0.5 * float(weight @ self.x**2)
         return fitness - 0.5 * float(volume)
@@ -89,7 +91,7 @@ def refit(
     """The model of `space` from x, first under the noise `floor`, then under the noise that it left the last time."""
     x = space.start() if x is None else np.asarray(x, float)
     if floor is not None:
-        x = fit(floor, space, x, rounds=rounds, enough=1e-2).x  # type: ignore[arg-type]
+        x = fit(floor, space, x, rounds=rounds, enough=1e-2).x
     e = like.raw(space.model(x))
     loss, own = like.loss(e), like.told(e)
     best = (loss, x, e, own)
@@ -104,7 +106,7 @@ def refit(
         if gain < ENOUGH:
             break
     loss, x, e, own = best
-    return Fitted(space, x, e, jacobian(own, space, x), own, loss)  # type: ignore[arg-type]
+    return Fitted(space, x, e, jacobian(own, space, x), own, loss)
 
 
 def with_term(base: Fitted, h: Hypothesis, x: Sequence[float] | np.ndarray) -> tuple[Space, np.ndarray]:

@@ -46,7 +46,6 @@ class Measures:
         self.effort = self._effort()
         self.term = ""
 
-
     def _effort(self) -> float:
         """Rms of what all drives make at the main body, N or Nm."""
         total = np.zeros(len(self.way))
@@ -95,15 +94,17 @@ class Measures:
         s = self.scale(node)
         volts = max(float(np.sqrt(np.mean(self.sim.volts**2))), LITTLE)
         stiffness = self.stiffness(node)
+        peak = float(np.abs(self.sim.volts).max(initial=0.0))
         table = {
             "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low,
             "drag": s.force / s.speed, "drag2": s.force / s.speed**2, "stiff": s.force / s.span,
             "twist": s.force / stiffness, "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
-            "stiffness": stiffness, "compliance": 1.0 / s.force, "inertia": self.inertia(node), "seconds": 1.0,
+            "swell": s.force / (s.speed * s.span**2), "stiffness": stiffness, "firm": self.firm(node),
+            "compliance": 1.0 / s.force, "inertia": self.inertia(node), "seconds": 1.0,
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
             "duration": len(self.way) * self.sim.record.dt, "volts": max(self.volts(node), 0.05 * volts),
-            "grain": self.grain(node), "per_volt": 1.0 / volts, "peak": max(float(np.abs(self.sim.volts).max(initial=0.0)), LITTLE),
-            "counts": self.grain(node), "swell": s.force / (s.speed * s.span**2), "pace": self.pace(node), "firm": self.firm(node), "grip": s.force, "contact": s.force,
+            "per_volt": 1.0 / volts, "peak": max(peak, LITTLE), "pace": self.pace(node),
+            "grain": self.grain(node), "counts": self.grain(node), "grip": s.force, "contact": s.force,
         }  # fmt: skip
         return table[measure]
 

@@ -30,7 +30,7 @@ class GraphModel(NamedTuple):
             if made is not None and s.node in machine.joints:
                 numbers = made(s)
                 base |= {f"joints.{s.node}.{key}": value for key, value in numbers.items()}
-                found[s.node] = machine.joints[s.node].model_copy(update={key: 1.0 for key in numbers})
+                found[s.node] = machine.joints[s.node].model_copy(update=dict.fromkeys(numbers, 1.0))
         if not found:
             return self
         elastic = machine.model_copy(update={"joints": {**machine.joints, **found}})
@@ -52,7 +52,7 @@ def settings_of(entry: dict[str, Any]) -> Settings:
 
 
 def rigid(layout: Layout, values: dict[str, float], main: str) -> dict[str, float]:
-    """Motion of each body for one unit of the body `main`, every joint taken as rigid; 0 where nothing connects them."""
+    """Motion of each body for one unit of the body `main`, joints taken as rigid; 0 where nothing connects the two."""
     machine = layout.machine
     out = {main: 1.0}
     todo = [main]

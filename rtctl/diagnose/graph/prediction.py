@@ -1,4 +1,4 @@
-"""Prediction of rows that no fit saw: models fitted to the first part of a record, judged on the rest under the observer."""
+"""Prediction of rows that no fit saw: fitted to the first part of a record, judged on the rest under the observer."""
 
 from typing import NamedTuple
 

@@ -54,16 +54,17 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     t = _column(path, columns, "t", "s, clock at the tick")
     if len(t) < LEAST_ROWS:
         raise NoAnswer(f"{path} holds {len(t)} rows; a verdict needs {LEAST_ROWS}")
+    rows = len(t)
     t, dt, even = _clock(path, t, case)
     n = len(t)
-    blank = np.full(n, np.nan)
+    blank = np.full(rows, np.nan)
     ref = columns.get("ref", blank)
-    w = np.nan_to_num(np.asarray(columns.get("w", np.zeros(n)), float))
+    w = np.nan_to_num(np.asarray(columns.get("w", np.zeros(rows)), float))
     machine = case.machine
     driven = [] if case.problem == "free" else list(machine.drives.values())
-    u = np.stack([even(_column(path, columns, d.column, f"{d.unit}, command")) for d in driven], axis=1) if driven else (
-        np.zeros((n, len(machine.drives)))
-    )  # fmt: skip
+    u = np.zeros((n, len(machine.drives)))
+    for d, drive in enumerate(driven):
+        u[:, d] = even(_column(path, columns, drive.column, f"{drive.unit}, command"))
     y: dict[str, np.ndarray] = {}
     grain: dict[str, float] = {}
     for name, sensor in machine.sensors.items():

@@ -95,9 +95,7 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], fl
     return not fewer.names or explained(fewer, more) > PART
 
 
-def stands(
-    base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]
-) -> bool:
+def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]) -> bool:
     """Whether every effect of a combination adds to the combination without it, as far as that was fitted."""
     if len(f.names) < 2:
         return True
