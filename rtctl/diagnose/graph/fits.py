@@ -1,8 +1,8 @@
 """Fit of a model to a recording under a noise of its own, with its evidence.
 
 The noise is estimated from the residual of the fit, and the fit made again: a noise that was estimated without an
-effect holds the effect for noise. The evidence is Laplace's: the likelihood at its maximum, times the prior there, times the
-volume of the posterior.
+effect holds the effect for noise. The evidence is Laplace's: the likelihood at its maximum, times the prior there,
+times the volume of the posterior.
 
 Source: MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28; Miller & Dunson, Robust Bayesian
 inference via coarsening, JASA 114 (2019) for the power of the likelihood.

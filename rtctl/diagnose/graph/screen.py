@@ -16,7 +16,6 @@ from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis
 
-CLOSER = 40  # hypotheses that are judged under their own noise
 TRIES = 3
 TOO_FAR = 3.0  # times the residual: a step that changes more says little about what is missing
 RIDGE = 1e-6
@@ -27,7 +26,7 @@ class Score(NamedTuple):
     """What a hypothesis promises."""
 
     hypothesis: Hypothesis
-    gain: float  # nats, under the noise that it leaves; of the less likely ones as `power`
+    gain: float  # nats, under the noise that it leaves
     power: float  # nats, under the noise of what no hypothesis explains
     x: np.ndarray  # of the hypothesis
     norm: float  # of a typical size beside the base, in standard deviations: below 3 or so nothing is seen
@@ -88,12 +87,13 @@ def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     found = [
         _solved(base, like, h, change, W, A, slope, r) for h, change in zip(candidates, changes, strict=True) if change
     ]
-    order = sorted(range(len(found)), key=lambda i: -found[i][0].power)
-    out = [found[i][0] for i in order[CLOSER:]]
-    for i in order[:CLOSER]:
-        score, dx, C = found[i]
-        e = base.e + np.tensordot(Jraw, dx[: len(base.x)], axes=1) + np.tensordot(C, dx[len(base.x) :], axes=1)
-        out.append(score._replace(gain=base.loss - like.loss(e)))
+
+    def judged(score: Score, dx: np.ndarray, C: np.ndarray) -> Score:
+        n = len(base.x)
+        e = base.e + np.tensordot(Jraw, dx[:n], axes=1) + np.tensordot(C, dx[n:], axes=1)
+        return score._replace(gain=base.loss - like.loss(e))
+
+    out = parallel([partial(judged, *one) for one in found])
     return Screened(sorted(out, key=lambda s: -s.gain), like, Jraw)
 
 

@@ -22,7 +22,8 @@ STARTS = 2  # of the first few of them
 FIRST = 3
 LEAST = 6.0  # nats that screening must promise for a refit
 BEAM = 2
-WORTH = 3.0  # nats of evidence that a further effect must bring
+ENOUGH = 5.0  # nats of evidence that a first effect must bring
+WORTH = 3.0  # nats that a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
 FORM = 0.05  # share of what the effects before it gained, which a further one must gain: no law is exact
 FAR = 30.0  # nats behind the best at which a combination is dropped
@@ -97,8 +98,10 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], fl
 
 def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]) -> bool:
     """Whether every effect of a combination adds to the combination without it, as far as that was fitted."""
-    if len(f.names) < 2:
+    if not f.names:
         return True
+    if len(f.names) == 1:
+        return merit(f) > merit(base) + ENOUGH
     rest = (tuple(sorted(set(f.names) - {name})) for name in f.names)
     return all(adds(base, known[names], f, merit) for names in rest if names in known)
 
