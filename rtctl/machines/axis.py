@@ -3,7 +3,7 @@
 reference -> shaper -> error -> PD or PI with velocity feedback -> limit
 """
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -82,6 +82,11 @@ class AxisConfig(MachineSettings):
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
     plant: AxisPlantSettings = AxisPlantSettings()
+
+
+def unit(config: Any) -> str:
+    """Unit of reference and position."""
+    return UNIT
 
 
 def metres_per_unit(config: AxisConfig) -> float:

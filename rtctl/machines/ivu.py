@@ -5,7 +5,7 @@ Block diagram of the tick, thesis figure 5.1:
     reference -> shaper -> error -> PD -> + friction + excitation -> allocation to two motors (+ tension) -> limits
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,11 @@ SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
 def radius(config: IvuConfig) -> float:
     """Radius that turns metres of tape into radians of the capstan."""
     return config.R_c
+
+
+def unit(config: Any) -> str:
+    """Unit of reference and position."""
+    return UNIT
 
 
 def metres_per_unit(config: IvuConfig) -> float:

@@ -5,7 +5,7 @@ Block diagram of the tick, thesis figures 12.7 and 12.10:
     reference -> shaper -> error -> law (PI with velocity feedback, PD, or any sections) -> + friction -> limit
 """
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -159,6 +159,11 @@ class LduConfig(MachineSettings):
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
     plant: LduPlantSettings = LduPlantSettings()
+
+
+def unit(config: Any) -> str:
+    """Unit of reference and position."""
+    return UNIT
 
 
 def metres_per_unit(config: LduConfig) -> float:
