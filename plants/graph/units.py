@@ -99,7 +99,15 @@ def _sensor_units(sensor: Mapping[str, Any], turns: bool) -> dict[str, str]:
     measures = str(sensor.get("measures", "position"))
     if measures not in ("position", "speed", "acceleration", "force", "current"):
         return {}
-    return {"counts_per_unit": f"1/({measured_unit(measures, turns)})".replace("(rad)", "rad").replace("(m)", "m")}
+    unit = measured_unit(measures, turns)
+    column = {} if "per_unit" in sensor or "counts_per_unit" in sensor else {"resolution": unit, "noise": unit}
+    return {"counts_per_unit": _per(unit), **column}
+
+
+def _per(unit: str) -> str:
+    """Unit of counts for one of `unit`: 1/rad, s/rad, 1/N."""
+    over, _, under = unit.partition("/")
+    return f"{under}/{over}" if under else f"1/{over}"
 
 
 def _body(path: str, body: Mapping[str, Any]) -> dict[str, Any]:

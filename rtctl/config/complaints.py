@@ -58,7 +58,7 @@ def _walk(model: Any, loc: tuple) -> tuple[tuple, Shape, Shape]:
         if place.choices and part in place.choices:
             place = owner = Shape(place.choices[part], model=place.choices[part])
             continue
-        if place.model is None and place.item is None and not isinstance(part, int):
+        if place.model is None and place.item is None and place.each is None and not isinstance(part, int):
             continue  # the name of a union's member
         owner, place = place, child(place, part) or Shape(None)
         path.append(part)

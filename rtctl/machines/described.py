@@ -23,13 +23,13 @@ from rtctl.machines.base import (
 from rtctl.machines.described_plant import converter, graph_of, is_counter, readout_of, truth_columns, wires
 from rtctl.machines.described_plant import plant_diagram as described_plant
 from rtctl.machines.described_settings import DescribedConfig, config_class, drive_name, feedback_name
-from rtctl.machines.ldu import play, prepare
 from rtctl.own import law as own_law
 from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.linearised import linearised, sensor_row
 from rtctl.plants.graph.units import measured_unit
 from rtctl.plants.linear import MOST_DRIVES
 
-__all__ = ["DescribedConfig", "config_class", "diagram", "plant_diagram", "play", "prepare"]
+__all__ = ["DescribedConfig", "config_class", "diagram", "plant_diagram"]
 
 SETTLE_FLOOR = 0.0  # two percent of the step say it all
 PLANT_RATE = 1000.0
@@ -46,14 +46,21 @@ DESCRIBED_STATE = state(k_run=int, gains=int, play=int, u_fb=float)
 
 
 @tick
-def switch_on(p, s, x):
-    """The tick in which outputs come on: every law starts from where the machine stands."""
-    reference.hold(0, s.reference, x)
-    shaper.reset(p.shaper, s.shaper, x)
-    velocity.reset(p.velocity, s.velocity)
-    bumpless.reset(p.bumpless, s.bumpless)
-    limit.reset(p.limit, s.limit, 0.0)
-    s.machine.u_fb = 0.0
+def settle(p, s, guard, k):
+    """Armed leads to running once the law has held the machine for a moment."""
+    if guard.state == safety.ARMED and guard.armed_for > p.settle:
+        guard.state = safety.RUNNING
+        s.k_run = k
+
+
+@tick
+def play(t, s, guard, c, made, k):
+    """Start the table when it is asked for, once the machine runs; what was asked for while it was off is forgotten."""
+    if guard.state == safety.IDLE or guard.state == safety.TRIPPED:
+        s.play = c.play
+    elif guard.state == safety.RUNNING and c.play != s.play:
+        reference.start(t, made, k)
+        s.play = c.play
 
 
 class Parts(NamedTuple):
@@ -146,11 +153,9 @@ def truth(config: Any) -> tuple[Column, ...]:
 
 def forwards(config: Any) -> float:
     """1, or -1 where a positive command moves the feedback backwards: sign of the response to a short push."""
-    from rtctl.plants.graph.plant import state_space
-
     parts = parts_of(config)
     _, _, p = graph_of(parts.machine, 1.0)
-    A, B = state_space(p)
+    A, B = linearised(p)
     c, number = sensor_row(parts.machine, p, parts.feedback), parts.number
     moment, b = c, B[:, number]
     for _ in range(len(A)):  # first derivative of the output that the command reaches
@@ -159,15 +164,6 @@ def forwards(config: Any) -> float:
         if abs(reached) > 1e-12 * float(np.abs(moment) @ np.abs(b) or 1.0):
             return 1.0 if reached > 0 else -1.0
     return 1.0
-
-
-def sensor_row(machine: Description, p: Any, name: str) -> np.ndarray:
-    """What a sensor of position or speed shows of the state, (nx,), SI."""
-    n, row = list(machine.sensors).index(name), np.zeros(p.nx)
-    at = 0 if machine.sensors[name].measures == "position" else p.nq
-    row[at + p.sensor_i[n]] += p.sensor_a[n]
-    row[at + p.sensor_j[n]] += p.sensor_b[n]
-    return row
 
 
 def _params(config: Any, dt: float) -> DescribedParams:
@@ -235,15 +231,15 @@ def diagram(config: Any, dt: float) -> Diagram:
             (
                 *STATE_LINES,
                 "if s.safety.on != 0:",
-                "    machine.switch_on(p, s, y.feedback)",
+                *(f"    {line}" for line in SWITCH_ON),
                 *(f"    {line}" for line in position.reset),
-                "machine.prepare(p, s, c, k)",
+                "machine.settle(p.machine, s.machine, s.safety, k)",
             ),
         ),
         (
             "reference",
             (
-                "machine.play(t, s, c, k)",
+                "machine.play(t.reference, s.machine, s.safety, c, s.reference, k)",
                 "y.target = reference.step(t.reference, s.reference, c.setpoint, k)",
                 "y.ref = shaper.step(p.shaper, s.shaper, y.target)",
                 "y.w = excitation.step(t.excitation, k - s.machine.k_run) if s.safety.state == safety.RUNNING else 0.0",
@@ -292,6 +288,14 @@ def diagram(config: Any, dt: float) -> Diagram:
     return Diagram((*USES, position.uses), blocks, columns(config), stages)
 
 
+SWITCH_ON = (  # the tick in which outputs come on: every law starts from where the machine stands
+    "reference.hold(0, s.reference, y.feedback)",
+    "shaper.reset(p.shaper, s.shaper, y.feedback)",
+    "velocity.reset(p.velocity, s.velocity)",
+    "bumpless.reset(p.bumpless, s.bumpless)",
+    "limit.reset(p.limit, s.limit, 0.0)",
+    "s.machine.u_fb = 0.0",
+)
 USES = (
     "rtctl.drivers.at_mio_16de",
     "rtctl.drivers.daq_stc",

@@ -24,7 +24,7 @@ from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
 from rtctl.loop.safety import SafetySettings
 from rtctl.machines.base import COMMON_COLUMNS, MachineSettings
-from rtctl.machines.ldu import PositionSettings
+from rtctl.machines.ldu import PdLawSettings, PositionSettings
 from rtctl.machines.physics import PhysicsTerm
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.places import check_node
@@ -46,7 +46,7 @@ class DescribedLawSettings(Settings):
         default={}, description="share of the command that other drives get, by name; 0 if absent"
     )
     shaper: ShaperSettings = ShaperSettings()
-    position: PositionSettings
+    position: PositionSettings = PdLawSettings(gain=0.0)  # moves nothing; `rtctl tune` finds one
     limit: LimitSettings = LimitSettings()
     bumpless: BumplessSettings = BumplessSettings()
     velocity: VelocitySettings = VelocitySettings()
@@ -65,7 +65,7 @@ class DescribedConfig(MachineSettings):
 
     machine: Description
     driver: EmulatedSettings = Field(default=EmulatedSettings(), description="the board, emulated with the machine")
-    law: DescribedLawSettings
+    law: DescribedLawSettings = DescribedLawSettings()
     reference: ReferenceSettings = ReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
     plant: DescribedPlantSettings = DescribedPlantSettings()
@@ -143,7 +143,7 @@ def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
     excitation = with_units(create_model("E", excitation=(ExcitationSettings, NoneSettings())), symbols)
     return create_model(
         "DescribedConfig", __base__=DescribedConfig, __module__=__name__, __doc__=DescribedConfig.__doc__,
-        law=(law, Field(description="the law, block by block in the order of the tick")),
+        law=(law, law()),
         safety=(safety, safety(frozen_effort=0.5 * full, current_time=0.0)),
         reference=(reference, reference()),
         excitation=(excitation.model_fields["excitation"].annotation, excitation.model_fields["excitation"]),
