@@ -8,7 +8,7 @@ import numpy as np
 from rtctl.loop import safety
 from rtctl.loop.fused import Run
 from rtctl.machines import Machine
-from rtctl.trace.metrics import POSITION, machine_steps
+from rtctl.trace.metrics import machine_steps
 
 
 class Metric(NamedTuple):
@@ -30,9 +30,6 @@ METRICS: dict[str, Metric] = {
     "peak_output_V": Metric("largest voltage written to a drive", "V", 1),
     "trip_s": Metric("controller clock at the trip; none for no trip", "s", -1),
 }
-ERROR = {"ivu": "capstan_error", "ldu": "position_error", "axis": "position_error"}
-TRUTH = {"ivu": "truth_capstan", "ldu": "truth_x", "axis": "truth_x"}
-OUTPUTS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
 TENSIONS = ("truth_tension1", "truth_tension2"), ("tension1_estimate", "tension2_estimate")
 NAN = float("nan")
 
@@ -54,7 +51,7 @@ def measure(run: Run, machine: Machine, wanted: Iterable[str] = METRICS) -> dict
 
 
 def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    steps = machine_steps(machine, rows["t"], rows["target"], rows[POSITION[machine.kind]])
+    steps = machine_steps(machine, rows["t"], rows["target"], rows[machine.signals.position])
     if not steps:
         return {}
     settling = [_number(s["settling_s"]) for s in steps]
@@ -63,7 +60,7 @@ def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
         "overshoot_pct": _largest(steps, "overshoot_pct"),
         "settling_s": max(settling) if all(x == x for x in settling) else NAN,
     }
-    truth = TRUTH[machine.kind]
+    truth = machine.signals.truth
     if truth in (rows.dtype.names or ()):
         true = machine_steps(machine, rows["t"], rows["target"], rows[truth])
         found["true_final_error_mm"] = _largest(true, "final_error_mm")
@@ -79,7 +76,9 @@ def _number(value: float | None) -> float:
 
 
 def _error(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    error = 1000.0 * machine.metres_per_unit * rows[ERROR[machine.kind]]
+    if machine.metres_per_unit is None:
+        return {}
+    error = 1000.0 * machine.metres_per_unit * rows[machine.signals.error]
     return {"rms_error_mm": float(np.sqrt(np.mean(error * error))), "peak_error_mm": float(np.max(np.abs(error)))}
 
 
@@ -94,7 +93,7 @@ def _tension(rows: np.ndarray) -> dict[str, float]:
 
 
 def _outputs(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    written = [rows[name] for name in OUTPUTS[machine.kind]]
+    written = [rows[name] for name in machine.signals.outputs]
     return {
         "rms_output_V": max(float(np.sqrt(np.mean(u * u))) for u in written),
         "peak_output_V": max(float(np.max(np.abs(u))) for u in written),

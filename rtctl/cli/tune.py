@@ -53,7 +53,7 @@ def tune(
     common.machine_of(settings)
     file = out or Path(f"{settings.name}-tuned.yaml")
     picture = plot or file.with_suffix(".png")
-    pictures = [picture, *([picture.with_stem(f"{picture.stem}-radii")] if settings.machine == "ivu" else [])]
+    pictures = [picture, *([picture.with_stem(f"{picture.stem}-radii")] if settings.kind == "ivu" else [])]
     check_files(file, pictures, force)
     found = design.tune(settings, bandwidth, damping, gm, pm)
     header = f"{settings.name}, tuned by `rtctl tune`.\nbefore: {design.words(found.before)}\n"

@@ -48,8 +48,8 @@ def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None
     A reel unit gets motor 1 alone for its position, so that the loop does not change hands at every zero of the
     command. `f_max` is 0.4 of the sample rate if absent.
     """
-    values: dict[str, Any] = {**NO_FRICTION[config.machine], "loop.mode": "fused", "loop.write": config.loop.write}
-    if config.machine == "ivu":
+    values: dict[str, Any] = {**NO_FRICTION[config.kind], "loop.mode": "fused", "loop.write": config.loop.write}
+    if config.kind == "ivu":
         values["law.allocation.kind"] = "motor1"
     config = set_paths(config, values)
     f_max = f_max or 0.4 * config.loop.rate

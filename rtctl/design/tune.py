@@ -49,7 +49,7 @@ def tune(
 
     Raises NoAnswer where the loop to start from is unstable, or the limits cannot be met.
     """
-    kind = config.machine
+    kind = config.kind
     least = (LEAST[kind][0] if GM is None else GM, LEAST[kind][1] if PM is None else PM)
     hertz = BANDWIDTH[kind] if bandwidth is None else bandwidth
     check(hertz, damping, least, config.loop.rate)
@@ -120,7 +120,7 @@ def words(m: Margins) -> str:
 
 
 def _pd(config: Any, hertz: float, damping: float) -> tuple[Any, list[Reason]]:
-    at = 1.0 if config.machine == "ivu" else hertz
+    at = 1.0 if config.kind == "ivu" else hertz
     found = pd.design(config, 2 * np.pi * hertz, damping, at)
     found = found._replace(gain=float(f"{found.gain:.4g}"), tau_d=float(f"{found.tau_d:.4g}"))
     made = pd.applied(config, found)

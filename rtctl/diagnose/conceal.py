@@ -88,7 +88,7 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
 
     Raises UserError where nothing can be hidden in this machine.
     """
-    rng = np.random.default_rng([seed, *config.machine.encode()])
+    rng = np.random.default_rng([seed, *config.kind.encode()])
     names = [name for name in sorted(TERMS) if nodes(name, config)]
     at = len(config.plant.physics)
     for _ in range(TRIES):
@@ -106,9 +106,9 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
 
 def nodes(name: str, config: Any) -> list[str]:
     """Where an effect can be hidden in a machine without its loop running away at once."""
-    found = TERMS[name].nodes.get(config.machine, ()) if TERMS[name].tabled else ()
+    found = TERMS[name].nodes.get(config.kind, ()) if TERMS[name].tabled else ()
     if name == "sensor.rectified":
-        found = tuple(node for node in found if node not in FEEDBACK[config.machine])
+        found = tuple(node for node in found if node not in FEEDBACK[config.kind])
     return [node for node in found if name != "structure.stiffening" or use(node, config).stiffness > 0.0]
 
 
@@ -132,6 +132,6 @@ def sized(name: str, node: str, config: Any, rng: np.random.Generator) -> dict[s
         entry[key] = words[rng.integers(len(words))]
     if "seed" in term.settings.model_fields:
         entry["seed"] = int(rng.integers(1, 1_000_000))
-    if "R_c" in term.settings.model_fields and config.machine == "ldu":
+    if "R_c" in term.settings.model_fields and config.kind == "ldu":
         entry["R_c"] = ldu.parameters(config.plant).R_c
     return entry

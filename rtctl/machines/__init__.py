@@ -8,7 +8,7 @@ from rtctl.config.load import Widen
 from rtctl.laws import excitation, reference
 from rtctl.loop import faults
 from rtctl.machines import axis, described, ivu, ldu, own_plant
-from rtctl.machines.base import DESCRIBED, Column, Diagram, MachineSettings, PlantDiagram
+from rtctl.machines.base import DESCRIBED, Column, Diagram, MachineSettings, PlantDiagram, Signals
 from rtctl.own import model
 from rtctl.own.files import OwnError
 
@@ -18,6 +18,7 @@ CONFIGS: dict[str, type[MachineSettings]] = {
     "ldu": ldu.LduConfig,
     "axis": axis.AxisConfig,
 }
+EVERY: dict[str, type[MachineSettings]] = {**CONFIGS, DESCRIBED: described.DescribedConfig}  # of every kind
 
 
 def module_of(kind: str) -> Any:
@@ -48,9 +49,10 @@ class Machine(NamedTuple):
     excitation: excitation.ExcitationParams
     faults: tuple[faults.Fault, ...]
     truth: tuple[Column, ...]
-    unit: str  # of position and reference, rad or m
-    metres_per_unit: float
-    radius: float  # m, turns metres into radians
+    unit: str  # of position and reference: rad or m, or of a speed
+    metres_per_unit: float | None  # None where nothing moves along a line
+    radius: float | None  # m, turns metres into radians; None where nobody knows one
+    signals: Signals
 
 
 def _widened(base: Any, data: Any, folder: Any = None, law: bool = True) -> tuple[Any, Any]:
@@ -114,6 +116,7 @@ def _build(config: Any) -> Machine:
         unit=module.unit(config),
         metres_per_unit=module.metres_per_unit(config),
         radius=module.radius(config),
+        signals=module.signals(config),
     )
 
 

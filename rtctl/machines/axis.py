@@ -29,6 +29,7 @@ from rtctl.machines.base import (
     Diagram,
     MachineSettings,
     PlantDiagram,
+    Signals,
     physics_lines,
 )
 from rtctl.machines.ldu import PositionSettings, play, prepare
@@ -82,6 +83,11 @@ class AxisConfig(MachineSettings):
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
     plant: AxisPlantSettings = AxisPlantSettings()
+
+
+def signals(config: Any) -> Signals:
+    """Columns by which a run is judged."""
+    return Signals("x", "position_error", ("u",), "truth_x")
 
 
 def unit(config: Any) -> str:

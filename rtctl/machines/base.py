@@ -52,6 +52,15 @@ class PlantDiagram(NamedTuple):
     sample: tuple[tuple[str, tuple[str, ...]], ...]
 
 
+class Signals(NamedTuple):
+    """Columns by which a run is judged."""
+
+    position: str  # what follows the reference, as it is measured
+    error: str
+    outputs: tuple[str, ...]  # to the drives
+    truth: str  # the position in the emulator
+
+
 class LinkSettings(Settings):
     """How the loop reaches its plant or board."""
 

@@ -19,6 +19,7 @@ from rtctl.machines.base import (
     Column,
     Diagram,
     PlantDiagram,
+    Signals,
 )
 from rtctl.machines.described_plant import converter, graph_of, is_counter, readout_of, truth_columns, wires
 from rtctl.machines.described_plant import plant_diagram as described_plant
@@ -98,14 +99,23 @@ def unit(config: Any) -> str:
     return parts_of(config).unit
 
 
-def metres_per_unit(config: Any) -> float:
-    """Metres in one unit of a way; an angle has none."""
-    return 1.0
+def metres_per_unit(config: Any) -> float | None:
+    """Metres in one unit of the reference; None for an angle or a speed."""
+    return 1.0 if parts_of(config).unit == "m" else None
 
 
-def radius(config: Any) -> float:
-    """Metres per radian, for reports in rad; nothing says more of a described machine."""
-    return 1.0
+def radius(config: Any) -> None:
+    """Metres per radian: a description has one for every joint, and none for the whole machine."""
+    return None
+
+
+def signals(config: Any) -> Signals:
+    """Columns by which a run is judged."""
+    parts = parts_of(config)
+    sensor = parts.machine.sensors[parts.feedback]
+    seen = f"truth_{str(sensor.body).replace('-', '_')}" + ("_speed" if parts.is_speed else "")
+    outputs = tuple(drive.column for drive in parts.machine.drives.values())
+    return Signals("feedback", "position_error", outputs, seen)
 
 
 def columns(config: Any) -> tuple[Column, ...]:

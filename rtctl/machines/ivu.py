@@ -34,6 +34,7 @@ from rtctl.machines.base import (
     Block,
     Column,
     Diagram,
+    Signals,
 )
 from rtctl.machines.ivu_plant import plant_diagram, substeps
 from rtctl.machines.ivu_settings import IvuConfig
@@ -51,6 +52,11 @@ SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
 def radius(config: IvuConfig) -> float:
     """Radius that turns metres of tape into radians of the capstan."""
     return config.R_c
+
+
+def signals(config: Any) -> Signals:
+    """Columns by which a run is judged."""
+    return Signals("capstan", "capstan_error", ("u1", "u2"), "truth_capstan")
 
 
 def unit(config: Any) -> str:

@@ -43,6 +43,7 @@ from rtctl.machines.base import (
     Column,
     Diagram,
     MachineSettings,
+    Signals,
 )
 from rtctl.machines.ldu_plant import plant_diagram, substeps
 from rtctl.machines.physics import PhysicsTerm, check_nodes
@@ -159,6 +160,11 @@ class LduConfig(MachineSettings):
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
     plant: LduPlantSettings = LduPlantSettings()
+
+
+def signals(config: Any) -> Signals:
+    """Columns by which a run is judged."""
+    return Signals("position", "position_error", ("u",), "truth_x")
 
 
 def unit(config: Any) -> str:

@@ -125,7 +125,8 @@ class Scope:
     async def _look_at_settings(self) -> None:
         with contextlib.suppress(UserError):
             values = {part: (await self.feed.call("get", path=part))["value"] for part in PARTS}
-            self._settings = tunable(self.feed.status["machine"], values)
+            machine = (await self.feed.call("get", path="machine"))["value"]
+            self._settings = tunable(machine, values)
 
     def _start(self, connection: Connection) -> None:
         if self.feed.history is not None:

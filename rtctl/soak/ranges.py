@@ -85,13 +85,13 @@ def with_reference(config: Any) -> Any:
     given = config.reference
     if given.steps or len(given.knots) > 1:
         return config
-    return config.model_copy(update={"reference": given.model_copy(update={"knots": KNOTS[config.machine]})})
+    return config.model_copy(update={"reference": given.model_copy(update={"knots": KNOTS[config.kind]})})
 
 
 def gains_of(config: Any) -> dict[str, tuple[float, float]]:
     """Settings that this config's law has and uses, each with its lowest and highest value in SI."""
     out = {}
-    for path, (low, high) in RANGES[config.machine].gains.items():
+    for path, (low, high) in RANGES[config.kind].gains.items():
         try:
             value = get_path(config, path)
         except UserError:  # a law of another kind
@@ -107,7 +107,7 @@ def volts(config: Any) -> tuple[float, float]:
     low, high = (-limit.high if limit.low is None else limit.low), limit.high
     full = full_scale(config)
     half = full / 2 / CODES
-    if config.machine == "ldu":
+    if config.kind == "ldu":
         high, low = min(high, config.amplifier.limit), max(low, -config.amplifier.limit)
     return max(low, -full) - half, min(high, full) + half
 
@@ -115,7 +115,7 @@ def volts(config: Any) -> tuple[float, float]:
 def full_scale(config: Any) -> float:
     """Highest voltage of the converter."""
     wire = {"axis": lambda: config.output, "ldu": lambda: config.board.output}.get(
-        config.machine, lambda: config.board.output1
+        config.kind, lambda: config.board.output1
     )()
     return abs(float(wire.external_volts)) if wire.external_volts else at_mio_16de.INTERNAL_VOLTS
 
@@ -133,10 +133,10 @@ def unknown(config: Any) -> set[str]:
     from rtctl.machines import own_plant
     from rtctl.own.plant import TRUTH
 
-    columns = [column.name for column in own_plant.COLUMNS[config.machine]]
+    columns = [column.name for column in own_plant.COLUMNS[config.kind]]
     parts = own_plant.parts_of(config)
     if parts is not None:
-        fields = zip(columns, TRUTH[config.machine], strict=True)
+        fields = zip(columns, TRUTH[config.kind], strict=True)
         return {column for column, field in fields if field not in (parts.state.names or ())}
     return set(columns) if config.plant.fmu is not None else set()
 
@@ -149,12 +149,12 @@ def counts_per_unit(config: Any) -> float:
     from rtctl.plants.physics import TERMS
 
     if own_plant.is_own(config):
-        if config.machine == "ldu":
+        if config.kind == "ldu":
             return float("nan")
-    elif any(TERMS[t.term].act_at("reading", config.machine) is not None for t in config.plant.physics):
+    elif any(TERMS[t.term].act_at("reading", config.kind) is not None for t in config.plant.physics):
         return float("nan")
-    if config.machine == "axis":
+    if config.kind == "axis":
         return float(1.0 / config.encoder.pitch)
-    sensor = config.sensors.capstan if config.machine == "ivu" else config.sensors.encoder
+    sensor = config.sensors.capstan if config.kind == "ivu" else config.sensors.encoder
     per_rad = float(sensor.lines * sensor.multiply / (2 * np.pi))
-    return per_rad / float(ldu.parameters(config.plant).R_c) if config.machine == "ldu" else per_rad
+    return per_rad / float(ldu.parameters(config.plant).R_c) if config.kind == "ldu" else per_rad

@@ -24,6 +24,7 @@ PARQUET = "recording.parquet"
 CASE = "case.json"
 PART = "part-{:04d}"
 FORMAT = 1
+FORMATS = (1, 2)  # 2: the case describes the machine itself
 ROW_GROUP = 65_536  # rows; what a conversion holds in memory
 
 
@@ -134,8 +135,9 @@ def load_case(folder: Path) -> dict[str, Any]:
         raise UserError(f"{path} is nested too deeply to be a case") from None
     if not isinstance(case, dict):
         raise UserError(f"{path} holds a {type(case).__name__}; it should hold one object {{...}}")
-    if case.get("format", FORMAT) != FORMAT:
-        raise UserError(f"{path}: format is {case['format']!r}; this program reads format {FORMAT}")
+    if case.get("format", FORMAT) not in FORMATS:
+        known = " and ".join(map(str, FORMATS))
+        raise UserError(f"{path}: format is {case['format']!r}; this program reads format {known}")
     return case
 
 
