@@ -4,7 +4,8 @@
 
 Dry friction is left out: it has no linear model.
 
-Source: Meirovitch, Fundamentals of Vibrations (2001), ch. 7.
+Source: Meirovitch, Fundamentals of Vibrations (2001), ch. 7; Perez-Arriaga, Verghese & Schweppe, Selective modal
+analysis, IEEE Trans. PAS 101 (1982) for the participation of states.
 """
 
 import math
@@ -25,7 +26,7 @@ class Mode(NamedTuple):
     hertz: float  # 0 for a motion that does not swing
     damping: float  # share of critical; negative where the motion grows
     rate: float  # 1/s, of a motion that does not swing; positive where it grows
-    bodies: tuple[str, ...]  # that move most, against each other where there are two
+    bodies: tuple[str, ...]  # that take part most; none where it is a drive's own
 
 
 def linearised(p: GraphParams) -> tuple[np.ndarray, np.ndarray]:
@@ -49,23 +50,20 @@ def sensor_row(machine: Description, p: GraphParams, name: str) -> np.ndarray:
 
 def modes(machine: Description, p: GraphParams, names: list[str], coordinates: list[int]) -> list[Mode]:
     """Modes by rising frequency. `names` are the bodies that move, `coordinates` the coordinate of each."""
+    from scipy.linalg import eig  # slow to import, and needed here only
+
     A, _ = linearised(p)
-    values, vectors = np.linalg.eig(_scaled(A, p))
+    values, left, right = eig(A, left=True)
     found = []
-    for s, v in zip(values, vectors.T, strict=True):
-        if s.imag < 0:
+    for s, w, v in zip(values, left.T, right.T, strict=True):
+        if s.imag < 0 or abs(s) < STILL:
             continue
-        shape = np.abs(v[: p.nq]) + np.abs(v[p.nq : 2 * p.nq])
-        most = [name for name, at in zip(names, coordinates, strict=True) if shape[at] > 0.3 * shape.max()]
+        share = np.abs(w.conj() * v)  # participation of each state, whatever its unit
+        each = share[: p.nq] + share[p.nq : 2 * p.nq]
+        most = [name for name, at in zip(names, coordinates, strict=True) if each[at] > 0.2 * each.max()]
+        bodies = tuple(most) if each.sum() > share[2 * p.nq :].sum() else ()
         if s.imag > STILL:
-            found.append(Mode(abs(s) / (2 * np.pi), -s.real / abs(s), 0.0, tuple(most)))
-        elif abs(s.real) > STILL:
-            found.append(Mode(0.0, 1.0, float(s.real), tuple(most)))
+            found.append(Mode(float(abs(s) / (2 * np.pi)), float(-s.real / abs(s)), 0.0, bodies))
+        else:
+            found.append(Mode(0.0, 1.0, float(s.real), bodies))
     return sorted(found, key=lambda mode: (mode.hertz, -mode.rate))
-
-
-def _scaled(A: np.ndarray, p: GraphParams) -> np.ndarray:
-    """A in coordinates of equal inertia, so that an eigenvector says how the energy is shared."""
-    root = np.sqrt(p.inertia[: p.nq])
-    scale = np.concatenate([root, root, np.ones(p.nx - 2 * p.nq)])
-    return A * scale[:, None] / scale[None, :]

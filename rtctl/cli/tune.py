@@ -16,7 +16,8 @@ def tune(
     config: ConfigArgument,
     bandwidth: Annotated[
         float | None,
-        typer.Option("--bandwidth", metavar="HZ", help="Bandwidth to reach; 2 Hz ivu, 50 Hz ldu, 5 Hz axis if absent."),
+        typer.Option("--bandwidth", metavar="HZ", help="Bandwidth to reach; 2 Hz ivu, 50 Hz ldu, 5 Hz axis if absent; of a described machine "
+            "the fastest that keeps the margins."),
     ] = None,
     damping: Annotated[float, typer.Option("--damping", metavar="ZETA", help="Damping of a PD loop.")] = 1.0,
     gm: Annotated[
@@ -36,7 +37,7 @@ def tune(
     json: JsonOption = False,
 ) -> None:
     """Tune the law of a config on the model in its `plant`: PD with a gain schedule over the reel radii (ivu), lead-lag
-    with notches and a low-pass (ldu), PD (axis). Writes the tuned config with the reasons as comments, and a picture of
+    with notches and a low-pass (ldu), PD (axis), and a first law for a described machine: PD or PI. Writes the tuned config with the reasons as comments, and a picture of
     Bode plot, Nyquist plot and step response before and after.
 
     Exit code 3 where the loop to start from is unstable or the margins cannot be kept.
@@ -44,6 +45,8 @@ def tune(
     Examples:
 
       rtctl tune ivu --bandwidth 2 -o tuned.yaml
+
+      rtctl tune belt.yaml -o tuned.yaml
 
       rtctl tune ldu --set sensors.feedback=scale --gm 11 --pm 60
     """
@@ -101,7 +104,7 @@ def draw(settings: Any, found: Any, pictures: list[Path]) -> None:
     from rtctl.design import figures
     from rtctl.trace.plot import save
 
-    save(figures.loops({"before": settings, "after": found.config}), pictures[0])
+    save(figures.loops({**({"before": settings} if found.before else {}), "after": found.config}), pictures[0])
     for path in pictures[1:]:
         save(figures.radii(found.maps), path)
 
@@ -111,7 +114,7 @@ def as_json(found: Any, file: Path, pictures: list[Path]) -> dict[str, Any]:
     return {
         "config": str(file),
         "plots": [str(picture) for picture in pictures],
-        "before": found.before._asdict(),
+        "before": None if found.before is None else found.before._asdict(),
         "after": found.after._asdict(),
         "reasons": [reason._asdict() for reason in found.reasons],
     }

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from rtctl.config.errors import UserError, nearest
 from rtctl.own.parts import camel, upper
 
-KINDS = ("law", "plant", "term")
+KINDS = ("law", "plant", "term")  # of files; a machine is a config, see new_machine.py
 MACHINES = ("ivu", "ldu", "axis")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 UNIT = {"ivu": "rad", "ldu": "m", "axis": "m"}
@@ -43,7 +43,7 @@ def write(kind: str, name: str, machine: str, folder: Path) -> Written:
         if word not in known:
             near = nearest(word, known)
             raise UserError(
-                f"{what} '{word}': it is {', '.join(known)}" + (f"; did you mean '{near}'?" if near else "")
+                f"{what} '{word}': it is {', '.join([*known, *(('machine',) if what == 'kind' else ())])}" + (f"; did you mean '{near}'?" if near else "")
             )
     stem = _stem(name)
     files = Written(folder / f"{stem}.py", folder / f"test_{stem}.py", folder / f"{stem}.yaml")
