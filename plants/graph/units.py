@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from rtctl.config.errors import nearest
 from rtctl.config.units import to_si
 
 TURNS, SLIDES = "rad", "m"
@@ -50,6 +51,7 @@ def in_si(data: Mapping[str, Any]) -> dict[str, Any]:
     """
     out = dict(data)
     bodies = data.get("bodies")
+    _check_bodies(data)
     turns = {
         name: not (isinstance(body, Mapping) and "mass" in body) for name, body in _items(bodies)
     }  # of every body, as it is written
@@ -86,6 +88,19 @@ def in_si(data: Mapping[str, Any]) -> dict[str, Any]:
         lambda path, sensor: _converted(path, sensor, _sensor_units(sensor, acts_on_turning(sensor))),
     )
     return {key: value for key, value in out.items() if key in data}
+
+
+def _check_bodies(data: Mapping[str, Any]) -> None:
+    """Raise ValueError where an element is at a body that is not described: its units would be anybody's guess."""
+    known = [*(str(name) for name, _ in _items(data.get("bodies"))), "frame"]
+    for group, keys in (("joints", ("from", "to")), ("drives", ("body",)), ("sensors", ("body",))):
+        for name, element in _items(data.get(group)):
+            for key in keys if isinstance(element, Mapping) else ():
+                body = element.get(key)
+                if isinstance(body, str) and body not in known:
+                    near = nearest(body, known)
+                    hint = f"did you mean '{near}'?" if near else f"there is {', '.join(known)}"
+                    raise ValueError(f"{group}.{name}.{key}: there is no body '{body}'; {hint}")
 
 
 def _ends(joint: Mapping[str, Any], turns: Mapping[str, bool]) -> tuple[bool, bool]:

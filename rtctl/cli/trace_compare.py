@@ -37,7 +37,8 @@ def _steps(found: "Comparison") -> list[str]:
     if not count:
         return []
     unit = final_error_unit([*found.steps_a, *found.steps_b])
-    lines = [f"{'step':>4}{f'final error [{unit or '-'}]':>24}{'overshoot [%]':>24}{'settling [s]':>24}",
+    final = f"final error [{unit or '-'}]"
+    lines = [f"{'step':>4}{final:>24}{'overshoot [%]':>24}{'settling [s]':>24}",
              " " * 4 + f"{'A':>14}{'B':>10}" * 3]  # fmt: skip
     for k in range(count):
         pair = [steps[k] if k < len(steps) else {} for steps in (found.steps_a, found.steps_b)]

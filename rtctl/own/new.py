@@ -43,7 +43,7 @@ def write(kind: str, name: str, machine: str, folder: Path) -> Written:
         if word not in known:
             near = nearest(word, known)
             raise UserError(
-                f"{what} '{word}': it is {', '.join([*known, *(('machine',) if what == 'kind' else ())])}" + (f"; did you mean '{near}'?" if near else "")
+                f"{what} '{word}': it is {', '.join(known)}" + (f"; did you mean '{near}'?" if near else "")
             )
     stem = _stem(name)
     files = Written(folder / f"{stem}.py", folder / f"test_{stem}.py", folder / f"{stem}.yaml")

@@ -27,9 +27,9 @@ def step_metrics(
     both for a case. The keys:
 
     - `t`: s, when the reference arrives at its new value; `size`: in the machine's unit, with its sign
-    - `final_error`: mean of ref - y over the last tenth of the hold, in the machine's unit
-    - `final_error_rad`, `final_error_mm`: the same in rad and mm; None where the
+    - `final_error_rad`, `final_error_mm`: mean of ref - y over the last tenth of the hold; None where the
       unit of either has no scale: an angle that moves no tape has no mm
+    - `final_error`: the same in the machine's unit, where it is neither an angle nor a way
     - `overshoot_pct`: how far y went beyond the new value, in % of the step; never negative
     - `settling_s`: from `t` until y stays within `settle_band` of the step, or `settle_floor` (machine's unit; a few
       counts of the sensor) where that is more; None if it does not before the next step
@@ -51,7 +51,7 @@ def step_metrics(
             {
                 "t": float(t[start]),
                 "size": size,
-                "final_error": final,
+                **({"final_error": final} if scale_mm is None and rad_per_unit is None else {}),
                 "final_error_rad": None if rad_per_unit is None else final * rad_per_unit,
                 "final_error_mm": None if scale_mm is None else final * scale_mm,
                 "overshoot_pct": max(0.0, float(np.max((y[hold] - ref[hold]) / size)) * 100),
