@@ -184,8 +184,8 @@ class Description(Settings):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     bodies: dict[str, Body] = Field(min_length=1)
-    joints: dict[str, Joint] = {}
-    drives: dict[str, Drive] = {}
+    joints: dict[str, Joint] = Field(default={})
+    drives: dict[str, Drive] = Field(default={})
     sensors: dict[str, Sensor] = Field(min_length=1)
 
     @model_validator(mode="before")

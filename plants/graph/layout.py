@@ -14,7 +14,9 @@ NOWHERE = -1
 
 class Body(NamedTuple):
     coordinate: int  # index into the positions; NOWHERE for the frame
-    chain: tuple[tuple[str, bool], ...]  # rigid joints from the coordinate's own body, and whether each is passed from->to
+    chain: tuple[
+        tuple[str, bool], ...
+    ]  # rigid joints from the coordinate's own body, and whether each is passed from->to
 
 
 class Layout(NamedTuple):

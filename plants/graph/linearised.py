@@ -35,7 +35,9 @@ def linearised(p: GraphParams) -> tuple[np.ndarray, np.ndarray]:
     for k in range(p.weights):
         if p.weight_turns[k]:
             i, a = int(p.weight_i[k]), float(p.weight_a[k])
-            A[p.nq + i, i] -= a * a * float(p.weight_force[k]) * math.cos(float(p.weight_angle[k])) / float(p.inertia[i])
+            A[p.nq + i, i] -= (
+                a * a * float(p.weight_force[k]) * math.cos(float(p.weight_angle[k])) / float(p.inertia[i])
+            )
     return A, B
 
 

@@ -52,7 +52,9 @@ def check_node(machine: Description, path: str, term: str, node: str) -> None:
     allowed = nodes_for(machine, term)
     if node not in allowed:
         near = nearest(node, allowed)
-        hint = f"did you mean '{near}'?" if near else f"it can stand at {', '.join(allowed) or 'no node of this machine'}"
+        hint = (
+            f"did you mean '{near}'?" if near else f"it can stand at {', '.join(allowed) or 'no node of this machine'}"
+        )
         raise ValueError(f"{path}: {term} cannot stand at '{node}'; {hint}")
 
 
@@ -61,7 +63,11 @@ def place_of(layout: Layout, values: dict[str, float], node: str) -> Spot:
     machine = layout.machine
     kind = kind_of(machine, node)
     if kind == BODY:
-        springs = (n for name, n in layout.links.items() if node in (getattr(machine.joints[name], "from"), machine.joints[name].to))
+        springs = (
+            n
+            for name, n in layout.links.items()
+            if node in (getattr(machine.joints[name], "from"), machine.joints[name].to)
+        )
         return Spot(layout.coordinate(node), next(springs, 0), 0, layout.ratio(node, values))
     if kind == JOINT:
         return Spot(layout.coordinate(machine.joints[node].to), layout.links.get(node, 0), 0, 1.0)

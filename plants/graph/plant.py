@@ -176,4 +176,3 @@ def state_space(p: GraphParams) -> tuple[np.ndarray, np.ndarray]:
     A, G = np.zeros((p.nx, p.nx)), np.zeros((p.nx, p.nu + p.nq))
     assemble.interpret(p, A, G)
     return A, G[:, : p.nu]
-

@@ -1,4 +1,4 @@
-"""Described machine on given commands: what its sensors would show, from rest, without loop, converters and counters."""
+"""Described machine on given commands: what its sensors would show, from rest, without loop, converters, counters."""
 
 import numpy as np
 

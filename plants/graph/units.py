@@ -127,6 +127,8 @@ def _per(unit: str) -> str:
 
 def _body(path: str, body: Mapping[str, Any]) -> dict[str, Any]:
     slides = "mass" in body
+    if not slides and "inertia" not in body and not body.get("fixed"):
+        raise ValueError(f"{path}: give inertia (a body that turns) or mass (a body that slides)")
     out = _converted(path, body, {key: pair[slides] for key, pair in BODY.items()})
     weight = out.get("gravity")
     if isinstance(weight, Mapping):

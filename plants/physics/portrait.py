@@ -250,7 +250,9 @@ def stand(kind: str, h: float) -> tuple[Any, Any]:
     p = plant.build(getattr(plant, f"{name}Settings")(parameters=STAND[kind]), h, *DRIVES[kind])
     s = np.zeros(1, getattr(plant, f"{kind.upper()}_STATE")).view(np.recarray)[0]
     scope = dict(vars(plant))  # as plain Python, and without the matrix exponential, which nobody asks for
-    scope["linear"] = SimpleNamespace(link=linear.link.py_func, size=linear.size.py_func, discretise_machine=lambda _: None)
+    scope["linear"] = SimpleNamespace(
+        link=linear.link.py_func, size=linear.size.py_func, discretise_machine=lambda _: None
+    )
     for key, value in vars(plant).items():
         if hasattr(value, "py_func"):
             scope[key] = FunctionType(value.py_func.__code__, scope)

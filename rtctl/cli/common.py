@@ -91,10 +91,9 @@ def load_config(path: str, overrides: list[str] | None) -> Any:
         line = document.line(("machine",)) if kind else None
         where = f"{path}:{line}" if line else path
         known = ", ".join(machines.CONFIGS)
-        raise UserError(
-            f"{where}: machine: " + (f"{kind!r:.60} is not one of {known}" if kind else f"missing; it is one of {known}, or bodies, joints, drives and sensors")
-            + (f"; did you mean '{near}'?" if near else "")
-        )  # fmt: skip
+        wanted = f"{known}, or bodies, joints, drives and sensors"
+        what = f"{kind!r:.60} is not one of {known}" if kind else f"missing; it is one of {wanted}"
+        raise UserError(f"{where}: machine: {what}" + (f"; did you mean '{near}'?" if near else ""))
     return load_settings(file, model, overrides or [], machines.OWN)
 
 

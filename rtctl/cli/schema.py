@@ -28,7 +28,6 @@ def schema(
     if machine not in machines.EVERY:
         near = nearest(machine, machines.EVERY)
         raise UserError(
-            f"no machine '{machine}'; "
-            + (f"did you mean '{near}'?" if near else f"it is {', '.join(machines.EVERY)}")
+            f"no machine '{machine}'; " + (f"did you mean '{near}'?" if near else f"it is {', '.join(machines.EVERY)}")
         )
     typer.echo(json.dumps(json_schema(machines.EVERY[machine]), indent=2))

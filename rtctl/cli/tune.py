@@ -16,8 +16,12 @@ def tune(
     config: ConfigArgument,
     bandwidth: Annotated[
         float | None,
-        typer.Option("--bandwidth", metavar="HZ", help="Bandwidth to reach; 2 Hz ivu, 50 Hz ldu, 5 Hz axis if absent; of a described machine "
-            "the fastest that keeps the margins."),
+        typer.Option(
+            "--bandwidth",
+            metavar="HZ",
+            help="Bandwidth to reach; 2 Hz ivu, 50 Hz ldu, 5 Hz axis if absent; of a described machine "
+            "the fastest that keeps the margins.",
+        ),
     ] = None,
     damping: Annotated[float, typer.Option("--damping", metavar="ZETA", help="Damping of a PD loop.")] = 1.0,
     gm: Annotated[
@@ -37,8 +41,9 @@ def tune(
     json: JsonOption = False,
 ) -> None:
     """Tune the law of a config on the model in its `plant`: PD with a gain schedule over the reel radii (ivu), lead-lag
-    with notches and a low-pass (ldu), PD (axis), and a first law for a described machine: PD or PI. Writes the tuned config with the reasons as comments, and a picture of
-    Bode plot, Nyquist plot and step response before and after.
+    with notches and a low-pass (ldu), PD (axis), and a first law for a machine that the config describes: PD or PI.
+    Writes the tuned config with the reasons as comments, and a picture of Bode plot, Nyquist plot and step response
+    before and after.
 
     Exit code 3 where the loop to start from is unstable or the margins cannot be kept.
 

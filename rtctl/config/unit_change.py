@@ -48,11 +48,11 @@ def _power(symbol: str, power: int) -> str:
 
 def with_units(model: Any, symbols: Mapping[str, str]) -> Any:
     """The settings class with `symbols` of its units replaced, also in the settings below it. Kept once made."""
-    return _with_units(model, tuple(sorted(symbols.items())))
+    return _made(model, tuple(sorted(symbols.items())))
 
 
 @lru_cache(maxsize=256)
-def _with_units(model: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
+def _made(model: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
     fields: dict[str, Any] = {}
     for name, field in model.model_fields.items():
         annotation = _annotation(field.annotation, symbols)
@@ -71,13 +71,14 @@ def _with_units(model: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
 def _moved(settings: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
     """The same numbers in the class with other units."""
     given = {name: getattr(settings, name) for name in settings.model_fields_set}
-    return _with_units(type(settings), symbols).model_validate(given)
+    kind: Any = type(settings)
+    return _made(kind, symbols).model_validate(given)
 
 
 def _annotation(annotation: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
     """The annotation with every settings class in it in other units; the same object where none is."""
     if hasattr(annotation, "model_fields"):
-        return _with_units(annotation, symbols)
+        return _made(annotation, symbols)
     inner = get_args(annotation)
     if get_origin(annotation) is Annotated:
         made = _annotation(inner[0], symbols)

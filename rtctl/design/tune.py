@@ -63,7 +63,9 @@ def _described(config: Any, hertz: float | None, GM: float | None, PM: float | N
     else:
         reasons.append(Reason("law.position.tau_i", f"{first_law.INTEGRAL:g} / w of the crossover"))
         if law.tau_d:
-            reasons.append(Reason("law.position.velocity_gain", f"lead at the crossover, above {law.corner:.3g} Hz off"))
+            reasons.append(
+                Reason("law.position.velocity_gain", f"lead at the crossover, above {law.corner:.3g} Hz off")
+            )
     return Tuned(found.config, reasons, before, found.margins, {})
 
 

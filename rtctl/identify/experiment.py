@@ -119,9 +119,7 @@ def noise(
 def usual_of(config: Any) -> Usual:
     """The usual excitation of a machine. Raises UserError where there is none."""
     if config.kind not in USUAL:
-        raise UserError(
-            f"{config.name}: a frequency response is played on {' and '.join(USUAL)}, not on {config.kind}"
-        )
+        raise UserError(f"{config.name}: a frequency response is played on {' and '.join(USUAL)}, not on {config.kind}")
     return USUAL[config.kind]
 
 

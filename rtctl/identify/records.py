@@ -126,7 +126,7 @@ def config_of(bundle: Bundle) -> Any:
     data = bundle.case.get("config")
     where = bundle.folder / "case.json"
     base = machines.class_of(data)
-    if base is None:
+    if base is None or not isinstance(data, dict):
         raise UserError(f"{where}: no config of a machine under 'config'; experiments read recordings of `rtctl run`")
     refuse_plant(data, f"{where}: config.")
     model, data = without_code(base, data)

@@ -1,4 +1,4 @@
-"""Places of a machine's bodies in a drawing: a column for each joint away from what is driven, a row for each branch."""
+"""Places of bodies in a drawing: a column for each joint away from what is driven, a row for each branch."""
 
 from typing import NamedTuple
 

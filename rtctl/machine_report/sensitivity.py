@@ -21,11 +21,13 @@ from rtctl.plants.graph.params import build
 from rtctl.plants.graph.played import played
 
 SECONDS, MOST_ROWS = 5.0, 5000
+WINDOW = 0.05  # s, over which a position's change is looked at: where it started, and slow drift, tell little
 SHARE = 0.35  # of a drive's limit, rms of its multisine
 CHANGE = 0.01  # of a parameter, for the finite difference
 TOLERANCE = 0.15  # share by which an owner's value is usually wrong
 SURE = 5.0  # steps of all sensors together that a change by TOLERANCE has to make
-SAME = 2e-3  # singular value of the normed sensitivities below which parameters move alike
+SAME = 8e-3  # singular value of the normed sensitivities below which parameters move alike
+TWINS = 1e-5  # of 1 less their correlation, parameters whose effects are one: factors of a product
 PART = 0.2  # share of the largest that makes a parameter part of a combination
 LEFT_OUT = ("limit", "dac_range", "counts_per_unit", "per_unit", "resolution", "noise")
 
@@ -70,7 +72,7 @@ def commands(config: Any, n: int, dt: float) -> np.ndarray:
     f = np.geomspace(2.0 / (n * dt), 0.2 / dt, 40)
     u = []
     for drive in config.machine.drives.values():
-        wave = np.sum(np.sin(2 * np.pi * np.outer(t, f) + rng.uniform(0, 2 * np.pi, len(f))) / np.sqrt(f), axis=1)
+        wave = np.sum(np.sin(2 * np.pi * np.outer(t, f) + rng.uniform(0, 2 * np.pi, len(f))), axis=1)
         u.append(SHARE * (drive.limit or FULL) * wave / np.sqrt(np.mean(wave**2)))
     return np.stack(u, axis=1)
 
@@ -86,9 +88,13 @@ def sensitivity(config: Any) -> Sensitivity:
     steps = np.array([s.noise or s.grain or FINE for s in machine.sensors.values()])
     scales = np.array([s.scale for s in machine.sensors.values()]) / steps
 
+    moves = np.array([s.measures == "position" for s in machine.sensors.values()])
+    lag = max(1, round(WINDOW / dt))
+
     def shown(path: str, factor: float) -> np.ndarray:
         p = build(layout, {**values, path: values[path] * factor}, dt / substeps)
-        return (played(p, u, substeps) * scales).ravel()
+        y = played(p, u, substeps) * scales
+        return np.where(moves, y[lag:] - y[:-lag], y[lag:]).ravel()
 
     J = np.stack([(shown(p, 1 + CHANGE) - shown(p, 1 - CHANGE)) / (2 * CHANGE) for p in names], axis=1)
     return judged(names, np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0))
@@ -96,16 +102,17 @@ def sensitivity(config: Any) -> Sensitivity:
 
 def judged(names: list[str], J: np.ndarray) -> Sensitivity:
     """Groups of parameters by their whitened sensitivities J (rows, parameters)."""
-    norms = np.sqrt((J * J).sum(axis=0))
+    norms: np.ndarray = np.sqrt((J * J).sum(axis=0))
     unseen = tuple(name for name, norm in zip(names, norms, strict=True) if norm * TOLERANCE < SURE)
-    seen = [i for i, norm in enumerate(norms) if norm * TOLERANCE >= SURE]
+    seen: list[int] = [i for i, norm in enumerate(norms) if norm * TOLERANCE >= SURE]
     if not seen:
         return Sensitivity(tuple(names), 0, {}, (), unseen)
     R = J[:, seen] / norms[seen]
     twins = _twins(R)
     heads = [members[0] for members in twins]
+    sizes = norms[seen][heads]
     _, S, Vt = np.linalg.svd(R[:, heads], full_matrices=False)
-    directions = Vt / norms[seen][heads]  # relative change of each parameter
+    directions = Vt / sizes  # relative change of each parameter
     strong = S >= np.maximum(SAME, SURE / TOLERANCE * np.abs(directions).max(axis=1))
     groups = [Group(tuple(names[seen[i]] for i in members), ()) for members in twins if len(members) > 1]
     bound = {name for group in groups for name in group.names}
@@ -113,7 +120,7 @@ def judged(names: list[str], J: np.ndarray) -> Sensitivity:
         part = [i for i in range(len(heads)) if abs(d[i]) > PART]
         groups.append(Group(tuple(names[seen[heads[i]]] for i in part), tuple(float(d[i]) for i in part)))
     spread = np.sqrt(((directions[strong] / S[strong, None]) ** 2).sum(axis=0))
-    unseen += tuple(group.names[0] for group in groups if len(group.names) == 1)
+    unseen += tuple(g.names[0] for g in groups if len(g.names) == 1 and g.names[0] not in bound)
     groups = [group for group in groups if len(group.names) > 1]
     bound |= {name for group in groups for name in group.names} | set(unseen)
     told = {names[seen[i]]: float(spread[j]) for j, i in enumerate(heads) if names[seen[i]] not in bound}
@@ -123,7 +130,7 @@ def judged(names: list[str], J: np.ndarray) -> Sensitivity:
 def _twins(R: np.ndarray) -> list[list[int]]:
     """Columns of unit length, those of one direction together: factors of a product, parts of a sum."""
     found: list[list[int]] = []
-    alike = np.abs(R.T @ R) > 1.0 - SAME**2
+    alike = np.abs(R.T @ R) > 1.0 - TWINS
     for i in range(R.shape[1]):
         group = next((members for members in found if alike[i, members[0]]), None)
         if group is None:
@@ -138,7 +145,7 @@ def _sparse(directions: np.ndarray) -> np.ndarray:
     N = directions / np.abs(directions).max(axis=1, keepdims=True) if len(directions) else directions
     N = N.copy()
     for k in range(len(N)):
-        row, column = np.unravel_index(np.argmax(np.abs(N[k:])), N[k:].shape)
+        row, column = divmod(int(np.argmax(np.abs(N[k:]))), N.shape[1])
         N[[k, k + row]] = N[[k + row, k]]
         N[k] /= N[k, column]
         for other in range(len(N)):

@@ -28,9 +28,7 @@ class Canvas:
 def drawing(machine: Description) -> list[str]:
     """Lines of the drawing."""
     g = grid(machine)
-    label = {
-        name: [name, *([f"({marks(machine, name)})"] if marks(machine, name) else [])] for name in g.places
-    }
+    label = {name: [name, *([f"({marks(machine, name)})"] if marks(machine, name) else [])] for name in g.places}
     widths, heads, feet = [0] * g.columns, [0] * g.rows, [0] * g.rows
     for name, (column, row) in g.places.items():
         words = [*label[name], *above(machine, name), *below(machine, name)]
@@ -55,9 +53,7 @@ def drawing(machine: Description) -> list[str]:
     return canvas.lines()
 
 
-def _body(
-    canvas: Canvas, x: int, y: int, width: int, label: list[str], drives: list[str], sensors: list[str]
-) -> None:
+def _body(canvas: Canvas, x: int, y: int, width: int, label: list[str], drives: list[str], sensors: list[str]) -> None:
     canvas.text(x, y, "\u250c" + "\u2500" * (width - 2) + "\u2510")
     for i in range(2):
         canvas.text(x, y + 1 + i, "\u2502" + (label[i] if i < len(label) else "").center(width - 2) + "\u2502")

@@ -97,7 +97,8 @@ def _drives(machine: Description) -> Iterator[str]:
         turns = machine.turns(drive.body) if drive.body else ends_turn(machine, machine.joints[drive.joint])[1]
         force, made = FORCE[turns], {"force": FORCE[turns], "current": "A", "voltage": "V"}[drive.kind]
         per = f" for 1 {drive.unit}" if drive.unit else ""
-        parts = [f"{name} drives {drive.body or f'the two ends of {drive.joint}'} by {drive.column}: {si(drive.gain, made)}{per}"]
+        where = drive.body or f"the two ends of {drive.joint}"
+        parts = [f"{name} drives {where} by {drive.column}: {si(drive.gain, made)}{per}"]
         if drive.torque_constant is not None:
             parts.append(f"{si(drive.torque_constant, f'{force}/A')}")
         if drive.kind == "voltage":

@@ -12,7 +12,6 @@ from rtctl.idiom import Settings, quantity
 from rtctl.loop.faults import FaultSettings
 from rtctl.loop.safety import SafetySettings
 
-
 DESCRIBED = "described"  # kind of a machine whose config holds its description
 
 
@@ -201,9 +200,7 @@ class RatioParams(NamedTuple):
     ratio: float  # what a node moves for one unit of its coordinate
 
 
-def physics_lines(
-    terms: list[Any], kind: str, dt: float, place_of: Callable[[str], Any] | None = None
-) -> PhysicsLines:
+def physics_lines(terms: list[Any], kind: str, dt: float, place_of: Callable[[str], Any] | None = None) -> PhysicsLines:
     """Modules, blocks and lines of the plant's terms, in the order in which they act.
 
     `place_of` gives the place of a node of a described machine (plants/graph/places.py); by `kind` where it is absent.

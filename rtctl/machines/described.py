@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.drivers import at_mio_16de, daq_stc
+from rtctl.drivers import daq_stc
 from rtctl.idiom import state, tick
 from rtctl.laws import bumpless, limit, reference, shaper, velocity
 from rtctl.loop import safety
@@ -133,8 +133,8 @@ def columns(config: Any) -> tuple[Column, ...]:
             for name, drive in parts.machine.drives.items()
         ),
         *(
-            Column(s.column, "counts" if s.counts_per_unit is not None else _column_unit(parts.machine, s), f"{name}: {s.measures}")
-            for name, s in parts.machine.sensors.items()
+            Column(sensor.column, _column_unit(parts.machine, sensor), f"{name}: {sensor.measures}")
+            for name, sensor in parts.machine.sensors.items()
         ),
         Column("feedback", unit, f"what the loop closes on, by {parts.feedback}"),
         Column("position_error", unit, "ref - feedback"),
@@ -144,7 +144,9 @@ def columns(config: Any) -> tuple[Column, ...]:
 
 
 def _column_unit(machine: Description, sensor: Any) -> str:
-    """SI unit of a column of numbers; "" where the column is in another one."""
+    """Counts, or the SI unit of a column of numbers; "" where the column is in another one."""
+    if sensor.counts_per_unit is not None:
+        return "counts"
     if sensor.per_unit != 1.0:
         return ""
     turns = True

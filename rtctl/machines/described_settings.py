@@ -131,23 +131,22 @@ def config_class(data: Any) -> type[DescribedConfig]:
 @lru_cache(maxsize=64)
 def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
     symbols = {"V": command, "rad": way, "m": way}
-    kept = {"shaper": DescribedLawSettings.model_fields["shaper"]}  # its bandwidth is in rad/s, of whatever machine
-    limits = with_units(LimitSettings, symbols)
-    laws = with_units(DescribedLawSettings, symbols)
-    law = create_model(
-        "DescribedLawSettings", __base__=laws, __module__=__name__, __doc__=laws.__doc__,
-        limit=(limits, limits(high=full)), shaper=(kept["shaper"].annotation, kept["shaper"]),
-    )  # type: ignore[call-overload]
-    safety = with_units(SafetySettings, symbols)
-    reference = with_units(ReferenceSettings, symbols)
-    excitation = with_units(create_model("E", excitation=(ExcitationSettings, NoneSettings())), symbols)
-    return create_model(
-        "DescribedConfig", __base__=DescribedConfig, __module__=__name__, __doc__=DescribedConfig.__doc__,
-        law=(law, law()),
-        safety=(safety, safety(frozen_effort=0.5 * full, current_time=0.0)),
-        reference=(reference, reference()),
-        excitation=(excitation.model_fields["excitation"].annotation, excitation.model_fields["excitation"]),
-    )  # type: ignore[call-overload]
+    limits, laws = with_units(LimitSettings, symbols), with_units(DescribedLawSettings, symbols)
+    shaper = DescribedLawSettings.model_fields["shaper"]  # its bandwidth is in rad/s, of whatever machine
+    fields: dict[str, Any] = {"limit": (limits, limits(high=full)), "shaper": (ShaperSettings, shaper)}
+    law: Any = create_model("DescribedLawSettings", __base__=laws, __module__=__name__, __doc__=laws.__doc__, **fields)
+    safety, reference = with_units(SafetySettings, symbols), with_units(ReferenceSettings, symbols)
+    played = with_units(DescribedConfig, symbols).model_fields["excitation"]
+    fields = {
+        "law": (law, law()),
+        "safety": (safety, safety(frozen_effort=0.5 * full, current_time=0.0)),
+        "reference": (reference, reference()),
+        "excitation": (played.annotation, played),
+    }
+    made: Any = create_model(
+        "DescribedConfig", __base__=DescribedConfig, __module__=__name__, __doc__=DescribedConfig.__doc__, **fields
+    )
+    return made
 
 
 def _closable(machine: Description) -> list[str]:
@@ -176,7 +175,9 @@ def _check_columns(machine: Description) -> None:
     taken = {*SIGNALS, *(column.name for column in COMMON_COLUMNS)}
     for path, column in _columns(machine):
         if not (column.isidentifier() and column.isascii()) or keyword.iskeyword(column):
-            raise ValueError(f"{path}: '{column}' is no name of a signal; write letters, digits and _, as in motor_counts")
+            raise ValueError(
+                f"{path}: '{column}' is no name of a signal; write letters, digits and _, as in motor_counts"
+            )
         if column in taken or column.startswith("truth_"):
             raise ValueError(f"{path}: '{column}' is a signal of the loop itself; take another, such as {column}_read")
 
