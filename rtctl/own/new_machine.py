@@ -12,7 +12,7 @@ NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 def examples() -> list[str]:
     """Names of the machines to start from."""
-    folder = Path(str(resources.files("rtctl.configs.machines")))
+    folder = Path(str(resources.files("rtctl.configs"))) / "machines"
     return sorted(path.stem for path in folder.glob("*.yaml"))
 
 
@@ -31,7 +31,7 @@ def write_machine(name: str, like: str, folder: Path) -> Path:
         raise UserError(f"'{name:.60}': a machine's name is letters, digits, - and _; write e.g. belt.yaml")
     if path.exists():
         raise UserError(f"{path}: there already, and nothing is overwritten; take another name or --into DIR")
-    text = (resources.files("rtctl.configs.machines") / f"{like}.yaml").read_text(encoding="utf-8")
+    text = (resources.files("rtctl.configs") / "machines" / f"{like}.yaml").read_text(encoding="utf-8")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, text.replace(f"\nname: {like}\n", f"\nname: {path.stem}\n", 1))
