@@ -44,7 +44,8 @@ def nodes_for(machine: Description, term: str) -> list[str]:
     bodies = [name for name in machine.bodies if not machine.is_frame(name)]
     springs = [name for name, joint in machine.joints.items() if joint.stiffness is not None]
     groups = {BODY: bodies, JOINT: springs, DRIVE: list(machine.drives), SENSOR: list(machine.sensors), LOOP: [LOOP]}
-    return [name for kind, begins in FAMILIES.items() if term.startswith(begins) for name in groups[kind]]
+    own = ":" in term  # of a file of the user's own: wherever they put it
+    return [name for kind, begins in FAMILIES.items() if own or term.startswith(begins) for name in groups[kind]]
 
 
 def check_node(machine: Description, path: str, term: str, node: str) -> None:

@@ -11,6 +11,9 @@ BODY = {  # key -> unit where the body turns, and where it slides
     "inertia": ("kg*m^2", "kg*m^2"), "mass": ("kg", "kg"), "dry": ("Nm", "N"), "viscous": ("Nm*s/rad", "N*s/m"),
 }  # fmt: skip
 GRAVITY = {"mass": "kg", "arm": "m", "angle": "rad", "incline": "rad"}
+FITS = {  # place -> what a sensor can measure there
+    "body": ("position", "speed", "acceleration"), "joint": ("position", "speed", "force"), "drive": ("current",),
+}  # fmt: skip
 FORCE = {True: "Nm", False: "N"}
 WAY = {True: TURNS, False: SLIDES}
 
@@ -85,7 +88,7 @@ def in_si(data: Mapping[str, Any]) -> dict[str, Any]:
     out["sensors"] = _each(
         data,
         "sensors",
-        lambda path, sensor: _converted(path, sensor, _sensor_units(sensor, acts_on_turning(sensor))),
+        lambda path, sensor: _converted(path, sensor, _sensor_units(path, sensor, acts_on_turning(sensor))),
     )
     return {key: value for key, value in out.items() if key in data}
 
@@ -110,13 +113,21 @@ def _ends(joint: Mapping[str, Any], turns: Mapping[str, bool]) -> tuple[bool, bo
     return a, b if b is not None else a
 
 
-def _sensor_units(sensor: Mapping[str, Any], turns: bool) -> dict[str, str]:
+def _sensor_units(path: str, sensor: Mapping[str, Any], turns: bool) -> dict[str, str]:
     measures = str(sensor.get("measures", "position"))
+    check_place(f"{path}.", next((key for key in FITS if sensor.get(key) is not None), ""), measures)
     if measures not in ("position", "speed", "acceleration", "force", "current"):
         return {}
     unit = measured_unit(measures, turns)
     column = {} if "per_unit" in sensor or "counts_per_unit" in sensor else {"resolution": unit, "noise": unit}
     return {"counts_per_unit": _per(unit), **column}
+
+
+def check_place(path: str, where: str, measures: str) -> None:
+    """Raise ValueError where nothing of the kind can be measured at a body, joint or drive."""
+    if where and measures not in FITS[where]:
+        fits = ", ".join(FITS[where])
+        raise ValueError(f"{path}measures: {measures} is not seen at a {where}; it can be {fits}")
 
 
 def _per(unit: str) -> str:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.config.units import ANGLES
 from rtctl.loop import safety
 from rtctl.loop.fused import Run
 from rtctl.machines import Machine
@@ -24,6 +25,9 @@ METRICS: dict[str, Metric] = {
     "rms_error_mm": Metric("rms of reference - measured while running", "mm", 1),
     "peak_error_mm": Metric("largest of it", "mm", 1),
     "true_final_error_mm": Metric("final error by the emulator's own position", "mm", 1),
+    "final_error": Metric("largest mean error at the end of a step, of an angle or a speed", "unit", 1),
+    "rms_error": Metric("rms of reference - measured while running, of an angle or a speed", "unit", 1),
+    "peak_error": Metric("largest of it", "unit", 1),
     "tension_min_N": Metric("lowest tape tension while running", "N", -1),
     "tension_max_N": Metric("highest tape tension while running", "N", 1),
     "rms_output_V": Metric("rms of what was written to a drive, of the one that had most", "V", 1),
@@ -55,7 +59,12 @@ def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
     if not steps:
         return {}
     settling = [_number(s["settling_s"]) for s in steps]
+    own = {}
+    if machine.metres_per_unit is None:
+        unit = "final_error_rad" if machine.unit in ANGLES else "final_error"
+        own = {"final_error": _largest(steps, unit)}
     found = {
+        **own,
         "final_error_mm": _largest(steps, "final_error_mm"),
         "overshoot_pct": _largest(steps, "overshoot_pct"),
         "settling_s": max(settling) if all(x == x for x in settling) else NAN,
@@ -77,7 +86,8 @@ def _number(value: float | None) -> float:
 
 def _error(rows: np.ndarray, machine: Machine) -> dict[str, float]:
     if machine.metres_per_unit is None:
-        return {}
+        error = rows[machine.signals.error]
+        return {"rms_error": float(np.sqrt(np.mean(error * error))), "peak_error": float(np.max(np.abs(error)))}
     error = 1000.0 * machine.metres_per_unit * rows[machine.signals.error]
     return {"rms_error_mm": float(np.sqrt(np.mean(error * error))), "peak_error_mm": float(np.max(np.abs(error)))}
 

@@ -90,6 +90,10 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
     """
     rng = np.random.default_rng([seed, *config.kind.encode()])
     names = [name for name in sorted(TERMS) if nodes(name, config)]
+    if not names:
+        raise UserError(
+            f"{config.name}: effects are hidden in machines that come with the program, not in a described one"
+        )
     at = len(config.plant.physics)
     for _ in range(TRIES):
         name = names[rng.integers(len(names))]

@@ -83,8 +83,7 @@ class DescribedConfig(MachineSettings):
             _known(f"law.shares.{name}", name, list(machine.drives), "drive")
         _check_columns(machine)
         for i, term in enumerate(self.plant.physics):
-            if ":" not in term.term:
-                check_node(machine, f"plant.physics.{i}.node", term.term, term.node)
+            check_node(machine, f"plant.physics.{i}.node", term.term, term.node)
         return self
 
 
