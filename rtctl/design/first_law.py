@@ -19,7 +19,7 @@ from rtctl.config.load import set_path
 from rtctl.design import margins, response, systems
 from rtctl.design.margins import Margins
 from rtctl.laws import pd, pi_velocity, velocity
-from rtctl.machines.described import Parts, parts_of
+from rtctl.machines.described_parts import Parts, parts_of
 
 CROSSOVERS = 60  # tried, evenly in the logarithm
 SLOWEST, FASTEST = 1 / 4000, 1 / 12  # of the sample rate

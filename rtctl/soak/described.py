@@ -6,7 +6,7 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.laws import reference
-from rtctl.machines.described import parts_of, signals
+from rtctl.machines.described_parts import parts_of, signals
 from rtctl.machines.described_plant import converter, is_counter
 
 

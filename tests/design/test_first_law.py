@@ -7,7 +7,7 @@ import pytest
 from rtctl.config.errors import NoAnswer
 from rtctl.config.load import set_path
 from rtctl.design import first_law, systems, tune
-from rtctl.machines.described import parts_of
+from rtctl.machines.described_parts import parts_of
 
 LEAST = (6.0, 45.0)
 
