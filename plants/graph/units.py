@@ -56,7 +56,7 @@ def in_si(data: Mapping[str, Any]) -> dict[str, Any]:
     bodies = data.get("bodies")
     _check_bodies(data)
     turns = {
-        name: not (isinstance(body, Mapping) and "mass" in body) for name, body in _items(bodies)
+        name: not (isinstance(body, Mapping) and body.get("mass") is not None) for name, body in _items(bodies)
     }  # of every body, as it is written
 
     def kind_of(name: Any) -> bool:
@@ -137,7 +137,7 @@ def _per(unit: str) -> str:
 
 
 def _body(path: str, body: Mapping[str, Any]) -> dict[str, Any]:
-    slides = "mass" in body
+    slides = body.get("mass") is not None
     if not slides and "inertia" not in body and not body.get("fixed"):
         raise ValueError(f"{path}: give inertia (a body that turns) or mass (a body that slides)")
     out = _converted(path, body, {key: pair[slides] for key, pair in BODY.items()})

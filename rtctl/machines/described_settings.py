@@ -104,13 +104,13 @@ def units_of(data: Any) -> tuple[str, str, float]:
     bodies, sensors, drives = (_mapping(machine.get(key)) for key in ("bodies", "sensors", "drives"))
     found = [
         name for kind in FEEDBACK for name, s in sensors.items()
-        if _mapping(s).get("measures", "position") == kind and "body" in _mapping(s)
+        if _mapping(s).get("measures", "position") == kind and _mapping(s).get("body") is not None
     ]  # fmt: skip
     sensor = _mapping(sensors.get(str(law.get("feedback", found[0] if found else ""))))
     drive = _mapping(drives.get(str(law.get("drive", next(iter(drives), "")))))
     measures = sensor.get("measures", "position")
     body = _mapping(bodies.get(str(sensor.get("body"))))
-    way = measured_unit(measures if measures in FEEDBACK else "position", "mass" not in body)
+    way = measured_unit(measures if measures in FEEDBACK else "position", body.get("mass") is None)
     command = drive.get("unit", "V")
     command = {"%": "percent"}.get(command, command) if isinstance(command, str) else "V"
     full = FULL
