@@ -106,8 +106,8 @@ def units_of(data: Any) -> tuple[str, str, float]:
         name for kind in FEEDBACK for name, s in sensors.items()
         if _mapping(s).get("measures", "position") == kind and _mapping(s).get("body") is not None
     ]  # fmt: skip
-    sensor = _mapping(sensors.get(str(law.get("feedback", found[0] if found else ""))))
-    drive = _mapping(drives.get(str(law.get("drive", next(iter(drives), "")))))
+    sensor = _mapping(sensors.get(str(law.get("feedback") or (found[0] if found else ""))))
+    drive = _mapping(drives.get(str(law.get("drive") or next(iter(drives), ""))))
     measures = sensor.get("measures", "position")
     body = _mapping(bodies.get(str(sensor.get("body"))))
     way = measured_unit(measures if measures in FEEDBACK else "position", body.get("mass") is None)

@@ -124,8 +124,9 @@ def test_every_example_is_stable_with_margins(name):
 def test_a_written_config_loads_to_the_same(name, tmp_path):
     settings = config(name)
     path = tmp_path / "again.yaml"
-    path.write_text(to_yaml(settings))
-    assert load_config(str(path), []) == settings
+    for full in (False, True):
+        path.write_text(to_yaml(settings, full=full))
+        assert load_config(str(path), []) == settings
 
 
 def test_numbers_of_the_description_are_settings_like_others():
