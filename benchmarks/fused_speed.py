@@ -1,6 +1,7 @@
 """How fast a machine runs fused, against real time and against hand-written C.
 
     python benchmarks/fused_speed.py [--json] [--seconds S] [--windows N]
+    python benchmarks/fused_speed.py --described belt     a described machine, which has no twin in C
 
 Each window is a run of the shipped config with the shipped reference from rest, ours and C in turns, on one CPU.
 """
@@ -18,7 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from twins import Ours, Reference, machine_of
+from twins import CONFIGS, Ours, Reference, machine_of
+
+from rtctl import machines
+from rtctl.cli.common import load_config, with_loop
 
 VIRTUAL = {"ivu": 12.0, "ldu": 3.5}  # s, the whole of the reference
 SHORTEST = 0.1  # s of wall time in a window, below which the clock and the call count
@@ -77,6 +81,26 @@ def measure(kind: str, seconds: float | None, windows: int, folder: Path) -> dic
     }
 
 
+def described(name: str, windows: int) -> dict[str, Any]:
+    """A described machine: speed alone."""
+    config = load_config(str(CONFIGS / "machines" / f"{name}.yaml"), [])
+    machine = machines.build(with_loop(config, "fused", None))
+    ours = Ours(machine)
+    ticks = round((config.reference.repeat or 4.0) * machine.rate)
+    repeats = max(1, math.ceil(SHORTEST / timed(ours, ticks, 1)))
+    took = [timed(ours, ticks, repeats) / (ticks * repeats) for _ in range(windows)]
+    return {
+        "x_realtime": round(1.0 / (statistics.median(took) * machine.rate), 1),
+        "x_realtime_best": round(1.0 / (min(took) * machine.rate), 1),
+        "us_per_tick": round(statistics.median(took) * 1e6, 4),
+        "substeps": machine.substeps,
+        "ticks": ticks * repeats,
+        "windows": windows,
+        "ended_running": bool(ours.rows["state"][:ticks][-1] == 2),
+        "target": {"x_realtime": 3000.0},
+    }
+
+
 def agree(kind: str, ours: Any, c: Any, ticks: int) -> dict[str, Any]:
     """Largest difference of the two recordings, relative to the largest value of each column."""
     a, b = ours.rows[:ticks], c.rows[:ticks]
@@ -104,7 +128,20 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, help="virtual time of a run; the whole reference if not given")
     parser.add_argument("--windows", type=int, default=9, help="windows of ours and of C, in turns")
     parser.add_argument("--machine", choices=sorted(VIRTUAL), action="append", help="only this one")
+    parser.add_argument("--described", metavar="NAME", action="append", help="a described machine, such as belt")
     given = parser.parse_args()
+    if given.described:
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+        found = {name: described(name, given.windows) for name in given.described}
+        if given.json:
+            print(json.dumps(found))
+            return 0
+        for name, r in found.items():
+            print(
+                f"{name}: {r['x_realtime']:.0f} x real time (best window {r['x_realtime_best']:.0f}), "
+                f"{r['us_per_tick']:.3f} us a tick of {r['substeps']} substeps"
+            )
+        return 0
     if shutil.which("cc") is None:
         message = "there is no C compiler (cc) here to compare with; install gcc"
         print(json.dumps({"skipped": message}) if given.json else message)

@@ -15,7 +15,7 @@ from rtctl.loop import fused
 from rtctl.loop.safety import RUNNING
 from rtctl.trace import compare
 from rtctl.trace.bundle import Bundle, load_bundle
-from rtctl.trace.metrics import POSITION, machine_steps
+from rtctl.trace.metrics import machine_steps
 
 
 def load_config(name: str | Path, changes: Mapping[str, Any] | None = None, reference: str | None = None) -> Any:
@@ -70,7 +70,7 @@ def steps(what: fused.Run | Bundle | str | Path) -> list[dict[str, float | None]
     ran = what["state"] == RUNNING
     if not ran.any():
         return []
-    return machine_steps(machine, what["t"][ran], what["target"][ran], what[POSITION[machine.kind]][ran])
+    return machine_steps(machine, what["t"][ran], what["target"][ran], what[machine.signals.position][ran])
 
 
 def run_campaign(file: str | Path, folder: str | Path, jobs: int = 1, seconds: float | None = None) -> pa.Table:

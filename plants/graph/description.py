@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, create_model, model_validator
 
 from rtctl.idiom import Settings
-from rtctl.plants.graph.units import in_si
+from rtctl.plants.graph.units import check_place, in_si
 
 FRAME = "frame"
 NAME = r"^[A-Za-z][A-Za-z0-9_-]{0,39}$"
@@ -157,13 +157,8 @@ class Sensor(Settings):
     def _place(self) -> "Sensor":
         if sum(x is not None for x in (self.body, self.joint, self.drive)) != 1:
             raise ValueError("give one of body, joint, drive: what the sensor looks at")
-        fits = {
-            "body": ("position", "speed", "acceleration"), "joint": ("position", "speed", "force"),
-            "drive": ("current",),
-        }  # fmt: skip
         where = "body" if self.body is not None else "joint" if self.joint is not None else "drive"
-        if self.measures not in fits[where]:
-            raise ValueError(f"measures: {self.measures} is not seen at a {where}; it can be {', '.join(fits[where])}")
+        check_place("", where, self.measures)
         if self.scale == 0.0:
             raise ValueError("counts_per_unit or per_unit: 0 shows nothing; give column units for one SI unit")
         return self

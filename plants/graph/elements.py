@@ -1,11 +1,14 @@
 """Elements of a described machine with the traits that its topology gives them, and where each acts in the record."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from rtctl.config.errors import nearest
 from rtctl.plants.element import LOOP, Element, element
+from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import NOWHERE, Layout
+from rtctl.plants.graph.layout import layout as layout_of
 from rtctl.plants.graph.params import joint_place, place
-from rtctl.plants.physics import Term, standing
+from rtctl.plants.physics import TERMS, Term, nodes, standing
 
 
 class Spot(NamedTuple):
@@ -43,6 +46,22 @@ def elements(layout: Layout) -> tuple[Element, ...]:
         traits += ["counts"] if sensor.counts_per_unit is not None else []
         out.append(element(name, "sensor", " ".join(traits)))
     return (*out, LOOP)
+
+
+def check_node(machine: Description, path: str, term: str, node: str) -> None:
+    """Raise ValueError, which begins with `path`, where a term cannot stand at a node."""
+    allowed = nodes(TERMS[term], elements(layout_of(machine)))
+    if node not in allowed:
+        near = nearest(node, allowed)
+        hint = (
+            f"did you mean '{near}'?" if near else f"it can stand at {', '.join(allowed) or 'no node of this machine'}"
+        )
+        raise ValueError(f"{path}: {term} cannot stand at '{node}'; {hint}")
+
+
+def place_of(layout: Layout, values: dict[str, float], settings: Any) -> Spot:
+    """Where an entry of a `physics:` list acts."""
+    return spot(TERMS[settings.term], settings.node, layout, elements(layout), values)
 
 
 def spot(term: Term, node: str, layout: Layout, there: tuple[Element, ...], values: dict[str, float]) -> Spot:

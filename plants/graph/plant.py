@@ -144,6 +144,15 @@ def current(p, m, d):
 
 
 @tick
+def tension(m, j):
+    """Pull in link `j` at the end of the substep, with what terms added to it at its middle, N or Nm."""
+    i1, a, i2, b = m.link_i[j], m.link_a[j], m.link_j[j], m.link_b[j]
+    e = a * m.x[i1] + b * m.x[i2] + m.link_e[j]
+    v = a * m.x[m.nq + i1] + b * m.x[m.nq + i2] + m.link_v[j]
+    return m.link_c[j] * e + m.link_k[j] * v + m.link_T[j]
+
+
+@tick
 def read(p, m):
     """What each sensor would show, in SI units, into m.y."""
     nq = p.nq
@@ -157,7 +166,7 @@ def read(p, m):
         elif kind == ACCELERATION:  # mean of the last substep
             m.y[c] = (a * (m.x[nq + i] - m.v_before[i]) + b * (m.x[nq + j] - m.v_before[j])) / m.h
         elif kind == TENSION:
-            m.y[c] = linear.tension(m, p.sensor_of[c])
+            m.y[c] = tension(m, p.sensor_of[c])
         else:
             m.y[c] = current(p, m, p.sensor_of[c])
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from rtctl.config.errors import nearest
 from rtctl.config.units import to_si
 
 TURNS, SLIDES = "rad", "m"
@@ -10,6 +11,9 @@ BODY = {  # key -> unit where the body turns, and where it slides
     "inertia": ("kg*m^2", "kg*m^2"), "mass": ("kg", "kg"), "dry": ("Nm", "N"), "viscous": ("Nm*s/rad", "N*s/m"),
 }  # fmt: skip
 GRAVITY = {"mass": "kg", "arm": "m", "angle": "rad", "incline": "rad"}
+FITS = {  # place -> what a sensor can measure there
+    "body": ("position", "speed", "acceleration"), "joint": ("position", "speed", "force"), "drive": ("current",),
+}  # fmt: skip
 FORCE = {True: "Nm", False: "N"}
 WAY = {True: TURNS, False: SLIDES}
 
@@ -50,8 +54,9 @@ def in_si(data: Mapping[str, Any]) -> dict[str, Any]:
     """
     out = dict(data)
     bodies = data.get("bodies")
+    _check_bodies(data)
     turns = {
-        name: not (isinstance(body, Mapping) and "mass" in body) for name, body in _items(bodies)
+        name: not (isinstance(body, Mapping) and body.get("mass") is not None) for name, body in _items(bodies)
     }  # of every body, as it is written
 
     def kind_of(name: Any) -> bool:
@@ -83,9 +88,22 @@ def in_si(data: Mapping[str, Any]) -> dict[str, Any]:
     out["sensors"] = _each(
         data,
         "sensors",
-        lambda path, sensor: _converted(path, sensor, _sensor_units(sensor, acts_on_turning(sensor))),
+        lambda path, sensor: _converted(path, sensor, _sensor_units(path, sensor, acts_on_turning(sensor))),
     )
     return {key: value for key, value in out.items() if key in data}
+
+
+def _check_bodies(data: Mapping[str, Any]) -> None:
+    """Raise ValueError where an element is at a body that is not described: its units would be anybody's guess."""
+    known = [*(str(name) for name, _ in _items(data.get("bodies"))), "frame"]
+    for group, keys in (("joints", ("from", "to")), ("drives", ("body",)), ("sensors", ("body",))):
+        for name, element in _items(data.get(group)):
+            for key in keys if isinstance(element, Mapping) else ():
+                body = element.get(key)
+                if isinstance(body, str) and body not in known:
+                    near = nearest(body, known)
+                    hint = f"did you mean '{near}'?" if near else f"there is {', '.join(known)}"
+                    raise ValueError(f"{group}.{name}.{key}: there is no body '{body}'; {hint}")
 
 
 def _ends(joint: Mapping[str, Any], turns: Mapping[str, bool]) -> tuple[bool, bool]:
@@ -95,15 +113,33 @@ def _ends(joint: Mapping[str, Any], turns: Mapping[str, bool]) -> tuple[bool, bo
     return a, b if b is not None else a
 
 
-def _sensor_units(sensor: Mapping[str, Any], turns: bool) -> dict[str, str]:
+def _sensor_units(path: str, sensor: Mapping[str, Any], turns: bool) -> dict[str, str]:
     measures = str(sensor.get("measures", "position"))
+    check_place(f"{path}.", next((key for key in FITS if sensor.get(key) is not None), ""), measures)
     if measures not in ("position", "speed", "acceleration", "force", "current"):
         return {}
-    return {"counts_per_unit": f"1/({measured_unit(measures, turns)})".replace("(rad)", "rad").replace("(m)", "m")}
+    unit = measured_unit(measures, turns)
+    column = {} if "per_unit" in sensor or "counts_per_unit" in sensor else {"resolution": unit, "noise": unit}
+    return {"counts_per_unit": _per(unit), **column}
+
+
+def check_place(path: str, where: str, measures: str) -> None:
+    """Raise ValueError where nothing of the kind can be measured at a body, joint or drive."""
+    if where and measures not in FITS[where]:
+        fits = ", ".join(FITS[where])
+        raise ValueError(f"{path}measures: {measures} is not seen at a {where}; it can be {fits}")
+
+
+def _per(unit: str) -> str:
+    """Unit of counts for one of `unit`: 1/rad, s/rad, 1/N."""
+    over, _, under = unit.partition("/")
+    return f"{under}/{over}" if under else f"1/{over}"
 
 
 def _body(path: str, body: Mapping[str, Any]) -> dict[str, Any]:
-    slides = "mass" in body
+    slides = body.get("mass") is not None
+    if not slides and "inertia" not in body and not body.get("fixed"):
+        raise ValueError(f"{path}: give inertia (a body that turns) or mass (a body that slides)")
     out = _converted(path, body, {key: pair[slides] for key, pair in BODY.items()})
     weight = out.get("gravity")
     if isinstance(weight, Mapping):

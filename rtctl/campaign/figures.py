@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rtctl.campaign.metrics import ERROR, METRICS
+from rtctl.campaign.metrics import METRICS
 from rtctl.loop import safety
 from rtctl.loop.fused import Run
-from rtctl.trace.metrics import POSITION
 
 INK, BLUE, RED, GREY, GREEN = "#222222", "#0b62a8", "#b3262e", "#8a8f98", "#2e8b57"
 POINTS = 1200  # of a line
@@ -37,11 +36,11 @@ def line(run: Run, bad: bool) -> Line | None:
     if len(rows) < 2:
         return None
     machine = run.loop.machine
-    mm = 1000.0 * machine.metres_per_unit
+    mm = 1000.0 * (machine.metres_per_unit or 1.0)  # thousandths of the unit of an angle
     kept = rows[:: max(1, len(rows) // POINTS)]
-    y = kept[POSITION[machine.kind]]
+    y = kept[machine.signals.position]
     origin = kept["target"][0]
-    error = mm * kept[ERROR[machine.kind]]
+    error = mm * kept[machine.signals.error]
     return Line(kept["t"] - rows["t"][0], mm * (kept["target"] - origin), mm * (y - y[0]), error, bad)
 
 

@@ -5,10 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.config.units import ANGLES
 from rtctl.loop import safety
 from rtctl.loop.fused import Run
 from rtctl.machines import Machine
-from rtctl.trace.metrics import POSITION, machine_steps
+from rtctl.trace.metrics import machine_steps
 
 
 class Metric(NamedTuple):
@@ -24,15 +25,15 @@ METRICS: dict[str, Metric] = {
     "rms_error_mm": Metric("rms of reference - measured while running", "mm", 1),
     "peak_error_mm": Metric("largest of it", "mm", 1),
     "true_final_error_mm": Metric("final error by the emulator's own position", "mm", 1),
+    "final_error": Metric("largest mean error at the end of a step, of an angle or a speed", "unit", 1),
+    "rms_error": Metric("rms of reference - measured while running, of an angle or a speed", "unit", 1),
+    "peak_error": Metric("largest of it", "unit", 1),
     "tension_min_N": Metric("lowest tape tension while running", "N", -1),
     "tension_max_N": Metric("highest tape tension while running", "N", 1),
     "rms_output_V": Metric("rms of what was written to a drive, of the one that had most", "V", 1),
     "peak_output_V": Metric("largest voltage written to a drive", "V", 1),
     "trip_s": Metric("controller clock at the trip; none for no trip", "s", -1),
 }
-ERROR = {"ivu": "capstan_error", "ldu": "position_error", "axis": "position_error"}
-TRUTH = {"ivu": "truth_capstan", "ldu": "truth_x", "axis": "truth_x"}
-OUTPUTS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
 TENSIONS = ("truth_tension1", "truth_tension2"), ("tension1_estimate", "tension2_estimate")
 NAN = float("nan")
 
@@ -54,16 +55,21 @@ def measure(run: Run, machine: Machine, wanted: Iterable[str] = METRICS) -> dict
 
 
 def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    steps = machine_steps(machine, rows["t"], rows["target"], rows[POSITION[machine.kind]])
+    steps = machine_steps(machine, rows["t"], rows["target"], rows[machine.signals.position])
     if not steps:
         return {}
     settling = [_number(s["settling_s"]) for s in steps]
+    own = {}
+    if machine.metres_per_unit is None:
+        unit = "final_error_rad" if machine.unit in ANGLES else "final_error"
+        own = {"final_error": _largest(steps, unit)}
     found = {
+        **own,
         "final_error_mm": _largest(steps, "final_error_mm"),
         "overshoot_pct": _largest(steps, "overshoot_pct"),
         "settling_s": max(settling) if all(x == x for x in settling) else NAN,
     }
-    truth = TRUTH[machine.kind]
+    truth = machine.signals.truth
     if truth in (rows.dtype.names or ()):
         true = machine_steps(machine, rows["t"], rows["target"], rows[truth])
         found["true_final_error_mm"] = _largest(true, "final_error_mm")
@@ -79,7 +85,10 @@ def _number(value: float | None) -> float:
 
 
 def _error(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    error = 1000.0 * machine.metres_per_unit * rows[ERROR[machine.kind]]
+    if machine.metres_per_unit is None:
+        error = rows[machine.signals.error]
+        return {"rms_error": float(np.sqrt(np.mean(error * error))), "peak_error": float(np.max(np.abs(error)))}
+    error = 1000.0 * machine.metres_per_unit * rows[machine.signals.error]
     return {"rms_error_mm": float(np.sqrt(np.mean(error * error))), "peak_error_mm": float(np.max(np.abs(error)))}
 
 
@@ -94,7 +103,7 @@ def _tension(rows: np.ndarray) -> dict[str, float]:
 
 
 def _outputs(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    written = [rows[name] for name in OUTPUTS[machine.kind]]
+    written = [rows[name] for name in machine.signals.outputs]
     return {
         "rms_output_V": max(float(np.sqrt(np.mean(u * u))) for u in written),
         "peak_output_V": max(float(np.max(np.abs(u))) for u in written),

@@ -1,6 +1,7 @@
 """`rtctl check CONFIG`: whether a config is right, without compiling its tick or moving anything."""
 
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -17,8 +18,14 @@ def check(
     mode: ModeOption = None,
     link: LinkOption = None,
     set_: SetOption = None,
+    svg: Annotated[
+        Path | None, typer.Option("--svg", metavar="FILE.svg", help="Drawing of a described machine, as a picture.")
+    ] = None,
 ) -> None:
     """Check a config and say what it would run. Exit code 2 with every mistake, where it is wrong.
+
+    Of a machine that the config describes it also says what was described, in words and as a drawing, the modes that
+    follow, and which parameters a recording by these sensors could tell apart.
 
     A law or plant of your own, `kind: ./my_law.py:MyLaw`, is compiled by itself, looked through for what allocates, and
     timed on this machine.
@@ -27,11 +34,15 @@ def check(
 
       rtctl check ivu.yaml
 
+      rtctl check belt --svg belt.svg
+
       rtctl check ldu --reference print_steps --set loop.rate='5 kHz'
     """
     settings = common.with_loop(common.load_config(config, set_), mode, link)
     machine = common.machine_of(common.with_reference(settings, reference))
+    from rtctl.config.errors import UserError
     from rtctl.machines import fmu_of
+    from rtctl.machines.base import DESCRIBED
 
     if fmu_of(machine.config) is not None:
         from rtctl.machines.wiring import TERMINALS
@@ -42,6 +53,34 @@ def check(
     typer.echo("ok")
     for name, value in [*_summary(machine), *found]:
         typer.echo(f"  {name:10}{value}")
+    if machine.kind == DESCRIBED:
+        _report(machine.config, svg)
+    elif svg is not None:
+        raise UserError(f"--svg: the drawing is of a described machine; {machine.kind} comes with the program")
+
+
+def _report(config: Any, svg: Path | None) -> None:
+    """What the description says."""
+    from rtctl.config.errors import UserError
+    from rtctl.config.files import write_text
+    from rtctl.machine_report import modes, sensitivity, terminal, words
+    from rtctl.machine_report.svg import svg as picture
+
+    for group, line in words.sentences(config.machine):
+        typer.echo(f"  {group:10}{line}")
+    for n, line in enumerate(modes.sentences(config.machine)):
+        typer.echo(f"  {'' if n else 'modes':10}{line}")
+    for n, line in enumerate(sensitivity.sentences(sensitivity.sensitivity(config))):
+        typer.echo(f"  {'' if n else 'tells':10}{line}")
+    typer.echo("")
+    for line in terminal.drawing(config.machine):
+        typer.echo(f"  {line}")
+    if svg is not None:
+        try:
+            write_text(svg, picture(config.machine, config.name))
+        except OSError as error:
+            raise UserError(f"--svg {svg}: cannot be written: {error.strerror}") from None
+        typer.echo(f"\n  drawing in {svg}")
 
 
 def _own(machine: Any) -> list[tuple[str, str]]:

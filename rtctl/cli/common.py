@@ -85,16 +85,16 @@ def load_config(path: str, overrides: list[str] | None) -> Any:
     file = find(path)
     document = load_yaml(file)
     kind = document.data.get("machine") if isinstance(document.data, dict) else None
-    if kind not in machines.CONFIGS:
+    model = machines.class_of(document.data)
+    if model is None:
         near = nearest(str(kind), machines.CONFIGS) if kind else None
         line = document.line(("machine",)) if kind else None
         where = f"{path}:{line}" if line else path
         known = ", ".join(machines.CONFIGS)
-        raise UserError(
-            f"{where}: machine: " + (f"'{kind}' is not one of {known}" if kind else f"missing; it is one of {known}")
-            + (f"; did you mean '{near}'?" if near else "")
-        )  # fmt: skip
-    return load_settings(file, machines.CONFIGS[kind], overrides or [], machines.OWN)
+        wanted = f"{known}, or bodies, joints, drives and sensors"
+        what = f"{kind!r:.60} is not one of {known}" if kind else f"missing; it is one of {wanted}"
+        raise UserError(f"{where}: machine: {what}" + (f"; did you mean '{near}'?" if near else ""))
+    return load_settings(file, model, overrides or [], machines.OWN)
 
 
 def with_reference(config: Any, path: str | None) -> Any:

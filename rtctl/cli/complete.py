@@ -104,10 +104,10 @@ def _written() -> Iterator[float]:
 def _collect() -> dict[str, Any]:
     from rtctl.config.schema import settings_table
     from rtctl.loop.faults import KINDS
-    from rtctl.machines import CONFIGS
+    from rtctl.machines import EVERY
     from rtctl.plants.physics import TERMS
 
-    rows = [row for model in CONFIGS.values() for row in settings_table(model) if row.type != "keys"]
+    rows = [row for model in EVERY.values() for row in settings_table(model) if row.type != "keys"]
     paths = {_plain(row.path) for row in rows if "[]" not in row.path}
     return {"keys": sorted(paths), "faults": list(KINDS), "terms": list(TERMS)}
 

@@ -113,6 +113,10 @@ STEP_COLUMNS = {  # heading -> how much it matters; the least goes first where t
 }  # fmt: skip
 
 
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
+
+
 def steps_table(steps: list[dict[str, Any]], width: int) -> Table:
     """One row a step, in columns that fit into `width` cells."""
     kept = sorted(STEP_COLUMNS, key=STEP_COLUMNS.__getitem__)
@@ -127,8 +131,8 @@ def steps_table(steps: list[dict[str, Any]], width: int) -> Table:
         cells = (
             f"{s['t']:.2f}",
             f"{s['size']:+.4g}",
-            f"{s['final_error_rad']:+.2e}",
-            f"{s['final_error_mm']:+.4f}",
+            _number(s["final_error_rad"], "+.2e"),
+            _number(s["final_error_mm"], "+.4f"),
             f"{s['overshoot_pct']:.1f}",
             "-" if s["settling_s"] is None else f"{s['settling_s']:.2f}",
         )

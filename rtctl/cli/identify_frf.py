@@ -223,7 +223,7 @@ def _volts(text: str | None) -> float | None:
 
 
 def _speed(config: Any, text: str | None) -> float | None:
-    unit, example = ("rad/s", "2rad/s") if config.machine == "ivu" else ("m/s", "5mm/s")
+    unit, example = ("rad/s", "2rad/s") if config.kind == "ivu" else ("m/s", "5mm/s")
     return None if text is None else positive_si(text, "--speed", unit, example)
 
 

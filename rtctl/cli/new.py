@@ -1,4 +1,4 @@
-"""`rtctl new law|plant|term NAME`: the beginning of a file of your own, with a test that passes and a config."""
+"""`rtctl new law|plant|term|machine NAME`: the beginning of a file of your own, with what makes it run."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,14 +10,25 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def new(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="law, plant or term.")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="law, plant, term or machine.")],
     name: Annotated[str, typer.Argument(metavar="NAME", help="What it is called, e.g. feedforward.")],
     machine: Annotated[
         str, typer.Option("--for", metavar="MACHINE", help="ivu, ldu or axis: whose config comes with it.")
     ] = "ivu",
+    like: Annotated[
+        str,
+        typer.Option(
+            "--like",
+            metavar="MACHINE",
+            help="Machine to start from: belt, arm, screw, torsion, pendulum, hoist, spindle, gantry, two-motor, axis.",
+        ),
+    ] = "belt",
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder; made where it is missing.")] = Path(),
 ) -> None:
     """Write a law, a plant or a term of physics to start from: NAME.py, its test, and NAME.yaml, which uses it.
+
+    Of a machine it writes NAME.yaml: bodies, joints, drives and sensors with their units, a law and a reference, which
+    runs as it is; docs/bring_your_own_machine.md goes on from there.
 
     Nothing is ever overwritten. docs/tutorial_own_law.md goes on from here.
 
@@ -28,7 +39,16 @@ def new(
       rtctl new law cascade --for ldu --into bench
 
       rtctl new term windage
+
+      rtctl new machine winder.yaml --like spindle
     """
+    if kind == "machine":
+        from rtctl.own.new_machine import write_machine
+
+        path = write_machine(name, like, into)
+        typer.echo(f"{path!s:32}  a machine like {like}: bodies, joints, drives, sensors, law, reference")
+        typer.echo(f"next: rtctl check {path}; rtctl tune {path} -o tuned.yaml; rtctl run {path} --mode fused --for 4s")
+        return
     from rtctl.own.new import write
 
     files = write(kind, name, machine, into)

@@ -105,7 +105,7 @@ def _hide(settings: Any, seed: int, seal: Path) -> Any:
     from rtctl.diagnose.seal import close_seal
 
     hidden, entry = conceal(settings, seed)
-    answer = {"name": settings.name, "plant": settings.machine, "seed": seed, "physics": [entry]}
+    answer = {"name": settings.name, "plant": settings.kind, "seed": seed, "physics": [entry]}
     typer.echo(f"{settings.name}: sealed in {seal}, sha256 {close_seal(seal, answer)}", err=True)
     return machines.build(hidden)
 

@@ -9,7 +9,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def schema(
-    machine: Annotated[str, typer.Argument(metavar="MACHINE", help="ivu, ldu or axis.")],
+    machine: Annotated[str, typer.Argument(metavar="MACHINE", help="ivu, ldu, axis or described.")],
 ) -> None:
     """Print the JSON Schema of a machine's config: every key with its unit, bounds and meaning.
 
@@ -25,10 +25,9 @@ def schema(
     from rtctl.config.errors import UserError, nearest
     from rtctl.config.schema import json_schema
 
-    if machine not in machines.CONFIGS:
-        near = nearest(machine, machines.CONFIGS)
+    if machine not in machines.EVERY:
+        near = nearest(machine, machines.EVERY)
         raise UserError(
-            f"no machine '{machine}'; "
-            + (f"did you mean '{near}'?" if near else f"it is {', '.join(machines.CONFIGS)}")
+            f"no machine '{machine}'; " + (f"did you mean '{near}'?" if near else f"it is {', '.join(machines.EVERY)}")
         )
-    typer.echo(json.dumps(json_schema(machines.CONFIGS[machine]), indent=2))
+    typer.echo(json.dumps(json_schema(machines.EVERY[machine]), indent=2))

@@ -59,7 +59,7 @@ def _describe(loaded: "Bundle") -> dict[str, Any]:
     timing = timing if isinstance(timing, dict) else {}
     return {
         "bundle": str(loaded.folder),
-        "plant": case.get("plant"),
+        "plant": case.get("plant") or (case.get("config") or {}).get("name"),
         "rows": len(t),
         "duration_s": round(span, 6),
         "sample_rate_hz": case.get("sample_rate") or (round((len(t) - 1) / span, 3) if span > 0 else None),

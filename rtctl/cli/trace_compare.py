@@ -31,17 +31,18 @@ def say(found: "Comparison") -> list[str]:
 
 
 def _steps(found: "Comparison") -> list[str]:
-    from rtctl.trace.metrics import final_error_unit
+    from rtctl.trace.metrics import final_error_key, final_error_unit
 
     count = max(len(found.steps_a), len(found.steps_b))
     if not count:
         return []
     unit = final_error_unit([*found.steps_a, *found.steps_b])
-    lines = [f"{'step':>4}{f'final error [{unit}]':>24}{'overshoot [%]':>24}{'settling [s]':>24}",
+    final = f"final error [{unit or '-'}]"
+    lines = [f"{'step':>4}{final:>24}{'overshoot [%]':>24}{'settling [s]':>24}",
              " " * 4 + f"{'A':>14}{'B':>10}" * 3]  # fmt: skip
     for k in range(count):
         pair = [steps[k] if k < len(steps) else {} for steps in (found.steps_a, found.steps_b)]
-        keys = f"final_error_{unit}", "overshoot_pct", "settling_s"
+        keys = final_error_key(unit), "overshoot_pct", "settling_s"
         cells = [_cell(step.get(key)) for key in keys for step in pair]
         lines.append(f"{k + 1:4}" + "".join(f"{c:>{10 if i % 2 else 14}}" for i, c in enumerate(cells)))
     return lines

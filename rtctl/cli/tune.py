@@ -16,7 +16,12 @@ def tune(
     config: ConfigArgument,
     bandwidth: Annotated[
         float | None,
-        typer.Option("--bandwidth", metavar="HZ", help="Bandwidth to reach; 2 Hz ivu, 50 Hz ldu, 5 Hz axis if absent."),
+        typer.Option(
+            "--bandwidth",
+            metavar="HZ",
+            help="Bandwidth to reach; 2 Hz ivu, 50 Hz ldu, 5 Hz axis if absent; of a described machine "
+            "the fastest that keeps the margins.",
+        ),
     ] = None,
     damping: Annotated[float, typer.Option("--damping", metavar="ZETA", help="Damping of a PD loop.")] = 1.0,
     gm: Annotated[
@@ -36,14 +41,17 @@ def tune(
     json: JsonOption = False,
 ) -> None:
     """Tune the law of a config on the model in its `plant`: PD with a gain schedule over the reel radii (ivu), lead-lag
-    with notches and a low-pass (ldu), PD (axis). Writes the tuned config with the reasons as comments, and a picture of
-    Bode plot, Nyquist plot and step response before and after.
+    with notches and a low-pass (ldu), PD (axis), and a first law for a machine that the config describes: PD or PI.
+    Writes the tuned config with the reasons as comments, and a picture of Bode plot, Nyquist plot and step response
+    before and after.
 
     Exit code 3 where the loop to start from is unstable or the margins cannot be kept.
 
     Examples:
 
       rtctl tune ivu --bandwidth 2 -o tuned.yaml
+
+      rtctl tune belt.yaml -o tuned.yaml
 
       rtctl tune ldu --set sensors.feedback=scale --gm 11 --pm 60
     """
@@ -53,7 +61,7 @@ def tune(
     common.machine_of(settings)
     file = out or Path(f"{settings.name}-tuned.yaml")
     picture = plot or file.with_suffix(".png")
-    pictures = [picture, *([picture.with_stem(f"{picture.stem}-radii")] if settings.machine == "ivu" else [])]
+    pictures = [picture, *([picture.with_stem(f"{picture.stem}-radii")] if settings.kind == "ivu" else [])]
     check_files(file, pictures, force)
     found = design.tune(settings, bandwidth, damping, gm, pm)
     header = f"{settings.name}, tuned by `rtctl tune`.\nbefore: {design.words(found.before)}\n"
@@ -101,7 +109,7 @@ def draw(settings: Any, found: Any, pictures: list[Path]) -> None:
     from rtctl.design import figures
     from rtctl.trace.plot import save
 
-    save(figures.loops({"before": settings, "after": found.config}), pictures[0])
+    save(figures.loops({**({"before": settings} if found.before else {}), "after": found.config}), pictures[0])
     for path in pictures[1:]:
         save(figures.radii(found.maps), path)
 
@@ -111,7 +119,7 @@ def as_json(found: Any, file: Path, pictures: list[Path]) -> dict[str, Any]:
     return {
         "config": str(file),
         "plots": [str(picture) for picture in pictures],
-        "before": found.before._asdict(),
+        "before": None if found.before is None else found.before._asdict(),
         "after": found.after._asdict(),
         "reasons": [reason._asdict() for reason in found.reasons],
     }

@@ -58,7 +58,7 @@ def _walk(model: Any, loc: tuple) -> tuple[tuple, Shape, Shape]:
         if place.choices and part in place.choices:
             place = owner = Shape(place.choices[part], model=place.choices[part])
             continue
-        if place.model is None and place.item is None and not isinstance(part, int):
+        if place.model is None and place.item is None and place.each is None and not isinstance(part, int):
             continue  # the name of a union's member
         owner, place = place, child(place, part) or Shape(None)
         path.append(part)
@@ -67,12 +67,17 @@ def _walk(model: Any, loc: tuple) -> tuple[tuple, Shape, Shape]:
 
 def _inner(path: tuple, sentence: str, data: Any) -> tuple[tuple, str]:
     """A check of a group may begin with the key that it is about, as in "physics.0.node: no such node"."""
-    match = re.match(r"(\w+(?:\.\w+){0,9}): (?=.)", sentence[:200], re.ASCII)
+    match = re.match(r"([\w-]+(?:\.[\w-]+){0,9})(: (?=.)| is missing)", sentence[:200], re.ASCII)
     if match is None:
         return path, sentence
-    longer = path + tuple(int(part) if part.isdigit() else part for part in match[1].split("."))
+    parts = [int(part) if part.isdigit() else part for part in match[1].split(".")]
     absent = object()
-    return (path, sentence) if _raw(data, longer, absent) is absent else (longer, sentence[match.end() :])
+    if match[2] == ": " and _raw(data, (*path, *parts), absent) is not absent:
+        return (*path, *parts), sentence[match.end() :]
+    known = len(parts) - 1  # of a key that is missing, the nearest above it
+    while known and _raw(data, (*path, *parts[:known]), absent) is absent:
+        known -= 1
+    return (*path, *parts[:known]), sentence[len(".".join(match[1].split(".")[:known])) + (known > 0) :]
 
 
 def _what(entry: Any, path: tuple, place: Shape, owner: Shape, data: Any, texts: dict[tuple, str]) -> tuple[tuple, str]:

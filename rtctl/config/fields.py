@@ -11,7 +11,8 @@ DEEPEST = 30  # keys in a dotted path
 
 
 class Shape(NamedTuple):
-    """One place in a config. At most one of `model`, `choices` and `item` is there; none of them is a plain value."""
+    """One place in a config. At most one of `model`, `choices`, `item` and `each` is there; none of them is a plain
+    value."""
 
     annotation: Any
     field: FieldInfo | None = None
@@ -19,6 +20,7 @@ class Shape(NamedTuple):
     tag: str = ""  # key that chooses among `choices`
     choices: dict[str, Any] = {}  # noqa: RUF012  word -> settings class; never written to
     item: Any = None  # annotation of a list's items
+    each: Any = None  # annotation of the values under names that the person chooses
     optional: bool = False
 
     @property
@@ -45,6 +47,8 @@ def shape(annotation: Any, field: FieldInfo | None = None) -> Shape:
         return Shape(annotation, field, annotation)
     if get_origin(annotation) in (list, tuple):
         return Shape(annotation, field, item=get_args(annotation)[0])
+    if get_origin(annotation) is dict:
+        return Shape(annotation, field, each=get_args(annotation)[1])
     return Shape(annotation, field)
 
 
@@ -55,7 +59,7 @@ def child(place: Shape, part: Any) -> Shape | None:
         return shape(field.annotation, field)
     if place.item is not None and isinstance(part, int):
         return shape(place.item)
-    return None
+    return shape(place.each) if place.each is not None else None
 
 
 def literals(annotation: Any) -> list[Any]:
@@ -69,6 +73,8 @@ def fill(place: Shape, data: Any) -> Any:
         return [fill(shape(place.item), item) for item in data]
     if not isinstance(data, dict):
         return data
+    if place.each is not None:
+        return {name: fill(shape(place.each), value) for name, value in data.items()}
     model = place.model or _chosen(place, data)
     if model is None:
         return data
@@ -89,6 +95,8 @@ def written(value: Any) -> Any:
             for name, field in fields.items()
             if name in value.model_fields_set or len(literals(field.annotation)) == 1
         }
+    if isinstance(value, dict):
+        return {name: written(item) for name, item in value.items()}
     return [written(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 

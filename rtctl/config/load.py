@@ -66,6 +66,10 @@ def get_path(settings: Any, path: str) -> Any:
             if not (part.isascii() and part.isdigit() and len(part) < 7 and int(part) < len(node)):
                 raise UserError(f"{path}: '{part[:40]}' is not an index of {here}, which has {len(node)} items")
             node = node[int(part)]
+        elif isinstance(node, dict):
+            if part not in node:
+                raise UserError(f"{path}: {here} has no '{part[:40]}'; {unknown(part, node)}")
+            node = node[part]
         elif not hasattr(type(node), "model_fields"):
             raise UserError(f"{path}: {here} is a value and has no key '{part[:40]}'")
         elif part not in type(node).model_fields:

@@ -96,6 +96,8 @@ def _below(place: Shape, here: str, default: Any = None) -> Iterator[Row]:
         item = child(place, 0)
         assert item is not None
         yield from _below(item, f"{here}[]")
+    if place.each is not None:
+        yield from _below(shape(place.each), f"{here}.NAME")
 
 
 def about(model: type[Settings]) -> str:
@@ -123,6 +125,8 @@ def _type(place: Shape) -> str:
         return "keys"
     if place.item is not None:
         return f"list of {_type(shape(place.item))}"
+    if place.each is not None:
+        return f"names, each with {_type(shape(place.each))}"
     names = {"float": "number", "int": "whole number", "bool": "true | false", "str": "text"}
     parts = [part.strip() for part in getattr(place.annotation, "__name__", str(place.annotation)).split("|")]
     return " | ".join(names.get(part, part) for part in parts if part != "None")

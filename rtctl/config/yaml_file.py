@@ -72,7 +72,11 @@ def find(path: str | Path) -> Path:
     folder = Path(str(resources.files("rtctl.configs")))
     places = [Path(text), Path(f"{text}.yaml")]
     if is_name(text):
-        places += [base / name for base in (folder, folder / "references") for name in (text, f"{text}.yaml")]
+        places += [
+            base / name
+            for base in (folder, folder / "references", folder / "machines")
+            for name in (text, f"{text}.yaml")
+        ]
     try:
         found = [place for place in places if place.is_file()] or [place for place in places[:2] if place.exists()]
     except (OSError, ValueError):

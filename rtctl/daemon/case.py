@@ -14,7 +14,8 @@ import numpy as np
 from rtctl import __version__
 from rtctl.drivers import l292
 from rtctl.loop import generate
-from rtctl.machines import CONFIGS, Machine
+from rtctl.machines import CONFIGS, Machine, described
+from rtctl.machines.base import DESCRIBED
 from rtctl.own.files import is_own
 from rtctl.own.plant import own_plants
 from rtctl.plants import axis, ivu, ldu
@@ -30,10 +31,10 @@ def describe(machine: Machine, made: generate.Generated) -> dict[str, Any]:
     """case.json of a recording of this machine, with the model that its config believes in and no hidden term."""
     config = machine.config
     common = {
-        "plant": machine.kind,
+        **({} if machine.kind == DESCRIBED else {"plant": machine.kind}),
         "sample_rate": machine.rate,
         "delay_samples": 1.0 if config.loop.write == "next_tick" else 0.0,
-        "reaches": {"parameter_tolerance": 0.15, "radius_tolerance": 0.02},
+        **({} if machine.kind == DESCRIBED else {"reaches": {"parameter_tolerance": 0.15, "radius_tolerance": 0.02}}),
         "notes": TENSION_NOTE,
         "config": config.model_dump(mode="json", exclude_unset=True),
         "seed": config.loop.seed,
@@ -51,7 +52,7 @@ def describe(machine: Machine, made: generate.Generated) -> dict[str, Any]:
     if own is not None and own.source is not None:  # its equations are not those of the format: told as a bare machine
         config = config.model_copy(update={"plant": CONFIGS[machine.kind].model_fields["plant"].default})
         common["notes"] = f"{TENSION_NOTE} The emulated machine was {own.source.spec}, in `config.own`."
-    case = {**common, **{"ivu": _ivu, "ldu": _ldu, "axis": _axis}[machine.kind](config)}
+    case = {**common, **{"ivu": _ivu, "ldu": _ldu, "axis": _axis, DESCRIBED: _described}[machine.kind](config)}
     if own is not None:
         case["parameters"] = {}
     return {**case, "controller_known": case["controller"]["kind"] != "unknown"}
@@ -116,6 +117,18 @@ def _ldu(config: Any) -> dict[str, Any]:
             "damping": config.plant.damping,
         },
         "controller": _position(config.law),
+    }
+
+
+def _described(config: Any) -> dict[str, Any]:
+    """The description, which is the nominal model, in SI; the recorded command is what acted on it."""
+    parts = described.parts_of(config)
+    return {
+        "format": 2,
+        "machine": config.machine.model_dump(mode="json", exclude_unset=True),
+        "tolerance": {"default": 0.15},
+        "loop": {"feedback": parts.feedback, "drive": parts.drive, "unit": parts.unit, "command": parts.command},
+        "controller": {"kind": "unknown"},
     }
 
 

@@ -133,14 +133,18 @@ class Commands:
         machine = self._of.machine
         if unit is None or unit == machine.unit:
             return value
-        for kind in ("m", "rad"):
+        for kind in dict.fromkeys((machine.unit, "m", "rad")):
             try:
                 si = convert(value, unit, kind)
             except ValueError:
                 continue
             if kind == machine.unit:
                 return si
+            if machine.radius is None:
+                break
             return si / machine.radius if machine.unit == "rad" else si * machine.radius
+        if machine.radius is None:
+            raise UserError(f"'{unit}' is no unit of this machine's reference, which is in {machine.unit}")
         raise UserError(f"'{unit}' is neither a length nor an angle; use e.g. mm or rad")
 
     def _get(self, path: str) -> dict[str, Any]:

@@ -24,7 +24,7 @@ class FmuPlant:
 
     def __init__(self, machine: Machine, link: str, status: Any, out: Any, inp: Any) -> None:
         config = machine.config
-        terminals = TERMINALS[config.machine]
+        terminals = TERMINALS[config.kind]
         self.fmu = Fmu(config.plant.fmu, terminals.drives, terminals.sensors, machine.dt)
         dither = getattr(getattr(config, "board", None), "dither", False)
         self.card = EmulatedCard(wiring(config), EmulatedBoard(dt=machine.dt, seed=config.loop.seed), dither)
@@ -37,10 +37,10 @@ class FmuPlant:
 
     def _wired(self, config: Any, dt: float) -> list[Sensor]:
         """What each reading of the FMU does to the board, in the order of the machine's sensors."""
-        if config.machine == "ivu":
+        if config.kind == "ivu":
             reels = ((config.sensors.reel1, config.board.reel1), (config.sensors.reel2, config.board.reel2))
             return [self._rotary(0, config.sensors.capstan, dt), *(self._optical(s, w.channel, dt) for s, w in reels)]
-        if config.machine == "ldu":
+        if config.kind == "ldu":
             return [self._rotary(0, config.sensors.encoder, dt), self._linear(1, config.sensors.scale, dt)]
         return [self._linear(0, config.encoder, dt)]
 

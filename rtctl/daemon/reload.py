@@ -23,7 +23,9 @@ def reload(supervisor: "Supervisor", fresh: Any) -> tuple[list[str], list[str]]:
     """
     old = supervisor.config
     if fresh.machine != old.machine:
-        raise UserError(f"machine: '{fresh.machine}' instead of '{old.machine}' needs a restart")
+        named = isinstance(fresh.machine, str) and isinstance(old.machine, str)
+        what = f"'{fresh.machine}' instead of '{old.machine}'" if named else "another description"
+        raise UserError(f"machine: {what} needs a restart")
     if type(fresh) is not type(old):
         raise UserError(f"own: {' '.join(sorted({**old.own, **fresh.own}))} is another text now; restart the machine")
     changed = differences(old, fresh)

@@ -84,14 +84,14 @@ class Session:
         if self.bundle is None or not 0 < self._rows() <= MOST_ROWS:
             return []
         from rtctl.trace.bundle import load_bundle
-        from rtctl.trace.metrics import POSITION, machine_steps
+        from rtctl.trace.metrics import machine_steps
 
         trace = load_bundle(self.bundle).columns
         machine = self.supervisor.machine
         running = trace["state"] == 2
         if running.sum() < 2:
             return []
-        t, target, y = (trace[name][running] for name in ("t", "target", POSITION[machine.kind]))
+        t, target, y = (trace[name][running] for name in ("t", "target", machine.signals.position))
         return machine_steps(machine, t, target, y)
 
     def draw(self) -> str | None:

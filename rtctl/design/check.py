@@ -18,6 +18,7 @@ from rtctl.config.load import set_path, set_paths
 from rtctl.design import margins, response
 from rtctl.design.margins import Margins
 from rtctl.loop import fused, safety
+from rtctl.machines.base import DESCRIBED
 
 PERIODS = 3  # averaged, after one in which the loop forgets how it began
 SURE = 0.05  # deviation of the mean loop gain over the periods, above which a line is left out
@@ -48,8 +49,12 @@ def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None
     A reel unit gets motor 1 alone for its position, so that the loop does not change hands at every zero of the
     command. `f_max` is 0.4 of the sample rate if absent.
     """
-    values: dict[str, Any] = {**NO_FRICTION[config.machine], "loop.mode": "fused", "loop.write": config.loop.write}
-    if config.machine == "ivu":
+    if config.kind == DESCRIBED:
+        still = {f"machine.bodies.{name}.dry": 0.0 for name in config.machine.bodies}
+    else:
+        still = NO_FRICTION[config.kind]
+    values: dict[str, Any] = {**still, "loop.mode": "fused", "loop.write": config.loop.write}
+    if config.kind == "ivu":
         values["law.allocation.kind"] = "motor1"
     config = set_paths(config, values)
     f_max = f_max or 0.4 * config.loop.rate

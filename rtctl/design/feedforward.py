@@ -42,11 +42,11 @@ class Worth(NamedTuple):
 
 def design(config: Any, share: float = SHARE) -> list[Value]:
     """Feedforward values for the model of a config, `share` of its friction. Raises UserError for another machine."""
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         return _ivu(config, share)
-    if config.machine == "ldu":
+    if config.kind == "ldu":
         return _ldu(config, share)
-    raise UserError(f"machine: {config.machine} has no feedforward; ivu and ldu have")
+    raise UserError(f"machine: {config.kind} has no feedforward; ivu and ldu have")
 
 
 def applied(config: Any, values: list[Value]) -> Any:
@@ -60,7 +60,7 @@ def without(config: Any) -> Any:
         "ivu": ("law.friction.motor1.tau_C", "law.friction.motor2.tau_C", "law.inertia.share"),
         "ldu": ("law.friction.F_c", "law.inertia.volts"),
     }
-    return set_paths(config, dict.fromkeys(off[config.machine], 0.0))
+    return set_paths(config, dict.fromkeys(off[config.kind], 0.0))
 
 
 def computed_torque(config: Any) -> float:
@@ -86,12 +86,12 @@ def _played(config: Any, seconds: float) -> tuple[float, float, float]:
     if run.tripped:
         raise NoAnswer(f"the run tripped ({run.tripped}) at {run.trip_time:.3g} s")
     rows = run.between(0.0, seconds)
-    error = rows["capstan_error" if config.machine == "ivu" else "position_error"]
+    error = rows["capstan_error" if config.kind == "ivu" else "position_error"]
     still = _rests(rows["target"], round(0.2 * config.loop.rate))
     if not still.size:
         raise NoAnswer("the reference never rests long enough to tell a final error; take one with steps")
     swing = float("nan")
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         swing = float(np.sqrt(np.mean([np.var(rows[name]) for name in ("truth_tension1", "truth_tension2")])))
     return float(np.sqrt(np.mean(error**2))), float(np.abs(error[still]).max()), swing
 

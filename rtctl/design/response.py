@@ -18,10 +18,13 @@ from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.drivers import ldu_amplifier
 from rtctl.laws import allocation, gain_schedule
+from rtctl.machines import described
+from rtctl.machines.base import DESCRIBED
 from rtctl.own.files import is_own, refuse_plant
 from rtctl.plants import axis as plant_axis
 from rtctl.plants import ivu as plant_ivu
 from rtctl.plants import ldu as plant_ldu
+from rtctl.plants.graph.linearised import linearised, sensor_row
 
 
 class Model(NamedTuple):
@@ -58,12 +61,12 @@ def take(config: Any, motor: int = 1) -> Loop:
     blocks = {block.name: block.params for block in machine.diagram.blocks if block.params is not None}
     plant = next(block.params for block in machine.plant_diagram.blocks if block.name == "plant")
     return Loop(
-        model=MODELS[config.machine](config, plant, blocks, motor),
+        model=MODELS[config.kind](config, plant, blocks, motor),
         blocks=blocks,
         kind=getattr(config.law.position, "kind", "pd"),
         dt=machine.dt,
         delay=int(config.loop.write == "next_tick"),
-        factor=_factor(config, plant, blocks, motor) if config.machine == "ivu" else 1.0,
+        factor=_factor(config, plant, blocks, motor) if config.kind == "ivu" else 1.0,
     )
 
 
@@ -178,7 +181,14 @@ def _axis(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
     return Model(A, B[:, 0], _unit(len(A), 0))
 
 
-MODELS = {"ivu": _ivu, "ldu": _ldu, "axis": _axis}
+def _described(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
+    A, B = linearised(p)
+    machine = config.machine
+    name = described.parts_of(config).feedback
+    return Model(A, B @ blocks["machine"].shares[: B.shape[1]], sensor_row(machine, p, name))
+
+
+MODELS = {"ivu": _ivu, "ldu": _ldu, "axis": _axis, DESCRIBED: _described}
 
 
 def _unit(n: int, i: int) -> np.ndarray:

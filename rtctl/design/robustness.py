@@ -58,8 +58,8 @@ def at(config: Any, R_drive: float, R_other: float, motor: int = 1, printed: boo
 
 def with_radii(config: Any, R1: float, R2: float) -> Any:
     """The config with other reels (m), for its laws and its emulator alike."""
-    if config.machine != "ivu":
-        raise UserError(f"machine: {config.machine} has no reels; radii are those of an ivu")
+    if config.kind != "ivu":
+        raise UserError(f"machine: {config.kind} has no reels; radii are those of an ivu")
     radii = {"R1": float(R1), "R2": float(R2)}
     parameters = config.plant.parameters.model_copy(update=radii)
     return config.model_copy(

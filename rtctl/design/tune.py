@@ -3,6 +3,7 @@
     ivu     PD by bandwidth and damping (5.4), a gain schedule over the radii, feedforward of friction and inertia
     ldu     lead-lag, two notches and a low-pass by optimisation (12.7), feedforward of friction
     axis    PD by bandwidth and damping
+    others  PD or PI, the fastest that keeps its margins (first_law.py)
 
 What is tuned is the model that the config's `plant` holds, as it was identified or given.
 
@@ -16,11 +17,13 @@ import numpy as np
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import to_yaml
 from rtctl.config.yaml_file import parse
-from rtctl.design import feedforward, margins, pd, schedule, shaping
+from rtctl.design import feedforward, first_law, margins, pd, schedule, shaping
 from rtctl.design.margins import Margins
 from rtctl.design.robustness import Map
 from rtctl.design.shaping import Limits
+from rtctl.machines.base import DESCRIBED
 
+PLAIN = (6.0, 45.0)  # dB and deg, of machines that are not listed
 BANDWIDTH = {"ivu": 2.0, "ldu": 50.0, "axis": 5.0}  # Hz: w_n of the PD, or -3 dB of the closed loop
 LEAST = {"ivu": (6.0, 45.0), "ldu": (11.0, 60.0), "axis": (6.0, 45.0)}  # dB and deg
 
@@ -37,9 +40,33 @@ class Tuned(NamedTuple):
 
     config: Any
     reasons: list[Reason]
-    before: Margins
+    before: Margins | None  # None where there was no law to judge
     after: Margins
     maps: dict[str, Map]
+
+
+def _described(config: Any, hertz: float | None, GM: float | None, PM: float | None) -> Tuned:
+    """First law of a described machine, whatever law it had."""
+    least = (PLAIN[0] if GM is None else GM, PLAIN[1] if PM is None else PM)
+    check(1e-3 * config.loop.rate if hertz is None else hertz, 1.0, least, config.loop.rate)
+    before = None
+    if getattr(config.law.position, "gain", 1.0):
+        before = margins.of_config(config)
+    found = first_law.design(config, least, hertz)
+    law = found.law
+    reasons = [
+        Reason("law.position.kind", found.words),
+        Reason("law.position.gain", f"crosses |L| = 1 at {found.crossover:.3g} Hz, the fastest with these margins"),
+    ]
+    if law.kind == "pd":
+        reasons.append(Reason("law.position.tau_d", f"lead at the crossover, filtered above {law.corner:.3g} Hz"))
+    else:
+        reasons.append(Reason("law.position.tau_i", f"{first_law.INTEGRAL:g} / w of the crossover"))
+        if law.tau_d:
+            reasons.append(
+                Reason("law.position.velocity_gain", f"lead at the crossover, above {law.corner:.3g} Hz off")
+            )
+    return Tuned(found.config, reasons, before, found.margins, {})
 
 
 def tune(
@@ -49,7 +76,9 @@ def tune(
 
     Raises NoAnswer where the loop to start from is unstable, or the limits cannot be met.
     """
-    kind = config.machine
+    kind = config.kind
+    if kind == DESCRIBED:
+        return _described(config, bandwidth, GM, PM)
     least = (LEAST[kind][0] if GM is None else GM, LEAST[kind][1] if PM is None else PM)
     hertz = BANDWIDTH[kind] if bandwidth is None else bandwidth
     check(hertz, damping, least, config.loop.rate)
@@ -111,8 +140,12 @@ def written(tuned: Tuned, header: str = "") -> str:
     return "\n".join(out) + "\n"
 
 
-def words(m: Margins) -> str:
+def words(m: Margins | None) -> str:
     """Margins in one line."""
+    if m is None:
+        return "no law that moves the machine"
+    if not m.stable:
+        return f"unstable near {m.f_GM if np.isfinite(m.f_GM) else m.f_PM:.3g} Hz"
     return (
         f"bandwidth {m.bandwidth:.3g} Hz, gain margin {m.GM:.1f} dB at {m.f_GM:.3g} Hz, phase margin {m.PM:.0f} deg at "
         f"{m.f_PM:.3g} Hz, |S| up to {m.M_S:.1f} dB"
@@ -120,7 +153,7 @@ def words(m: Margins) -> str:
 
 
 def _pd(config: Any, hertz: float, damping: float) -> tuple[Any, list[Reason]]:
-    at = 1.0 if config.machine == "ivu" else hertz
+    at = 1.0 if config.kind == "ivu" else hertz
     found = pd.design(config, 2 * np.pi * hertz, damping, at)
     found = found._replace(gain=float(f"{found.gain:.4g}"), tau_d=float(f"{found.tau_d:.4g}"))
     made = pd.applied(config, found)

@@ -31,8 +31,12 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
 
     Raises UserError where nothing can be hidden in this machine.
     """
-    rng = np.random.default_rng([seed, *config.machine.encode()])
+    rng = np.random.default_rng([seed, *config.kind.encode()])
     names = [name for name in sorted(TERMS) if nodes(name, config)]
+    if not names:
+        raise UserError(
+            f"{config.name}: effects are hidden in machines that come with the program, not in a described one"
+        )
     at = len(config.plant.physics)
     for _ in range(TRIES):
         name = names[rng.integers(len(names))]
@@ -50,9 +54,9 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
 def nodes(name: str, config: Any) -> list[str]:
     """Where an effect can be hidden in a machine without its loop running away at once."""
     term = TERMS[name]
-    found = physics.nodes(term, config.machine) if term.tabled else ()
+    found = physics.nodes(term, config.kind) if term.tabled else ()
     if term.unsigned:  # a loop on a sensor without signs runs away
-        found = tuple(node for node in found if node not in physics.having(config.machine, "sensor", "feedback"))
+        found = tuple(node for node in found if node not in physics.having(config.kind, "sensor", "feedback"))
     return [node for node in found if not term.needs.stiffness or use(node, config).stiffness > 0.0]
 
 
@@ -75,6 +79,6 @@ def sized(name: str, node: str, config: Any, rng: np.random.Generator) -> dict[s
         entry[key] = words[rng.integers(len(words))]
     if "seed" in term.settings.model_fields:
         entry["seed"] = int(rng.integers(1, 1_000_000))
-    if "R_c" in term.settings.model_fields and config.machine == "ldu":
+    if "R_c" in term.settings.model_fields and config.kind == "ldu":
         entry["R_c"] = ldu.parameters(config.plant).R_c
     return entry

@@ -47,16 +47,16 @@ def measure(what: str, node: str, config: Any) -> float:
 
 def rms_volts(config: Any) -> float:
     """Command that ordinary use takes."""
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         return use("motor1", config).force / (ivu.parameters(config.plant).K_m1 * config.law.tension.amp_per_volt)
-    if config.machine == "ldu":
+    if config.kind == "ldu":
         return use("motor", config).force / (ldu.parameters(config.plant).K_m1 * LDU_GAIN)
     return use("carriage", config).force / config.plant.parameters.K
 
 
 def use(node: str, config: Any) -> Use:
     """How a node moves in ordinary use; a drive, or the loop, as the node that moves first."""
-    return {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.machine](node, config.plant, *USE[config.machine])
+    return {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.kind](node, config.plant, *USE[config.kind])
 
 
 def _ivu(node: str, plant: Any, speed: float, travel: float, hurry: float) -> Use:

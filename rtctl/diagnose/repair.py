@@ -65,7 +65,7 @@ def ready(config: Any, mode: str | None = None) -> Any:
             f"{config.name}: it has no reference, and how far a machine may be moved is its owner's to say; "
             "name one with --reference FILE"
         )
-    return set_path(config, "reference", ordinary_reference(config.machine))
+    return set_path(config, "reference", ordinary_reference(config.kind))
 
 
 def ordinary_reference(kind: str) -> dict[str, Any]:
@@ -100,7 +100,7 @@ def repair(
     from rtctl.diagnose import chain
 
     run_, diagnose = record or run, diagnose or chain.diagnose
-    seconds = LENGTH[config.machine] if length is None else length
+    seconds = LENGTH[config.kind] if length is None else length
     bundle = out / RECORDING
     progress(f"recording {seconds:g} s")
     trips = [run_(config, bundle, seconds)["tripped"] or ""]

@@ -136,7 +136,7 @@ def steps(config: Any) -> list[Step]:
              "0 V, within 5 mV, and no drift", None),
         Step("rest", "", f"counters stand still, inputs within {REST_CODES} codes", _rest(config)),
     ]  # fmt: skip
-    of = {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.machine]
+    of = {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.kind]
     return [*common, *of(config)]
 
 

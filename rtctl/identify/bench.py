@@ -44,7 +44,7 @@ def seconds(config: Any) -> float:
 
 def arming(config: Any) -> float:
     """s, at most, until the reference plays."""
-    return ARMING[config.radius.source if config.machine == "ivu" else "given"]
+    return ARMING[config.radius.source if config.kind == "ivu" else "given"]
 
 
 def play(config: Any, length: float | None = None) -> Record:

@@ -50,7 +50,7 @@ def driver_config(config: Any, highest: float = 3.0, step: float = 0.1) -> Any:
     The amplifier is written raw, without the inverse of its curve. Raises UserError where `highest` is above 3.0 V,
     where it runs away.
     """
-    need(config.machine, config.name, "ldu")
+    need(config.kind, config.name, "ldu")
     if not 0 < step <= highest <= 3.0 + 1e-9:
         raise UserError(
             f"{config.name}: 0 to {highest:g} V in steps of {step:g} V; the amplifier runs away above 3.0 V"

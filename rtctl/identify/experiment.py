@@ -118,16 +118,14 @@ def noise(
 
 def usual_of(config: Any) -> Usual:
     """The usual excitation of a machine. Raises UserError where there is none."""
-    if config.machine not in USUAL:
-        raise UserError(
-            f"{config.name}: a frequency response is played on {' and '.join(USUAL)}, not on {config.machine}"
-        )
-    return USUAL[config.machine]
+    if config.kind not in USUAL:
+        raise UserError(f"{config.name}: a frequency response is played on {' and '.join(USUAL)}, not on {config.kind}")
+    return USUAL[config.kind]
 
 
 def check_size(config: Any, rms: float) -> None:
     """Raise UserError where four times `rms` V leaves the drive's linear range (8.1: 5 V; 12.2: 3 V, runaway)."""
-    most = min(config.law.limit.high, 5.0 if config.machine == "ivu" else config.amplifier.limit)
+    most = min(config.law.limit.high, 5.0 if config.kind == "ivu" else config.amplifier.limit)
     if 4 * rms > most:
         raise UserError(
             f"{config.name}: excitation of {rms:g} V rms peaks at some {4 * rms:.2g} V, the drive takes {most:g} V; "
@@ -136,10 +134,10 @@ def check_size(config: Any, rms: float) -> None:
 
 
 def _prepared(config: Any, usual: Usual, motor: int, keep_law: bool) -> Any:
-    if motor not in (1, 2) or (motor == 2 and config.machine != "ivu"):
-        raise UserError(f"{config.name}: motor {motor}: the {config.machine} has no such motor")
+    if motor not in (1, 2) or (motor == 2 and config.kind != "ivu"):
+        raise UserError(f"{config.name}: motor {motor}: the {config.kind} has no such motor")
     config = set_paths(config, {} if keep_law else usual.law)
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         config = set_path(config, "law.allocation.kind", f"motor{motor}")
         if config.safety.following_error:
             config = set_path(config, "safety.following_error", max(config.safety.following_error, 1.0))

@@ -72,14 +72,14 @@ def carried(relative: np.ndarray) -> np.ndarray:
 def drive(config: Any, f: np.ndarray) -> np.ndarray:
     """Response (n,) of the known drive in A/V at `f` (n,) Hz. Raises UserError where the machine has none."""
     s = 2j * np.pi * np.asarray(f, float)
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         K, w, zeta = l292.second_order(config.plant.driver)
         zero = config.plant.driver.R_F * config.plant.driver.C_F
         return K * (1 + s * zero) / (1 + 2 * zeta * s / w + (s / w) ** 2)
-    if config.machine == "ldu":
+    if config.kind == "ldu":
         w = 2 * np.pi * config.plant.bandwidth
         return ldu_amplifier.AMPERE_PER_VOLT / (1 + 2 * config.plant.damping * s / w + (s / w) ** 2)
-    raise UserError(f"{config.machine}: volts are force there, no drive is known to be divided out")
+    raise UserError(f"{config.kind}: volts are force there, no drive is known to be divided out")
 
 
 def motor_of(record: Record) -> int:

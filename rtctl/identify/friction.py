@@ -63,18 +63,18 @@ def velocity_config(config: Any, speeds: Sequence[float] | None = None, turns: f
 
     A reel unit first winds to the smaller reel, so that it does not run empty. One turn more is for settling.
     """
-    need(config.machine, config.name, "ivu", "ldu")
+    need(config.kind, config.name, "ivu", "ldu")
     way = (turns + 1.0) * TURN
     per_rad = 1.0
     changes: dict[str, Any] = {}
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         way *= 1.0 if config.radius.R1 < config.radius.R2 else -1.0
         changes |= {"safety.current_time": 0}
     else:
         per_rad = config.sensors.R_c
         changes |= {"safety.frozen_time": 0}
     steps, at = [], 0.5
-    for speed in speeds or SPEEDS[config.machine]:
+    for speed in speeds or SPEEDS[config.kind]:
         for to in (way, 0.0):
             steps.append({"at": at, "to": to * per_rad, "ramp": speed * per_rad})
             at += abs(way) / speed + 1.0
@@ -87,8 +87,8 @@ def break_away_config(config: Any, times: int = 2, most: float | None = None, ra
     The law is proportional and so soft that the machine, once it moves, unloads it. No feedforward helps. While it gets
     under way the force still grows: by 4 mV on an LDU (one code of its board), and 1 % on an IVU.
     """
-    need(config.machine, config.name, "ivu", "ldu")
-    if config.machine == "ivu":
+    need(config.kind, config.name, "ivu", "ldu")
+    if config.kind == "ivu":
         gain, most, rate = 0.8, most or 1.0, rate or 0.01  # V/rad
         changes: dict[str, Any] = {
             "law.position": {"gain": gain, "tau_d": 0.1, "derivative_filter": 10.0},

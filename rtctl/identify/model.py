@@ -32,7 +32,7 @@ class Model:
     """A machine's plant as a function of named parameters."""
 
     def __init__(self, config: Any, names: Sequence[str]):
-        self.config, self.kind = config, config.machine
+        self.config, self.kind = config, config.kind
         self.parts = response.take(config)
         plant = plant_ivu if self.kind == "ivu" else plant_ldu
         self.base = plant.parameters(config.plant)

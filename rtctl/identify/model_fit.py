@@ -88,9 +88,9 @@ def fit(
     from scipy.stats import t as student
 
     given = (frfs,) if isinstance(frfs, Frf) else tuple(frfs)
-    names = tuple(FREE.get(config.machine, ()) if free is None else free)
+    names = tuple(FREE.get(config.kind, ()) if free is None else free)
     _check(given, config, names)
-    bottom, top = band or BAND[config.machine]
+    bottom, top = band or BAND[config.kind]
     kept = tuple(frf.select((frf.f >= bottom) & (frf.f <= top) & (frf.relative < 0.5)) for frf in given)
     lines = sum(len(frf.f) for frf in kept)
     if 2 * lines < 3 * (len(names) + 1):
@@ -144,20 +144,20 @@ def fit(
 
 
 def _check(frfs: tuple[Frf, ...], config: Any, names: Sequence[str]) -> None:
-    if config.machine not in FREE:
-        raise UserError(f"{config.name}: a response is fitted for {' and '.join(FREE)}, not for {config.machine}")
+    if config.kind not in FREE:
+        raise UserError(f"{config.name}: a response is fitted for {' and '.join(FREE)}, not for {config.kind}")
     known = type(config.plant.parameters).model_fields
     for name in names:
-        if not all(key in known for key in keys(config.machine, name)):
-            choices = [*known, *(PAIRS if config.machine == "ivu" else ())]
+        if not all(key in known for key in keys(config.kind, name)):
+            choices = [*known, *(PAIRS if config.kind == "ivu" else ())]
             near = nearest(name, choices)
-            raise UserError(f"free: the {config.machine} has no parameter '{name}'"
+            raise UserError(f"free: the {config.kind} has no parameter '{name}'"
                             + (f"; did you mean '{near}'?" if near else ""))  # fmt: skip
-    meant = [key for name in names for key in keys(config.machine, name)]
+    meant = [key for name in names for key in keys(config.kind, name)]
     if len(set(meant)) < len(meant) or not names:
         raise UserError(f"free: {', '.join(names) or 'nothing'}: name each parameter once, and at least one")
-    if not frfs or any(frf.kind != config.machine or frf.dt != frfs[0].dt for frf in frfs):
-        raise UserError(f"{config.name}: the responses must be of an {config.machine}, all at one rate")
+    if not frfs or any(frf.kind != config.kind or frf.dt != frfs[0].dt for frf in frfs):
+        raise UserError(f"{config.name}: the responses must be of an {config.kind}, all at one rate")
 
 
 def _best(misfit: Callable[[np.ndarray], np.ndarray], start: np.ndarray, span: float) -> Any:
@@ -182,7 +182,7 @@ def _misfit(frfs: tuple[Frf, ...], models: list[np.ndarray], chi2: float, config
     worst = max(range(len(off)), key=lambda i: float(off[i].max()))
     f = frfs[worst].f[off[worst] > 0.5 * off[worst].max()]
     hint = ""
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         hint = "; where the two sides are not alike, give responses of both motors at two pairs of radii and free "
         hint += ", ".join(EACH)
     return (
@@ -232,7 +232,7 @@ def _check_known(
 
 def _units(config: Any, names: Sequence[str]) -> dict[str, str]:
     fields = type(config.plant.parameters).model_fields
-    return {n: (fields[keys(config.machine, n)[0]].json_schema_extra or {}).get("unit", "") for n in names}
+    return {n: (fields[keys(config.kind, n)[0]].json_schema_extra or {}).get("unit", "") for n in names}
 
 
 def _process_gain(

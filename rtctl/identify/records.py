@@ -101,7 +101,7 @@ def take(source: Run | Bundle | Record) -> Record:
     if not running.any():
         raise NoAnswer(f"{name}: the machine never ran" + (f", it tripped: {trip} at {when:.3f} s" if trip else ""))
     kept = {n: np.asarray(column)[running] for n, column in columns.items()}
-    return Record(config.machine, config, 1.0 / config.loop.rate, kept, trip, when, name)
+    return Record(config.kind, config, 1.0 / config.loop.rate, kept, trip, when, name)
 
 
 def take_all(sources: Any) -> list[Record]:
@@ -125,10 +125,11 @@ def config_of(bundle: Bundle) -> Any:
 
     data = bundle.case.get("config")
     where = bundle.folder / "case.json"
-    if not isinstance(data, dict) or data.get("machine") not in machines.CONFIGS:
+    base = machines.class_of(data)
+    if base is None or not isinstance(data, dict):
         raise UserError(f"{where}: no config of a machine under 'config'; experiments read recordings of `rtctl run`")
     refuse_plant(data, f"{where}: config.")
-    model, data = without_code(machines.CONFIGS[data["machine"]], data)
+    model, data = without_code(base, data)
     filled = fill(Shape(model, model=model), data)
     try:
         return model.model_validate(filled)

@@ -56,7 +56,7 @@ def travel_for(share: float, increments: float = 209, R_max: float = 0.04, R_c: 
 
 def radius_config(config: Any, travel: float = 3.8, speed: float = 0.5) -> Any:
     """The config that winds `travel` rad to reel 1 and back, each way at `speed` rad/s of the capstan."""
-    need(config.machine, config.name, "ivu")
+    need(config.kind, config.name, "ivu")
     back = 0.5 + travel / speed + 1.0
     steps = [{"at": 0.5, "to": travel, "ramp": speed}, {"at": back, "to": 0.0, "ramp": speed}]
     return changed(config, {"reference": {"steps": steps}})

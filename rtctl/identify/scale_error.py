@@ -44,7 +44,7 @@ class ScaleError(NamedTuple):
 
 def scale_config(config: Any, travel: float = 0.6, speed: float = 0.02) -> Any:
     """The config that runs `travel` m at `speed` m/s, with a run-up that `passes` leaves out."""
-    need(config.machine, config.name, "ldu")
+    need(config.kind, config.name, "ldu")
     more = RUN_UP * speed  # s of it at either end
     step = {"at": 0.3, "to": travel + 2.0 * more, "ramp": speed}
     return changed(config, {"law.shaper": {}, "reference": {"steps": [step]}})

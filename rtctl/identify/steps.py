@@ -33,7 +33,7 @@ class Steps(NamedTuple):
 
 def printing_config(config: Any, size: float = TWELFTH, count: int = 24, hold: float = 0.4) -> Any:
     """The config that makes `count` steps of `size` m, `hold` s each, and the same home again."""
-    need(config.machine, config.name, "ldu")
+    need(config.kind, config.name, "ldu")
     ends = [*range(1, count + 1), *range(count - 1, -1, -1)]
     steps = [{"at": 0.5 + k * hold, "to": n * size} for k, n in enumerate(ends)]
     last = {"at": 0.5 + len(ends) * hold, "to": 0.0}
@@ -46,7 +46,7 @@ def radian_config(config: Any, tau_C: float = 2.4e-3, R1: float = 0.025, R2: flo
     A step is a jump, as in the thesis, without the shaper and the feedforward of inertia; the friction of both motors
     is compensated in full, at standstill too.
     """
-    need(config.machine, config.name, "ivu")
+    need(config.kind, config.name, "ivu")
     changes = {
         "law.shaper": {},
         "law.inertia": {},
@@ -95,9 +95,9 @@ def summary(each: Sequence[dict[str, float | None]], by: str, mm: float) -> Step
 
 def radius(config: Any) -> float | None:
     """Radius of the capstan, between radians and metres; None on an axis."""
-    if config.machine == "axis":
+    if config.kind == "axis":
         return None
-    return float(config.R_c if config.machine == "ivu" else config.sensors.R_c)
+    return float(config.R_c if config.kind == "ivu" else config.sensors.R_c)
 
 
 def usual_configs(config: Any) -> list[Any]:
@@ -105,8 +105,8 @@ def usual_configs(config: Any) -> list[Any]:
 
     Raises UserError for another machine.
     """
-    need(config.machine, config.name, "ivu", "ldu")
-    if config.machine == "ldu":
+    need(config.kind, config.name, "ivu", "ldu")
+    if config.kind == "ldu":
         return [printing_config(config, TWELFTH), printing_config(config, TWENTY_FOURTH)]
     return [radian_config(config, 2.4e-3), radian_config(config, 1.5e-3)]
 

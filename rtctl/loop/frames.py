@@ -6,11 +6,12 @@ Fixed little-endian records, the same over ZeroMQ and shared memory. A frame of 
 import numpy as np
 
 from rtctl.idiom import tick
+from rtctl.plants import linear
 
 MAGIC = 0x4C544352  # "RCTL"
-VERSION = 3
+VERSION = 4
 HELLO = -1  # sequence number of the frame with which a loop wakes a plant that waits for it
-AO_CHANNELS, COUNTERS, AI_CHANNELS, TRUTHS = 2, 2, 16, 8
+AO_CHANNELS, COUNTERS, AI_CHANNELS, TRUTHS = linear.MOST_DRIVES, linear.MOST_SENSORS, 16, 2 * linear.MOST_BODIES
 
 OUTPUTS = np.dtype(
     [

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from pydantic import Field
 
 from rtctl.idiom import Settings, guard, quantity, state, tick
+from rtctl.loop import frames
 
 IDLE, ARMED, RUNNING, TRIPPED = range(4)
 STATES = ("idle", "armed", "running", "tripped")
@@ -139,7 +140,7 @@ SAFETY_STATE = state(
     late=int,
     counts=int,
     apart=float,  # of two sensors in the tick in which the outputs came on, m
-    hold=(float, 2),  # outputs of the last tick before the trip, V
+    hold=(float, frames.AO_CHANNELS),  # outputs of the last tick before the trip, V
     gate=float,  # share of them that is still written: 1, falling to 0 after a trip
     on=int,  # 1 in the tick in which the outputs come on
     board=int,  # times that the board says it has taken outputs to zero by itself

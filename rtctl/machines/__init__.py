@@ -1,14 +1,16 @@
 """One file a machine: the settings of its loop and its block diagram, from which the tick is generated."""
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
 from rtctl.config.load import Widen
 from rtctl.laws import excitation, reference
 from rtctl.loop import faults
-from rtctl.machines import axis, ivu, ldu, own_plant
-from rtctl.machines.base import Column, Diagram, MachineSettings, PlantDiagram
+from rtctl.machines import axis, described, ivu, ldu, own_plant
+from rtctl.machines.base import DESCRIBED, Column, Diagram, MachineSettings, PlantDiagram, Signals
 from rtctl.own import model
+from rtctl.own.files import OwnError
 
 MODULES: dict[str, Any] = {"ivu": ivu, "ldu": ldu, "axis": axis}
 CONFIGS: dict[str, type[MachineSettings]] = {
@@ -16,6 +18,20 @@ CONFIGS: dict[str, type[MachineSettings]] = {
     "ldu": ldu.LduConfig,
     "axis": axis.AxisConfig,
 }
+EVERY: dict[str, type[MachineSettings]] = {**CONFIGS, DESCRIBED: described.DescribedConfig}  # of every kind
+
+
+def module_of(kind: str) -> Any:
+    """Module of a kind of machine: its columns, units and diagrams."""
+    return described if kind == DESCRIBED else MODULES[kind]
+
+
+def class_of(data: Any) -> type[MachineSettings] | None:
+    """Settings class for plain data, by its key `machine`: a name, or a description; None where it is neither."""
+    machine = data.get("machine") if isinstance(data, Mapping) else None
+    if isinstance(machine, Mapping):
+        return described.config_class(data)
+    return CONFIGS.get(machine) if isinstance(machine, str) else None
 
 
 class Machine(NamedTuple):
@@ -33,19 +49,28 @@ class Machine(NamedTuple):
     excitation: excitation.ExcitationParams
     faults: tuple[faults.Fault, ...]
     truth: tuple[Column, ...]
-    unit: str  # of position and reference, rad or m
-    metres_per_unit: float
-    radius: float  # m, turns metres into radians
+    unit: str  # of position and reference: rad or m, or of a speed
+    metres_per_unit: float | None  # None where nothing moves along a line
+    radius: float | None  # m, turns metres into radians; None where nobody knows one
+    signals: Signals
 
 
-OWN = Widen(model.long_form, model.widened)  # for load_settings
-OWN_PLANT = Widen(model.long_form, partial(model.widened, law=False))  # where nobody asks for the law
+def _widened(base: Any, data: Any, folder: Any = None, law: bool = True) -> tuple[Any, Any]:
+    """As `rtctl.own.model.widened`, from the class in the units of the machine that the data describe."""
+    return model.widened(class_of(data) or base, data, folder, law)
+
+
+OWN = Widen(model.long_form, _widened)  # for load_settings
+OWN_PLANT = Widen(model.long_form, partial(_widened, law=False))  # where nobody asks for the law
 
 
 def widened(data: Any) -> tuple[Any, Any]:
     """Settings class for plain data of a known machine that is complete, with the keys of the own files that it names,
     and the data; see `rtctl.own.model.widened`. Raises OwnError."""
-    return model.widened(CONFIGS[data["machine"]], data)
+    kind = class_of(data)
+    if kind is None:
+        raise OwnError(f"machine: {str(data.get('machine'))[:40]!r} is not one of {', '.join(CONFIGS)}")
+    return model.widened(kind, data)
 
 
 def settings(data: Any) -> Any:
@@ -64,7 +89,7 @@ def build(config: Any) -> Machine:
 
 def _build(config: Any) -> Machine:
     check_plant(config)
-    module = MODULES[config.machine]
+    module = module_of(config.kind)
     dt = 1.0 / config.loop.rate
     if config.loop.mode == "real":
         period = 1.0 / (config.plant.rate or max(module.PLANT_RATE, config.loop.rate))
@@ -76,7 +101,7 @@ def _build(config: Any) -> Machine:
     else:
         plant = module.plant_diagram(config, period, config.loop.seed)
     return Machine(
-        kind=config.machine,
+        kind=config.kind,
         config=config,
         rate=config.loop.rate,
         dt=dt,
@@ -88,9 +113,10 @@ def _build(config: Any) -> Machine:
         excitation=excitation.build(config.excitation, dt),
         faults=tuple(faults.build(settings, dt) for settings in config.faults),
         truth=plant.truth if config.record.truth else (),
-        unit=module.UNIT,
+        unit=module.unit(config),
         metres_per_unit=module.metres_per_unit(config),
         radius=module.radius(config),
+        signals=module.signals(config),
     )
 
 

@@ -3,7 +3,7 @@
 reference -> shaper -> error -> PD or PI with velocity feedback -> limit
 """
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -29,6 +29,7 @@ from rtctl.machines.base import (
     Diagram,
     MachineSettings,
     PlantDiagram,
+    Signals,
     physics_lines,
 )
 from rtctl.machines.ldu import PositionSettings, play, prepare
@@ -82,6 +83,16 @@ class AxisConfig(MachineSettings):
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
     plant: AxisPlantSettings = AxisPlantSettings()
+
+
+def signals(config: Any) -> Signals:
+    """Columns by which a run is judged."""
+    return Signals("x", "position_error", ("u",), "truth_x")
+
+
+def unit(config: Any) -> str:
+    """Unit of reference and position."""
+    return UNIT
 
 
 def metres_per_unit(config: AxisConfig) -> float:

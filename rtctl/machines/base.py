@@ -1,5 +1,6 @@
 """What every machine's config shares, and the block diagram from which its tick is generated."""
 
+from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -10,6 +11,8 @@ from rtctl.drivers.boards import DriverSettings
 from rtctl.idiom import Settings, quantity
 from rtctl.loop.faults import FaultSettings
 from rtctl.loop.safety import SafetySettings
+
+DESCRIBED = "described"  # kind of a machine whose config holds its description
 
 
 class Column(NamedTuple):
@@ -46,6 +49,15 @@ class PlantDiagram(NamedTuple):
     start: tuple[str, ...]
     advance: tuple[tuple[str, tuple[str, ...]], ...]
     sample: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+class Signals(NamedTuple):
+    """Columns by which a run is judged."""
+
+    position: str  # what follows the reference, as it is measured
+    error: str
+    outputs: tuple[str, ...]  # to the drives
+    truth: str  # the position in the emulator
 
 
 class LinkSettings(Settings):
@@ -143,6 +155,12 @@ class MachineSettings(Settings):
         default={}, description="texts of the own files that the config names; filled in when it is read, and recorded"
     )
 
+    @property
+    def kind(self) -> str:
+        """Name of the kind of machine; `described` where the config holds a description."""
+        machine = getattr(self, "machine")  # noqa: B009  of the classes below this one
+        return machine if isinstance(machine, str) else DESCRIBED
+
 
 COMMON_COLUMNS = (
     Column("tick", "", "number of the tick"),
@@ -178,8 +196,15 @@ class PhysicsLines(NamedTuple):
     moves: tuple[str, ...]  # those of the reading lines that say where the carriage stands
 
 
-def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
-    """Modules, blocks and lines of the plant's terms, in the order in which they act."""
+class RatioParams(NamedTuple):
+    ratio: float  # what a node moves for one unit of its coordinate
+
+
+def physics_lines(terms: list[Any], kind: str, dt: float, place_of: Callable[[str], Any] | None = None) -> PhysicsLines:
+    """Modules, blocks and lines of the plant's terms, in the order in which they act.
+
+    `place_of` gives the place of an entry on a described machine (plants/graph/elements.py); by `kind` where absent.
+    """
     from rtctl.plants.physics import TERMS, ordered, place
     from rtctl.plants.physics.term import SITES
 
@@ -190,7 +215,12 @@ def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
     for number, settings in enumerate(ordered(terms)):
         term = TERMS[settings.term]
         name = f"term{number}"
-        spot = place(kind, settings.node)
+        if place_of is None:
+            spot = place(kind, settings.node)
+            ratio = f"p.plant.{spot.factor}" if spot.factor else "1.0"
+        else:
+            spot, ratio = place_of(settings), f"p.{name}_node.ratio"
+            blocks.append(Block(f"{name}_node", RatioParams(spot.factor), None))
         blocks.append(Block(name, term.build(settings, dt), term.state))
         uses.append(term.build.__module__)
         for site in SITES:
@@ -198,7 +228,7 @@ def physics_lines(terms: list[Any], kind: str, dt: float) -> PhysicsLines:
             if act is not None:
                 line = act.format(
                     p=f"p.{name}", s=f"s.{name}", m="s.plant.m", i=spot.node, l=spot.link, c=spot.channel,
-                    r=f"p.plant.{spot.factor}" if spot.factor else "1.0",
+                    r=ratio,
                 )  # fmt: skip
                 lines[site] += line.split("\n")
                 if site == "reading" and term.moves:

@@ -5,7 +5,7 @@ Block diagram of the tick, thesis figure 5.1:
     reference -> shaper -> error -> PD -> + friction + excitation -> allocation to two motors (+ tension) -> limits
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from rtctl.machines.base import (
     Block,
     Column,
     Diagram,
+    Signals,
 )
 from rtctl.machines.ivu_plant import plant_diagram, substeps
 from rtctl.machines.ivu_settings import IvuConfig
@@ -53,6 +54,16 @@ SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
 def radius(config: IvuConfig) -> float:
     """Radius that turns metres of tape into radians of the capstan."""
     return config.R_c
+
+
+def signals(config: Any) -> Signals:
+    """Columns by which a run is judged."""
+    return Signals("capstan", "capstan_error", ("u1", "u2"), "truth_capstan")
+
+
+def unit(config: Any) -> str:
+    """Unit of reference and position."""
+    return UNIT
 
 
 def metres_per_unit(config: IvuConfig) -> float:

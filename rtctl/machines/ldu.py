@@ -5,7 +5,7 @@ Block diagram of the tick, thesis figures 12.7 and 12.10:
     reference -> shaper -> error -> law (PI with velocity feedback, PD, or any sections) -> + friction -> limit
 """
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -43,6 +43,7 @@ from rtctl.machines.base import (
     Column,
     Diagram,
     MachineSettings,
+    Signals,
 )
 from rtctl.machines.ldu_plant import plant_diagram, substeps
 from rtctl.machines.physics import PhysicsTerm, check_nodes
@@ -159,6 +160,16 @@ class LduConfig(MachineSettings):
     reference: MetreReferenceSettings = MetreReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()
     plant: LduPlantSettings = LduPlantSettings()
+
+
+def signals(config: Any) -> Signals:
+    """Columns by which a run is judged."""
+    return Signals("position", "position_error", ("u",), "truth_x")
+
+
+def unit(config: Any) -> str:
+    """Unit of reference and position."""
+    return UNIT
 
 
 def metres_per_unit(config: LduConfig) -> float:

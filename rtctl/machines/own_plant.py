@@ -22,7 +22,7 @@ def is_own(config: Any) -> bool:
 
 def plant_diagram(config: Any, period: float, seed: int, substeps: int) -> PlantDiagram:
     """Blocks and lines of the emulated machine, advanced by `period` s a call."""
-    kind, h = config.machine, period / substeps
+    kind, h = config.kind, period / substeps
     parts = own_plants[type(config.plant)]
     blocks, read, write, sample = {"axis": _axis, "ldu": _ldu, "ivu": _ivu}[kind](config, h, seed)
     fields = parts.state.names or ()

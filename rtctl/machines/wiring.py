@@ -49,9 +49,9 @@ TERMINALS: dict[str, Terminals] = {
 
 def wiring(config: Any) -> Wiring:
     """Channels that a machine's config uses."""
-    if config.machine == "ivu":
+    if config.kind == "ivu":
         board = config.board
         return Wiring((board.output1, board.output2), (board.reel1, board.reel2), counters=1)
-    if config.machine == "ldu":
+    if config.kind == "ldu":
         return Wiring((config.board.output,), (), counters=2, lines=(config.board.direction_line,))
     return Wiring((config.output,), (), counters=1)

@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 
 from rtctl.config.fields import Shape, child, shape
 from rtctl.config.schema import Row, about, settings_table
-from rtctl.machines import CONFIGS
+from rtctl.machines import CONFIGS, EVERY
 from rtctl.machines.base import MachineSettings
 from rtctl.manual.command_pages import cell
 from rtctl.plants.physics import TERMS, by_kind
 
-TITLES = {"ivu": "Image Verification Unit", "ldu": "Linear Drive Unit", "axis": "one axis"}
+SHOWN = {"described": "belt"}  # config that stands for a kind, where it has another name
+TITLES = {"ivu": "Image Verification Unit", "ldu": "Linear Drive Unit", "axis": "one axis", "described": "any machine"}
 PHYSICS = "plant.physics[]"
 HEAD = """# Config
 
@@ -63,11 +64,11 @@ class Part(NamedTuple):
 
 def config_pages() -> dict[str, str]:
     """File name -> text."""
-    pages = ", ".join(f"[{kind}](config_{kind}.md)" for kind in CONFIGS)
+    pages = ", ".join(f"[{kind}](config_{kind}.md)" for kind in EVERY)
     common = parts(MachineSettings)
     found = {"config.md": page(HEAD.format(pages=pages), common), "config_physics.md": _physics()}
     shared = {part.paths for part in common} - {("",)}
-    for kind, model in CONFIGS.items():
+    for kind, model in EVERY.items():
         own = [part for part in parts(model) if part.paths not in shared]
         own = [p._replace(rows=tuple(r for r in p.rows if r.path not in MachineSettings.model_fields)) for p in own]
         head = MACHINE.format(title=TITLES[kind], kind=kind, text=_shipped(kind))
@@ -78,7 +79,7 @@ def config_pages() -> dict[str, str]:
 def _shipped(kind: str) -> str:
     from rtctl.config.yaml_file import find
 
-    return find(kind).read_text().rstrip("\n")
+    return find(SHOWN.get(kind, kind)).read_text().rstrip("\n")
 
 
 def _physics() -> str:

@@ -49,13 +49,11 @@ def _params(diagram: Any, name: str) -> Any:
 
 def _check_term(machine: Any, settings: Any, file: File) -> None:
     """Compile the lines of a term on the record of its machine; they may not allocate."""
-    from rtctl.plants.physics import TERMS, place
-    from rtctl.plants.physics.place import PLANTS
+    from rtctl.plants.physics import TERMS
     from rtctl.plants.physics.term import SITES
 
     term, kind = TERMS[settings.term], machine.kind
-    spot = place(kind, settings.node)
-    record = getattr(PLANTS[kind], f"{kind.upper()}_STATE")
+    spot, record, ratio = _where(machine.config, kind, settings)
     empty = np.dtype([("spare", np.float64)])
     parts = Parts(load(file), file.name, term.settings, term.state or empty, file)
     lines = []
@@ -64,7 +62,7 @@ def _check_term(machine: Any, settings: Any, file: File) -> None:
         if act is not None:
             lines += act.format(
                 p="p", s="s", m="m", i=spot.node, l=spot.link, c=spot.channel,
-                r=f"plant.{spot.factor}" if spot.factor else "1.0",
+                r=ratio,
             ).split("\n")  # fmt: skip
     params = record_dtype(term.build(settings, machine.plant_period / machine.substeps))
     belief = record_dtype(_params(machine.plant_diagram, "plant"))
@@ -72,3 +70,19 @@ def _check_term(machine: Any, settings: Any, file: File) -> None:
         check.check_lines(parts, lines, {"p": params, "s": parts.state, "m": record["m"], "plant": belief})
     except OwnError as error:
         raise UserError(str(error)) from error
+
+
+def _where(config: Any, kind: str, settings: Any) -> tuple[Any, np.dtype, str]:
+    """Place of an entry of `physics:`, record of its plant, and text of the node's ratio."""
+    if not isinstance(config.machine, str):
+        from rtctl.machines.described_plant import graph_of
+        from rtctl.plants.graph.elements import place_of
+        from rtctl.plants.graph.plant import GRAPH_STATE
+
+        layout, values, _ = graph_of(config.machine, 1e-3)
+        return place_of(layout, values, settings), GRAPH_STATE, "1.0"
+    from rtctl.plants.physics import place
+    from rtctl.plants.physics.place import PLANTS
+
+    spot = place(kind, settings.node)
+    return spot, getattr(PLANTS[kind], f"{kind.upper()}_STATE"), f"plant.{spot.factor}" if spot.factor else "1.0"

@@ -48,6 +48,9 @@ def widened(base: Any, data: Any, folder: Path | None = None, law: bool = True) 
         base = _with_any_law(base)
     if not found:
         return base, data
+    if PLANT in found and isinstance(data.get("machine"), dict):
+        why = "a machine that the config describes is its own plant; drop plant.kind, or name a machine"
+        raise MisplacedError(PLANT, OwnError(why))
     given = data.get("own")
     texts = dict(given) if isinstance(given, dict) else {}
     sources = {}

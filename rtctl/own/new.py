@@ -13,7 +13,7 @@ from typing import NamedTuple
 from rtctl.config.errors import UserError, nearest
 from rtctl.own.parts import camel, upper
 
-KINDS = ("law", "plant", "term")
+KINDS = ("law", "plant", "term")  # of files; a machine is a config, see new_machine.py
 MACHINES = ("ivu", "ldu", "axis")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 UNIT = {"ivu": "rad", "ldu": "m", "axis": "m"}

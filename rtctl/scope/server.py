@@ -13,6 +13,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from rtctl.config.errors import UserError
+from rtctl.machines.base import DESCRIBED
 from rtctl.scope.connection import Connection
 from rtctl.scope.feed import Feed
 from rtctl.scope.guard import HEADERS, Guard
@@ -125,7 +126,10 @@ class Scope:
     async def _look_at_settings(self) -> None:
         with contextlib.suppress(UserError):
             values = {part: (await self.feed.call("get", path=part))["value"] for part in PARTS}
-            self._settings = tunable(self.feed.status["machine"], values)
+            machine = self.feed.status["machine"]
+            if machine == DESCRIBED:
+                machine = (await self.feed.call("get", path="machine"))["value"]
+            self._settings = tunable(machine, values)
 
     def _start(self, connection: Connection) -> None:
         if self.feed.history is not None:

@@ -9,17 +9,19 @@ PARTS = ("law", "safety")  # of the config, in the order of the page
 SIDES = ("gt", "ge", "lt", "le")
 
 
-def tunable(kind: str, values: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows for the page from the parts of a running machine's config, as `get` returns them.
+def tunable(machine: Any, values: dict[str, Any]) -> list[dict[str, Any]]:
+    """Rows for the page from the parts of a running machine's config, as `get` returns them; `machine` is that of the
+    config, a name or a description.
 
     `path`, `value`, `type` (number, integer, boolean or choice), `unit`, `help`, `bounds` as a person writes them, and
     each bound under its own name (gt, ge, lt, le). Lists are left out: they are the structure of a law.
     """
     from rtctl import machines
 
-    if kind not in machines.CONFIGS:
+    model = machines.class_of({"machine": machine, "law": values.get("law")})
+    if model is None:
         return []
-    whole = Shape(machines.CONFIGS[kind], model=machines.CONFIGS[kind])
+    whole = Shape(model, model=model)
     rows: list[dict[str, Any]] = []
     for part in PARTS:
         place = child(whole, part)

@@ -4,7 +4,7 @@ The ranges are those that a bench would allow: moves that the law follows, gains
 machine with other bounds adds a row here.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,29 +13,8 @@ from rtctl.config.load import get_path
 from rtctl.drivers import at_mio_16de, ldu_amplifier
 from rtctl.loop.faults import CODES
 from rtctl.machines import Machine
-
-
-class Range(NamedTuple):
-    """Lengths in the unit of the machine's reference (rad or m), times in s."""
-
-    position: str  # column
-    error: str
-    outputs: tuple[str, ...]
-    counts: str
-    truth: str  # where the counted thing really is; only an emulator knows
-    tensions: tuple[str, ...]  # estimates
-    truth_tensions: tuple[str, ...]
-    travel: float  # to either side of where the day began
-    jump: float  # largest setpoint without a ramp
-    rate: tuple[float, float]  # of a ramp, per s
-    settle: float  # from the end of a move until it has to be there
-    tolerance: float  # how far from its target it may then be
-    stretch: float  # counts that encoder and truth may be apart: an edge that is just passed, springs between the two
-    counters: int  # channels that are wired
-    inputs: int
-    gains: dict[str, tuple[float, float]]  # setting -> share of the config's own value, lowest and highest
-    measure: tuple[str, str] | None = None  # setting with which arming measures what is followed by counts
-
+from rtctl.machines.base import DESCRIBED
+from rtctl.soak.described import DESCRIBED_GAINS, Range, described_counts, described_range, full_commands, rounding_of
 
 RANGES = {
     "ivu": Range(
@@ -74,7 +53,12 @@ KNOTS = {  # (s, rad or m) from where it starts: played where the config has no 
 
 
 def range_of(machine: Machine) -> Range:
-    """The row of this machine's kind. Raises UserError where there is none."""
+    """The row of this machine's kind; of a described machine one that follows from its own reference.
+
+    Raises UserError where there is none.
+    """
+    if machine.kind == DESCRIBED:
+        return described_range(machine.config)
     if machine.kind not in RANGES:
         raise UserError(f"no soak for machine '{machine.kind}'; it is for {', '.join(RANGES)}")
     return RANGES[machine.kind]
@@ -85,13 +69,20 @@ def with_reference(config: Any) -> Any:
     given = config.reference
     if given.steps or len(given.knots) > 1:
         return config
-    return config.model_copy(update={"reference": given.model_copy(update={"knots": KNOTS[config.machine]})})
+    return config.model_copy(update={"reference": given.model_copy(update={"knots": knots_of(config)})})
+
+
+def knots_of(config: Any) -> list[tuple[float, float]]:
+    """Reference of a config that has none."""
+    if config.kind == DESCRIBED:
+        raise UserError(f"{config.name}: a soak moves as the reference does; give the config one")
+    return KNOTS[config.kind]
 
 
 def gains_of(config: Any) -> dict[str, tuple[float, float]]:
     """Settings that this config's law has and uses, each with its lowest and highest value in SI."""
     out = {}
-    for path, (low, high) in RANGES[config.machine].gains.items():
+    for path, (low, high) in (DESCRIBED_GAINS if config.kind == DESCRIBED else RANGES[config.kind].gains).items():
         try:
             value = get_path(config, path)
         except UserError:  # a law of another kind
@@ -103,11 +94,13 @@ def gains_of(config: Any) -> dict[str, tuple[float, float]]:
 
 def volts(config: Any) -> tuple[float, float]:
     """Lowest and highest output that law and converter allow, V, with half a code for rounding."""
+    if config.kind == DESCRIBED:
+        return full_commands(config)
     limit = config.law.limit
     low, high = (-limit.high if limit.low is None else limit.low), limit.high
     full = full_scale(config)
     half = full / 2 / CODES
-    if config.machine == "ldu":
+    if config.kind == "ldu":
         high, low = min(high, config.amplifier.limit), max(low, -config.amplifier.limit)
     return max(low, -full) - half, min(high, full) + half
 
@@ -115,7 +108,7 @@ def volts(config: Any) -> tuple[float, float]:
 def full_scale(config: Any) -> float:
     """Highest voltage of the converter."""
     wire = {"axis": lambda: config.output, "ldu": lambda: config.board.output}.get(
-        config.machine, lambda: config.board.output1
+        config.kind, lambda: config.board.output1
     )()
     return abs(float(wire.external_volts)) if wire.external_volts else at_mio_16de.INTERNAL_VOLTS
 
@@ -123,6 +116,8 @@ def full_scale(config: Any) -> float:
 def rounding(config: Any) -> float:
     """V that a row's output may differ from what the law wanted: half a code, one lost at the end of the scale, and
     what makes up for the knee of a measured amplifier."""
+    if config.kind == DESCRIBED:
+        return rounding_of(config)
     code = full_scale(config) / CODES
     amplifier = getattr(config, "amplifier", None)
     return 2 * code + (ldu_amplifier.KNEE_VOLTS if amplifier is not None and amplifier.compensate else 0.0)
@@ -133,10 +128,12 @@ def unknown(config: Any) -> set[str]:
     from rtctl.machines import own_plant
     from rtctl.own.plant import TRUTH
 
-    columns = [column.name for column in own_plant.COLUMNS[config.machine]]
+    if config.kind == DESCRIBED:
+        return set()
+    columns = [column.name for column in own_plant.COLUMNS[config.kind]]
     parts = own_plant.parts_of(config)
     if parts is not None:
-        fields = zip(columns, TRUTH[config.machine], strict=True)
+        fields = zip(columns, TRUTH[config.kind], strict=True)
         return {column for column, field in fields if field not in (parts.state.names or ())}
     return set(columns) if config.plant.fmu is not None else set()
 
@@ -149,12 +146,14 @@ def counts_per_unit(config: Any) -> float:
     from rtctl.plants.physics import TERMS
 
     if own_plant.is_own(config):
-        if config.machine == "ldu":
+        if config.kind == "ldu":
             return float("nan")
-    elif any(TERMS[t.term].act_at("reading", config.machine) is not None for t in config.plant.physics):
+    elif any(TERMS[t.term].act_at("reading", config.kind) is not None for t in config.plant.physics):
         return float("nan")
-    if config.machine == "axis":
+    if config.kind == DESCRIBED:
+        return described_counts(config)
+    if config.kind == "axis":
         return float(1.0 / config.encoder.pitch)
-    sensor = config.sensors.capstan if config.machine == "ivu" else config.sensors.encoder
+    sensor = config.sensors.capstan if config.kind == "ivu" else config.sensors.encoder
     per_rad = float(sensor.lines * sensor.multiply / (2 * np.pi))
-    return per_rad / float(ldu.parameters(config.plant).R_c) if config.machine == "ldu" else per_rad
+    return per_rad / float(ldu.parameters(config.plant).R_c) if config.kind == "ldu" else per_rad

@@ -45,7 +45,7 @@ def quantities(signals: Mapping[str, float], units: Mapping[str, str], law: Mapp
     error = error_name(units)
     if error is not None and error in signals:
         stem = error.removesuffix("_error")
-        measured = stem if stem in signals else "x"
+        measured = next((name for name in (stem, "x", "feedback") if name in signals), "x")
         if measured in signals and "ref" in signals:
             unit = shown(0.0, units[error])[1]
             at, ref, off = (shown(signals[name], units[error])[0] for name in (measured, "ref", error))

@@ -12,11 +12,11 @@ import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
-from rtctl.trace.metrics import POSITION, scales, settle_floor, step_metrics
+from rtctl.trace.metrics import scales, settle_floor, step_metrics
 
 Align = Literal["auto", "tick", "reference"]
 REFERENCES = ("target", "ref")  # before shaping, if it is there: it moves at once
-MEASURED = tuple(POSITION.values())
+MEASURED = ("capstan", "position", "x", "feedback")  # in the order in which they are looked for
 MOVES = 0.01  # share of the reference's span that counts as a start
 RATE_OFF = 1e-3  # share by which the rates may differ
 RUNNING = 2  # in the column `state`

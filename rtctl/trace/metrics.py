@@ -9,7 +9,6 @@ import numpy as np
 from rtctl.config.units import ANGLES
 from rtctl.machines import MODULES, Machine
 
-POSITION = {"ivu": "capstan", "ldu": "position", "axis": "x"}  # the column that steps are judged by
 LEAST_HOLD = 10  # samples; a reference that rests for less is still on its way
 
 
@@ -30,6 +29,7 @@ def step_metrics(
     - `t`: s, when the reference arrives at its new value; `size`: in the machine's unit, with its sign
     - `final_error_rad`, `final_error_mm`: mean of ref - y over the last tenth of the hold; None where the
       unit of either has no scale: an angle that moves no tape has no mm
+    - `final_error`: the same in the machine's unit, where it is neither an angle nor a way
     - `overshoot_pct`: how far y went beyond the new value, in % of the step; never negative
     - `settling_s`: from `t` until y stays within `settle_band` of the step, or `settle_floor` (machine's unit; a few
       counts of the sensor) where that is more; None if it does not before the next step
@@ -51,6 +51,7 @@ def step_metrics(
             {
                 "t": float(t[start]),
                 "size": size,
+                **({"final_error": final} if scale_mm is None and rad_per_unit is None else {}),
                 "final_error_rad": None if rad_per_unit is None else final * rad_per_unit,
                 "final_error_mm": None if scale_mm is None else final * scale_mm,
                 "overshoot_pct": max(0.0, float(np.max((y[hold] - ref[hold]) / size)) * 100),
@@ -62,8 +63,9 @@ def step_metrics(
 
 def machine_steps(machine: Machine, t: np.ndarray, ref: np.ndarray, y: np.ndarray) -> list[dict[str, float | None]]:
     """`step_metrics` in the units of a machine, with what it calls settled."""
-    rad = 1.0 if machine.unit == "rad" else 1.0 / machine.radius
-    return step_metrics(t, ref, y, 1000.0 * machine.metres_per_unit, rad, settle_floor=settle_floor(machine.kind))
+    rad = 1.0 if machine.unit in ANGLES else 1.0 / machine.radius if machine.radius else None
+    mm = None if machine.metres_per_unit is None else 1000.0 * machine.metres_per_unit
+    return step_metrics(t, ref, y, mm, rad, settle_floor=settle_floor(machine.kind))
 
 
 def settle_floor(kind: str) -> float:
@@ -72,8 +74,17 @@ def settle_floor(kind: str) -> float:
 
 
 def final_error_unit(steps: Sequence[Mapping[str, Any]]) -> str:
-    """Unit in which people read the final errors of the steps: mm, or rad where nothing moves along a line."""
-    return "mm" if not steps or any(step.get("final_error_mm") is not None for step in steps) else "rad"
+    """Unit in which people read the final errors of the steps: mm, rad where nothing moves along a line, "" (the
+    machine's own) for a speed."""
+    for unit in ("mm", "rad"):
+        if not steps or any(step.get(f"final_error_{unit}") is not None for step in steps):
+            return unit
+    return ""
+
+
+def final_error_key(unit: str) -> str:
+    """Key of the final error in a unit of `final_error_unit`."""
+    return f"final_error_{unit}" if unit else "final_error"
 
 
 def scales(case: Mapping[str, Any]) -> tuple[float | None, float | None]:
@@ -82,8 +93,11 @@ def scales(case: Mapping[str, Any]) -> tuple[float | None, float | None]:
     mm is None on a rotary axis, rad where a linear axis has no capstan radius R_c. Raises ValueError where an ivu has
     none.
     """
-    if (case.get("sensors") or {}).get("unit") in ANGLES:
+    unit = (case.get("loop") or case.get("sensors") or {}).get("unit")
+    if unit in ANGLES:
         return None, 1.0
+    if unit not in (None, "m"):  # a speed
+        return None, None
     radius = case.get("parameters", {}).get("R_c")
     if case.get("plant") == "ivu":
         if not radius:

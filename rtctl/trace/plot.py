@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from rtctl.config.errors import UserError
 from rtctl.config.files import replaced
 from rtctl.trace.bundle import Bundle
-from rtctl.trace.metrics import final_error_unit
+from rtctl.trace.metrics import final_error_key, final_error_unit
 
 BUCKETS = 1500  # about the pixels of a panel's width
 
@@ -42,6 +42,7 @@ PANELS = (
             Trace("capstan", "capstan", BLUE),
             Trace("position", "measured", BLUE),
             Trace("x", "measured", BLUE),
+            Trace("feedback", "measured", BLUE),
             Trace("ref", "reference", INK, "--"),
         ),
     ),
@@ -137,7 +138,7 @@ def save(figure: Figure, path: Path, option: str = "--plot ") -> None:
 def summary(metrics: Sequence[Mapping[str, Any]]) -> str:
     """The steps of a run in one line."""
     unit = final_error_unit(metrics)
-    worst = max((step[f"final_error_{unit}"] for step in metrics), key=abs)
+    worst = max((step[final_error_key(unit)] for step in metrics), key=abs)
     over = max(step["overshoot_pct"] for step in metrics)
     times = [step["settling_s"] for step in metrics]
     settled = [s for s in times if s is not None]
@@ -209,6 +210,8 @@ def _prefixed(unit: str, largest: float) -> tuple[float, str]:
 
 
 def _title(case: Mapping[str, Any]) -> str:
-    machine = case.get("machine") or NAMES.get(str(case.get("plant")), case.get("plant")) or "Run"
+    described = isinstance(case.get("machine"), Mapping)
+    named = (case.get("config") or {}).get("name") if described else case.get("machine")
+    machine = named or NAMES.get(str(case.get("plant")), case.get("plant")) or "Run"
     date = str(case.get("recorded_at", "")).replace("T", " ").removesuffix("+00:00")
     return f"{machine}, {date} UTC" if date else str(machine)

@@ -99,9 +99,9 @@ def replay_bundle(bundle: Bundle, changed: Mapping[str, Any] | None = None) -> R
 def _config(bundle: Bundle) -> Any:
     """The settings that the recording started with."""
     given = bundle.case.get("config")
-    if not isinstance(given, dict) or given.get("machine") not in machines.CONFIGS:
+    model = machines.class_of(given)
+    if model is None or not isinstance(given, dict):
         raise NoAnswer(f"{bundle.folder}: its case has no rtctl `config`, so nobody knows the law to replay")
-    model = machines.CONFIGS[given["machine"]]
     try:
         model, given = machines.widened(given)
         return model.model_validate(given)

@@ -42,7 +42,7 @@ def ends() -> Ends:
 
 def test_a_frame_arrives_as_it_was_sent_and_once(ends: Ends) -> None:
     assert ends.newest() == 0
-    assert ends.send(7, t_ns=-(2**40), ao_codes=[-2048, 2047], dio_lines=0xFFFFFFFF, state=2)
+    assert ends.send(7, t_ns=-(2**40), ao_codes=[-2048, 2047, 5, -5], dio_lines=0xFFFFFFFF, state=2)
     assert ends.newest() == 1 and ends.got.tobytes() == ends.tx.tobytes()
     assert ends.newest() == 0
 

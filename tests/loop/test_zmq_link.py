@@ -48,7 +48,7 @@ def ends(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[Ends]:
 
 
 def test_a_frame_arrives_as_it_was_sent(ends: Ends) -> None:
-    assert ends.send(7, t_ns=-(2**40), ao_codes=[-2048, 2047], dio_lines=0xFFFFFFFF, state=2)
+    assert ends.send(7, t_ns=-(2**40), ao_codes=[-2048, 2047, 5, -5], dio_lines=0xFFFFFFFF, state=2)
     assert ends.wait() == 1
     assert ends.got.tobytes() == ends.tx.tobytes()
 
@@ -68,7 +68,7 @@ def test_the_newest_wins(ends: Ends) -> None:
 
 @pytest.mark.parametrize("wrong", [{"magic": 1}, {"version": frames.VERSION + 1}])
 def test_foreign_frames_are_ignored(ends: Ends, wrong: dict[str, int]) -> None:
-    ends.send(1, ao_codes=[5, 5])
+    ends.send(1, ao_codes=5)
     ends.wait()
     foreign = ends.tx.copy()
     foreign["seq"] = 2

@@ -1,5 +1,6 @@
 import pytest
 
+from rtctl.cli.common import load_config
 from rtctl.scope.tunable import tunable
 
 
@@ -27,6 +28,14 @@ def test_values_units_and_bounds_are_those_of_the_config(found):
 
 def test_what_changes_the_structure_is_not_offered(found):
     assert not [path for path in found("ldu") if path.endswith(".kind") or not path.startswith(("law.", "safety."))]
+
+
+def test_a_described_machine_has_its_own_units():
+    settings = load_config("spindle", [])
+    parts = {part: getattr(settings, part).model_dump(mode="json") for part in ("law", "safety")}
+    rows = {row["path"]: row for row in tunable(settings.machine.model_dump(mode="json"), parts)}
+    assert (rows["law.position.gain"]["value"], rows["law.position.gain"]["unit"]) == (0.208, "V*s/rad")
+    assert rows["law.limit.high"]["unit"] == "V" and rows["law.position.tau_i"]["unit"] == "s"
 
 
 def test_a_machine_that_this_version_does_not_know_has_none():

@@ -55,7 +55,7 @@ export class Commands {
 
   status(status) {
     const s = status.signals ?? {};
-    const where = s.capstan ?? s.position ?? s.x;
+    const where = s.capstan ?? s.position ?? s.x ?? s.feedback;
     this.target = s.target ?? s.ref ?? 0;
     $("setpoint-now").textContent = `target ${withUnit(this.target, this.unit)}, machine at ${withUnit(where, this.unit)}`;
   }

@@ -14,7 +14,7 @@ import { withUnit } from "./units.js";
 const $ = (id) => document.getElementById(id);
 const WINDOWS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60];
 const KEPT_LAST = ["tick", "t", "period", "lateness", "state", "trip", "link_age", "order"]; // of interest now and then
-const MEASURED = ["capstan", "position", "x"];
+const MEASURED = ["capstan", "position", "x", "feedback"];
 
 const want = { kind: "time", signals: [], x: "", window: 5, columns: 1000, hold: false, span: null, trigger: { mode: "off", signal: "", level: 0, edge: "rising", pre: 0.2, armed: 0 } };
 const signals = new Map(); // name -> { unit, help, slot }

@@ -48,7 +48,7 @@ class Source:
     @property
     def name(self) -> str:
         """What the machine is called in a file: ivu, ldu, axis."""
-        return str(self.case.get("plant") or "trace")
+        return str(self.case.get("plant") or (self.case.get("config") or {}).get("name") or "trace")
 
     @property
     def started(self) -> datetime | None:

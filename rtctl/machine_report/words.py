@@ -1,0 +1,133 @@
+"""Sentences on a described machine: bodies, joints, drives and sensors, a line each, in the units people read."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from rtctl.plants.graph.description import Body, Description
+from rtctl.plants.graph.units import FORCE, WAY, joint_units
+
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
+Line = tuple[str, str]
+
+
+def si(value: float, unit: str) -> str:
+    """A number with its unit and three digits, with the prefix that leaves no zeros: 21 mN, 1.2 kN/m."""
+    plain = unit in ("", "percent") or unit.startswith("kg") or "/" in unit.replace("/m", "").replace("/rad", "")
+    if value == 0 or not math.isfinite(value) or plain:
+        return f"{value:.4g} {unit}".strip()
+    factor, prefix = next(((f, p) for f, p in PREFIXES if abs(value) >= 0.9995 * f), PREFIXES[-1])
+    return f"{value / factor:.4g} {prefix}{unit}"
+
+
+def sentences(machine: Description) -> list[Line]:
+    """Name of the group, in the first line of each, and a line for each element."""
+    groups = (("bodies", _bodies), ("joints", _joints), ("drives", _drives), ("sensors", _sensors))
+    found: list[Line] = []
+    for group, told in groups:
+        found += [(group if n == 0 else "", line) for n, line in enumerate(told(machine))]
+    return found
+
+
+def _bodies(machine: Description) -> Iterator[str]:
+    for name, body in machine.bodies.items():
+        if machine.is_frame(name):
+            yield f"{name} is the frame"
+            continue
+        size = f"turns, {si(body.inertia, 'kg m^2')}" if body.turns else f"slides, {si(body.mass, 'kg')}"
+        yield ", ".join([f"{name} {size}", *_drag(body), *_weight(body)])
+
+
+def _drag(body: Body) -> Iterator[str]:
+    force, way = FORCE[body.turns], WAY[body.turns]
+    if body.dry:
+        yield f"dry friction {si(body.dry, force)}"
+    if body.viscous:
+        yield f"viscous friction {si(body.viscous, f'{force} s/{way}')}"
+
+
+def _weight(body: Body) -> Iterator[str]:
+    for weight in body.weights:
+        if weight.incline is not None:
+            angle = math.degrees(weight.incline)
+            yield "its weight pulls it down" if abs(angle - 90) < 1e-6 else f"on a slope of {angle:.4g} deg"
+        else:
+            off = math.degrees(weight.angle)
+            hangs = f" at {-off:.4g} deg" if off else ""
+            yield f"a pendulum of {si(weight.mass, 'kg')} at {si(weight.arm, 'm')} that hangs{hangs}"
+
+
+def _joints(machine: Description) -> Iterator[str]:
+    for name, joint in machine.joints.items():
+        a, b = getattr(joint, "from"), joint.to
+        units = joint_units(*ends_turn(machine, joint))
+        ratio = si(joint.ratio, units["ratio"])
+        if joint.stiffness is None:
+            yield f"{name} couples {a} and {b} rigidly, ratio {ratio}"
+            continue
+        damping = f", damping {si(joint.damping, units['damping'].replace('*', ' '))}" if joint.damping else ""
+        moves = "" if "frame" in (a, b) else f", ratio {ratio}"
+        yield f"{name} is a spring from {a} to {b}{moves}, {si(joint.stiffness, units['stiffness'])}{damping}"
+
+
+def joint_label(machine: Description, joint: Any) -> list[str]:
+    """Ratio and stiffness of a joint, for a drawing."""
+    units = joint_units(*ends_turn(machine, joint))
+    ratio = [si(joint.ratio, units["ratio"])] if joint.ratio != 1.0 else []
+    return ratio + ([si(joint.stiffness, units["stiffness"])] if joint.stiffness is not None else ["rigid"])
+
+
+def size_label(machine: Description, name: str) -> str:
+    """Inertia or mass of a body, for a drawing."""
+    body = machine.bodies.get(name)
+    if body is None or machine.is_frame(name):
+        return ""
+    return si(body.inertia, "kg m^2") if body.turns else si(body.mass, "kg")
+
+
+def ends_turn(machine: Description, joint: Any) -> tuple[bool, bool]:
+    """Whether the two ends of a joint turn; the frame is as the other end."""
+    a, b = getattr(joint, "from"), joint.to
+    one, two = machine.turns(a), machine.turns(b)
+    return two if machine.is_frame(a) else one, one if machine.is_frame(b) else two
+
+
+def _drives(machine: Description) -> Iterator[str]:
+    for name, drive in machine.drives.items():
+        turns = machine.turns(drive.body) if drive.body else ends_turn(machine, machine.joints[drive.joint])[1]
+        force, made = FORCE[turns], {"force": FORCE[turns], "current": "A", "voltage": "V"}[drive.kind]
+        per = f" for 1 {drive.unit}" if drive.unit else ""
+        where = drive.body or f"the two ends of {drive.joint}"
+        parts = [f"{name} drives {where} by {drive.column}: {si(drive.gain, made)}{per}"]
+        if drive.torque_constant is not None:
+            parts.append(f"{si(drive.torque_constant, f'{force}/A')}")
+        if drive.kind == "voltage":
+            parts.append(f"{si(drive.resistance, 'ohm')}, with back-EMF")
+        if drive.limit is not None:
+            parts.append(f"at most {drive.limit:.4g} {drive.unit}")
+        if drive.bandwidth_hz is not None:
+            parts.append(f"follows up to {drive.bandwidth_hz:.4g} Hz")
+        yield ", ".join(parts)
+
+
+def _sensors(machine: Description) -> Iterator[str]:
+    for name, sensor in machine.sensors.items():
+        where = sensor.body or sensor.joint or sensor.drive
+        grain = sensor.grain / abs(sensor.scale)
+        unit = column_si(machine, sensor)
+        fine = f", one step is {si(grain, unit)}" if grain else ", of unknown resolution"
+        noise = f", noise {si(sensor.noise / abs(sensor.scale), unit)}" if sensor.noise else ""
+        yield f"{name} shows the {sensor.measures} of {where} in {sensor.column}{fine}{noise}"
+
+
+def column_si(machine: Description, sensor: Any) -> str:
+    """SI unit of what a sensor measures."""
+    from rtctl.plants.graph.units import measured_unit
+
+    if sensor.body is not None:
+        turns = machine.turns(sensor.body)
+    elif sensor.joint is not None:
+        turns = ends_turn(machine, machine.joints[sensor.joint])[1]
+    else:
+        turns = True
+    return measured_unit(sensor.measures, turns)
