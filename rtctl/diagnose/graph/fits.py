@@ -22,6 +22,7 @@ from rtctl.plants.physics import TERMS
 ROUNDS = 3  # of noise and fit
 ENOUGH = 2.0  # nats, that a further round must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
+RESTLESS = 1.2  # times what differs from block to block, the same
 COARSE = 2000.0  # innovations that a recording counts for at most: no model is exact
 
 
@@ -120,14 +121,16 @@ def without(base: Fitted, index: int) -> tuple[Space, np.ndarray]:
 
 
 def explained(base: Fitted, best: Fitted) -> float:
-    """Share of the power of the residual, above the noise of counting, that the best model takes off.
+    """Share of the power of the residual, above the noise of the sensor, that the best model takes off.
 
-    The sensor in which most is missing counts.
+    Noise is what counting leaves, and what differs from one block to the next without a pattern. The sensor in which
+    most is missing counts.
     """
-    least = FLOOR * base.like.least * np.sqrt(base.like.mean)
+    restless = np.std(np.diff(best.e, axis=0), axis=0) / np.sqrt(2.0)
+    least = np.maximum(FLOOR * base.like.least * np.sqrt(base.like.mean), RESTLESS * restless)
     before = np.sqrt(np.mean(base.e**2, axis=0))
     after = np.sqrt(np.mean(best.e**2, axis=0))
-    c = int(np.argmax(before / base.like.least))
+    c = int(np.argmax(before / least))
     excess = before[c] ** 2 - least[c] ** 2
     if excess <= 0.0 or after[c] <= least[c]:
         return 1.0
