@@ -81,7 +81,7 @@ def test_the_shipped_campaign() -> None:
         ({"set": {"law.position.gain": -1}}, "out of bounds"),
         ({"set": {"law.positon": 1}}, "did you mean 'position'?"),
         ({"seconds": "5 mm"}, "seconds"),
-        ({"metrics": ["final_error"]}, "did you mean 'final_error_mm'?"),
+        ({"metrics": ["final_eror_mm"]}, "did you mean 'final_error_mm'?"),
         ({"keep": {"by": "overshoot"}}, "did you mean 'overshoot_pct'?"),
         ({"keep": {"bundles": "most"}}, "'most' is not one of some, all, none"),
         ({"metrics": ["overshoot_pct"]}, "not among them"),

@@ -113,7 +113,7 @@ def test_the_direction_line_and_both_counters_of_the_ldu(stand):
     ldu.rig.pulse(1, -3)
     sample = ldu.order((10,), lines=0b1)
     assert (ldu.rig.line(0), ldu.volts) == (1, [10 * STEP])
-    assert list(sample["counter_codes"]) == [daq_stc.INITIAL_COUNT, daq_stc.INITIAL_COUNT - 3]
+    assert list(sample["counter_codes"][:2]) == [daq_stc.INITIAL_COUNT, daq_stc.INITIAL_COUNT - 3]
 
 
 def test_a_card_that_fails_while_it_runs_ends_it_with_the_outputs_off(stand):

@@ -67,7 +67,7 @@ def test_the_direction_bit_gives_the_ldus_volts_their_sign(plant):
     tick(ldu, [0.0, 0.0], (100,), lines=1)
     seen = tick(ldu, [-2 * np.pi / 400, 1e-5 + 1e-7], (100,), lines=0)
     assert ldu.fmu.volts == [[100 * STEP], [-100 * STEP]]
-    assert [int(c) - daq_stc.INITIAL_COUNT for c in seen["counter_codes"]] == pytest.approx([-50, 20], abs=1)
+    assert [int(c) - daq_stc.INITIAL_COUNT for c in seen["counter_codes"][:2]] == pytest.approx([-50, 20], abs=1)
 
 
 def test_the_axis_counts_its_scale_both_ways(plant):

@@ -65,7 +65,7 @@ def test_counters_begin_in_the_middle_and_count_both_ways(wired, frame):
     wired.pulse(0, 100)
     wired.pulse(1, -7)
     wired.card.read(frame)
-    assert list(frame["counter_codes"]) == [daq_stc.INITIAL_COUNT + 100, daq_stc.INITIAL_COUNT - 7]
+    assert list(frame["counter_codes"][:2]) == [daq_stc.INITIAL_COUNT + 100, daq_stc.INITIAL_COUNT - 7]
     wired.pulse(0, -300)
     wired.card.read(frame)
     assert frame["counter_codes"][0] == daq_stc.INITIAL_COUNT - 200
@@ -127,4 +127,4 @@ def test_a_machine_without_inputs_or_lines_reads_its_counter_alone(rig, kind, fr
     assert made.output(1) == pytest.approx(10.0, abs=OUT_STEP)
     made.pulse(0, 3)
     made.card.read(frame)
-    assert list(frame["counter_codes"]) == [daq_stc.INITIAL_COUNT + 3, 0]
+    assert list(frame["counter_codes"][:2]) == [daq_stc.INITIAL_COUNT + 3, 0]
