@@ -6,7 +6,7 @@ from scipy.signal import welch
 
 from rtctl.diagnose.figures import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.missing import Curve, Missing, subjects
+from rtctl.diagnose.graph.missing import Missing, subjects
 from rtctl.diagnose.graph.posterior import rivals
 from rtctl.diagnose.graph.words import called, here, value_unit
 from rtctl.diagnose.missing import BLOCK, binned
@@ -18,43 +18,68 @@ MOST_BARS = 8
 MOST_PANELS = 3
 OWN = 0.85  # of the tolerance's interval, from which on the recording says nothing of a parameter
 LEAST_BAR = 1e-4
+PLACES = ("position", "angle")  # axes along which both directions may differ
+APART = 0.5  # of the largest, from which on they are drawn apart
 
 
 def missing_force(d: GraphDiagnosis) -> Figure:
     """What the model lacks against the axis where it lives, binned, with the law that was found through it."""
     runs, panels = Missing(d), subjects(d)[:MOST_PANELS]
-    figure, axes = new(0.4 + 2.9 * len(panels), len(panels), 1)
+    figure, axes = new(0.4 + 3.0 * len(panels), len(panels), 1)
     for ax, (term, node, axis) in zip(axes, panels, strict=True):
         if axis == "frequency":
             _spectrum(ax, runs, term, node)
         else:
-            _curve(ax, d, runs.of(term, node, axis), runs.rows, bool(term), axis)
+            _curves(ax, d, runs, term, node, axis)
         at = here(runs.machine, node)
-        label(ax, ax.get_xlabel(), ax.get_ylabel(), f"{noun(term)} at {at}" if term else f"what is left at {at}")
-        legend(ax, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 0.98))
+        title = f"{noun(term)} at {at}" if term else f"what is left at {at}"
+        ax.set_title(title, color=INK, fontsize=10, loc="left", pad=22)
+        legend(ax, ncols=4, loc="lower left", bbox_to_anchor=(-0.01, 0.98))
     return figure
 
 
-def _curve(ax, d: GraphDiagnosis, c: Curve, rows: slice, named: bool, axis: str) -> None:  # noqa: ANN001
-    x, y, law = c.x[rows], c.y[rows], c.law[rows]
-    middle, m, half, known = binned(x, y, law, BINS, max(4, round(BLOCK / d.record.dt)))
-    scale, shown = prefixed(np.abs(m), c.y_unit)
-    across, along = prefixed(x, c.x_unit) if c.x_unit != "degrees" else (1.0, c.x_unit)
-    middle = across * middle
-    ax.fill_between(middle, scale * (m - half), scale * (m + half), color=BEFORE, alpha=0.3, lw=0, label="95 % band")
-    said = "missing without it, median" if named else "missing, median"
-    ax.plot(middle, scale * m, "o", ms=3, color=BEFORE, label=said)
-    if named:
-        ax.plot(middle, scale * known, color=AFTER, lw=1.8, label="the law that was found")
+def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: str) -> None:  # noqa: ANN001
+    c, rows = runs.of(term, node, axis), runs.rows
+    block = max(4, round(BLOCK / d.record.dt))
+    parts = {"": np.ones(len(c.x[rows]), bool)}
+    if axis in PLACES:
+        forward = runs.speed(node)[rows] > 0.0
+        parts |= {", forwards": forward, ", backwards": ~forward}
+    found = {way: binned(*(v[rows][keep] for v in (c.x, c.y, c.law)), BINS, block) for way, keep in parts.items()}
+    both = [k for k in found if k] if _differ(found) else [""]
+    size = max(float(np.nanmax(np.abs(found[k][1]), initial=0.0)) for k in both)
+    law = max(float(np.nanmax(np.abs(found[k][3]), initial=0.0)) for k in both) if term else 0.0
+    scale, shown = prefixed(np.array([size]), c.y_unit)
+    across, along = prefixed(c.x, c.x_unit) if c.x_unit != "degrees" else (1.0, c.x_unit)
+    missing = "missing without it" if term else "missing"
+    half = 0.0
+    for way, marker, line in zip(both, "o^", ("-", "--"), strict=False):
+        middle, m, band, known = found[way]
+        ax.fill_between(across * middle, scale * (m - band), scale * (m + band), color=BEFORE, alpha=0.3, lw=0)
+        ax.plot(across * middle, scale * m, marker, ms=3.5, color=BEFORE, label=f"{missing}{way}")
+        if term:
+            ax.plot(across * middle, scale * known, line, color=AFTER, lw=1.8, label=f"the law that was found{way}")
+        half = max(half, _middle(band))
     free = d.decided.unlisted
-    if not named and d.located is not None and free is not None and axis == free.axis:
-        inside = across * free.knots if c.x_unit != "degrees" else np.degrees(free.knots)
+    if not term and d.located is not None and free is not None and axis == free.axis:
+        inside = np.degrees(free.knots) if c.x_unit == "degrees" else across * free.knots
         ax.plot(inside, scale * free.force, color=AFTER, lw=1.5, marker="s", ms=3, label="free force that fits best")
     ax.axhline(0, color=SEEN, lw=0.8)
-    top = scale * (1.5 * float(np.nanmax(np.abs([*m, *(known if named else [])]), initial=0.0)) + _middle(half))
+    top = scale * (1.4 * max(size, law) + half)
     ax.set_ylim(-top or -1.0, top or 1.0)
-    ax.set_xlabel(f"{c.x_words}, {along}")
-    ax.set_ylabel(f"{c.y_words}, {shown}")
+    label(ax, f"{c.x_words}, {along}", f"{c.y_words}, {shown}")
+
+
+def _differ(found: dict[str, np.ndarray]) -> bool:
+    """Whether what is missing depends on the direction of motion: curves (4, bins) by direction, "" for both."""
+    ways = [v for k, v in found.items() if k and v.shape[1] > 1]
+    if len(ways) < 2:
+        return False
+    (x0, y0), (x1, y1) = ([v[i][np.isfinite(v[0])] for i in (0, 1)] for v in ways)
+    gap = np.median(np.abs(y0 - np.interp(x0, x1, y1)))
+    apart = np.max(np.abs(y0 - np.interp(x0, x1, y1)))
+    size = max(np.abs(y0).max(), np.abs(y1).max())
+    return bool(gap > APART * size or apart > 2 * APART * size)
 
 
 def _middle(half: np.ndarray) -> float:
@@ -82,9 +107,10 @@ def heldout(d: GraphDiagnosis) -> Figure:
     late = d.heldout.late
     sim, record = late.sim, late.sim.record
     names = sim.channels
-    models = [("before", d.heldout.models[0], BEFORE), ("after", d.heldout.models[1], AFTER)]
+    first = "before" if d.decided.best.names else "the description, fitted"
+    models = [(first, d.heldout.models[0], BEFORE), ("after", d.heldout.models[1], AFTER)]
     models = models[: 2 if d.heldout.models[1].terms != d.heldout.models[0].terms else 1]
-    residuals = [(text, late.raw(m) / late.least, color) for text, m, color in models]
+    residuals = [(text, late.raw(m) / (late.least * np.sqrt(late.mean)), color) for text, m, color in models]
     order = np.argsort(-np.max([np.sqrt(np.mean(e**2, axis=0)) for _, e, _ in residuals], axis=0))[:MOST_PANELS]
     figure, axes = new(1.5 + 1.6 * len(order), 1 + len(order), 1, sharex=True)
     rows = slice(late.rows[0], late.rows[1])
@@ -100,7 +126,7 @@ def heldout(d: GraphDiagnosis) -> Figure:
             worst = max(worst, float(np.abs(e[:, c]).max()))
         ax.axhspan(-2, 2, color=NOISE, alpha=0.3, lw=0)
         ax.set_ylim(-1.1 * worst, 1.1 * worst)
-        label(ax, "", "in units of noise", f"Residual of {here(record.case.machine, names[c])}")
+        label(ax, "", "in noise", f"Residual of {here(record.case.machine, names[c])}")
         legend(ax, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
     axes[-1].set_xlabel("time, s", color=INK, fontsize=9.5)
     return figure
@@ -120,7 +146,7 @@ def posterior(d: GraphDiagnosis) -> Figure:
     figure, (ax,) = new(0.8 + 0.33 * len(bars))
     for row, bar in enumerate(bars):
         ax.barh(row, 100 * bar.probability, color=BEFORE if bar.free else AFTER, height=0.6)
-        text = percent(bar.probability) if bar.probability > LEAST_BAR else f"e^{bar.behind:.0f}"
+        text = percent(bar.probability) if bar.probability > LEAST_BAR else f"1e{bar.behind / np.log(10.0):.0f}"
         ax.text(100 * bar.probability + 1.0, row, text, va="center", fontsize=8.5, color=INK)
     machine = d.record.case.machine
     said = [bar.free or " + ".join(called(machine, n) for n in bar.names) or "the description alone" for bar in bars]

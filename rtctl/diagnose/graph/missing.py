@@ -113,6 +113,10 @@ class Missing:
             return record.u[:, number], f"command of {here(self.machine, list(self.machine.drives)[number])}", drive.unit
         return record.t - record.t[0], "time", "s"
 
+    def speed(self, node: str) -> np.ndarray:
+        """Speed (n,) of the body of a node, rad/s or m/s."""
+        return self.abscissa("velocity", node)[0]
+
     def unnamed(self) -> GraphModel:
         """The model beside which the force without a name was found."""
         return source_of(self.d).model

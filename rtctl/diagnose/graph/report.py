@@ -18,6 +18,7 @@ from rtctl.diagnose.report import COLOR, Picture, interval, svg
 from rtctl.diagnose.words import need, noun, phrase_of
 from rtctl.plants.physics import TERMS
 
+LEAST = 1e-3  # probability of a look-alike that is told where nothing is known to tell it apart
 MOST_RIVALS = 4  # look-alikes of one effect in the table
 PICTURES = {
     "missing": (figures.missing_force, {
@@ -29,17 +30,25 @@ PICTURES = {
                  "zero where nothing is missing.",
     }),
     "heldout": (figures.heldout, {
-        "": "Residual of each sensor on rows that no fit saw, in units of the least noise that its counts or steps have. "
-            "The grey band holds 95 % of it.",
+        "": "Residual of each sensor on rows that no fit saw, in units of the noise of its counts or steps. The grey band "
+            "holds 95 % of that noise.",
     }),
     "posterior": (figures.posterior, {
-        "": "Posterior probability of each answer. A force without a name is a free function with ten values; e^-9 is "
-            "the factor by which an answer is less likely than the first.",
+        "": "Posterior probability of each answer. A force without a name is a free function with ten values; 1e-9 is "
+            "how probable an answer is beside the first.",
     }),
     "parameters": (figures.parameters, {
         "": "Fitted numbers over the nominal ones with 90 % intervals. A wrong number is not missing physics.",
     }),
 }  # fmt: skip
+
+
+MISSING = {
+    NAMED: "What is missing, and the law that was found",
+    AMBIGUOUS: "What is missing, and the likeliest law",
+    UNNAMED: "What is missing, and the free force that fits best",
+    NOTHING: "What is left: no force with a pattern",
+}
 
 
 class Row(NamedTuple):
@@ -64,6 +73,7 @@ def html(d: GraphDiagnosis) -> str:
         d=d,
         title=f"{machine_words(r.case.machine)}, {r.t[-1] - r.t[0]:.4g} s at {numbers.nice(1 / r.dt, 'Hz', 3)}",
         headline=d.headline,
+        missing=MISSING[d.verdict],
         summary=summary(d),
         effects=effect_rows(d),
         checks=checks(d),
@@ -138,12 +148,14 @@ def rival_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
     machine = d.record.case.machine
     rows = []
     for e in d.effects:
-        for r in e.look_alikes[:MOST_RIVALS]:
+        for r in e.look_alikes:
             tell = TERMS[e.name].look_alikes.get(r.name, "") or TERMS[r.name].look_alikes.get(e.name, "")
-            p = f"{100 * r.p_value:.1f} %" if r.p_value >= 1e-3 else "< 0.1 %"
+            p = f"{100 * r.p_value:.1f} %" if r.p_value >= LEAST else "< 0.1 %"
+            if r.p_value < LEAST and not tell:
+                continue
             names = (words.called(machine, f"{x.name}:{x.node}") for x in (e, r))
             rows.append((*names, p, tell))
-    return rows
+    return rows[: MOST_RIVALS * len(d.effects)]
 
 
 def instead(d: GraphDiagnosis) -> list[str]:
@@ -155,11 +167,16 @@ def instead(d: GraphDiagnosis) -> list[str]:
         return lines or [f"To show {noun(n)}: {need(f'{n}:')}." for n in names]
     if d.verdict == UNNAMED and d.located is not None:
         at = words.here(d.record.case.machine, d.located.node)
-        return [
+        machine = d.record.case.machine
+        blind = [b for b in machine.bodies if not machine.is_frame(b) and b not in {s.body for s in machine.sensors.values()}]
+        lines = [
             f"The rest lives at {at}, by {d.located.axis}. Vary the {d.located.axis} there alone, slowly, both ways, and "
             "keep all else as it is.",
-            "A sensor at another body says on which side of each joint it acts.",
         ]
+        if blind:
+            at = words.here(machine, blind[0])
+            lines.append(f"A sensor at {at}, which has none, says on which side of its joints the effect acts.")
+        return lines
     return []
 
 
@@ -211,7 +228,8 @@ def terminal(d: GraphDiagnosis) -> RenderableType:
         parts.append(Text(reason(d), style="dim"))
     parts += [Text(line, style="dim") for line in instead(d)]
     if d.cannot_test:
-        text = f"{len(d.cannot_test)} effects cannot be told from this recording; the report says what to record."
+        many = len(d.cannot_test)
+        text = f"{many} effect{'s' * (many > 1)} cannot be told from this recording; the report says what to record."
         parts.append(Text(text, style="dim"))
     return Group(*parts)
 
