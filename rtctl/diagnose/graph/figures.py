@@ -4,12 +4,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import welch
 
+from rtctl.diagnose.diagnosis import NOTHING
 from rtctl.diagnose.figures import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.missing import Missing, subjects
 from rtctl.diagnose.graph.posterior import rivals
 from rtctl.diagnose.graph.words import called, here, value_unit
-from rtctl.diagnose.missing import BLOCK, binned
+from rtctl.diagnose.missing import binned
 from rtctl.diagnose.numbers import figures as digits
 from rtctl.diagnose.numbers import percent
 from rtctl.diagnose.words import noun
@@ -19,6 +20,8 @@ MOST_PANELS = 3
 OWN = 0.85  # of the tolerance's interval, from which on the recording says nothing of a parameter
 LEAST_BAR = 1e-4
 PLACES = ("position", "angle")  # axes along which both directions may differ
+FINER = 60  # bins along a place
+ALIKE = 2.0  # over the observer's bandwidth: rows whose errors count as one
 APART = 0.5  # of the largest, from which on they are drawn apart
 
 
@@ -40,25 +43,26 @@ def missing_force(d: GraphDiagnosis) -> Figure:
 
 def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: str) -> None:  # noqa: ANN001
     c, rows = runs.of(term, node, axis), runs.rows
-    block = max(4, round(BLOCK / d.record.dt))
+    block = max(4, round(ALIKE / runs.fast.follow / d.record.dt))
     parts = {"": np.ones(len(c.x[rows]), bool)}
-    if axis in PLACES:
+    bins = BINS
+    if axis in PLACES and d.verdict != NOTHING:
+        bins = FINER
         forward = runs.speed(node)[rows] > 0.0
         parts |= {", forwards": forward, ", backwards": ~forward}
-    found = {way: binned(*(v[rows][keep] for v in (c.x, c.y, c.law)), BINS, block) for way, keep in parts.items()}
-    both = [k for k in found if k] if _differ(found) else [""]
+    found = {way: binned(*(v[rows][keep] for v in (c.x, c.y, c.law)), bins, block, np.mean) for way, keep in parts.items()}
+    both = [k for k in found if k] if _differ(found, 3 if term else 1) else [""]
     size = max(float(np.nanmax(np.abs(found[k][1]), initial=0.0)) for k in both)
     law = max(float(np.nanmax(np.abs(found[k][3]), initial=0.0)) for k in both) if term else 0.0
     scale, shown = prefixed(np.array([size]), c.y_unit)
     across, along = prefixed(c.x, c.x_unit) if c.x_unit != "degrees" else (1.0, c.x_unit)
-    missing = "missing without it" if term else "missing"
     half = 0.0
     for way, marker, line in zip(both, "o^", ("-", "--"), strict=False):
         middle, m, band, known = found[way]
         ax.fill_between(across * middle, scale * (m - band), scale * (m + band), color=BEFORE, alpha=0.3, lw=0)
-        ax.plot(across * middle, scale * m, marker, ms=3.5, color=BEFORE, label=f"{missing}{way}")
+        ax.plot(across * middle, scale * m, marker, ms=3.5, color=BEFORE, label=f"missing{way}")
         if term:
-            ax.plot(across * middle, scale * known, line, color=AFTER, lw=1.8, label=f"the law that was found{way}")
+            ax.plot(across * middle, scale * known, line, color=AFTER, lw=1.8, label=f"law that was found{way}")
         half = max(half, _middle(band))
     free = d.decided.unlisted
     if not term and d.located is not None and free is not None and axis == free.axis:
@@ -70,16 +74,15 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
     label(ax, f"{c.x_words}, {along}", f"{c.y_words}, {shown}")
 
 
-def _differ(found: dict[str, np.ndarray]) -> bool:
-    """Whether what is missing depends on the direction of motion: curves (4, bins) by direction, "" for both."""
-    ways = [v for k, v in found.items() if k and v.shape[1] > 1]
-    if len(ways) < 2:
+def _differ(found: dict[str, np.ndarray], row: int) -> bool:
+    """Whether a row of the curves (4, bins) depends on the direction of motion, with "" for both directions at once."""
+    ways = [v[[0, row]][:, np.isfinite(v[0])] for k, v in found.items() if k]
+    if len(ways) < 2 or min(v.shape[1] for v in ways) < 2:
         return False
-    (x0, y0), (x1, y1) = ([v[i][np.isfinite(v[0])] for i in (0, 1)] for v in ways)
-    gap = np.median(np.abs(y0 - np.interp(x0, x1, y1)))
-    apart = np.max(np.abs(y0 - np.interp(x0, x1, y1)))
+    (x0, y0), (x1, y1) = ways
+    gap = np.abs(y0 - np.interp(x0, x1, y1))
     size = max(np.abs(y0).max(), np.abs(y1).max())
-    return bool(gap > APART * size or apart > 2 * APART * size)
+    return bool((np.max(gap) if row == 3 else np.median(gap)) > APART * size)
 
 
 def _middle(half: np.ndarray) -> float:

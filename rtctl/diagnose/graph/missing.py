@@ -22,9 +22,7 @@ from rtctl.diagnose.quantities import DIMENSIONS
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.units import measured_unit
 from rtctl.plants.physics import TERMS
-from rtctl.plants.physics.term import SITES
 
-READING = SITES[-1]
 CLEARER = 3.0  # times more than the followed sensor, from which on another sensor's reading shows an effect
 
 
@@ -133,10 +131,9 @@ class Missing:
         others = [name for name in self.sim.channels if name != self.sim.main]
         if known is None or not others:
             return None
-        at_sensor = node in self.machine.sensors
-        if at_sensor:
-            return node if node in others else None
-        if node not in self.machine.joints:
+        if node in self.machine.sensors and node in others:
+            return node
+        if node not in self.machine.joints and node not in self.machine.sensors:
             return None
         change = {n: float(np.std((out1 - out0)[self.rows, self.sim.layout.sensors[n]])) for n in self.sim.channels}
         least = dict(zip(self.sim.channels, self.d.found.like.least, strict=True))

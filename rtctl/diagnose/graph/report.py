@@ -23,10 +23,10 @@ MOST_RIVALS = 4  # look-alikes of one effect in the table
 PICTURES = {
     "missing": (figures.missing_force, {
         "": "What it takes to keep the simulation without the effect on the recorded track, by the axis where the effect "
-            "lives: medians with their 95 % bands, and what the effect that was found gives instead.",
-        UNNAMED: "What it takes to keep the simulation on the recorded track, by the axis where it lives: medians with "
+            "lives: means with their 95 % bands, and what the effect that was found gives instead.",
+        UNNAMED: "What it takes to keep the simulation on the recorded track, by the axis where it lives: means with "
                  "their 95 % bands, and the free force that fits best.",
-        NOTHING: "What it takes to keep the simulation on the recorded track: medians with their 95 % bands, which hold "
+        NOTHING: "What it takes to keep the simulation on the recorded track: means with their 95 % bands, which hold "
                  "zero where nothing is missing.",
     }),
     "heldout": (figures.heldout, {
