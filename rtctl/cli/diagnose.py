@@ -127,20 +127,19 @@ def _refuse(option: str, why: str) -> None:
 
 
 def _bundle(console: Any, bundle: Path, other: Path | None, out: Path | None, report: bool, json: bool) -> None:
-    from rtctl.diagnose.chain import diagnose as chain
-    from rtctl.diagnose.diagnosis import as_json
-    from rtctl.diagnose.folder import FOLDER, finite, own_config, write
+    from rtctl.diagnose.engines import diagnose_into
+    from rtctl.diagnose.results import FOLDER
 
     folder = out if out is not None else bundle / FOLDER
     with console.stages() as stage:
-        d = chain(bundle, other, stage)
-        stage("writing the results")
-        faults = write(d, folder, own_config(bundle), report, bundle if out is None else None)
-    console.notes([*d.record.case.warnings, *faults])
+        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage)
+    console.notes([*made.diagnosis.record.case.warnings, *made.faults])
     if json:
-        common.print_json(finite(as_json(d)))
+        common.print_json(made.data)
+    elif made.described:
+        console.described(made.diagnosis, folder)
     else:
-        console.result(d, folder)
+        console.result(made.diagnosis, folder)
 
 
 def _folder(
@@ -185,7 +184,8 @@ def _machine(
     json: bool,
 ) -> None:
     from rtctl.diagnose import repair
-    from rtctl.diagnose.folder import finite, own_config, write
+    from rtctl.diagnose.folder import own_config, write
+    from rtctl.diagnose.results import finite
     from rtctl.own import files
 
     config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)

@@ -84,11 +84,18 @@ class DiagnoseConsole:
         self.out.print(terminal(d), soft_wrap=not self.out.is_terminal)
         self.files(folder)
 
+    def described(self, d: Any, folder: Path) -> None:
+        """The same of a described machine."""
+        from rtctl.diagnose.graph.report import terminal
+
+        self.out.print(terminal(d), soft_wrap=not self.out.is_terminal)
+        self.files(folder)
+
     def files(self, folder: Path) -> None:
         """What was written."""
-        from rtctl.diagnose.folder import EXPERIMENT, MODEL
+        from rtctl.diagnose.results import EXPERIMENT, MODEL, REPORT
 
-        for word, name in (("report", "report.html"), ("model", MODEL), ("experiment", EXPERIMENT)):
+        for word, name in (("report", REPORT), ("model", MODEL), ("experiment", EXPERIMENT)):
             if (folder / name).is_file():
                 self.out.print(f"{word:11}{folder / name}", highlight=False, markup=False, soft_wrap=True)
 

@@ -100,7 +100,7 @@ def set_paths(settings: Any, values: Mapping[str, Any]) -> Any:
 def to_yaml(settings: Any, full: bool = False) -> str:
     """YAML that loads to equal settings, in SI: what was written, or with `full` every key."""
     data = settings.model_dump() if full else written(settings)
-    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=120)
+    return yaml.dump(data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=120)
 
 
 def _where(document: Document, said: dict[tuple, str], path: tuple) -> str:
@@ -113,7 +113,7 @@ def _where(document: Document, said: dict[tuple, str], path: tuple) -> str:
     return document.path
 
 
-class _Dumper(yaml.SafeDumper):
+class Dumper(yaml.SafeDumper):
     """Quotes what either YAML 1.1 or 1.2 would not read as text, and leaves the lines of an own file as they are."""
 
     def ignore_aliases(self, data: Any) -> bool:
@@ -125,4 +125,4 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
 
 
-_Dumper.add_representer(str, _text)
+Dumper.add_representer(str, _text)

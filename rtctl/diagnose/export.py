@@ -139,7 +139,7 @@ def _settings_data(model: Model, record: Record, config: dict[str, Any] | None) 
     data, left = (dict(config), []) if config is not None else carried(model, record)
     plant = dict(data.get("plant") or {})
     plant["parameters"] = parameters
-    plant["physics"] = [_entry(term) for term in model.terms]
+    plant["physics"] = [entry_of(term) for term in model.terms]
     return {**data, "machine": model.kind, "plant": plant}, left
 
 
@@ -161,7 +161,7 @@ def _wanted(kind: str, name: str) -> bool:
     return (kind, name) not in (("ivu", "J_1"), ("ivu", "J_2"), ("axis", "k"))
 
 
-def _entry(term: Settings) -> dict[str, Any]:
+def entry_of(term: Settings) -> dict[str, Any]:
     """One entry of `physics:`, what differs from the term's defaults only."""
     entry: dict[str, Any] = {"term": term.term, "node": term.node}  # type: ignore[attr-defined]
     settings = TERMS[entry["term"]].settings

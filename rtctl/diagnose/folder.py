@@ -21,12 +21,10 @@ from typing import Any, NamedTuple
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.failures import told
-from rtctl.config.files import made_in, replaced_path, write_text
+from rtctl.config.files import write_text
+from rtctl.diagnose.results import EXPERIMENT, FOLDER, MODEL, RESULT, TURN, finite, fresh, put
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
 
-RESULT, MODEL, EXPERIMENT = "diagnosis.json", "model.yaml", "experiment.yaml"
-TURN = "torque_over_turn.csv"  # of an axis that turns
-FOLDER = "diagnosis"  # in the bundle, where nobody says otherwise
 SECOND = "-heldout"  # a bundle of this name beside another is a second recording of the same machine
 ALONE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 LIMIT = 600.0  # s
@@ -77,50 +75,30 @@ def write(
     from rtctl.diagnose.turn import of_diagnosis
 
     faults: list[str] = []
-    _fresh(folder, (RESULT, MODEL, EXPERIMENT, TURN, "report.html"), base)
+    fresh(folder, base)
     try:
-        _put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config, d.left_out))
+        put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config, d.left_out))
     except UserError as error:
         faults.append(f"{folder / MODEL} is not written: {error}")
     if d.experiment is not None:
         text = experiment_yaml(d, config)
-        _put(folder / EXPERIMENT, lambda path: write_text(path, text))
+        put(folder / EXPERIMENT, lambda path: write_text(path, text))
     turn = of_diagnosis(d)
     if turn is not None:
-        _put(folder / TURN, lambda path: write_turn(turn, path))
+        put(folder / TURN, lambda path: write_turn(turn, path))
     if report:
         try:
             from rtctl.diagnose import report as page
 
             html = page.html(d)
-            _put(folder / page.NAME, lambda path: write_text(path, html))
+            put(folder / page.NAME, lambda path: write_text(path, html))
         except UserError:
             raise
         except Exception as error:  # a figure that fails must not take the verdict with it
             faults.append(f"the report is not written: {told(error)[1]}")
     result = json.dumps(finite(as_json(d)), indent=1) + "\n"
-    _put(folder / RESULT, lambda path: write_text(path, result))
+    put(folder / RESULT, lambda path: write_text(path, result))
     return faults
-
-
-def _fresh(folder: Path, names: tuple[str, ...], base: Path | None) -> None:
-    """The folder, without files that would pass for the new diagnosis's."""
-    try:
-        if base is not None:
-            made_in(base, *folder.relative_to(base).parts)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in names:
-            (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise UserError(f"{folder} cannot be written to: {error.strerror}") from None
-
-
-def _put(path: Path, make: Callable[[Path], Any]) -> None:
-    try:
-        with replaced_path(path) as part:
-            make(part)
-    except OSError as error:
-        raise UserError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def own_config(bundle: Path) -> dict[str, Any] | None:
@@ -128,19 +106,6 @@ def own_config(bundle: Path) -> dict[str, Any] | None:
     case = load_case(bundle)
     config = case.get("config")
     return config if isinstance(config, dict) and config.get("machine") == case.get("plant") else None
-
-
-def finite(value: Any) -> Any:
-    """The same with None for what is no finite number, and numpy's numbers as Python's: JSON knows no others."""
-    if isinstance(value, dict):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    if hasattr(value, "tolist"):
-        return finite(value.tolist())
-    if isinstance(value, float) and not abs(value) < float("inf"):
-        return None
-    return value
 
 
 def is_bundle(folder: Path) -> bool:
@@ -182,14 +147,12 @@ def done(task: Task) -> Outcome | None:
 
 def one(task: Task, report: bool) -> Outcome:
     """Diagnose one bundle into its folder. Nothing is raised: what went wrong is told in the outcome."""
-    from rtctl.diagnose.chain import diagnose
-    from rtctl.diagnose.diagnosis import as_json
+    from rtctl.diagnose.engines import diagnose_into
 
     began = time.monotonic()
     try:
-        d = diagnose(task.bundle, task.other)
-        faults = write(d, task.out, own_config(task.bundle), report, task.out.parent)
-        return Outcome(task.name, 0, time.monotonic() - began, finite(as_json(d)), "; ".join(faults))
+        made = diagnose_into(task.bundle, task.other, task.out, report, task.out.parent)
+        return Outcome(task.name, 0, time.monotonic() - began, made.data, "; ".join(made.faults))
     except (UserError, NoAnswer) as error:
         return Outcome(task.name, error.exit_code, time.monotonic() - began, message=_line(error))
     except Exception as error:

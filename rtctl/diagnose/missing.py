@@ -1,5 +1,8 @@
 """What a model lacks, as a force or a reading, against the axis where it lives."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from scipy.stats import t
 
@@ -95,8 +98,11 @@ class Missing:
         return record.t - record.t[0], "time", "s"
 
 
-def binned(x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int) -> np.ndarray:
-    """Along x: middles, medians of y, half widths of their 95 % bands, and medians of the law, (4, bins).
+def binned(
+    x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int, middle: Callable[..., Any] = np.median
+) -> np.ndarray:
+    """Along x: middles, medians of y (or another `middle`), half widths of their 95 % bands, and medians of the law, (4,
+    bins).
 
     Neighbouring samples are not independent: the band comes from the scatter of the means of `block` rows, visit by
     visit. Each bin has the same sum of its shares of the way along x and of the samples; a gap in x leaves a column of
@@ -115,5 +121,5 @@ def binned(x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int
             at = float(np.median(x[here]))
             if out and at - out[-1][0] > GAP * (hi - lo):
                 out.append((np.nan,) * 4)
-            out.append((at, float(np.median(y[here])), half, float(np.median(law[here]))))
+            out.append((at, float(middle(y[here])), half, float(middle(law[here]))))
     return np.array(out, float).reshape(-1, 4).T

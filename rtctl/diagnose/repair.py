@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path, to_yaml
 from rtctl.diagnose.diagnosis import AMBIGUOUS, Diagnosis
-from rtctl.diagnose.folder import EXPERIMENT
+from rtctl.diagnose.results import EXPERIMENT
 from rtctl.diagnose.numbers import span
 from rtctl.diagnose.ordinary import USE
 

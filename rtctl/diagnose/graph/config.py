@@ -1,0 +1,197 @@
+"""Model of a described machine as a config, and back: `machine:` with fitted numbers and `plant.physics` with effects.
+
+A config of any described machine, a bare description and the file written here are read alike, so that what one
+diagnosis found is what the next one believes (`rtctl import --machine model.yaml`).
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+from pydantic import ValidationError
+
+from rtctl.config.complaints import sentences
+from rtctl.config.errors import UserError, nearest
+from rtctl.config.files import write_text
+from rtctl.config.load import Dumper
+from rtctl.config.units import to_si
+from rtctl.config.yaml_file import Document, find, load_yaml
+from rtctl.diagnose.export import entry_of
+from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.record import GraphRecord
+from rtctl.diagnose.graph.words import value_unit
+from rtctl.idiom import Settings
+from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.layout import layout
+from rtctl.plants.physics import TERMS
+
+PARTS = ("bodies", "joints", "drives", "sensors")
+NO_NAME = "machine"
+
+
+class Believed(NamedTuple):
+    """What a YAML file believes of a machine."""
+
+    machine: Description
+    physics: tuple[dict[str, Any], ...]  # entries of a `physics:` list, SI
+    tolerance: dict[str, Any]  # by dotted path; empty where the file has none
+    case: dict[str, Any]  # further keys that a case.json has too
+
+
+CARRIED = ("delay_samples", "inputs", "problem", "group", "per_recording", "notes")
+
+
+def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Plain data of a config with the fitted numbers, each with its unit, and the terms of physics.
+
+    `config` is the recorded machine's own, where our daemon made the recording: the rest stays as it was.
+    """
+    case = record.case
+    machine = case.machine.model_dump(mode="json", exclude_unset=True)
+    for path, value in model.base.items():
+        if value != case.values.get(path):
+            value = float(f"{value:.6g}")
+        _put(machine, path.split("."), _with_unit(value, value_unit(case.machine, path)))
+    physics = [entry_of(term) for term in model.terms]
+    if config is not None:
+        plant = {key: value for key, value in dict(config.get("plant") or {}).items() if key != "physics"}
+        return {**config, "machine": machine, "plant": {**plant, "physics": physics}}
+    name = re.sub(r"[^A-Za-z0-9_-]", "-", case.file.parent.name)[:40] or NO_NAME
+    return {
+        "name": name,
+        "loop": {
+            "rate": float(f"{1.0 / record.dt:.9g}"),
+            "write": "next_tick" if case.delay_samples >= 0.5 else "same_tick",
+        },
+        "machine": machine,
+        "plant": {"physics": physics},
+    }
+
+
+def write_model(
+    model: GraphModel, record: GraphRecord, path: Path | str, config: Mapping[str, Any] | None = None
+) -> Path:
+    """Write the config as YAML under a head that says where it comes from and what changed; its path.
+
+    Raises UserError where the machine would not be read again or the file cannot be written.
+    """
+    data = to_config(model, record, config)
+    checked(data, Document(data, path=str(path)))
+    text = _head(model, record) + yaml.dump(data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=120)
+    try:
+        write_text(Path(path), text)
+    except OSError as error:
+        raise UserError(f"{path} cannot be written: {error.strerror}") from None
+    return Path(path)
+
+
+def read_machine(path: Path | str) -> Believed:
+    """Machine, known physics and tolerance of a YAML file: a config with `machine:`, or a bare description.
+
+    Raises UserError with file, line and what would be right.
+    """
+    file = find(path)
+    document = load_yaml(file)
+    return checked(document.data, document)
+
+
+def checked(data: Any, document: Document) -> Believed:
+    """What plain data believe of a machine. Raises UserError as `read_machine`."""
+    if not isinstance(data, dict):
+        raise UserError(f"{document.path} holds no keys; a description has bodies, joints, drives and sensors")
+    bare = "machine" not in data and any(part in data for part in PARTS)
+    given, at = ({part: data[part] for part in PARTS if part in data}, ()) if bare else (data.get("machine"), ("machine",))
+    if not isinstance(given, dict):
+        said = f"machine is {given!r}" if "machine" in data else "machine is missing"
+        raise UserError(
+            f"{_where(document, at)}: {said}; a description has bodies, joints, drives and sensors below machine"
+        )
+    try:
+        machine = Description.model_validate(given)
+        layout(machine)
+    except ValidationError as error:
+        where = lambda path: f"{_where(document, (*at, *path))}: {'.'.join(at)}".removesuffix(": ")  # noqa: E731
+        raise UserError(sentences(error, Description, given, where, document.texts)) from None
+    except ValueError as error:
+        raise UserError(f"{_where(document, at)}: {error}") from None
+    plant = data.get("plant")
+    physics = data.get("physics", plant.get("physics") if isinstance(plant, dict) else None)
+    tolerance = data.get("tolerance")
+    if tolerance is not None and not isinstance(tolerance, dict):
+        tolerance = {"default": tolerance}
+    return Believed(
+        machine,
+        _physics(physics, document),
+        dict(tolerance or {}),
+        {key: data[key] for key in CARRIED if key in data},
+    )
+
+
+def _physics(given: Any, document: Document) -> tuple[dict[str, Any], ...]:
+    if given is None:
+        return ()
+    at = ("physics",) if ("physics",) in document.lines else ("plant", "physics")
+    if not isinstance(given, list):
+        raise UserError(f"{_where(document, at)}: physics is a list of terms, each with term, node and its numbers")
+    out = []
+    for i, entry in enumerate(given):
+        here = (*at, i)
+        name = entry.get("term") if isinstance(entry, dict) else None
+        if name not in TERMS:
+            near = nearest(str(name), TERMS)
+            hint = f"; did you mean '{near}'?" if near else "; `rtctl physics` lists them"
+            raise UserError(f"{_where(document, here)}: physics.{i}.term: there is no term {name!r}{hint}")
+        settings = TERMS[name].settings
+        try:
+            out.append(entry_of(settings.model_validate(entry)))
+        except ValidationError as error:
+            where = lambda path, here=here: f"{_where(document, (*here, *path))}: {'.'.join(map(str, here))}"  # noqa: E731
+            raise UserError(sentences(error, settings, entry, where, document.texts)) from None
+    return tuple(out)
+
+
+def _where(document: Document, at: tuple) -> str:
+    line = document.line(at)
+    return f"{document.path}:{line}" if line else document.path
+
+
+def _put(data: Any, path: list[str], value: Any) -> None:
+    *outer, last = path
+    for key in outer:
+        data = data[int(key)] if isinstance(data, list) else data.get(key)
+        if data is None:
+            return  # a default that the owner did not write
+    if last in data:
+        data[last] = value
+
+
+def _with_unit(value: float, unit: str) -> float | str:
+    """The number with its unit; bare where the unit is not one that a config reads."""
+    if not unit:
+        return value
+    text = f"{value!r} {unit}"
+    try:
+        return text if abs(to_si(text, unit) - value) <= 1e-12 * abs(value) else value
+    except ValueError:
+        return value
+
+
+def _head(model: GraphModel, record: GraphRecord) -> str:
+    """Comment lines on top of the file."""
+    case = record.case
+    seconds = len(record.t) * record.dt
+    lines = [f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"]
+    lines.append("found are in plant.physics. Changed, nominal -> fitted:")
+    for path, value in model.base.items():
+        old = case.values.get(path, value)
+        if abs(value - old) > 5e-4 * abs(old):
+            unit = value_unit(case.machine, path)
+            lines.append(f"  {path}: {old:.4g} -> {value:.4g} {unit}".rstrip())
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def settings(entries: tuple[dict[str, Any], ...]) -> tuple[Settings, ...]:
+    """Settings of the entries of a `physics:` list."""
+    return tuple(TERMS[str(e["term"])].settings.model_validate(e) for e in entries)

@@ -1,0 +1,52 @@
+"""Prediction of a second recording of the same machine by the models that were fitted to the first."""
+
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from rtctl.config.errors import UserError
+from rtctl.diagnose.graph.answer import GraphDiagnosis
+from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.prediction import Heldout
+from rtctl.diagnose.graph.record import GraphRecord, load_record
+from rtctl.diagnose.graph.simulate import Simulator
+
+
+def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
+    """The diagnosis with the errors on the recording in the folder `other` as its held-out errors.
+
+    Raises UserError where the folder cannot be read or is of another machine, NoAnswer where it supports no verdict.
+    """
+    record = load_record(other)
+    check_same(d.record, record)
+    with threadpool_limits(1):
+        return d._replace(heldout=errors(record, d.found.base.model, d.decided.best.model))
+
+
+def check_same(first: GraphRecord, second: GraphRecord) -> None:
+    """Raise UserError where two records are of machines with other elements."""
+    for group in ("bodies", "joints", "drives", "sensors"):
+        one, two = (set(getattr(r.case.machine, group)) for r in (first, second))
+        if one != two:
+            raise UserError(
+                f"{second.case.file}: machine.{group} has {', '.join(sorted(two)) or 'none'}, and the first recording's "
+                f"{', '.join(sorted(one)) or 'none'}; a second recording is of the same machine"
+            )
+    if list(first.y) != list(second.y):
+        raise UserError(
+            f"{second.case.file}: the recording shows {', '.join(second.y)}, and the first {', '.join(first.y)}; "
+            "a second recording has the same sensors"
+        )
+
+
+def errors(record: GraphRecord, base: GraphModel, best: GraphModel) -> Heldout:
+    """Errors of two models under the tracking observer, by the spread of each sensor, on all rows of a record."""
+    like = Likelihood(Simulator(record))
+    begin, end = like.rows
+    spread = np.std(like.target[begin:end], axis=0)
+    spread = np.where(spread > 0.0, spread, 1.0)
+    found = [float(np.sqrt(np.mean(np.mean(like.raw(m) ** 2, axis=0) / spread**2))) for m in (base, best)]
+    floor = float(np.sqrt(np.mean(like.least**2 * like.mean / spread**2)))
+    return Heldout(found[0], found[1], min(floor, found[1]), (begin, end), (base, best), like)
