@@ -302,7 +302,8 @@ static void follow_tape(void)
     double tau2 = p.plant_plant_c_m2 * (m->qm[MOTOR2] - q2) + p.plant_plant_k_m2 * (m->vm[MOTOR2] - v2);
     m->f[REEL1] += (F1 * plant.R1 + tau1) * (J1_lin / plant.J1) - (F1_lin * R1_lin + tau1);
     m->f[REEL2] += (F2 * plant.R2 + tau2) * (J2_lin / plant.J2) - (F2_lin * R2_lin + tau2);
-    m->f[CAPSTAN] += p.plant_plant_R_c * ((F2 - F2_lin) - (F1 - F1_lin));
+    m->f[CAPSTAN] += R_c * (F1_lin - F1); /* tape by tape, as the joints of a machine are summed */
+    m->f[CAPSTAN] += R_c * (F2 - F2_lin);
 }
 
 static void substep(void)

@@ -12,7 +12,8 @@ from rtctl.cli.common import load_config, with_loop, with_reference
 from rtctl.loop import fused, generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
-from rtctl.plants import ivu, ldu, linear
+from rtctl.plants.graph import plant as graph
+from rtctl.plants.graph.plant import GRAPH_STATE
 
 HERE = Path(__file__).parent
 CONFIGS = HERE.parent / "configs"
@@ -134,11 +135,7 @@ def _collect(out: dict[str, float], prefix: str, params: Any) -> None:
 def _matrices(machine: machines.Machine) -> tuple[np.ndarray, np.ndarray]:
     """Phi and Gamma of one substep, from the plant's own equations."""
     plant = next(b for b in machine.plant_diagram.blocks if b.name == "plant")
-    module = ivu if machine.kind == "ivu" else ldu
-    A, G = np.zeros((module.NX, module.NX)), np.zeros((module.NX, module.NU + module.NQ))
-    p = plant.params
-    if machine.kind == "ivu":
-        ivu.assemble(p, p.R1, p.R2, p.J_1, p.J_2, A, G)
-    else:
-        ldu.assemble(p, A, G)
-    return linear.discretise(A, G, p.h)
+    p, s = plant.params.graph, np.zeros(1, GRAPH_STATE)[0]
+    graph.start(p, s)
+    m = s["m"]
+    return m["Phi_T"][: p.nx, : p.nx].copy(), m["Gamma_T"][: p.nu + p.nq, : p.nx].copy()

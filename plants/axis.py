@@ -3,18 +3,23 @@
     M x'' = K u - F_v x' - k x - F_c sign(x')
 
 The plainest machine that a drive moves, and the owner's model of many real ones (ball screws, belts, unloaded
-motors). For a rotary axis read J, rad and Nm for M, m and N.
+motors). For a rotary axis read J, rad and Nm for M, m and N. It runs as axis.yaml describes it.
 
 Source: Janot, Gautier & Brunot, Data set and reference models of EMPS (2019) for the form.
 """
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants import linear
+from rtctl.idiom import Settings, quantity
 from rtctl.plants.element import LOOP, element
+from rtctl.plants.graph import plant
+from rtctl.plants.graph.params import GraphParams
+from rtctl.plants.graph.plant import GRAPH_STATE
+from rtctl.plants.graph.symbols import Machine, machine
 
 CARRIAGE = 0
 NODES = {"carriage": CARRIAGE}
@@ -48,54 +53,36 @@ class AxisSettings(Settings):
 
 
 class AxisParams(NamedTuple):
+    """Symbols of the equation, and the same numbers for the kernel of described machines."""
+
     h: float
     M: float
     K: float
     F_v: float
     F_c: float
     k: float
+    graph: GraphParams
 
 
-AXIS_STATE = state(m=linear.MACHINE)
+AXIS_STATE = GRAPH_STATE
+
+
+def described() -> Machine:
+    """The description of the machine."""
+    return machine(Path(__file__).with_name("axis.yaml"))
 
 
 def build(settings: AxisSettings, h: float) -> AxisParams:
     """Params for substeps of `h` s."""
-    return AxisParams(h, **settings.parameters.model_dump())
+    return params(settings.parameters.model_dump(), h)
 
 
-@tick
-def assemble(p, A, G):
-    """Fill A (2, 2) and G = [volts | force] (2, 2)."""
-    A[0, 0] = 0.0
-    A[0, 1] = 1.0
-    A[1, 0] = -p.k / p.M
-    A[1, 1] = -p.F_v / p.M
-    G[0, 0] = 0.0
-    G[0, 1] = 0.0
-    G[1, 0] = p.K / p.M
-    G[1, 1] = 1.0 / p.M
-
-
-@tick
-def start(p, s):
-    """Matrices and dry friction; position and speed stay as they are (zero at first)."""
-    linear.size(s.m, NQ, NX, NU, NY, NL)
-    s.m.h = p.h
-    s.m.dry_base[CARRIAGE] = p.F_c
-    assemble(p, s.m.A, s.m.G)
-    linear.discretise_machine(s.m)
-    linear.link(s.m, 0, CARRIAGE, 1.0, CARRIAGE, 0.0, p.k, 0.0)
-
-
-@tick
-def read(s):
-    """What the sensor would show, m or rad, into s.m.y."""
-    s.m.y[0] = s.m.x[CARRIAGE]
+def params(symbols: Mapping[str, float], h: float) -> AxisParams:
+    """As `build`, from the values of the symbols; what is not among them is 0."""
+    own = {name: symbols.get(name, 0.0) for name in AxisParams._fields[1:-1]}
+    return AxisParams(h=h, **own, graph=described().build(own, {}, h))
 
 
 def state_space(p: AxisParams) -> tuple[np.ndarray, np.ndarray]:
     """A (2, 2) and B (2, 1), volts in, without dry friction."""
-    A, G = np.zeros((NX, NX)), np.zeros((NX, NU + NQ))
-    assemble.interpret(p, A, G)
-    return A, G[:, :NU]
+    return plant.state_space(p.graph)

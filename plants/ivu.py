@@ -12,20 +12,26 @@ winds tape and pulls it taut: the tensions are T_i = -F_si. Capstan and reel 1 t
 
 As tape moves, R_i = R_i(0) + d_tape phi_i / 2 pi (4.3, 4.4) and J_i follows R_i^4 (4.1, 4.2). The layer that lands
 moves at the reel's own surface speed and brings its momentum with it, so that J phi'' has no J' phi' beside it.
-The linear model is taken anew when a radius has moved by half a percent; in between the difference is a force.
+The machine runs as ivu.yaml describes it, by the kernel of all machines (plants/graph/reel.py for what winds).
 
 Source: thesis chapter 4 and appendix A. Erratum: appendix A prints the identified R_c as 1.25e-3, it is 1.25e-2 m;
 the simulation set has J_m twice too small for its own process gain; its 250 Hz mode needs J_10 of 3.2e-5.
 """
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants import linear
+from rtctl.idiom import Settings, quantity
 from rtctl.plants.element import LOOP, element
+from rtctl.plants.graph import plant
+from rtctl.plants.graph.params import GraphParams
+from rtctl.plants.graph.plant import GRAPH_STATE
+from rtctl.plants.graph.reel import reel_inertia
+from rtctl.plants.graph.symbols import Machine, machine
 
 MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 = range(5)
 NODES = {"motor1": MOTOR1, "reel1": REEL1, "capstan": CAPSTAN, "reel2": REEL2, "motor2": MOTOR2}
@@ -53,7 +59,6 @@ ELEMENTS = (
 )
 NY, NL = len(SENSORS), len(LINKS)
 NQ, NU, NX = 5, 2, 14  # five rotations and their speeds, two states of each motor driver
-RELINEARISE = 5e-3  # of a radius: the explicit correction forces stay a hundred times below the linear ones
 
 
 class IvuParameters(Settings):
@@ -107,6 +112,8 @@ class IvuSettings(Settings):
 
 
 class IvuParams(NamedTuple):
+    """Symbols of the thesis, and the same numbers for the kernel of described machines."""
+
     h: float
     R1: float
     R2: float
@@ -129,27 +136,22 @@ class IvuParams(NamedTuple):
     k2: float
     K_m1: float
     K_m2: float
+    rho_tape: float
+    h_tape: float
     rho_h: float  # rho_tape h_tape, kg/m^2
     d_tape: float
     tau_F1: float
     tau_F2: float
     tau_Fc: float
-    drive: np.ndarray  # (2, 4) of each driver: gain A/V, natural frequency rad/s, damping, zero s
+    graph: GraphParams
 
 
-IVU_STATE = state(
-    m=linear.MACHINE,
-    R1=float,  # m, now
-    R2=float,
-    J1=float,  # kg m^2, now
-    J2=float,
-    R1_lin=float,  # and when the matrices were last taken
-    R2_lin=float,
-    J1_lin=float,
-    J2_lin=float,
-    T1=float,  # N, as `tensions` wrote it
-    T2=float,
-)
+IVU_STATE = GRAPH_STATE
+
+
+def described() -> Machine:
+    """The description of the machine."""
+    return machine(Path(__file__).with_name("ivu.yaml"))
 
 
 def parameters(settings: IvuSettings) -> IvuParameters:
@@ -164,142 +166,29 @@ def parameters(settings: IvuSettings) -> IvuParameters:
     return p.model_copy(update=fill)
 
 
-def build(settings: IvuSettings, h: float, drives: list[tuple[float, float, float, float]]) -> IvuParams:
-    """Params for substeps of `h` s; `drives` gives A/V, natural frequency (rad/s), damping and zero (s) of each."""
-    p = parameters(settings)
-    values = {name: getattr(p, name) for name in IvuParams._fields if hasattr(p, name)}
-    return IvuParams(h=h, rho_h=p.rho_tape * p.h_tape, drive=np.array(drives, float), **values)
+def build(settings: IvuSettings, h: float, drives: Sequence[Sequence[float]], follow_tape: bool = True) -> IvuParams:
+    """Params for substeps of `h` s; `drives` gives A/V, natural frequency (rad/s), damping and zero (s) of each.
 
-
-@tick
-def reel_inertia(J_0, rho_h, R, R_min):
-    """Inertia in kg m^2 of a reel with paper up to radius R (4.1)."""
-    return J_0 + 0.5 * np.pi * rho_h * (R**4 - R_min**4)
-
-
-@tick
-def assemble(p, R1, R2, J1, J2, A, G):
-    """Fill A (14, 14) and G = [volts | node torques] (14, 7) at the given radii and inertias."""
-    for i in range(NX):
-        for j in range(NX):
-            A[i, j] = 0.0
-        for j in range(NU + NQ):
-            G[i, j] = 0.0
-    for i in range(NQ):
-        A[i, NQ + i] = 1.0
-    _spring(A, MOTOR1, 1.0 / p.J_m1, REEL1, 1.0 / J1, 1.0, -1.0, p.c_m1, p.k_m1)
-    _spring(A, MOTOR2, 1.0 / p.J_m2, REEL2, 1.0 / J2, 1.0, -1.0, p.c_m2, p.k_m2)
-    _spring(A, REEL1, 1.0 / J1, CAPSTAN, 1.0 / p.J_c, R1, -p.R_c, p.c1, p.k1)
-    _spring(A, REEL2, 1.0 / J2, CAPSTAN, 1.0 / p.J_c, R2, p.R_c, p.c2, p.k2)
-    inertia = (p.J_m1, J1, p.J_c, J2, p.J_m2)
-    for i in range(NQ):
-        G[NQ + i, NU + i] = 1.0 / inertia[i]
-    for d in range(2):
-        a = 2 * NQ + 2 * d  # I = x + zero x', with x' = w z and z' = w (gain u - x) - 2 zeta w z
-        gain, w, zeta = p.drive[d, 0], p.drive[d, 1], p.drive[d, 2]
-        node = MOTOR1 if d == 0 else MOTOR2
-        torque = (p.K_m1 if d == 0 else p.K_m2) * G[NQ + node, NU + node]
-        A[a, a + 1] = w
-        A[a + 1, a] = -w
-        A[a + 1, a + 1] = -2.0 * zeta * w
-        G[a + 1, d] = w * gain
-        A[NQ + node, a] = torque
-        A[NQ + node, a + 1] = torque * p.drive[d, 3] * w
-
-
-@tick
-def _spring(A, i, wi, j, wj, ai, aj, c, k):
-    """A spring and damper of elongation ai q_i + aj q_j between two nodes of inverse inertias wi, wj."""
-    nq = NQ
-    A[nq + i, i] -= wi * ai * ai * c
-    A[nq + i, j] -= wi * ai * aj * c
-    A[nq + j, i] -= wj * aj * ai * c
-    A[nq + j, j] -= wj * aj * aj * c
-    A[nq + i, nq + i] -= wi * ai * ai * k
-    A[nq + i, nq + j] -= wi * ai * aj * k
-    A[nq + j, nq + i] -= wj * aj * ai * k
-    A[nq + j, nq + j] -= wj * aj * aj * k
-
-
-@tick
-def start(p, s):
-    """Matrices and dry friction for the starting radii; positions and speeds stay as they are (all zero at first)."""
-    s.R1, s.R2, s.J1, s.J2 = p.R1, p.R2, p.J_1, p.J_2
-    linear.size(s.m, NQ, NX, NU, NY, NL)
-    s.m.h = p.h
-    s.m.dry_base[MOTOR1] = p.tau_F1
-    s.m.dry_base[MOTOR2] = p.tau_F2
-    s.m.dry_base[CAPSTAN] = p.tau_Fc
-    _linearise(p, s)
-
-
-@tick
-def _linearise(p, s):
-    s.R1_lin, s.R2_lin, s.J1_lin, s.J2_lin = s.R1, s.R2, s.J1, s.J2
-    assemble(p, s.R1, s.R2, s.J1, s.J2, s.m.A, s.m.G)
-    linear.discretise_machine(s.m)
-    linear.link(s.m, 0, REEL1, s.R1, CAPSTAN, -p.R_c, p.c1, p.k1)  # positive when taut
-    linear.link(s.m, 1, REEL2, s.R2, CAPSTAN, p.R_c, p.c2, p.k2)
-    linear.link(s.m, 2, MOTOR1, 1.0, REEL1, -1.0, p.c_m1, p.k_m1)
-    linear.link(s.m, 3, MOTOR2, 1.0, REEL2, -1.0, p.c_m2, p.k_m2)
-
-
-@tick
-def read(s):
-    """What the sensors would show, rad, into s.m.y."""
-    s.m.y[0], s.m.y[1], s.m.y[2] = s.m.x[CAPSTAN], s.m.x[REEL1], s.m.x[REEL2]
-
-
-@tick
-def follow_tape(p, s):
-    """Radii and inertias that follow the tape (4.3-4.8), as forces on top of the model that is linear in between."""
-    m = s.m
-    grow = p.d_tape / (2.0 * np.pi)
-    q1, q2, v1, v2 = m.qm[REEL1], m.qm[REEL2], m.vm[REEL1], m.vm[REEL2]
-    s.R1 = max(p.R1 + grow * q1, p.R_min)
-    s.R2 = max(p.R2 + grow * q2, p.R_min)
-    s.J1 = p.J_1 + 0.5 * np.pi * p.rho_h * (s.R1**4 - p.R1**4)
-    s.J2 = p.J_2 + 0.5 * np.pi * p.rho_h * (s.R2**4 - p.R2**4)
-    if abs(s.R1 - s.R1_lin) > RELINEARISE * s.R1_lin or abs(s.R2 - s.R2_lin) > RELINEARISE * s.R2_lin:
-        _linearise(p, s)
-    l1 = wound(q1, p.R1, grow, p.R_min)
-    l2 = wound(q2, p.R2, grow, p.R_min)
-    x, dx = p.R_c * m.qm[CAPSTAN], p.R_c * m.vm[CAPSTAN]
-    F1_lin = p.c1 * (x - s.R1_lin * q1) + p.k1 * (dx - s.R1_lin * v1)
-    F2_lin = p.c2 * (-x - s.R2_lin * q2) + p.k2 * (-dx - s.R2_lin * v2)
-    F1 = p.c1 * (x - l1) + p.k1 * (dx - s.R1 * v1)
-    F2 = p.c2 * (-x - l2) + p.k2 * (-dx - s.R2 * v2)
-    m.link_e[0] = l1 - s.R1_lin * q1
-    m.link_e[1] = l2 - s.R2_lin * q2
-    m.link_T[0] += F1_lin - F1 - p.c1 * m.link_e[0]  # with these linear.tension tells the tension on the true radius
-    m.link_T[1] += F2_lin - F2 - p.c2 * m.link_e[1]
-    tau1 = p.c_m1 * (m.qm[MOTOR1] - q1) + p.k_m1 * (m.vm[MOTOR1] - v1)
-    tau2 = p.c_m2 * (m.qm[MOTOR2] - q2) + p.k_m2 * (m.vm[MOTOR2] - v2)
-    m.f[REEL1] += (F1 * s.R1 + tau1) * (s.J1_lin / s.J1) - (F1_lin * s.R1_lin + tau1)
-    m.f[REEL2] += (F2 * s.R2 + tau2) * (s.J2_lin / s.J2) - (F2_lin * s.R2_lin + tau2)
-    m.f[CAPSTAN] += p.R_c * ((F2 - F2_lin) - (F1 - F1_lin))
-
-
-@tick
-def wound(q, R, grow, R_min):
-    """Tape wound by a reel of radius `R` that turns by `q` and grows by `grow` per radian; its core stays R_min."""
-    if R + grow * q >= R_min:
-        return (R + 0.5 * grow * q) * q
-    q_end = (R_min - R) / grow
-    return (R + 0.5 * grow * q_end) * q_end + R_min * (q - q_end)
-
-
-@tick
-def tensions(s):
-    """Write the tape tensions T1, T2 in N into the state, positive when taut, with the pull of every term of physics.
-
-    They are those of the last substep, at its middle; 0 before the first.
+    Without `follow_tape` the radii stay what they are at the start.
     """
-    s.T1, s.T2 = linear.tension(s.m, 0), linear.tension(s.m, 1)
+    p = parameters(settings)
+    return params(p.model_dump(), h, drives, follow_tape)
+
+
+def params(
+    symbols: Mapping[str, float], h: float, drives: Sequence[Sequence[float]], follow_tape: bool = True
+) -> IvuParams:
+    """As `build`, from the values of the symbols."""
+    all_of = {**symbols, "rho_h": symbols["rho_tape"] * symbols["h_tape"]}
+    bridges: dict[str, float] = {}
+    for name, (gain, w, zeta, zero) in zip(DRIVES, drives, strict=True):
+        own = {"gain": gain, "bandwidth_hz": w / (2.0 * np.pi), "damping": zeta, "zero": zero}
+        bridges |= {f"drives.{name}.{key}": float(value) for key, value in own.items()}
+    taken = all_of if follow_tape else {**all_of, "d_tape": 0.0}
+    own = {name: all_of[name] for name in IvuParams._fields[1:-1]}
+    return IvuParams(h=h, **own, graph=described().build(taken, bridges, h))
 
 
 def state_space(p: IvuParams) -> tuple[np.ndarray, np.ndarray]:
     """A (14, 14) and B (14, 2), volts in, at the starting radii and without dry friction, for design and tests."""
-    A, G = np.zeros((NX, NX)), np.zeros((NX, NU + NQ))
-    assemble.interpret(p, p.R1, p.R2, p.J_1, p.J_2, A, G)
-    return A, G[:, :NU]
+    return plant.state_space(p.graph)

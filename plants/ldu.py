@@ -6,8 +6,8 @@
                                               + b_c (th_c' - th_e') + k_c (th_c - th_e) + R_c F_c     (F.5, F.6, F.9)
     b_c (th_c' - th_e') + k_c (th_c - th_e) = J_e th_e''                                                         (F.7)
 
-The carriage stands at x = R_c th_c. F_c is the dry friction of the carriage, which the thesis finds (12.6) but
-does not write into its equations.
+The machine runs as ldu.yaml describes it, by the kernel of all machines. The carriage stands at x = R_c th_c. F_c is
+the dry friction of the carriage, which the thesis finds (12.6) but does not write into its equations.
 
 Source: thesis 12.1 and appendix F. Erratum: `b_m` in row 4 of A is b_s; the ninth column of A does not exist.
 The listed k_s, k_c give 239, 919, 951 and 3261 Hz; figure 12.2 shows 114, 254, 286 and 2100 Hz, hence two sets.
@@ -15,14 +15,19 @@ Damping, B_c, B_m, K_m2 are not given; they are chosen for 2 to 10 percent modal
 the break-away voltages of 12.6.
 """
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.plants import linear
+from rtctl.idiom import Settings, quantity
 from rtctl.plants.element import LOOP, element
+from rtctl.plants.graph import plant
+from rtctl.plants.graph.params import GraphParams
+from rtctl.plants.graph.plant import GRAPH_STATE
+from rtctl.plants.graph.symbols import Machine, machine
 
 MOTOR, WHEEL, CAPSTAN, ENCODER = range(4)
 NODES = {"motor": MOTOR, "wheel": WHEEL, "capstan": CAPSTAN, "encoder": ENCODER}
@@ -91,6 +96,8 @@ class LduSettings(Settings):
 
 
 class LduParams(NamedTuple):
+    """Symbols of the thesis, and the same numbers for the kernel of described machines."""
+
     h: float
     N: float
     R_c: float
@@ -108,10 +115,15 @@ class LduParams(NamedTuple):
     B_c: float
     B_m: float
     F_c: float
-    drive: np.ndarray  # (2,) of the amplifier: natural frequency rad/s, damping
+    graph: GraphParams
 
 
-LDU_STATE = state(m=linear.MACHINE)
+LDU_STATE = GRAPH_STATE
+
+
+def described() -> Machine:
+    """The description of the machine."""
+    return machine(Path(__file__).with_name("ldu.yaml"))
 
 
 def parameters(settings: LduSettings) -> LduParameters:
@@ -122,70 +134,16 @@ def parameters(settings: LduSettings) -> LduParameters:
 def build(settings: LduSettings, h: float, drive: tuple[float, float]) -> LduParams:
     """Params for substeps of `h` s; `drive` is the natural frequency (rad/s) and damping of the amplifier."""
     p = parameters(settings)
-    values = {name: getattr(p, name) for name in LduParams._fields if hasattr(p, name)}
-    return LduParams(h=h, N=p.R_t / p.R_s, drive=np.array(drive, float), **values)
+    return params({**p.model_dump(), "N": p.R_t / p.R_s}, h, drive)
 
 
-@tick
-def assemble(p, A, G):
-    """Fill A (10, 10) and G = [amperes asked for | node torques] (10, 5)."""
-    for i in range(NX):
-        for j in range(NX):
-            A[i, j] = 0.0
-        for j in range(NU + NQ):
-            G[i, j] = 0.0
-    J_load = p.J_c + p.M * p.R_c**2
-    for i in range(NQ):
-        A[i, NQ + i] = 1.0
-    for d in range(2):  # stiffness fills the columns of the positions, damping those of the speeds
-        c = d * NQ
-        s = p.b_s if d == 1 else p.k_s
-        k = p.b_c if d == 1 else p.k_c
-        A[NQ + MOTOR, c + MOTOR] -= s / p.J_m
-        A[NQ + MOTOR, c + WHEEL] += p.N * s / p.J_m
-        A[NQ + WHEEL, c + MOTOR] += p.N * s / p.J_t
-        A[NQ + WHEEL, c + WHEEL] -= (k + p.N**2 * s) / p.J_t
-        A[NQ + WHEEL, c + CAPSTAN] += k / p.J_t
-        A[NQ + CAPSTAN, c + WHEEL] += k / J_load
-        A[NQ + CAPSTAN, c + CAPSTAN] -= 2.0 * k / J_load
-        A[NQ + CAPSTAN, c + ENCODER] += k / J_load
-        A[NQ + ENCODER, c + CAPSTAN] += k / p.J_e
-        A[NQ + ENCODER, c + ENCODER] -= k / p.J_e
-    A[NQ + MOTOR, NQ + MOTOR] -= p.K_m2 / p.J_m
-    A[NQ + CAPSTAN, NQ + CAPSTAN] -= (p.B_c + p.R_c**2 * p.B_m) / J_load
-    inertia = (p.J_m, p.J_t, J_load, p.J_e)
-    for i in range(NQ):
-        G[NQ + i, NU + i] = 1.0 / inertia[i]
-    a = 2 * NQ  # current and its scaled derivative: I' = w x, x' = w (I_wanted - I) - 2 zeta w x
-    w, zeta = p.drive[0], p.drive[1]
-    A[a, a + 1] = w
-    A[a + 1, a] = -w
-    A[a + 1, a + 1] = -2.0 * zeta * w
-    G[a + 1, 0] = w
-    A[NQ + MOTOR, a] = p.K_m1 / p.J_m
-
-
-@tick
-def start(p, s):
-    """Matrices and dry friction; positions and speeds stay as they are (all zero at first)."""
-    linear.size(s.m, NQ, NX, NU, NY, NL)
-    s.m.h = p.h
-    s.m.dry_base[CAPSTAN] = p.R_c * p.F_c
-    assemble(p, s.m.A, s.m.G)
-    linear.discretise_machine(s.m)
-    linear.link(s.m, 0, MOTOR, 1.0, WHEEL, -p.N, p.k_s, p.b_s)
-    linear.link(s.m, 1, WHEEL, 1.0, CAPSTAN, -1.0, p.k_c, p.b_c)
-    linear.link(s.m, 2, CAPSTAN, 1.0, ENCODER, -1.0, p.k_c, p.b_c)
-
-
-@tick
-def read(p, s):
-    """What the sensors would show, rad and m, into s.m.y."""
-    s.m.y[0], s.m.y[1] = s.m.x[ENCODER], p.R_c * s.m.x[CAPSTAN]
+def params(symbols: Mapping[str, float], h: float, drive: tuple[float, float]) -> LduParams:
+    """As `build`, from the values of the symbols."""
+    amplifier = {"drives.drive.bandwidth_hz": drive[0] / (2.0 * np.pi), "drives.drive.damping": drive[1]}
+    own = {name: symbols[name] for name in LduParams._fields[1:-1]}
+    return LduParams(h=h, **own, graph=described().build(symbols, amplifier, h))
 
 
 def state_space(p: LduParams) -> tuple[np.ndarray, np.ndarray]:
     """A (10, 10) and B (10, 1), amperes in, without dry friction, for design and tests."""
-    A, G = np.zeros((NX, NX)), np.zeros((NX, NU + NQ))
-    assemble.interpret(p, A, G)
-    return A, G[:, :NU]
+    return plant.state_space(p.graph)

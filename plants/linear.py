@@ -27,6 +27,7 @@ MOST_BODIES = 12  # coordinates, as many as a machine may have; a record of one 
 MOST_DRIVES = 4
 MOST_SENSORS = 12
 MOST_LINKS = 16
+MOST_REELS = 4
 DRIVE_STATES = 3
 MOST_STATES = 2 * MOST_BODIES + DRIVE_STATES * MOST_DRIVES  # a multiple of LANES
 MOST_INPUTS = MOST_DRIVES + MOST_BODIES
@@ -66,6 +67,12 @@ MACHINE = state(  # a machine: its matrices for one substep, its state, and what
     link_T=(float, MOST_LINKS),  # what terms pull with on top of it, this substep
     link_e=(float, MOST_LINKS),  # elongation that the linear model does not know, as of tape wound at another radius
     link_v=(float, MOST_LINKS),  # its rate
+    inertia=(float, MOST_BODIES),  # of each coordinate, with which A and G were made, kg m^2 or kg
+    reel_R=(float, MOST_REELS),  # m, radius of what winds tape, now
+    reel_J=(float, MOST_REELS),  # kg m^2, its inertia
+    reel_R_lin=(float, MOST_REELS),  # m, the radius with which A was made
+    reel_pull=(float, MOST_REELS),  # Nm, of all joints at the reel, at its radius
+    reel_pull_lin=(float, MOST_REELS),  # Nm, the same in the linear model
 )
 
 

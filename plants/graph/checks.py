@@ -30,11 +30,13 @@ def check(machine: "Description") -> None:
     for name, joint in machine.joints.items():
         _check_joint(machine, name, joint)
     _check_rigid(machine)
+    _check_spans(machine)
     for group in ("drives", "sensors"):
         for name, element in getattr(machine, group).items():
             _check_place(machine, f"{group}.{name}", element)
     _check_columns(machine)
     _check_seen(machine)
+    _check_symbols(machine)
 
 
 def _check_name(group: str, name: str) -> None:
@@ -56,6 +58,39 @@ def _check_joint(machine: "Description", name: str, joint: Any) -> None:
             f"joints.{name}.stiffness is missing: a rigid joint to the frame holds {held} still; give the stiffness, "
             f"or write bodies.{held}.fixed: true"
         )
+
+
+def _check_spans(machine: "Description") -> None:
+    """A span of tape needs two radii; what winds tape is alone on its coordinate and holds it by one span."""
+    for name, joint in machine.joints.items():
+        if joint.span is None:
+            continue
+        for end in ("from", "to"):
+            body = machine.bodies.get(getattr(joint, end))
+            if body is None or body.radius is None:
+                raise ValueError(
+                    f"joints.{name}.{end}: {getattr(joint, end)} has no radius for the tape to run on; give "
+                    f"bodies.{getattr(joint, end)}.radius"
+                )
+    reels = [name for name, body in machine.bodies.items() if body.reel is not None]
+    if len(reels) > linear.MOST_REELS:
+        raise ValueError(f"bodies: {len(reels)} reels; {linear.MOST_REELS} is the most that one machine can have")
+    for name in reels:
+        body, joints = machine.bodies[name], _joints_at(machine, name)
+        if body.radius < body.reel.core:
+            raise ValueError(f"bodies.{name}.radius: {body.radius:g} m is less than the core of {body.reel.core:g} m")
+        if not any(machine.joints[joint].span for joint in joints):
+            raise ValueError(f"bodies.{name}.reel: no span of tape ends here; give a joint with span: open or crossed")
+        for joint in joints:
+            if machine.joints[joint].stiffness is None:
+                raise ValueError(
+                    f"joints.{joint}.stiffness is missing: {name} is a reel, whose inertia changes, and cannot move as "
+                    "one with another body"
+                )
+
+
+def _joints_at(machine: "Description", body: str) -> list[str]:
+    return [name for name, joint in machine.joints.items() if body in (getattr(joint, "from"), joint.to)]
 
 
 def _check_rigid(machine: "Description") -> None:
@@ -127,6 +162,14 @@ def _check_seen(machine: "Description") -> None:
                 f"bodies.{name}: no sensor sees it, nor any body that it is connected with; add a sensor or a joint, "
                 "or leave the body out"
             )
+
+
+def _check_symbols(machine: "Description") -> None:
+    """A symbol stands for numbers that the description has."""
+    known = [path for path, _ in machine.paths()]
+    for symbol, paths in machine.symbols.items():
+        for path in paths:
+            _known(f"symbols.{symbol}", path, known, "number")
 
 
 def _looked_at(machine: "Description") -> Iterator[str]:

@@ -35,6 +35,15 @@ class Gravity(Settings):
         return self
 
 
+class Reel(Settings):
+    """Reel of tape: `radius` of the body grows as tape lands, and its inertia with it."""
+
+    core: float = Field(gt=0, description="radius of the empty reel, m")
+    thickness: float = Field(0.0, ge=0, description="of the tape, m; 0 keeps the radius as it is")
+    density: float = Field(0.0, ge=0, description="of the tape, kg/m^3")
+    width: float = Field(0.0, ge=0, description="of the tape, m")
+
+
 class Body(Settings):
     """One coordinate: an angle where `inertia` is given, a way where `mass` is."""
 
@@ -44,6 +53,8 @@ class Body(Settings):
     viscous: float = Field(0.0, ge=0, description="viscous friction to the frame, Nms/rad or Ns/m")
     gravity: Gravity | list[Gravity] | None = Field(None, description="weight that acts along the coordinate")
     fixed: bool = Field(False, description="the body is the frame")
+    radius: float | None = Field(None, gt=0, description="at which tape, belt or rope runs on the body, m")
+    reel: Reel | None = Field(None, description="the body winds tape: its radius and inertia are those at the start")
 
     @property
     def turns(self) -> bool:
@@ -68,6 +79,10 @@ class Body(Settings):
                 raise ValueError(f"{at}: this body slides; give incline, the slope of its way")
             if weight.incline is not None and self.turns:
                 raise ValueError(f"{at}: this body turns; give mass and arm")
+        if (self.radius is not None or self.reel is not None) and not self.turns:
+            raise ValueError(f"{'reel' if self.radius is None else 'radius'}: this body slides; give inertia, it turns")
+        if self.reel is not None and self.radius is None:
+            raise ValueError("radius is missing; a reel needs that with which it starts (m)")
         return self
 
 
@@ -77,8 +92,13 @@ class _Joint(Settings):
 
     to: str = Field(description="body at its other end, or frame")
     ratio: float = Field(1.0, description="what `to` moves for one unit of `from`: 12.7 mm/rad for a pulley")
-    stiffness: float | None = Field(None, gt=0, description="in units of `to`; rigid where absent")
+    stiffness: float | None = Field(None, ge=0, description="in units of `to`; rigid where absent, 0 for a damper")
     damping: float = Field(0.0, ge=0, description="in units of `to`")
+    span: Literal["open", "crossed"] | None = Field(
+        None,
+        description="tape, belt or rope between the radii of the two bodies, which turn the same way (open) or against "
+        "each other (crossed); stiffness in N/m, no ratio",
+    )
 
     @model_validator(mode="after")
     def _rigid(self) -> "_Joint":
@@ -86,6 +106,10 @@ class _Joint(Settings):
             raise ValueError("damping: a rigid joint has none; give stiffness as well")
         if self.ratio == 0.0:
             raise ValueError("ratio: 0 connects nothing; give what `to` moves for one unit of `from`")
+        if self.span is not None and self.stiffness is None:
+            raise ValueError("stiffness is missing; a span of tape needs it (N/m)")
+        if self.span is not None and "ratio" in self.model_fields_set:
+            raise ValueError("ratio: that of a span follows from the radii of its two bodies; leave it out")
         return self
 
 
@@ -111,6 +135,7 @@ class Drive(Settings):
     dac_range: float = Field(10.0, gt=0, description="largest command that the converter gives")
     bandwidth_hz: float | None = Field(None, gt=0, description="natural frequency of the drive, Hz")
     damping: float = Field(0.7071, gt=0, description="of the drive's second-order low pass")
+    zero: float | None = Field(None, ge=0, description="time constant of a zero of the low pass, s")
 
     @property
     def step(self) -> float:
@@ -127,6 +152,8 @@ class Drive(Settings):
             raise ValueError(f"torque_constant is missing; a {self.kind} drive needs it (Nm/A, or N/A)")
         if self.kind == "voltage" and self.resistance is None:
             raise ValueError("resistance is missing; a voltage drive needs it (ohm)")
+        if self.zero and (self.bandwidth_hz is None or self.kind == "voltage"):
+            raise ValueError("zero: it is that of the low pass of a force or current drive; give bandwidth_hz as well")
         return self
 
 
@@ -182,6 +209,9 @@ class Description(Settings):
     joints: dict[str, Joint] = Field(default={})
     drives: dict[str, Drive] = Field(default={})
     sensors: dict[str, Sensor] = Field(min_length=1)
+    symbols: dict[str, list[str]] = Field(
+        default={}, description="symbol of the literature: dotted paths of the numbers that it stands for"
+    )
 
     @model_validator(mode="before")
     @classmethod

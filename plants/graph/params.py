@@ -35,6 +35,9 @@ class GraphParams(NamedTuple):
     link_b: np.ndarray
     link_c: np.ndarray  # stiffness
     link_k: np.ndarray  # damping
+    link_wound: np.ndarray  # 1: a span that a reel winds
+    link_reel_i: np.ndarray  # reel whose coordinate is at the end i, j; NOWHERE where there is none
+    link_reel_j: np.ndarray
     weights: int
     weight_i: np.ndarray  # (MOST_WEIGHTS,)
     weight_a: np.ndarray
@@ -54,12 +57,20 @@ class GraphParams(NamedTuple):
     drive_L: np.ndarray
     drive_w: np.ndarray  # rad/s, natural frequency; 0 where the drive follows at once
     drive_zeta: np.ndarray
+    drive_zero: np.ndarray  # s, time constant of a zero of the low pass
     sensor_kind: np.ndarray  # (Y,)
     sensor_i: np.ndarray
     sensor_j: np.ndarray
     sensor_a: np.ndarray
     sensor_b: np.ndarray
     sensor_of: np.ndarray  # link or drive
+    reels: int
+    winds: int  # 1: the radii follow the tape
+    reel_i: np.ndarray  # (MOST_REELS,) coordinate
+    reel_R: np.ndarray  # m, radius at the start
+    reel_core: np.ndarray  # m, radius of the empty reel
+    reel_grow: np.ndarray  # m/rad, growth of the radius
+    reel_paper: np.ndarray  # kg/m^2, inertia for a radius to the fourth power
 
 
 def build(layout: Layout, values: dict[str, float], h: float) -> GraphParams:
@@ -79,6 +90,7 @@ def build(layout: Layout, values: dict[str, float], h: float) -> GraphParams:
         a["link_c"][number] = values[f"joints.{name}.stiffness"]
         a["link_k"][number] = values.get(f"joints.{name}.damping", 0.0)
     weights = _weights(layout, values, a)
+    reels = _reels(layout, values, a)
     nx = 2 * layout.nq
     for name, number in layout.drives.items():
         drive, path = machine.drives[name], f"drives.{name}"
@@ -91,6 +103,7 @@ def build(layout: Layout, values: dict[str, float], h: float) -> GraphParams:
         a["drive_L"][number] = values.get(f"{path}.inductance", 0.0)
         a["drive_w"][number] = 2.0 * np.pi * values.get(f"{path}.bandwidth_hz", 0.0)
         a["drive_zeta"][number] = values.get(f"{path}.damping", 0.7071)
+        a["drive_zero"][number] = values.get(f"{path}.zero", 0.0)
         nx += states_of(drive)
     for name, number in layout.sensors.items():
         sensor = machine.sensors[name]
@@ -104,7 +117,7 @@ def build(layout: Layout, values: dict[str, float], h: float) -> GraphParams:
     whole = {key: a[key].astype(np.int64) for key in WHOLE}
     return GraphParams(
         h=h, nq=layout.nq, nx=nx, nu=len(layout.drives), ny=len(layout.sensors), nl=len(layout.links),
-        weights=weights, **{**a, **whole},
+        weights=weights, reels=reels, winds=int(a["reel_grow"].any()), **{**a, **whole},
     )  # fmt: skip
 
 
@@ -122,11 +135,16 @@ def place(layout: Layout, element: Any, values: dict[str, float]) -> tuple[int, 
 
 
 def joint_place(layout: Layout, name: str, values: dict[str, float]) -> tuple[int, float, int, float]:
-    """Elongation of a joint, q_to - ratio q_from, by coordinates; that of `to` comes first."""
+    """Elongation of a joint by coordinates, that of `to` first: q_to - ratio q_from, or of a span
+    R_to q_to -+ R_from q_from."""
     joint = layout.machine.joints[name]
     a, b = getattr(joint, "from"), joint.to
     i, j = layout.coordinate(b), layout.coordinate(a)
-    of_to, of_from = layout.ratio(b, values), -values[f"joints.{name}.ratio"] * layout.ratio(a, values)
+    if joint.span is None:
+        of_to, of_from = layout.ratio(b, values), -values[f"joints.{name}.ratio"] * layout.ratio(a, values)
+    else:
+        of_to, of_from = (values[f"bodies.{body}.radius"] * layout.ratio(body, values) for body in (b, a))
+        of_from = -of_from if joint.span == "open" else of_from
     if of_to == 0.0:  # the frame
         i = j
     if of_from == 0.0:
@@ -156,14 +174,31 @@ def _weights(layout: Layout, values: dict[str, float], a: dict[str, np.ndarray])
     return n
 
 
+def _reels(layout: Layout, values: dict[str, float], a: dict[str, np.ndarray]) -> int:
+    a["link_reel_i"][:], a["link_reel_j"][:] = NOWHERE, NOWHERE
+    reels = [name for name, body in layout.machine.bodies.items() if body.reel is not None]
+    for number, name in enumerate(reels):
+        path, at = f"bodies.{name}", layout.coordinate(name)
+        a["reel_i"][number], a["reel_R"][number] = at, values[f"{path}.radius"]
+        a["reel_core"][number] = values[f"{path}.reel.core"]
+        a["reel_grow"][number] = values[f"{path}.reel.thickness"] / (2.0 * np.pi)
+        a["reel_paper"][number] = 0.5 * np.pi * (values[f"{path}.reel.density"] * values[f"{path}.reel.width"])
+        for joint, link in layout.links.items():
+            for end in ("i", "j"):
+                if a[f"link_{end}"][link] == at:
+                    a[f"link_reel_{end}"][link] = number
+                    a["link_wound"][link] += layout.machine.joints[joint].span is not None
+    return len(reels)
+
+
 G_N = 9.80665  # m/s^2
 WHOLE = (
-    "link_i", "link_j", "weight_i", "weight_turns", "drive_i", "drive_j", "drive_kind", "drive_at", "sensor_kind",
-    "sensor_i", "sensor_j", "sensor_of",
+    "link_i", "link_j", "link_wound", "link_reel_i", "link_reel_j", "weight_i", "weight_turns", "drive_i", "drive_j",
+    "drive_kind", "drive_at", "sensor_kind", "sensor_i", "sensor_j", "sensor_of", "reel_i",
 )  # fmt: skip
 SIZES = {
     name: Q if name in ("inertia", "dry", "viscous")
-    else {"link": L, "weight": MOST_WEIGHTS, "drive": U, "sensor": Y}[name.partition("_")[0]]
+    else {"link": L, "weight": MOST_WEIGHTS, "drive": U, "sensor": Y, "reel": linear.MOST_REELS}[name.partition("_")[0]]
     for name in GraphParams._fields
-    if name not in ("h", "nq", "nx", "nu", "ny", "nl", "weights")
+    if name not in ("h", "nq", "nx", "nu", "ny", "nl", "weights", "reels", "winds")
 }  # fmt: skip

@@ -2,27 +2,20 @@
 
     M q'' = - F_v q' - sum_links a (c e + k e') + sum_drives a F + weight + terms + dry friction,   e = a q_i + b q_j
 
-A drive's command u passes its limit and a second-order low pass; then it is a force F = gain u, a current
-F = K gain u, or a voltage: L I' = gain u - R I - K e', F = K I (L = 0: I follows at once).
-
-Source: Spong, Hutchinson & Vidyasagar, Robot Modeling and Control (2006), ch. 6 for drives.
+Drives are those of drives.py; what winds tape is in reel.py.
 """
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 
 from rtctl.idiom import state, tick
 from rtctl.plants import linear
-from rtctl.plants.graph.params import (
-    ACCELERATION,
-    CURRENT,
-    POSITION,
-    SPEED,
-    TENSION,
-    VOLTAGE,
-    GraphParams,
-)
+from rtctl.plants.graph import reel
+from rtctl.plants.graph.drives import current, drive
+from rtctl.plants.graph.params import ACCELERATION, POSITION, SPEED, TENSION, GraphParams
+from rtctl.plants.graph.spring import spring
 
 GRAPH_STATE = state(m=linear.MACHINE)
 
@@ -31,20 +24,35 @@ GRAPH_STATE = state(m=linear.MACHINE)
 def start(p, s):
     """Matrices and dry friction; positions and speeds stay as they are (zero at first)."""
     m = s.m
+    prepare(p, m)
+    discretise(p, m)
+
+
+@tick
+def prepare(p, m):
+    """Numbers of the machine into its record, without the matrices over a substep."""
     linear.size(m, p.nq, p.nx, p.nu, p.ny, p.nl)
     m.h = p.h
     for i in range(p.nq):
         m.dry_base[i] = p.dry[i]
-    assemble(p, m.A, m.G)
-    linear.discretise_machine(m)
+        m.inertia[i] = p.inertia[i]
     for j in range(p.nl):
         linear.link(m, j, p.link_i[j], p.link_a[j], p.link_j[j], p.link_b[j], p.link_c[j], p.link_k[j])
+    reel.start_reels(p, m)
 
 
 @tick
-def assemble(p, A, G):
-    """Fill A (nx, nx) and G = [commands | forces at the coordinates] (nx, nu + nq)."""
-    nq = p.nq
+def discretise(p, m):
+    """Matrices at the radii and inertias of now."""
+    reel.linearise(p, m)
+    assemble(p, m)
+    linear.discretise_machine(m)
+
+
+@tick
+def assemble(p, m):
+    """Fill A (nx, nx) and G = [commands | forces at the coordinates] (nx, nu + nq) of the record."""
+    nq, A, G = p.nq, m.A, m.G
     for i in range(p.nx):
         for j in range(p.nx):
             A[i, j] = 0.0
@@ -52,64 +60,12 @@ def assemble(p, A, G):
             G[i, j] = 0.0
     for i in range(nq):
         A[i, nq + i] = 1.0
-        A[nq + i, nq + i] = -p.viscous[i] / p.inertia[i]
-        G[nq + i, p.nu + i] = 1.0 / p.inertia[i]
+        A[nq + i, nq + i] = -p.viscous[i] / m.inertia[i]
+        G[nq + i, p.nu + i] = 1.0 / m.inertia[i]
     for k in range(p.nl):
-        damper(A, p, p.link_i[k], p.link_a[k], p.link_j[k], p.link_b[k], p.link_c[k], p.link_k[k])
+        spring(A, m, m.link_i[k], m.link_a[k], m.link_j[k], m.link_b[k], m.link_c[k], m.link_k[k])
     for d in range(p.nu):
-        drive(A, G, p, d)
-
-
-@tick
-def damper(A, p, i, a, j, b, c, k):
-    """Spring c and damper k of elongation a q_i + b q_j."""
-    nq = p.nq
-    wi, wj = 1.0 / p.inertia[i], 1.0 / p.inertia[j]
-    A[nq + i, i] -= wi * a * a * c
-    A[nq + i, j] -= wi * a * b * c
-    A[nq + j, i] -= wj * b * a * c
-    A[nq + j, j] -= wj * b * b * c
-    A[nq + i, nq + i] -= wi * a * a * k
-    A[nq + i, nq + j] -= wi * a * b * k
-    A[nq + j, nq + i] -= wj * b * a * k
-    A[nq + j, nq + j] -= wj * b * b * k
-
-
-@tick
-def drive(A, G, p, d):
-    """States of drive `d`, and the force that it puts on its coordinates."""
-    nq, at = p.nq, p.drive_at[d]
-    i, a, j, b = p.drive_i[d], p.drive_a[d], p.drive_j[d], p.drive_b[d]
-    kind, K, w = p.drive_kind[d], p.drive_K[d], p.drive_w[d]
-    wi, wj = a / p.inertia[i], b / p.inertia[j]
-    made = -1  # state that holds what the low pass gives, in N, A or V
-    if w > 0.0:  # x' = w z, z' = w (gain u - x) - 2 zeta w z
-        A[at, at + 1] = w
-        A[at + 1, at] = -w
-        A[at + 1, at + 1] = -2.0 * p.drive_zeta[d] * w
-        G[at + 1, d] = w * p.drive_gain[d]
-        made, at = at, at + 2
-    if kind == VOLTAGE and p.drive_L[d] > 0.0:
-        L = p.drive_L[d]
-        A[at, at] = -p.drive_R[d] / L
-        A[at, nq + i] -= K * a / L
-        A[at, nq + j] -= K * b / L
-        if made >= 0:
-            A[at, made] = 1.0 / L
-        else:
-            G[at, d] = p.drive_gain[d] / L
-        A[nq + i, at] += wi * K
-        A[nq + j, at] += wj * K
-        return
-    factor = K / p.drive_R[d] if kind == VOLTAGE else K if kind == CURRENT else 1.0
-    if kind == VOLTAGE:
-        damper(A, p, i, a, j, b, 0.0, K * factor)
-    if made >= 0:
-        A[nq + i, made] += wi * factor
-        A[nq + j, made] += wj * factor
-    else:
-        G[nq + i, d] += wi * factor * p.drive_gain[d]
-        G[nq + j, d] += wj * factor * p.drive_gain[d]
+        drive(A, G, p, m, d)
 
 
 @tick
@@ -121,26 +77,17 @@ def take(p, m):
 
 @tick
 def weigh(p, m):
-    """Weight of every body, on top of the forces m.f."""
+    """Forces of what is not linear, on top of the forces m.f: weight of every body, and reels that wind."""
     for k in range(p.weights):
         i, a = p.weight_i[k], p.weight_a[k]
         force = p.weight_force[k]
         if p.weight_turns[k] != 0:
             force *= math.sin(a * m.qm[i] + p.weight_angle[k])
         m.f[i] -= a * force
-
-
-@tick
-def current(p, m, d):
-    """Current of drive `d`, A; of a force drive what it would be at a torque constant of 1."""
-    nq, at, w = p.nq, p.drive_at[d], p.drive_w[d]
-    given = m.x[at] if w > 0.0 else p.drive_gain[d] * m.u[d]
-    if p.drive_kind[d] != VOLTAGE:
-        return given
-    if p.drive_L[d] > 0.0:
-        return m.x[at + 2] if w > 0.0 else m.x[at]
-    speed = p.drive_a[d] * m.x[nq + p.drive_i[d]] + p.drive_b[d] * m.x[nq + p.drive_j[d]]
-    return (given - p.drive_K[d] * speed) / p.drive_R[d]
+    if p.winds != 0:
+        if reel.grow(p, m):
+            discretise(p, m)
+        reel.wind(p, m)
 
 
 @tick
@@ -172,7 +119,11 @@ def read(p, m):
 
 
 def state_space(p: GraphParams) -> tuple[np.ndarray, np.ndarray]:
-    """A (nx, nx) and B (nx, nu), commands in, without weight and dry friction."""
-    A, G = np.zeros((p.nx, p.nx)), np.zeros((p.nx, p.nu + p.nq))
-    assemble.interpret(p, A, G)
-    return A, G[:, : p.nu]
+    """A (nx, nx) and B (nx, nu), commands in, at the start, without weight and dry friction."""
+    fields = linear.MACHINE.fields or {}  # as plain arrays: those of a record are slow to reach from Python
+    m = SimpleNamespace(
+        **{name: np.zeros(kind.shape, kind.base) for name, (kind, *_) in fields.items() if name != "work"}
+    )
+    prepare.interpret(p, m)
+    assemble.interpret(p, m)
+    return m.A[: p.nx, : p.nx].copy(), m.G[: p.nx, : p.nu].copy()

@@ -9,7 +9,9 @@ from rtctl.config.units import to_si
 TURNS, SLIDES = "rad", "m"
 BODY = {  # key -> unit where the body turns, and where it slides
     "inertia": ("kg*m^2", "kg*m^2"), "mass": ("kg", "kg"), "dry": ("Nm", "N"), "viscous": ("Nm*s/rad", "N*s/m"),
+    "radius": ("m", "m"),
 }  # fmt: skip
+REEL = {"core": "m", "thickness": "m", "density": "kg/m^3", "width": "m"}
 GRAVITY = {"mass": "kg", "arm": "m", "angle": "rad", "incline": "rad"}
 FITS = {  # place -> what a sensor can measure there
     "body": ("position", "speed", "acceleration"), "joint": ("position", "speed", "force"), "drive": ("current",),
@@ -35,7 +37,7 @@ def drive_units(kind: str, command: str, turns: bool) -> dict[str, str]:
     gain = "" if made == command else f"{made}/{command}" if command else made
     return {
         "gain": gain, "torque_constant": f"{FORCE[turns]}/A", "resistance": "ohm", "inductance": "H",
-        "limit": command, "dac_range": command, "bandwidth_hz": "Hz", "damping": "",
+        "limit": command, "dac_range": command, "bandwidth_hz": "Hz", "damping": "", "zero": "s",
     }  # fmt: skip
 
 
@@ -107,7 +109,9 @@ def _check_bodies(data: Mapping[str, Any]) -> None:
 
 
 def _ends(joint: Mapping[str, Any], turns: Mapping[str, bool]) -> tuple[bool, bool]:
-    """Whether the two ends of a joint turn; the frame is as the other end."""
+    """Whether the two ends of a joint turn; the frame is as the other end. A span is a length of tape: it slides."""
+    if joint.get("span") is not None:
+        return False, False
     a, b = turns.get(str(joint.get("from"))), turns.get(str(joint.get("to")))
     a = a if a is not None else b if b is not None else True
     return a, b if b is not None else a
@@ -141,6 +145,8 @@ def _body(path: str, body: Mapping[str, Any]) -> dict[str, Any]:
     if not slides and "inertia" not in body and not body.get("fixed"):
         raise ValueError(f"{path}: give inertia (a body that turns) or mass (a body that slides)")
     out = _converted(path, body, {key: pair[slides] for key, pair in BODY.items()})
+    if isinstance(out.get("reel"), Mapping):
+        out["reel"] = _converted(f"{path}.reel", out["reel"], REEL)
     weight = out.get("gravity")
     if isinstance(weight, Mapping):
         out["gravity"] = _converted(f"{path}.gravity", weight, GRAVITY)

@@ -2,7 +2,7 @@
 
     R = R_0 + d q / 2 pi (4.3, 4.4),  l = integral of R dq,  J = J_0 + (pi/2) rho_h (R^4 - R_0^4) (4.1, 4.2)
 
-plants/ivu.py does this for both reels with the thickness that the owner gives, and takes its matrices anew on the way;
+plants/graph/reel.py does this with the thickness that the owner gives, and takes its matrices anew on the way;
 here it is for one reel, or with `other` for both, on top of what the model has, as forces alone. Where the owner's tape
 has no thickness the two agree to a few percent of the effect over nine turns; a reel that is nearly empty is the worst.
 
@@ -15,6 +15,7 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import ivu, linear
 from rtctl.plants.element import stand
+from rtctl.plants.graph import reel
 from rtctl.plants.physics.ripple_tape import tape_of
 from rtctl.plants.physics.search import Choice, Size
 from rtctl.plants.physics.story import Draw, Needs, Phrase
@@ -60,7 +61,7 @@ def wound(p, m, i, grow):
     """Stretch the tape of reel `i` by what the reel has wound at another radius."""
     j = tape_of(m, i)
     R_0, q = m.link_a[j], m.qm[i]
-    way = ivu.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
+    way = reel.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
     linear.extend(m, j, way, (radius(p, m, i, grow) - R_0) * m.vm[i])
 
 

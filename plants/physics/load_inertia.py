@@ -46,7 +46,7 @@ def build_inertia(settings: InertiaSettings, h: float) -> InertiaParams:
 @tick
 def acceleration(m, i):
     """What the linear model makes of all that acts on node `i`, without dry friction, rad/s^2 or m/s^2."""
-    nq, nu, nx = m.r.shape[0], m.u.shape[0], m.x.shape[0]
+    nq, nu, nx = m.nq, m.nu, m.nx
     a = 0.0
     for j in range(nq):
         a += m.A[nq + i, j] * m.qm[j] + m.A[nq + i, nq + j] * m.vm[j] + m.G[nq + i, nu + j] * m.f[j]
@@ -60,7 +60,7 @@ def acceleration(m, i):
 @tick
 def turned(p, m, i, r):
     """Let all that turns node `i` turn its inertia at its angle; `r` takes its rotation to the unit of A."""
-    nq, nu = m.r.shape[0], m.u.shape[0]
+    nq, nu = m.nq, m.nu
     J_0 = 1.0 / m.G[nq + i, nu + i]
     x = p.n * r * m.qm[i] + p.phi
     J = max(J_0 + r * r * p.A * math.cos(x), SMALLEST * J_0)

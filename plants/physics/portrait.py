@@ -6,13 +6,13 @@ line of the term is that of the generated plant, and the machine's record is fil
 is compiled, which would take longer than all the rest.
 """
 
-from types import FunctionType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rtctl.idiom import Settings, interpreted
-from rtctl.plants import linear
+from rtctl.plants.graph import plant as graph
+from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.physics.place import PLANTS, place
 from rtctl.plants.physics.placement import anywhere
 from rtctl.plants.physics.term import SITES, Term
@@ -45,6 +45,7 @@ TEXT = '''
 import numpy as np
 from rtctl.idiom import tick
 from rtctl.plants import {kind}, linear
+from rtctl.plants.graph import plant as graph
 from rtctl.plants.physics import {module}
 
 @tick
@@ -70,12 +71,11 @@ def run(acts, P, S, p, s, i, r, l, c, q, v, volts, read, pull, dry, force):
             m.x[n] = q[k, n] + 0.5 * m.h * v[k, n]
         for n in range(m.nl):
             pull[k, n] = linear.tension(m, n)
-        {read}
+        graph.read(p.graph, m)
         if acts:
             {reading}
         volts[k], read[k], dry[k], force[k] = m.volts, m.y, m.dry[:nq], m.f[:nq]
 '''
-READ = {"axis": "axis.read(s)", "ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)"}
 
 
 class Curve(NamedTuple):
@@ -240,7 +240,7 @@ def assembled(term: Term, kind: str) -> Any:
     }
     module = term.build.__module__.rpartition(".")[2]
     scope: dict[str, Any] = {}
-    exec(TEXT.format(kind=kind, module=module, read=READ[kind], **lines), scope)
+    exec(TEXT.format(kind=kind, module=module, **lines), scope)
     return scope["run"]
 
 
@@ -249,14 +249,9 @@ def stand(kind: str, h: float) -> tuple[Any, Any]:
     plant = PLANTS[kind]
     name = kind.capitalize()
     p = plant.build(getattr(plant, f"{name}Settings")(parameters=STAND[kind]), h, *DRIVES[kind])
-    s = np.zeros(1, getattr(plant, f"{kind.upper()}_STATE")).view(np.recarray)[0]
-    scope = dict(vars(plant))  # as plain Python, and without the matrix exponential, which nobody asks for
-    link, size = linear.link.py_func, linear.size.py_func
-    scope["linear"] = SimpleNamespace(link=link, size=size, discretise_machine=lambda _: None)
-    for key, value in vars(plant).items():
-        if hasattr(value, "py_func"):
-            scope[key] = FunctionType(value.py_func.__code__, scope)
-    scope["start"](p, s)
+    s = np.zeros(1, GRAPH_STATE).view(np.recarray)[0]
+    graph.prepare.interpret(p.graph, s.m)  # without the matrix exponential, which nobody asks for
+    graph.assemble.interpret(p.graph, s.m)
     s.m.Gamma_T[:, :] = h * s.m.G.T
     return p, s
 

@@ -51,7 +51,7 @@ def build_torque(settings: TorqueSettings, h: float) -> TorqueParams:
 @tick
 def torque(p, m, c, i, r):
     """Give drive `c` the gain of the angle of node `i` in the middle of the substep; `r` takes it to its own unit."""
-    q = r * (m.x[i] + 0.5 * m.h * m.x[m.r.shape[0] + i])
+    q = r * (m.x[i] + 0.5 * m.h * m.x[m.nq + i])
     m.volts[c] *= 1.0 + harmonics(p.n * q, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3)
 
 

@@ -34,32 +34,31 @@ from numba import njit
 from rtctl.diagnose import law
 from rtctl.idiom import tick as compiled
 from rtctl.plants import {kind}, linear
+from rtctl.plants.graph import plant as graph
 {imports}
 
 entry = njit(nogil=True, error_model="numpy", fastmath=False, cache=True)
 '''
 
 DRIVES = {
-    "ivu": ("m.u[0], m.u[1] = m.volts[0], m.volts[1]",),
+    "ivu": ("graph.take(p.graph, m)",),
     "ldu": ("m.u[0] = min(max(job.gain * m.volts[0], -job.current_limit), job.current_limit)",),
-    "axis": ("m.u[0] = m.volts[0]",),
+    "axis": ("graph.take(p.graph, m)",),
 }
-FOLLOW = {"ivu": ("if p.d_tape > 0.0:", "    ivu.follow_tape(p, s)")}
-READ = {"ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)", "axis": "axis.read(s)"}
-RATE = {"axis": ("if job.speed != 0:", "    rate(s, t)")}
+RATE = {"axis": ("if job.speed != 0:", "    rate(p.graph, s, t)")}
 SPEED = {  # a sensor of speed shows how a sensor of position would change: what misleads the one misleads the other
     "axis": '''
 @compiled
-def rate(s, t):
+def rate(p, s, t):
     """Change of the reading over a substep around now, into s.m.y."""
     m = s.m
     x, way = m.x[axis.CARRIAGE], m.h * m.x[axis.NQ + axis.CARRIAGE]
     m.x[axis.CARRIAGE] = x - 0.5 * way
-    axis.read(s)
+    graph.read(p, m)
     reading(t, m)
     before = m.y[0]
     m.x[axis.CARRIAGE] = x + 0.5 * way
-    axis.read(s)
+    graph.read(p, m)
     reading(t, m)
     m.x[axis.CARRIAGE] = x
     m.y[0] = (m.y[0] - before) / m.h
@@ -76,7 +75,7 @@ def substep(job, p, s, t):
     for c in range(m.nu):
         m.u[c] += job.correction * job.share[c]
     linear.midpoint(m)
-    {follow}
+    graph.weigh(p.graph, m)
     force(t, m)
     last(t, m)
     for i in range(m.nq):
@@ -88,7 +87,7 @@ def substep(job, p, s, t):
 def look(job, p, s, t):
     """Readings of all sensors in their own unit into job.y; a rectified counter adds up the way."""
     m = s.m
-    {read}
+    graph.read(p.graph, m)
     reading(t, m)
     {rate}
     for c in range(m.ny):
@@ -110,7 +109,7 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
     In mode 1 the correction ends at row jobs.release, where jobs.jolt is added to position and speed of all bodies.
     """
     job, p, s, t, the_law, law_state = jobs[0], ps[0], ss[0], ts[0], laws[0], law_states[0]
-    {kind}.start(p, s)
+    graph.start(p.graph, s)
     m = s.m
     n, drives = volts.shape
     stride = job.stride
@@ -121,9 +120,9 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
             for c in range(m.ny):
                 job.zero[c] = job.y[c] * (job.speed == 0)
         if k <= job.release < k + stride:
-            for i in range({kind}.NQ):
+            for i in range(m.nq):
                 m.x[i] += job.jolt[0] * job.rigid[i]
-                m.x[{kind}.NQ + i] += job.jolt[1] * job.rigid[i]
+                m.x[m.nq + i] += job.jolt[1] * job.rigid[i]
                 m.v_before[i] += job.jolt[1] * job.rigid[i]
         look(job, p, s, t)
         at = min(k, n - 1)
@@ -133,7 +132,7 @@ def run(jobs, ps, ss, ts, laws, law_states, lead, ref, w, volts, seen, out, writ
             if k < stride - lead or k == 0:
                 job.e = e
             if job.speed != 0:  # of a sensor that may not know direction
-                job.e, job.d = 0.0, -e if job.y[0] * m.x[{kind}.NQ] < 0.0 else e
+                job.e, job.d = 0.0, -e if job.y[0] * m.x[m.nq] < 0.0 else e
             else:
                 job.d += job.a * ((e - job.e) * job.rate - job.d)
                 job.e = e
@@ -259,8 +258,6 @@ def source(kind: str) -> str:
         RUN.format(
             kind=kind,
             drives=indent.join(DRIVES[kind]),
-            follow=indent.join(FOLLOW.get(kind, ("pass",))),
-            read=READ[kind],
             rate=indent.join(RATE.get(kind, ("pass",))),
         )
     )
@@ -294,6 +291,7 @@ def sources_hash(kind: str) -> str:
     root = Path(rtctl.__file__).parent
     plants = Path(next(iter(rtctl.plants.__path__)))
     shared = [root / "idiom.py", root / "diagnose" / "law.py", plants / "linear.py", plants / f"{kind}.py"]
+    shared += sorted(plants.glob("graph/*.py"))
     folders = (root / "laws", Path(next(iter(rtctl.drivers.__path__))), plants / "physics")
     return hash_of([*shared, *(path for folder in folders for path in sorted(folder.glob("*.py")))])
 

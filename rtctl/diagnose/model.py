@@ -130,17 +130,9 @@ def plant_params(model: Model, case: Case, h: float) -> Any:
                     f"{case.file}: parameters.{name} is missing, {words}; without it there is no belief to simulate, "
                     "only a model that was fitted"
                 )
-        params = axis.AxisParams
-        return params(h, *(base.get(name, 0.0) for name in params._fields[1:]))
+        return axis.params(base, h)
     w = 2 * np.pi * (case.drive.bandwidth_hz or DIRECT)
     zeta = case.drive.damping or DAMPING
     if model.kind == "ldu":
-        drive = np.array([w, zeta])
-        return ldu.LduParams(h=h, drive=drive, **_pick(base, ldu.LduParams, "h", "drive"))
-    drive = np.array([[gain, w, zeta, 0.0] for gain in case.drive.amp_per_volt])
-    values = {**base, "rho_h": base["rho_tape"] * base["h_tape"]}
-    return ivu.IvuParams(h=h, drive=drive, **_pick(values, ivu.IvuParams, "h", "drive"))
-
-
-def _pick(values: dict[str, float], params: Any, *but: str) -> dict[str, float]:
-    return {name: values[name] for name in params._fields if name not in but}
+        return ldu.params(base, h, (w, zeta))
+    return ivu.params(base, h, [(gain, w, zeta, 0.0) for gain in case.drive.amp_per_volt])

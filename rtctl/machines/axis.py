@@ -267,7 +267,7 @@ def plant_diagram(config: AxisConfig, period: float, seed: int) -> PlantDiagram:
         (
             "encoder",
             (
-                "axis.read(s.plant)",
+                "plant.read(p.plant.graph, s.plant.m)",
                 *terms.reading,
                 "pulses = linear_scale.step(p.encoder, s.encoder, s.plant.m.y[0])",
                 "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
@@ -283,13 +283,13 @@ def plant_diagram(config: AxisConfig, period: float, seed: int) -> PlantDiagram:
             "rtctl.drivers.at_mio_16de",
             "rtctl.drivers.daq_stc",
             "rtctl.drivers.linear_scale",
-            "rtctl.plants.axis",
+            "rtctl.plants.graph.plant",
             "rtctl.plants.linear",
             *terms.uses,
         ),
         blocks=blocks,
         truth=TRUTH,
-        start=("axis.start(p.plant, s.plant)",),
+        start=("plant.start(p.plant.graph, s.plant)",),
         advance=advance,
         sample=sample,
     )

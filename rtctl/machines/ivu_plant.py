@@ -33,10 +33,10 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
     board = config.board
     driver = (*l292.second_order(config.plant.driver), config.plant.driver.R_F * config.plant.driver.C_F)
     terms = physics_lines(config.plant.physics, "ivu", h)
-    follow = ("ivu.follow_tape(p.plant, s.plant)",) if config.plant.follow_tape else ()
+    follow = ("plant.weigh(p.plant.graph, s.plant.m)",) if config.plant.follow_tape else ()
     ripple = RIPPLE if config.plant.driver.ripple else ()
     blocks = (
-        Block("plant", plant_ivu.build(config.plant, h, [driver, driver]), plant_ivu.IVU_STATE),
+        Block("plant", plant_ivu.build(config.plant, h, [driver, driver], config.plant.follow_tape), plant_ivu.IVU_STATE),
         Block("driver", l292.build(config.plant.driver, h), None),
         Block("output1", at_mio_16de.build_output(config.board.output1, h), at_mio_16de.ANALOG_OUTPUT_STATE),
         Block("output2", at_mio_16de.build_output(config.board.output2, h), at_mio_16de.ANALOG_OUTPUT_STATE),
@@ -68,7 +68,7 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
         (
             "encoder",
             (
-                "ivu.read(s.plant)",
+                "plant.read(p.plant.graph, s.plant.m)",
                 *terms.reading,
                 "pulses = ls7084.step(p.capstan, s.capstan, s.plant.m.y[0], p.plant.h)",
                 "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
@@ -90,14 +90,13 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
         (
             "truth",
             (
-                "ivu.tensions(s.plant)",
-                "rx.truth[0] = s.plant.T1",
-                "rx.truth[1] = s.plant.T2",
+                "rx.truth[0] = linear.tension(s.plant.m, 0)",  # at the middle of the last substep
+                "rx.truth[1] = linear.tension(s.plant.m, 1)",
                 "rx.truth[2] = s.plant.m.x[ivu.CAPSTAN]",
                 "rx.truth[3] = s.plant.m.x[ivu.MOTOR1]",
                 "rx.truth[4] = s.plant.m.x[ivu.MOTOR2]",
-                "rx.truth[5] = s.plant.R1",
-                "rx.truth[6] = s.plant.R2",
+                "rx.truth[5] = s.plant.m.reel_R[0]",
+                "rx.truth[6] = s.plant.m.reel_R[1]",
             ),
         ),
     )
@@ -108,13 +107,14 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
             "rtctl.drivers.l292",
             "rtctl.drivers.ls7084",
             "rtctl.drivers.optical_sensor",
+            "rtctl.plants.graph.plant",
             "rtctl.plants.ivu",
             "rtctl.plants.linear",
             *terms.uses,
         ),
         blocks=blocks,
         truth=TRUTH,
-        start=("ivu.start(p.plant, s.plant)",),
+        start=("plant.start(p.plant.graph, s.plant)",),
         advance=advance,
         sample=sample,
     )

@@ -58,7 +58,7 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
         (
             "encoder and scale",
             (
-                "ldu.read(p.plant, s.plant)",
+                "plant.read(p.plant.graph, s.plant.m)",
                 *terms.reading,
                 "pulses = ls7084.step(p.encoder, s.encoder, s.plant.m.y[0], p.plant.h)",
                 "daq_stc.counter_step(s.counter0, abs(pulses), pulses > 0)",
@@ -79,7 +79,7 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
         (
             "truth",
             (
-                "ldu.read(p.plant, s.plant)",  # anew, without the errors of the sensors
+                "plant.read(p.plant.graph, s.plant.m)",  # anew, without the errors of the sensors
                 *terms.moves,
                 "rx.truth[0] = s.plant.m.y[1]",
                 "rx.truth[1] = p.plant.R_c * s.plant.m.x[ldu.NQ + ldu.CAPSTAN]",
@@ -94,13 +94,14 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
             "rtctl.drivers.ldu_amplifier",
             "rtctl.drivers.linear_scale",
             "rtctl.drivers.ls7084",
+            "rtctl.plants.graph.plant",
             "rtctl.plants.ldu",
             "rtctl.plants.linear",
             *terms.uses,
         ),
         blocks=blocks,
         truth=TRUTH,
-        start=("ldu.start(p.plant, s.plant)",),
+        start=("plant.start(p.plant.graph, s.plant)",),
         advance=advance,
         sample=sample,
     )

@@ -15,6 +15,9 @@ from rtctl.plants.physics import TERMS
 
 def same(one, two):
     for name in type(one)._fields:
+        if hasattr(getattr(one, name), "_fields"):
+            same(getattr(one, name), getattr(two, name))
+            continue
         np.testing.assert_allclose(getattr(one, name), getattr(two, name), rtol=1e-12, err_msg=name)
 
 

@@ -18,6 +18,7 @@ from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator, channels, gear, lever, per_unit, pushes, resolution, rigid_gain
 from rtctl.idiom import tick
 from rtctl.plants import axis, linear
+from rtctl.plants.graph import plant as graph
 from rtctl.plants.physics import TERMS
 
 
@@ -28,9 +29,9 @@ def term(name, node, **values):
 @tick
 def by_hand(p, s, volts, substeps, late, x):
     """The axis under held volts that come `late` substeps late."""
-    axis.start(p, s)
+    graph.start(p.graph, s)
     for k in range(len(volts)):
-        axis.read(s)
+        graph.read(p.graph, s.m)
         x[k] = s.m.y[0]
         for i in range(substeps):
             s.m.u[0] = volts[max((k * substeps + i - late) // substeps, 0)]

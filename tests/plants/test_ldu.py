@@ -9,6 +9,7 @@ from scipy.linalg import eig
 
 from rtctl.idiom import fill_record, record_dtype, tick
 from rtctl.plants import ldu, linear
+from rtctl.plants.graph import plant as graph
 
 AMPLIFIER = (2 * np.pi * 2000.0, 0.7071)
 H = 5e-5
@@ -24,7 +25,7 @@ def plant(p: ldu.LduParams) -> Any:
     rows = np.zeros(1, record_dtype(p)).view(np.recarray)
     fill_record(rows[0], p)
     s = np.zeros(1, ldu.LDU_STATE).view(np.recarray)[0]
-    ldu.start(rows[0], s)
+    graph.start(rows[0].graph, s)
     return s
 
 

@@ -85,7 +85,7 @@ def test_a_rigid_machine_does_not_creep_in_a_million_steps():
     m.x[:2] = 1.0
     run(m, 1_000_000)
     np.testing.assert_allclose(m.x[:2], 1.0, rtol=0, atol=1e-6)  # rounding; a count is 6e-4 rad
-    assert np.abs(m.x[2:]).max() < 1e-8
+    assert np.abs(m.x[2:4]).max() < 1e-8
     m.x[:4] = [0.0, 0.0, 1.0, 1.0]
     run(m, 1_000_000)
     np.testing.assert_allclose(m.x[:4], [500.0, 500.0, 1.0, 1.0], rtol=1e-6)
@@ -152,7 +152,7 @@ def coast(h: float, F: float, v: float, t: float, dry: float) -> np.ndarray:
     m = mass(h, dry=dry)
     m.u[0], m.x[1] = F, v
     run(m, round(t / h))
-    return np.array(m.x)
+    return np.array(m.x[:2])
 
 
 def test_a_turn_within_a_substep_is_second_order():
@@ -235,13 +235,13 @@ def test_gauss_seidel_holds_both_ends_of_a_pulled_spring():
     m = pair(1.0, 1.0)
     m.u[0] = 1.5
     run(m, 40_000)
-    assert np.abs(m.x[2:]).max() < STILL
+    assert np.abs(m.x[2:4]).max() < STILL
     assert 0 < m.r[0] * -1 <= 1.0 and 0 <= -m.r[1] <= 1.0
     assert 1.5 + m.r.sum() == pytest.approx(0.0, abs=1e-6)
     m.u[0] = 2.5
     run(m, 40_000)
     assert m.x[2] == pytest.approx(m.x[3], rel=1e-3)
-    assert m.x[2:].mean() == pytest.approx(0.5 * 0.5 * 20, rel=0.02)  # (2.5 - 2) N on 2 kg for 20 s
+    assert m.x[2:4].mean() == pytest.approx(0.5 * 0.5 * 20, rel=0.02)  # (2.5 - 2) N on 2 kg for 20 s
 
 
 def test_advance_and_discretise_allocate_nothing(allocations):

@@ -10,6 +10,8 @@ import numpy as np
 
 from rtctl.idiom import Settings, fill_record, record_dtype
 from rtctl.plants import axis, ivu, ldu
+from rtctl.plants.graph import plant as graph
+from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.physics import (
     contact,
     friction,
@@ -47,6 +49,7 @@ TEXT = '''
 import numpy as np
 from rtctl.idiom import tick
 from rtctl.plants import {kind}, linear
+from rtctl.plants.graph import plant as graph
 from rtctl.plants.physics import {modules}
 
 @tick
@@ -75,7 +78,7 @@ def run(slots, ps, ss, p, s, inputs, substeps, q, v, y, work):
             linear.advance(m)
             for i in range(nq):
                 done += (m.f[i] + m.r[i]) * (m.x[i] - m.qm[i])
-        {read}
+        graph.read(p.graph, m)
         for n in range(slots.shape[0]):
             reading(slots[n].number, ps[n], ss[n], m, slots[n].i, slots[n].r, slots[n].l, slots[n].c)
         for i in range(nq):
@@ -84,7 +87,6 @@ def run(slots, ps, ss, p, s, inputs, substeps, q, v, y, work):
             y[k, i] = m.y[i]
         work[k] = done
 '''
-READ = {"axis": "axis.read(s)", "ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)"}
 SLOT = np.dtype([("number", "i8"), ("i", "i8"), ("l", "i8"), ("c", "i8"), ("r", "f8")])
 
 
@@ -116,7 +118,7 @@ def compiled(kind: str) -> tuple[Any, np.dtype, np.dtype]:
         sites[site] = "\n    ".join(lines)
     scope: dict[str, Any] = {}
     modules = ", ".join(sorted({term.build.__module__.rpartition(".")[2] for term in terms}))
-    exec(TEXT.format(kind=kind, modules=modules, read=READ[kind], **sites), scope)
+    exec(TEXT.format(kind=kind, modules=modules, **sites), scope)
     params, states = [], [("spare", np.float64)]
     for term in terms:
         field = term.name.replace(".", "_")
@@ -132,8 +134,8 @@ def plant(kind: str, h: float, **parameters: float) -> tuple[Any, Any]:
     settings = getattr(module, f"{kind.capitalize()}Settings")(parameters=parameters)
     drives = {"axis": (), "ivu": ([(0.2, 2e3, 0.7, 0.0)] * 2,), "ldu": ((6e3, 0.7),)}[kind]
     p = module.build(settings, h, *drives)
-    s = np.zeros(1, getattr(module, f"{kind.upper()}_STATE")).view(np.recarray)[0]
-    module.start(p, s)
+    s = np.zeros(1, GRAPH_STATE).view(np.recarray)[0]
+    graph.start(p.graph, s)
     return p, s
 
 
@@ -151,7 +153,7 @@ def run(
     function, params, states = compiled(kind)
     substeps = substeps or SUBSTEPS[kind]
     p, s = plant(kind, tick / substeps, **parameters)
-    nq, known = len(s.m.r), [term for term in TERMS.values() if nodes(term, kind)]
+    nq, known = s.m.nq, [term for term in TERMS.values() if nodes(term, kind)]
     for node, speed in (speeds or {}).items():
         spot = place(kind, node)
         s.m.x[nq + spot.node] = s.m.v_before[spot.node] = speed / (getattr(p, spot.factor) if spot.factor else 1.0)
@@ -165,14 +167,14 @@ def run(
         fill_record(ps[n][term.name.replace(".", "_")], term.build(settings, tick / substeps))
     inputs = np.ascontiguousarray(np.asarray(inputs, float).reshape(len(inputs), -1))
     n = len(inputs)
-    out = np.zeros((n, nq)), np.zeros((n, nq)), np.zeros((n, len(s.m.y))), np.zeros(n)
+    out = np.zeros((n, nq)), np.zeros((n, nq)), np.zeros((n, s.m.ny)), np.zeros(n)
     function(slots, ps, ss, p, s, inputs, substeps, *out)
     return Run(*out, s, ss)
 
 
 def kinetic(s: Any, v: np.ndarray) -> np.ndarray:
     """Kinetic energy of rows of speeds (n, nq), J."""
-    nq, nu = len(s.m.r), len(s.m.u)
+    nq, nu = s.m.nq, s.m.nu
     inertia = np.array([1.0 / s.m.G[nq + i, nu + i] for i in range(nq)])
     return 0.5 * (v**2 * inertia).sum(axis=1)
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from rtctl.idiom import Settings, fill_record, record_dtype, state
 from rtctl.plants import axis, ivu, ldu
+from rtctl.plants.graph import plant as graph
+from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.physics import (
     drive,
     drive_dynamics,
@@ -58,6 +60,7 @@ REQUIRED = {
 TEXT = '''
 from rtctl.idiom import tick
 from rtctl.plants import {kind}, linear
+from rtctl.plants.graph import plant as graph
 from rtctl.plants.physics import {modules}
 
 {sites}
@@ -77,7 +80,7 @@ def run(q, z, p, s, volts, substeps, x, y):
             force(q, z, m)
             last(q, z, m)
             linear.advance(m)
-        {read}
+        graph.read(p.graph, m)
         reading(q, z, m)
         for i in range(m.nx):
             x[k, i] = m.x[i]
@@ -91,7 +94,6 @@ def {site}(q, z, m):
     for k in range(q.shape[0]):
         {lines}
 '''
-READ = {"axis": "axis.read(s)", "ivu": "ivu.read(s)", "ldu": "ldu.read(p, s)"}
 
 
 class Run(NamedTuple):
@@ -121,7 +123,7 @@ def source(kind: str) -> str:
                 lines += [f"if q[k].number == {number}:", f"    {filled}"]
         sites.append(SITE.format(site=site, lines="\n        ".join(lines)))
     modules = ", ".join(module.__name__.rpartition(".")[2] for module in MODULES)
-    return TEXT.format(kind=kind, modules=modules, sites="\n".join(sites), read=READ[kind])
+    return TEXT.format(kind=kind, modules=modules, sites="\n".join(sites))
 
 
 @cache
@@ -151,8 +153,8 @@ def plant(kind: str, h: float, **parameters: float) -> tuple[Any, Any]:
     settings = getattr(module, f"{kind.capitalize()}Settings")(parameters=parameters)
     drives = {"axis": (), "ivu": ([(0.2, 2e3, 0.7, 0.0)] * 2,), "ldu": ((6e3, 0.7),)}[kind]
     p = module.build(settings, h, *drives)
-    s = np.zeros(1, getattr(module, f"{kind.upper()}_STATE")).view(np.recarray)[0]
-    module.start(p, s)
+    s = np.zeros(1, GRAPH_STATE).view(np.recarray)[0]
+    graph.start(p.graph, s)
     return p, s
 
 
@@ -169,7 +171,7 @@ def run(
     """Drive a machine by volts (n, nu), each row held for `tick` s; `x` gives states that do not start at zero."""
     function, slot, memory = compiled(kind)
     p, s = plant(kind, tick / substeps, **parameters)
-    nq = len(s.m.r)
+    nq = s.m.nq
     for i, value in (x or {}).items():
         s.m.x[i] = value
         if nq <= i < 2 * nq:
@@ -182,7 +184,7 @@ def run(
         q[n].r = getattr(p, spot.factor) if spot.factor else 1.0
         fill_record(q[n][name.replace(".", "_")], TERMS[name].build(settings, tick / substeps))
     volts = np.ascontiguousarray(np.asarray(volts, float).reshape(len(volts), -1))
-    out = np.zeros((len(volts), len(s.m.x))), np.zeros((len(volts), len(s.m.y)))
+    out = np.zeros((len(volts), s.m.nx)), np.zeros((len(volts), s.m.ny))
     function(q, z, p, s, volts, substeps, *out)
     return Run(*out, s)
 

@@ -13,6 +13,7 @@ import pytest
 
 from rtctl.idiom import interpreted
 from rtctl.plants import axis, linear
+from rtctl.plants.graph import plant as graph
 from rtctl.plants.physics import TERMS, anywhere, by_kind
 from rtctl.plants.physics.term import SITES
 
@@ -43,7 +44,7 @@ def run(P, S, p, s, i, r, l, c, volts, out):
         {force}
         {last}
         linear.advance(m)
-        axis.read(s)
+        graph.read(p.graph, s.m)
         {reading}
         out[k] = m.x[0], m.x[1], m.y[0], m.u[0], m.f[0], m.dry[0], m.r[0], m.volts[0]
 """
@@ -67,9 +68,9 @@ def run(name: str | None, volts: np.ndarray, h: float, v: float = 0.0, dry: floa
     """Drive the axis at rest, or with a speed, with a term or without."""
     p = axis.build(axis.AxisSettings(parameters={"M": M, "K": K, "F_v": 0.0, "F_c": dry, "k": SPRING}), h)
     s = np.zeros(1, axis.AXIS_STATE).view(np.recarray)[0]
-    axis.start(p, s)
+    graph.start(p.graph, s)
     s.m.x[1] = s.m.v_before[0] = v
-    lines, scope, params, memory = dict.fromkeys(SITES, "pass"), {"linear": linear, "axis": axis}, None, None
+    lines, scope, params, memory = dict.fromkeys(SITES, "pass"), {"linear": linear, "graph": graph}, None, None
     if name is not None:
         term = TERMS[name]
         fill = {"p": "P", "s": "S", "m": "m", "i": "i", "r": "r", "l": "l", "c": "c"}

@@ -12,7 +12,8 @@ from pydantic import ValidationError
 
 from rtctl.idiom import tick
 from rtctl.plants import axis, linear
-from rtctl.plants.physics import TERMS, by_kind, friction
+from rtctl.plants.graph import plant as graph
+from rtctl.plants.physics import TERMS, friction
 
 FORMS = ("gaussian", "exponential", "tustin")
 H = 1e-3
@@ -116,7 +117,7 @@ def closed_run(s, dry, brake, stick, ref, out):
 def plant() -> Any:
     p = axis.build(axis.AxisSettings(), H)
     s = np.zeros(1, axis.AXIS_STATE).view(np.recarray)[0]
-    axis.start(p, s)
+    graph.start(p.graph, s)
     return s
 
 
@@ -176,7 +177,7 @@ def test_every_term_is_explained():
     for name, term in TERMS.items():
         assert name == term.name == term.settings.model_fields["term"].default
         assert len(term.words) > 20 and len(term.equation) > 4 and len(term.source) > 4
-        assert by_kind(term)
+        assert term.stands
         assert term.look_alikes and name not in term.look_alikes
         for rival, experiment in term.look_alikes.items():
             assert re.fullmatch(r"[a-z]+\.[a-z_]+", rival), rival

@@ -6,22 +6,24 @@ import stand
 
 from rtctl.idiom import tick
 from rtctl.plants import ivu, linear
+from rtctl.plants.graph import plant as graph
+from rtctl.plants.graph import reel
 from rtctl.plants.physics import TERMS, geometry, ripple_tape
 
 ROUND = ripple_tape.build_reel(ripple_tape.ReelSettings(node="reel2", e=0.0), 5e-4)
 
 
 @tick
-def wind(p, s, volts, substeps, x, reel):
+def wind(p, s, volts, substeps, x, ripple):
     """The plant with its own radii that follow the tape, and a second reel out of round."""
     m = s.m
     for k in range(volts.shape[0]):
         for _ in range(substeps):
             m.u[0], m.u[1] = volts[k, 0], volts[k, 1]
             linear.midpoint(m)
-            ivu.follow_tape(p, s)
-            ripple_tape.reel(reel, m, ivu.REEL2)
-            ripple_tape.reel_arm(reel, m, ivu.REEL2)
+            graph.weigh(p.graph, m)
+            ripple_tape.reel(ripple, m, ivu.REEL2)
+            ripple_tape.reel_arm(ripple, m, ivu.REEL2)
             linear.advance(m)
         for i in range(m.nx):
             x[k, i] = m.x[i]
@@ -63,12 +65,12 @@ def test_the_plant_tells_the_tension_on_its_true_radius():
     p, s = stand.plant("ivu", 2.5e-4, d_tape=1e-3)
     wind(p, s, volts(600), 8, np.zeros((600, 14)), ROUND)
     linear.midpoint(s.m)
-    ivu.follow_tape(p, s)
-    ivu.tensions(s)
+    graph.weigh(p.graph, s.m)
+    (T1, T2), (R1, R2) = (linear.tension(s.m, tape) for tape in (0, 1)), s.m.reel_R[:2]
     grow, x = p.d_tape / (2 * np.pi), s.m.x
-    for T, reel, R, way, c, k in ((s.T1, ivu.REEL1, s.R1, -1, p.c1, p.k1), (s.T2, ivu.REEL2, s.R2, 1, p.c2, p.k2)):
-        stretch = way * p.R_c * x[ivu.CAPSTAN] + ivu.wound(x[reel], p.R1 if way < 0 else p.R2, grow, p.R_min)
-        rate = way * p.R_c * x[ivu.NQ + ivu.CAPSTAN] + R * x[ivu.NQ + reel]
+    for T, at, R, way, c, k in ((T1, ivu.REEL1, R1, -1, p.c1, p.k1), (T2, ivu.REEL2, R2, 1, p.c2, p.k2)):
+        stretch = way * p.R_c * x[ivu.CAPSTAN] + reel.wound(x[at], p.R1 if way < 0 else p.R2, grow, p.R_min)
+        rate = way * p.R_c * x[ivu.NQ + ivu.CAPSTAN] + R * x[ivu.NQ + at]
         assert pytest.approx(c * stretch + k * rate, abs=0.02) == T
 
 

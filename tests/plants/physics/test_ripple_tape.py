@@ -46,14 +46,14 @@ def test_an_oval_capstan_is_off_by_what_the_thesis_says():
 def forces(act, node: int, q: np.ndarray, v: np.ndarray, damped: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Forces on all nodes of the linear springs and the term at middles q, v (5,), and the pulls in both tapes."""
     _, s = stand.plant("ivu", H, d_tape=0.0, **({} if damped else {"k1": 0.0, "k2": 0.0}))
-    s.m.qm[:], s.m.vm[:] = q, v
+    s.m.qm[:5], s.m.vm[:5] = q, v
     linear_part = np.zeros(5)
     for j in (0, 1):
         T = linear.tension(s.m, j)
         linear_part[s.m.link_i[j]] -= s.m.link_a[j] * T
         linear_part[s.m.link_j[j]] -= s.m.link_b[j] * T
     act(s.m, node)
-    return linear_part + s.m.f, np.array([linear.tension(s.m, 0), linear.tension(s.m, 1)])
+    return linear_part + s.m.f[:5], np.array([linear.tension(s.m, 0), linear.tension(s.m, 1)])
 
 
 def together(p: ripple_tape.WheelParams, way, arm):

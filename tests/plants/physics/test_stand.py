@@ -95,7 +95,7 @@ def test_no_run_takes_memory(kind, allocations):
     p, s = stand.plant(kind, 5e-4)
     volts = stand.excitation(kind, 3)
     q, z = np.zeros(1, slot).view(np.recarray), np.zeros(1, memory).view(np.recarray)
-    x, y = np.zeros((3, len(s.m.x))), np.zeros((3, len(s.m.y)))
+    x, y = np.zeros((3, s.m.nx)), np.zeros((3, s.m.ny))
     none = allocations(function, q, z, p, s, volts, 4, x, y)  # of the call itself
     for number in range(1, len(stand.of(kind)) + 1):
         q[0].number = number

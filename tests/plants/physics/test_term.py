@@ -75,7 +75,7 @@ def test_a_passive_term_never_makes_a_machine_faster_than_it_was_pushed(name, ki
         substeps=4 * bench.SUBSTEPS[kind],
         **UNDAMPED[kind],
     )
-    v = np.zeros((1, len(r.s.m.r)))
+    v = np.zeros((1, r.s.m.nq))
     for pushed, speed in speeds[kind].items():
         v[0, bench.place(kind, pushed).node] = speed
     assert bench.kinetic(r.s, r.v).max() < bench.kinetic(r.s, v)[0] * 1.002
