@@ -102,7 +102,9 @@ def checked(data: Any, document: Document) -> Believed:
     if not isinstance(data, dict):
         raise UserError(f"{document.path} holds no keys; a description has bodies, joints, drives and sensors")
     bare = "machine" not in data and any(part in data for part in PARTS)
-    given, at = ({part: data[part] for part in PARTS if part in data}, ()) if bare else (data.get("machine"), ("machine",))
+    given, at = (
+        ({part: data[part] for part in PARTS if part in data}, ()) if bare else (data.get("machine"), ("machine",))
+    )
     if not isinstance(given, dict):
         said = f"machine is {given!r}" if "machine" in data else "machine is missing"
         raise UserError(
@@ -182,7 +184,9 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
     """Comment lines on top of the file."""
     case = record.case
     seconds = len(record.t) * record.dt
-    lines = [f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"]
+    lines = [
+        f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"
+    ]
     lines.append("found are in plant.physics. Changed, nominal -> fitted:")
     for path, value in model.base.items():
         old = case.values.get(path, value)
