@@ -1,0 +1,53 @@
+"""Order of the floors: a package imports only from those below it (docs/architecture.md)."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+FLOORS = (
+    "cli", "scope", "terminal", "foxglove", "machine_report", "reproduce", "identify", "design", "diagnose", "daemon",
+    "trace", "loop", "machines", "own", "laws", "plants", "drivers", "config",
+)  # fmt: skip
+UPWARDS = {  # module -> floor above it that it imports from: none may be added
+    "rtctl/machines/__init__.py": {"loop"},  # settings of safety and faults stand beside the loop that obeys them
+    "rtctl/machines/axis.py": {"loop"},
+    "rtctl/machines/base.py": {"loop"},
+    "rtctl/machines/described.py": {"loop"},
+    "rtctl/machines/described_settings.py": {"loop"},
+    "rtctl/machines/ivu.py": {"loop"},
+    "rtctl/machines/ldu.py": {"loop"},
+    "rtctl/own/check.py": {"loop"},
+    "rtctl/own/machine.py": {"machines"},
+    "rtctl/trace/imports/case.py": {"diagnose"},  # names of the exchange format
+}
+
+
+def imported(tree: ast.AST) -> Iterator[str]:
+    """Modules of this program that a module imports, anywhere in it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def floor_of(parts: tuple[str, ...]) -> str | None:
+    """Package that a path or a dotted name belongs to; None where it is no floor."""
+    name = parts[1] if parts[0] == "rtctl" and len(parts) > 1 else parts[0]
+    return name if name in FLOORS else None
+
+
+def test_imports_point_down():
+    found: dict[str, set[str]] = {}
+    for folder in ("rtctl", "plants", "drivers"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            own = floor_of(path.relative_to(ROOT).parts)
+            if own is None:
+                continue
+            for module in imported(ast.parse(path.read_text("utf-8"))):
+                other = floor_of(tuple(module.split("."))) if module.startswith("rtctl.") else None
+                if other is not None and FLOORS.index(other) < FLOORS.index(own):
+                    found.setdefault(path.relative_to(ROOT).as_posix(), set()).add(other)
+    assert found == UPWARDS
