@@ -41,6 +41,7 @@ class Needs(NamedTuple):
     alone: str = ""  # what a lone sensor shows it by all the same: "slides" its node, "unsigned" the reading
     second: tuple[Stand, ...] = ()  # where a record of one sensor shows nothing of it
     stiffness: bool = False  # a spring at its node
+    dry: bool = False  # dry friction at its node, which it alters
 
 
 NOTHING = Needs()
