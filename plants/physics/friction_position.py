@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Shape, Size, Turn
-from rtctl.plants.physics.story import Draw, Phrase
+from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -74,6 +74,7 @@ POSITION = Term(
     ),
     check="Pull slowly over the whole way with a spring balance; look at the rail and at worn stretches.",
     units={"A": "force", "length": "position", "slope": "stiffness"},
+    needs=Needs(dry=True),
     search=(Turn("A", "phi", "force", 0.2), Shape("length", "span", (0.5, 1.2), 2.0)),
     richer=(Size("slope", "stiff", 0.1, signed=True),),
     static=True,
