@@ -17,6 +17,7 @@ Moreau-Jean time stepping (Acary & Brogliato, Numerical Methods for Nonsmooth Dy
 import numpy as np
 
 from rtctl.idiom import state, tick
+from rtctl.plants.rows import LANES, sum_rows
 
 SWEEPS = 3  # of Gauss-Seidel, warm-started: node couplings within one substep are weak
 TAYLOR = 12  # terms; the argument is scaled below a half, so the remainder is under 1e-13 of it
@@ -29,9 +30,8 @@ MOST_SENSORS = 12
 MOST_LINKS = 16
 MOST_REELS = 4
 DRIVE_STATES = 3
-MOST_STATES = 2 * MOST_BODIES + DRIVE_STATES * MOST_DRIVES  # a multiple of LANES
+MOST_STATES = -(-(2 * MOST_BODIES + DRIVE_STATES * MOST_DRIVES) // LANES) * LANES
 MOST_INPUTS = MOST_DRIVES + MOST_BODIES
-LANES = 4  # states that are advanced side by side
 
 MACHINE = state(  # a machine: its matrices for one substep, its state, and what acts on it
     nq=int,  # positions, which come first in x, then as many speeds, then other states
@@ -55,6 +55,7 @@ MACHINE = state(  # a machine: its matrices for one substep, its state, and what
     vm=(float, MOST_BODIES),
     v_before=(float, MOST_BODIES),
     f=(float, MOST_BODIES),  # smooth force on each coordinate, N or Nm
+    push=(float, MOST_BODIES),  # with the dry friction of the last substep
     dry_base=(float, MOST_BODIES),
     dry=(float, MOST_BODIES),  # limit of the dry friction on each coordinate
     r=(float, MOST_BODIES),  # dry friction in force
@@ -269,46 +270,50 @@ def advance(m):
     """One substep with the inputs `m.u` and the smooth forces `m.f` held; dry friction `m.dry` closes it."""
     nx, nu, nq = m.nx, m.nu, m.nq
     m.t += m.h
-    Phi, Gamma, x, u = m.Phi_T, m.Gamma_T, m.x, m.u
-    for i in range(0, nx, LANES):  # sums side by side, which stay in registers; each adds up in the order of j
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
-        for j in range(nx):
-            a += Phi[j, i] * x[j]
-            b += Phi[j, i + 1] * x[j]
-            c += Phi[j, i + 2] * x[j]
-            d += Phi[j, i + 3] * x[j]
-        for j in range(nu):
-            a += Gamma[j, i] * u[j]
-            b += Gamma[j, i + 1] * u[j]
-            c += Gamma[j, i + 2] * u[j]
-            d += Gamma[j, i + 3] * u[j]
-        m.x_next[i] = a
-        m.x_next[i + 1] = b
-        m.x_next[i + 2] = c
-        m.x_next[i + 3] = d
-    dry_nodes = 0
+    dry_nodes, last = 0, 0
     for j in range(nq):
         if m.dry[j] > 0.0:
             dry_nodes += 1
+            last = j
         else:
             m.r[j] = 0.0
-        force = m.f[j] + m.r[j]  # the last reaction is the warm start
-        if force != 0.0:
-            _add_row(m.x_next, m.Gamma_T, nu + j, force, nx)
-    for _ in range(SWEEPS if dry_nodes > 1 else dry_nodes):  # one alone is exact at once
-        settled = True
-        for j in range(nq):
-            if m.dry[j] > 0.0:
-                gain = m.Gamma_T[nu + j, nq + j]
-                r = dry_friction(m.x[nq + j], m.x_next[nq + j] - gain * m.r[j], gain, m.dry[j])
-                if r != m.r[j]:
-                    _add_row(m.x_next, m.Gamma_T, nu + j, r - m.r[j], nx)
-                    m.r[j] = r
-                    settled = False
-        if settled:  # as it is while they slide
-            break
+        m.push[j] = m.f[j] + m.r[j]  # the last reaction is the warm start
+    sum_rows(m.x_next, nx, m.Phi_T, m.x, nx, m.Gamma_T, m.u, nu, m.push, nq)
+    if dry_nodes == 1:  # exact at once, and written where it goes
+        change = _reaction(m, last)
+        if change != 0.0:
+            for i in range(nx):
+                m.x[i] = m.x_next[i] + m.Gamma_T[nu + last, i] * change
+            return
+    elif dry_nodes > 1:
+        _gauss_seidel(m)
     for i in range(nx):
         m.x[i] = m.x_next[i]
+
+
+@tick
+def _gauss_seidel(m):
+    """Dry friction at several coordinates, into x_next."""
+    for _ in range(SWEEPS):
+        settled = True
+        for j in range(m.nq):
+            if m.dry[j] > 0.0:
+                change = _reaction(m, j)
+                if change != 0.0:
+                    settled = False
+                    for i in range(m.nx):
+                        m.x_next[i] += m.Gamma_T[m.nu + j, i] * change
+        if settled:  # as it is while they slide
+            break
+
+
+@tick
+def _reaction(m, j):
+    """Dry friction at coordinate `j` into r; what it has changed by."""
+    gain, before = m.Gamma_T[m.nu + j, m.nq + j], m.r[j]
+    r = dry_friction(m.x[m.nq + j], m.x_next[m.nq + j] - gain * before, gain, m.dry[j])
+    m.r[j] = r
+    return r - before
 
 
 @tick
@@ -332,9 +337,3 @@ def dry_friction(v, v_free, gain, limit):
         return -v_free / gain
     share = -v / change  # of the substep, before the turn
     return s * limit * (1.0 - 2.0 * share)
-
-
-@tick
-def _add_row(x, T, j, a, n):
-    for i in range(n):
-        x[i] += T[j, i] * a

@@ -70,6 +70,7 @@ class GraphParams(NamedTuple):
     reel_R: np.ndarray  # m, radius at the start
     reel_core: np.ndarray  # m, radius of the empty reel
     reel_grow: np.ndarray  # m/rad, growth of the radius
+    reel_moved: np.ndarray  # 1: a drive or viscous friction acts on it
     reel_paper: np.ndarray  # kg/m^2, inertia for a radius to the fourth power
 
 
@@ -90,7 +91,6 @@ def build(layout: Layout, values: dict[str, float], h: float) -> GraphParams:
         a["link_c"][number] = values[f"joints.{name}.stiffness"]
         a["link_k"][number] = values.get(f"joints.{name}.damping", 0.0)
     weights = _weights(layout, values, a)
-    reels = _reels(layout, values, a)
     nx = 2 * layout.nq
     for name, number in layout.drives.items():
         drive, path = machine.drives[name], f"drives.{name}"
@@ -114,6 +114,7 @@ def build(layout: Layout, values: dict[str, float], h: float) -> GraphParams:
         if sensor.joint is not None:
             a["sensor_of"][number] = layout.links[sensor.joint]
         _put_place(a, "sensor", number, place(layout, sensor, values))
+    reels = _reels(layout, values, a)
     whole = {key: a[key].astype(np.int64) for key in WHOLE}
     return GraphParams(
         h=h, nq=layout.nq, nx=nx, nu=len(layout.drives), ny=len(layout.sensors), nl=len(layout.links),
@@ -183,6 +184,8 @@ def _reels(layout: Layout, values: dict[str, float], a: dict[str, np.ndarray]) -
         a["reel_core"][number] = values[f"{path}.reel.core"]
         a["reel_grow"][number] = values[f"{path}.reel.thickness"] / (2.0 * np.pi)
         a["reel_paper"][number] = 0.5 * np.pi * (values[f"{path}.reel.density"] * values[f"{path}.reel.width"])
+        driven = any(at in (a["drive_i"][d], a["drive_j"][d]) for d in layout.drives.values())
+        a["reel_moved"][number] = driven or a["viscous"][at] != 0.0
         for joint, link in layout.links.items():
             for end in ("i", "j"):
                 if a[f"link_{end}"][link] == at:
@@ -194,7 +197,7 @@ def _reels(layout: Layout, values: dict[str, float], a: dict[str, np.ndarray]) -
 G_N = 9.80665  # m/s^2
 WHOLE = (
     "link_i", "link_j", "link_wound", "link_reel_i", "link_reel_j", "weight_i", "weight_turns", "drive_i", "drive_j",
-    "drive_kind", "drive_at", "sensor_kind", "sensor_i", "sensor_j", "sensor_of", "reel_i",
+    "drive_kind", "drive_at", "sensor_kind", "sensor_i", "sensor_j", "sensor_of", "reel_i", "reel_moved",
 )  # fmt: skip
 SIZES = {
     name: Q if name in ("inertia", "dry", "viscous")

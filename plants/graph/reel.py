@@ -106,7 +106,7 @@ def wind(p, m):
     for k in range(p.reels):
         i = p.reel_i[k]
         ratio = m.inertia[i] / m.reel_J[k]  # whatever turns the reel turns its inertia of now
-        others = others_on(p, m, i)
+        others = others_on(p, m, i) if p.reel_moved[k] != 0 else 0.0
         m.f[i] = m.f[i] * ratio + ((m.reel_pull[k] + others) * ratio - (m.reel_pull_lin[k] + others))
 
 

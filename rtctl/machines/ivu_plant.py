@@ -35,8 +35,9 @@ def plant_diagram(config: IvuConfig, period: float, seed: int) -> PlantDiagram:
     terms = physics_lines(config.plant.physics, "ivu", h)
     follow = ("plant.weigh(p.plant.graph, s.plant.m)",) if config.plant.follow_tape else ()
     ripple = RIPPLE if config.plant.driver.ripple else ()
+    params = plant_ivu.build(config.plant, h, [driver, driver], config.plant.follow_tape)
     blocks = (
-        Block("plant", plant_ivu.build(config.plant, h, [driver, driver], config.plant.follow_tape), plant_ivu.IVU_STATE),
+        Block("plant", params, plant_ivu.IVU_STATE),
         Block("driver", l292.build(config.plant.driver, h), None),
         Block("output1", at_mio_16de.build_output(config.board.output1, h), at_mio_16de.ANALOG_OUTPUT_STATE),
         Block("output2", at_mio_16de.build_output(config.board.output2, h), at_mio_16de.ANALOG_OUTPUT_STATE),
