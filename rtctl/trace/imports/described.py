@@ -22,6 +22,7 @@ from rtctl.trace.part import refuse_taken
 FORMAT = 2
 TOLERANCE = 0.15  # of a description whose file names none
 OFF_COUNT = 0.1  # of a count: how far a number in another unit may be from whole counts
+PREFIXES, OTHERS = ("m", "u", "k"), ("deg", "turn", "rpm")  # of a unit that a column may be in
 BESIDE = {"ref": "", "w": ""}  # columns that a described machine may have beside its own
 NOT_OURS = {"plant": "--plant", "parameters": "--parameter"}
 
@@ -194,7 +195,13 @@ def _shown(want: Wanted | None) -> str:
         return ""
     if want.counts:
         return "counts"
-    return want.unit if want.scale == 1.0 else f"{want.unit}/{want.scale:g}"
+    for unit in (want.unit, *(f"{prefix}{want.unit}" for prefix in PREFIXES), *OTHERS):
+        try:
+            if abs(convert(1.0, want.unit, unit) / want.scale - 1.0) < 1e-6:
+                return unit
+        except ValueError:
+            continue
+    return f"{want.unit}/{want.scale:g}"
 
 
 def _ask_unit(table: Table, column: str, want: Wanted) -> None:

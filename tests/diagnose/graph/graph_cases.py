@@ -1,12 +1,14 @@
 """Recordings of described machines, made in memory by the simulation of the fits."""
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from rtctl.diagnose.graph.answer import diagnose_record
 from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.model import nominal, settings_of
 from rtctl.diagnose.graph.record import GraphRecord, record_of
@@ -28,6 +30,8 @@ BELT = {
         "scale": {"body": "carriage", "measures": "position", "column": "scale_counts", "counts_per_unit": 2e5},
     },
 }  # fmt: skip
+
+RUB = {"term": "friction.coulomb", "node": "carriage", "F_C": 2.0}
 
 
 def case_of(machine, **more):
@@ -80,3 +84,23 @@ def write_bundle(folder, case, columns):
     pq.write_table(pa.table(columns), folder / "recording.parquet")
     (folder / "case.json").write_text(json.dumps(case))
     return folder
+
+
+@cache
+def nothing():
+    """Diagnosis of a pendulum that is as described."""
+    return diagnose_record(record(case_of(PENDULUM), command(4.0)))
+
+
+@cache
+def named():
+    """Diagnosis of a belt axis whose carriage rubs."""
+    return diagnose_record(record(case_of(BELT), command(0.6), [RUB]))
+
+
+@cache
+def unnamed():
+    """Diagnosis of a pendulum that something pushes now and then."""
+    u = command(4.0)
+    now_and_then = np.sin(2 * np.pi * 1.1 * np.arange(len(u)) / RATE) > 0.8
+    return diagnose_record(record(case_of(PENDULUM), u, push=0.2 * now_and_then))
