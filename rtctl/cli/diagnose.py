@@ -190,6 +190,8 @@ def _machine(
 
     config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)
     files.refuse_plant(config, f"{what}: ")
+    if not isinstance(config.machine, str):
+        _refuse("--closed-loop", f"takes ivu, ldu and axis; of a described machine: rtctl run {what}, then diagnose")
     config = repair.ready(config, mode)
     folder = out if out is not None else common.default_folder(config.name)
     with console.stages() as stage:

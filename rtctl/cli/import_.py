@@ -30,6 +30,10 @@ def import_(
     rate: Annotated[
         str | None, typer.Option("--rate", metavar="HZ", help="Rows a second, where no column is the time.")
     ] = None,
+    machine: Annotated[
+        Path | None,
+        typer.Option("--machine", metavar="YAML", help="Description of the machine: bodies, joints, drives, sensors."),
+    ] = None,
     plant: Annotated[str | None, typer.Option("--plant", metavar="KIND", help="axis, ivu or ldu.")] = None,
     parameter: Annotated[
         list[str] | None,
@@ -61,7 +65,8 @@ def import_(
     """Make a bundle of a recording from elsewhere, in SI units, so that plot, compare and diagnose work on it.
 
     Units are those of --unit, else those that the file names, else SI. Without --map, columns that have our names
-    already are taken. Of a file of text the names, units, separator and decimal sign are seen from the file.
+    already are taken. With --machine, OURS are the columns of the description's drives and sensors, or their names, and
+    the description, its tolerance and known physics go into the bundle. Of a file of text the names, units, separator and decimal sign are seen from the file.
 
     Examples:
 
@@ -70,6 +75,8 @@ def import_(
       rtctl import log.csv --out bench --plant axis --map u=volts --unit x=mm --rate 1kHz
 
       rtctl import log.parquet --out bench --map-file log.yaml
+
+      rtctl import log.csv --machine belt.yaml --map u=volts,encoder_counts=pos --out bench
     """
     from rtctl.trace.imports import read
     from rtctl.trace.imports.make import make_bundle
@@ -81,7 +88,14 @@ def import_(
         "encoding": encoding,
     }  # fmt: skip
     plan = with_options(plan, plant, map_ or [], unit or [], rate, parameter or [], case or [], uneven, text)
-    made = make_bundle(read(file, plan.text), plan, out)
+    if machine is not None:
+        from rtctl.plants.graph.file import read_machine
+        from rtctl.trace.imports.described import make_described
+
+        believed = read_machine(machine)
+        made = make_described(read(file, plan.text), plan, believed, out)
+    else:
+        made = make_bundle(read(file, plan.text), plan, out)
     lacks = _diagnosable(out)
     if json:
         common.print_json({**made._asdict(), "folder": str(made.folder), "notes": list(made.notes), "lacks": lacks})
@@ -98,10 +112,10 @@ def import_(
 def _diagnosable(folder: Path) -> Any:
     """What `rtctl diagnose` would refuse it for; None where it would not."""
     from rtctl.config.errors import NoAnswer, UserError
-    from rtctl.diagnose.record import load_record
+    from rtctl.diagnose.engines import load
 
     try:
-        load_record(folder)
+        load(folder)
     except (UserError, NoAnswer) as error:
         return str(error)
     return None

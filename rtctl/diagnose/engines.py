@@ -23,6 +23,17 @@ def is_described(case: dict[str, Any]) -> bool:
     return case.get("format") == DESCRIBED_FORMAT or isinstance(case.get("machine"), dict)
 
 
+def load(bundle: Path) -> Any:
+    """The record of a bundle, checked. Raises UserError and NoAnswer as `diagnose_into`."""
+    if is_described(load_case(bundle)):
+        from rtctl.diagnose.graph.record import load_record as load_graph
+
+        return load_graph(bundle)
+    from rtctl.diagnose.record import load_record
+
+    return load_record(bundle)
+
+
 def diagnose_into(
     bundle: Path,
     other: Path | None,

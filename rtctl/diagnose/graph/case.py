@@ -9,7 +9,9 @@ from pydantic import ValidationError
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
 from rtctl.plants.graph.description import Description, Input
+from rtctl.plants.graph.elements import elements
 from rtctl.plants.graph.layout import Layout, layout
+from rtctl.plants.physics import TERMS, nodes, standing
 
 FORMAT = 2
 KEYS = (
@@ -113,7 +115,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         values=values,
         tolerances=tolerances,
         default_tolerance=default,
-        physics=_physics(where, case.get("physics")),
+        physics=_physics(where, placed, case.get("physics")),
         inputs=_inputs(where, machine, case.get("inputs")),
         problem=problem,
         delay_samples=delay,
@@ -154,11 +156,26 @@ def _tolerances(
     return out, out.pop("default", DEFAULT_TOLERANCE)
 
 
-def _physics(where: Path, given: Any) -> tuple[dict[str, Any], ...]:
+def _physics(where: Path, placed: Layout, given: Any) -> tuple[dict[str, Any], ...]:
     if given is None:
         return ()
     if not isinstance(given, list) or not all(isinstance(entry, dict) and "term" in entry for entry in given):
         raise UserError(f"{where}: physics should be a list of objects with 'term', 'node' and the term's parameters")
+    there = elements(placed)
+    for i, entry in enumerate(given):
+        at, name = f"{where}: physics.{i}", str(entry["term"])
+        if name not in TERMS:
+            hint = nearest(name, TERMS)
+            near = f"did you mean '{hint}'?" if hint else "`rtctl physics` lists them"
+            raise UserError(f"{at}.term: there is no term '{name}'; {near}")
+        settings = TERMS[name].settings
+        try:
+            settings.model_validate(entry)
+        except ValidationError as error:
+            raise UserError(sentences(error, settings, entry, lambda _, at=at: at).splitlines()[0]) from None
+        if standing(TERMS[name], there, str(entry.get("node"))) is None:
+            where_it_can = ", ".join(nodes(TERMS[name], there)) or "nowhere in this machine"
+            raise UserError(f"{at}.node: {name} cannot stand at '{entry.get('node')}'; it can at {where_it_can}")
     return tuple(given)
 
 

@@ -7,40 +7,22 @@ diagnosis found is what the next one believes (`rtctl import --machine model.yam
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import yaml
-from pydantic import ValidationError
 
-from rtctl.config.complaints import sentences
-from rtctl.config.errors import UserError, nearest
+from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
 from rtctl.config.load import Dumper
 from rtctl.config.units import to_si
-from rtctl.config.yaml_file import Document, find, load_yaml
+from rtctl.config.yaml_file import Document
 from rtctl.diagnose.export import entry_of
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.words import value_unit
-from rtctl.idiom import Settings
-from rtctl.plants.graph.description import Description
-from rtctl.plants.graph.layout import layout
-from rtctl.plants.physics import TERMS
+from rtctl.plants.graph.file import checked
 
-PARTS = ("bodies", "joints", "drives", "sensors")
 NO_NAME = "machine"
-
-
-class Believed(NamedTuple):
-    """What a YAML file believes of a machine."""
-
-    machine: Description
-    physics: tuple[dict[str, Any], ...]  # entries of a `physics:` list, SI
-    tolerance: dict[str, Any]  # by dotted path; empty where the file has none
-    case: dict[str, Any]  # further keys that a case.json has too
-
-
-CARRIED = ("delay_samples", "inputs", "problem", "group", "per_recording", "notes")
 
 
 def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -87,78 +69,6 @@ def write_model(
     return Path(path)
 
 
-def read_machine(path: Path | str) -> Believed:
-    """Machine, known physics and tolerance of a YAML file: a config with `machine:`, or a bare description.
-
-    Raises UserError with file, line and what would be right.
-    """
-    file = find(path)
-    document = load_yaml(file)
-    return checked(document.data, document)
-
-
-def checked(data: Any, document: Document) -> Believed:
-    """What plain data believe of a machine. Raises UserError as `read_machine`."""
-    if not isinstance(data, dict):
-        raise UserError(f"{document.path} holds no keys; a description has bodies, joints, drives and sensors")
-    bare = "machine" not in data and any(part in data for part in PARTS)
-    given, at = (
-        ({part: data[part] for part in PARTS if part in data}, ()) if bare else (data.get("machine"), ("machine",))
-    )
-    if not isinstance(given, dict):
-        said = f"machine is {given!r}" if "machine" in data else "machine is missing"
-        raise UserError(
-            f"{_where(document, at)}: {said}; a description has bodies, joints, drives and sensors below machine"
-        )
-    try:
-        machine = Description.model_validate(given)
-        layout(machine)
-    except ValidationError as error:
-        where = lambda path: f"{_where(document, (*at, *path))}: {'.'.join(at)}".removesuffix(": ")  # noqa: E731
-        raise UserError(sentences(error, Description, given, where, document.texts)) from None
-    except ValueError as error:
-        raise UserError(f"{_where(document, at)}: {error}") from None
-    plant = data.get("plant")
-    physics = data.get("physics", plant.get("physics") if isinstance(plant, dict) else None)
-    tolerance = data.get("tolerance")
-    if tolerance is not None and not isinstance(tolerance, dict):
-        tolerance = {"default": tolerance}
-    return Believed(
-        machine,
-        _physics(physics, document),
-        dict(tolerance or {}),
-        {key: data[key] for key in CARRIED if key in data},
-    )
-
-
-def _physics(given: Any, document: Document) -> tuple[dict[str, Any], ...]:
-    if given is None:
-        return ()
-    at = ("physics",) if ("physics",) in document.lines else ("plant", "physics")
-    if not isinstance(given, list):
-        raise UserError(f"{_where(document, at)}: physics is a list of terms, each with term, node and its numbers")
-    out = []
-    for i, entry in enumerate(given):
-        here = (*at, i)
-        name = entry.get("term") if isinstance(entry, dict) else None
-        if name not in TERMS:
-            near = nearest(str(name), TERMS)
-            hint = f"; did you mean '{near}'?" if near else "; `rtctl physics` lists them"
-            raise UserError(f"{_where(document, here)}: physics.{i}.term: there is no term {name!r}{hint}")
-        settings = TERMS[name].settings
-        try:
-            out.append(entry_of(settings.model_validate(entry)))
-        except ValidationError as error:
-            where = lambda path, here=here: f"{_where(document, (*here, *path))}: {'.'.join(map(str, here))}"  # noqa: E731
-            raise UserError(sentences(error, settings, entry, where, document.texts)) from None
-    return tuple(out)
-
-
-def _where(document: Document, at: tuple) -> str:
-    line = document.line(at)
-    return f"{document.path}:{line}" if line else document.path
-
-
 def _put(data: Any, path: list[str], value: Any) -> None:
     *outer, last = path
     for key in outer:
@@ -184,9 +94,7 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
     """Comment lines on top of the file."""
     case = record.case
     seconds = len(record.t) * record.dt
-    lines = [
-        f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"
-    ]
+    lines = [f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"]
     lines.append("found are in plant.physics. Changed, nominal -> fitted:")
     for path, value in model.base.items():
         old = case.values.get(path, value)
@@ -194,8 +102,3 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
             unit = value_unit(case.machine, path)
             lines.append(f"  {path}: {old:.4g} -> {value:.4g} {unit}".rstrip())
     return "".join(f"# {line}\n" for line in lines)
-
-
-def settings(entries: tuple[dict[str, Any], ...]) -> tuple[Settings, ...]:
-    """Settings of the entries of a `physics:` list."""
-    return tuple(TERMS[str(e["term"])].settings.model_validate(e) for e in entries)

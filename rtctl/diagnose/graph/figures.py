@@ -37,7 +37,7 @@ def missing_force(d: GraphDiagnosis) -> Figure:
         at = here(runs.machine, node)
         title = f"{noun(term)} at {at}" if term else f"what is left at {at}"
         ax.set_title(title, color=INK, fontsize=10, loc="left", pad=22)
-        legend(ax, ncols=4, loc="lower left", bbox_to_anchor=(-0.01, 0.98))
+        legend(ax, ncols=4, loc="lower left", bbox_to_anchor=(-0.01, 0.98), columnspacing=1.2, handlelength=1.6)
     return figure
 
 
@@ -64,7 +64,7 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
         ax.fill_between(across * middle, scale * (m - band), scale * (m + band), color=BEFORE, alpha=0.3, lw=0)
         ax.plot(across * middle, scale * m, marker, ms=3.5, color=BEFORE, label=f"missing{way}")
         if term:
-            ax.plot(across * middle, scale * known, line, color=AFTER, lw=1.8, label=f"law that was found{way}")
+            ax.plot(across * middle, scale * known, line, color=AFTER, lw=1.8, label=f"law{way}" if way else "law that was found")
         half = max(half, _middle(band))
     free = d.decided.unlisted
     if not term and d.located is not None and free is not None and axis == free.axis:
@@ -102,7 +102,8 @@ def _spectrum(ax, runs: Missing, term: str, node: str) -> None:
     for values, color, text in ((y, BEFORE, "missing without it"), (rest, AFTER, "left with it")):
         f, p = welch(values, rate, nperseg=size)
         ax.loglog(f[1:], scale * np.sqrt(p[1:]), color=color, lw=1.0, label=text)
-    ax.set_xlim(None, min(rate / 2, 4 * runs.fast.follow))
+    ax.tick_params(which="both", colors=INK, labelsize=8.5)
+    ax.set_xlim(2.0 * rate / size, min(rate / 2, 4 * runs.fast.follow))
     ax.set_xlabel("frequency, Hz")
     ax.set_ylabel(f"{c.y_words}, {shown}/rtHz")
 

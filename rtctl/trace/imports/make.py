@@ -54,7 +54,7 @@ def make_bundle(table: Table, plan: Plan, folder: Path | str) -> Imported:
         raise UserError("--plant: say what kind of machine it is: axis, ivu or ldu")
     known = known_columns(plan.plant)
     columns, units, notes = _signals(table, _wanted(table, plan, known), plan, known)
-    t, rate, more = _clock(table, plan, columns)
+    t, rate, more = clock_of(table, plan, columns)
     notes += more
     columns = {"t": t, **{name: values for name, values in columns.items() if name != "t"}}
     units = {"t": "s", **units}
@@ -119,19 +119,19 @@ def _signals(
         if name == "t":
             if theirs is None and not is_date(table.has(given.column, "t")):
                 assumed.append("t in s")
-            columns[name], units[name] = _times(table, given.column, theirs), "s"
+            columns[name], units[name] = times_of(table, given.column, theirs), "s"
             continue
         values = table.numbers(given.column, name)
         ours = known[name].unit if name in known else theirs or ""
         choices = OTHER_UNITS.get(ours, (ours,)) if plan.plant == "axis" else (ours,)
         if theirs is None:
-            _ask_suffix(table, name, given.column, ours, choices)
+            ask_suffix(table, name, given.column, ours, choices)
             assumed += [f"{name} in {ours}"] if ours not in ("", "counts", "ticks") else []
         elif name in known:
-            factor, ours = _factor(table, name, given.column, theirs, choices)
+            factor, ours = unit_factor(table, name, given.column, theirs, choices)
             values = values if factor == 1.0 else values * factor
         if name.endswith(COUNTS):
-            _whole(table, given.column, values)
+            whole(table, given.column, values)
             values, wrapped = unwrapped(name, values, per_turn(plan.case))
             notes += [wrapped] if wrapped else []
         columns[name], units[name] = values, ours
@@ -150,13 +150,13 @@ def _signals(
     return columns, units, notes
 
 
-def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
+def times_of(table: Table, column: str, theirs: str | None) -> np.ndarray:
     """Times (n,) in s."""
     if is_date(table.has(column, "t")):
         return table.times(column, 1.0)
     if theirs is not None:
-        return table.times(column, _factor(table, "t", column, theirs, ("s",))[0])
-    _ask_suffix(table, "t", column, "s", ("s",))
+        return table.times(column, unit_factor(table, "t", column, theirs, ("s",))[0])
+    ask_suffix(table, "t", column, "s", ("s",))
     t = table.times(column, 1.0)
     step = float(np.median(np.abs(np.diff(t)))) if len(t) > 1 else 0.0
     begin = abs(float(table.columns[column][0])) if len(t) else 0.0  # of integers, which are counted from the first
@@ -169,7 +169,7 @@ def _times(table: Table, column: str, theirs: str | None) -> np.ndarray:
     return t
 
 
-def _ask_suffix(table: Table, name: str, column: str, ours: str, choices: Sequence[str]) -> None:
+def ask_suffix(table: Table, name: str, column: str, ours: str, choices: Sequence[str]) -> None:
     """Refuse a name such as `pos_mm` that ends in another unit of one of the dimensions that it may be in, where no
     unit is given."""
     base, mark, unit = column.rpartition("_")
@@ -187,7 +187,7 @@ def _ask_suffix(table: Table, name: str, column: str, ours: str, choices: Sequen
         )
 
 
-def _factor(table: Table, name: str, column: str, theirs: str, choices: Sequence[str]) -> tuple[float, str]:
+def unit_factor(table: Table, name: str, column: str, theirs: str, choices: Sequence[str]) -> tuple[float, str]:
     """What turns the file's unit into ours, and ours: the first of `choices` that fits."""
     first: ValueError | None = None
     if theirs in choices:
@@ -204,7 +204,7 @@ def _factor(table: Table, name: str, column: str, theirs: str, choices: Sequence
     ) from first
 
 
-def _whole(table: Table, column: str, values: np.ndarray) -> None:
+def whole(table: Table, column: str, values: np.ndarray) -> None:
     off = np.flatnonzero(values != np.round(values))
     if len(off):
         raise UserError(
@@ -213,7 +213,7 @@ def _whole(table: Table, column: str, values: np.ndarray) -> None:
         )
 
 
-def _clock(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None, list[str]]:
+def clock_of(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[np.ndarray, float | None, list[str]]:
     """Times (n,) s, the rate (None where they are uneven and may be), and notes."""
     n = len(next(iter(columns.values())))
     if "t" not in columns:

@@ -1,0 +1,106 @@
+"""Recordings of described machines, made in memory by the simulation of the fits."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from rtctl.diagnose.graph.answer import diagnose_record
+from rtctl.diagnose.graph.case import read_case
+from rtctl.diagnose.graph.model import nominal, settings_of
+from rtctl.diagnose.graph.record import GraphRecord, record_of
+from rtctl.diagnose.graph.simulate import OPEN, Simulator
+
+RATE, SECONDS = 500.0, 4.0
+PENDULUM = {
+    "bodies": {"rod": {"inertia": 9.8e-3, "dry": 5e-3, "viscous": 2e-3,
+                       "gravity": {"mass": 0.28, "arm": 0.17, "angle": 0.0}}},
+    "drives": {"motor": {"body": "rod", "column": "u", "kind": "force", "gain": 0.1}},
+    "sensors": {"encoder": {"body": "rod", "measures": "position", "column": "rod_counts", "counts_per_unit": 5000.0}},
+}  # fmt: skip
+BELT = {
+    "bodies": {"motor": {"inertia": 4e-5, "dry": 4e-3, "viscous": 2e-5}, "carriage": {"mass": 1.5, "dry": 2.0}},
+    "joints": {"belt": {"from": "motor", "to": "carriage", "ratio": 0.0127, "stiffness": 4e4, "damping": 25.0}},
+    "drives": {"amplifier": {"body": "motor", "column": "u", "kind": "force", "gain": 0.25}},
+    "sensors": {
+        "encoder": {"body": "motor", "measures": "position", "column": "encoder_counts", "counts_per_unit": 1300.0},
+        "scale": {"body": "carriage", "measures": "position", "column": "scale_counts", "counts_per_unit": 2e5},
+    },
+}  # fmt: skip
+
+RUB = {"term": "friction.coulomb", "node": "carriage", "F_C": 2.0}
+
+
+def case_of(machine, **more):
+    """A case.json of a machine."""
+    return {"format": 2, "sample_rate": RATE, "machine": machine, "delay_samples": 1.0, "tolerance": {"default": 0.1},
+            "controller": {"kind": "unknown"}, **more}  # fmt: skip
+
+
+def command(amplitude, seconds=SECONDS, seed=1):
+    """A command (n,) of several tones and random levels, which starts at zero."""
+    t = np.arange(round(seconds * RATE)) / RATE
+    rng = np.random.default_rng(seed)
+    tones = sum(np.sin(2 * np.pi * f * t + rng.uniform(0, 6)) for f in (0.7, 1.3, 2.9))
+    levels = np.repeat(rng.uniform(-1, 1, len(t) // 100 + 1), 100)[: len(t)]
+    return amplitude * (0.4 * tones + 0.6 * levels) * np.minimum(t / 0.2, 1.0)
+
+
+def blank(case, u):
+    """A record of a case with a command (n,) and sensors that show nothing yet."""
+    n = len(u)
+    read = read_case(case, "bundle")
+    sensors = read.machine.sensors
+    y = {name: np.zeros(n) for name in sensors}
+    grain = {name: abs(s.grain / s.scale) for name, s in sensors.items()}
+    return GraphRecord(read, np.arange(n) / RATE, 1.0 / RATE, np.full(n, np.nan), np.zeros(n), u[:, None], y, grain, None)
+
+
+def columns_of(case, u, terms=(), push=None):
+    """Columns of a recording: the machine with `terms` beyond its description, and a force push (n,) on coordinate 0."""
+    record = blank(case, u)
+    sim = Simulator(record)
+    if push is not None:
+        forces = np.zeros((len(u), sim.layout.nq))
+        forces[:, 0] = push
+        sim = sim.pushed(forces)
+    out = sim.run(nominal(record.case).add(*map(settings_of, terms)), mode=OPEN)
+    assert np.isfinite(out).all()
+    shown = {s.column: np.floor(out[:, k] * s.scale) for k, s in enumerate(record.case.machine.sensors.values())}
+    return {"t": record.t, "u": u, **shown}
+
+
+def record(case, u, terms=(), push=None):
+    """The record of `columns_of`."""
+    return record_of(columns_of(case, u, terms, push), read_case(case, "bundle"), Path("bundle/recording.parquet"))
+
+
+def write_bundle(folder, case, columns):
+    """A bundle on disk."""
+    folder.mkdir(parents=True)
+    pq.write_table(pa.table(columns), folder / "recording.parquet")
+    (folder / "case.json").write_text(json.dumps(case))
+    return folder
+
+
+@cache
+def nothing():
+    """Diagnosis of a pendulum that is as described."""
+    return diagnose_record(record(case_of(PENDULUM), command(4.0)))
+
+
+@cache
+def named():
+    """Diagnosis of a belt axis whose carriage rubs."""
+    return diagnose_record(record(case_of(BELT), command(0.6), [RUB]))
+
+
+@cache
+def unnamed():
+    """Diagnosis of a pendulum that something pushes now and then."""
+    u = command(4.0)
+    now_and_then = np.sin(2 * np.pi * 1.1 * np.arange(len(u)) / RATE) > 0.8
+    return diagnose_record(record(case_of(PENDULUM), u, push=0.2 * now_and_then))

@@ -1,0 +1,41 @@
+import pytest
+from graph_cases import named, nothing, unnamed
+
+from rtctl.diagnose.diagnosis import NAMED, NOTHING, UNNAMED
+
+def test_nothing():
+    d = nothing()
+    assert d.verdict == NOTHING
+    assert not d.effects
+    assert d.located is None
+    assert d.headline.startswith("Nothing is missing")
+    assert d.heldout.before < 2 * d.heldout.floor
+    for path, v in d.parameters.items():
+        assert v.low <= d.record.case.values[path] <= v.high, path
+
+
+def test_dry_friction_of_the_carriage():
+    d = named()
+    assert d.verdict == NAMED
+    assert [(e.name, e.node) for e in d.effects] == [("friction.coulomb", "carriage")]
+    force = d.effects[0].parameters["F_C"]
+    assert force.low <= 2.0 <= force.high
+    assert force.unit == "N"
+    assert "The carriage rubs" in d.headline
+    assert d.heldout.after < 0.2 * d.heldout.before
+
+
+def test_a_force_without_a_name():
+    d = unnamed()
+    assert d.verdict == UNNAMED
+    assert not d.effects
+    assert d.located.node == "rod"
+    assert d.decided.why
+
+
+@pytest.mark.parametrize("d", [nothing, named, unnamed])
+def test_json_has_the_keys_of_the_exchange_format(d):
+    data = d().as_json()
+    assert {"verdict", "effects", "located", "parameters", "fit", "cannot_test", "separating_experiment", "seconds"} <= set(data)
+    assert set(data["fit"]) == {"heldout_nrmse_before", "heldout_nrmse_after", "noise_floor"}
+    assert all(len(p["ci90"]) == 2 for p in data["parameters"].values())

@@ -1,0 +1,61 @@
+from functools import cache
+
+import numpy as np
+import pytest
+from graph_cases import BELT, case_of, command, record
+
+from rtctl.diagnose.graph.likelihood import QUANTISED, RATE, Likelihood
+from rtctl.diagnose.graph.model import nominal, settings_of
+from rtctl.diagnose.graph.simulate import Simulator
+
+RUB = {"term": "friction.coulomb", "node": "carriage", "F_C": 2.0}
+
+
+@cache
+def like():
+    return Likelihood(Simulator(record(case_of(BELT), command(0.6), [RUB])))
+
+
+def model(force):
+    return nominal(like().sim.case).add(settings_of({**RUB, "F_C": force}))
+
+
+def test_residuals_of_the_true_model_are_those_of_counting():
+    e = like().raw(model(2.0))
+    np.testing.assert_allclose(e.std(axis=0), QUANTISED / np.array([1300.0, 2e5]), rtol=0.6)
+    assert like().mean == round(like().sim.record.dt**-1 / RATE)
+
+
+def test_loss_is_least_at_the_truth():
+    losses = {force: like().loss(like().raw(model(force))) for force in (1.0, 1.8, 2.0, 2.2, 3.0)}
+    assert min(losses, key=losses.get) == 2.0
+    assert losses[3.0] > losses[2.2] > losses[2.0]
+
+
+def test_innovations_under_their_own_noise():
+    e = like().raw(model(0.0))
+    own = like().told(e)
+    white = own.white(e)
+    assert len(white) == own.size
+    np.testing.assert_allclose(np.mean(white**2), 1.0, rtol=0.3)
+    np.testing.assert_allclose(own.filtered(e[:, :, None])[:, 0], white)
+
+
+def test_rows_of_a_part():
+    part = like().during(1000, 1500)
+    assert part.rows == (1000, 1500)
+    np.testing.assert_allclose(part.raw(model(2.0))[:, 0], like().raw(model(2.0))[1000 - like().rows[0] :][:500, 0])
+
+
+def test_start_of_a_second_counter_says_nothing():
+    out = like().sim.run(model(2.0))
+    moved = out + np.array([0.0, 0.01])
+    np.testing.assert_allclose(like().of_readings(moved), like().of_readings(out), atol=1e-12)
+    forced = out + np.array([0.01, 0.0])
+    assert np.abs(like().of_readings(forced)[:, 0]).mean() == pytest.approx(0.01, rel=0.05)
+
+
+def test_a_model_that_ran_away_is_no_likely_one():
+    out = like().sim.run(model(2.0)).copy()
+    out[1200:] = np.nan
+    assert like().loss(like().of_readings(out)) > like().loss(like().raw(model(0.0)))
