@@ -64,7 +64,14 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
         ax.fill_between(across * middle, scale * (m - band), scale * (m + band), color=BEFORE, alpha=0.3, lw=0)
         ax.plot(across * middle, scale * m, marker, ms=3.5, color=BEFORE, label=f"missing{way}")
         if term:
-            ax.plot(across * middle, scale * known, line, color=AFTER, lw=1.8, label=f"law{way}" if way else "law that was found")
+            ax.plot(
+                across * middle,
+                scale * known,
+                line,
+                color=AFTER,
+                lw=1.8,
+                label=f"law{way}" if way else "law that was found",
+            )
         half = max(half, _middle(band))
     free = d.decided.unlisted
     if not term and d.located is not None and free is not None and axis == free.axis:
