@@ -44,7 +44,9 @@ def checked(data: Any, document: Document) -> Believed:
     if not isinstance(data, dict):
         raise UserError(f"{document.path} holds no keys; a description has bodies, joints, drives and sensors")
     bare = "machine" not in data and any(part in data for part in PARTS)
-    given, at = ({part: data[part] for part in PARTS if part in data}, ()) if bare else (data.get("machine"), ("machine",))
+    given, at = (
+        ({part: data[part] for part in PARTS if part in data}, ()) if bare else (data.get("machine"), ("machine",))
+    )
     if not isinstance(given, dict):
         said = f"machine is {given!r}" if "machine" in data else "machine is missing"
         raise UserError(

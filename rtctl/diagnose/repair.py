@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path, to_yaml
 from rtctl.diagnose.diagnosis import AMBIGUOUS, Diagnosis
-from rtctl.diagnose.results import EXPERIMENT
 from rtctl.diagnose.numbers import span
 from rtctl.diagnose.ordinary import USE
+from rtctl.diagnose.results import EXPERIMENT
 
 LENGTH = {"ivu": 25.0, "ldu": 10.0, "axis": 25.0}  # s, of a recording
 RECORDING, SECOND = "recording", "experiment"  # bundles in the folder of a repair

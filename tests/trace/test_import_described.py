@@ -24,11 +24,15 @@ sensors:
   encoder: {body: motor, measures: position, column: encoder_counts, counts_per_unit: 8000 counts/turn}
   scale: {body: carriage, measures: position, column: scale_mm, per_unit: 1000, resolution: 0.005}
 """
-CONFIG = "machine:\n" + "".join(f"  {line}\n" for line in BELT.splitlines()) + """\
+CONFIG = (
+    "machine:\n"
+    + "".join(f"  {line}\n" for line in BELT.splitlines())
+    + """\
 tolerance: {default: 0.1, joints.belt.ratio: 0}
 physics:
   - {term: friction.viscous, node: carriage, B: 3}
 """
+)
 T = np.arange(100) / 500.0
 TURN = 2 * np.pi * np.sin(T)
 
@@ -90,7 +94,12 @@ def test_units_of_the_log_become_those_of_the_description(bench):
 @pytest.mark.parametrize(
     ("log", "maps", "units", "sentence"),
     [
-        ({}, ["t=time,encoder_counts=pos"], [], "no column is 'u' of drive amplifier; --map u=NAME says which, of volts"),
+        (
+            {},
+            ["t=time,encoder_counts=pos"],
+            [],
+            "no column is 'u' of drive amplifier; --map u=NAME says which, of volts",
+        ),
         ({}, ["t=time,u=volts"], [], "no column is 'encoder_counts' of sensor encoder; --map encoder_counts=NAME"),
         ({}, ["t=time,u=volts,encodr_counts=pos"], [], "no column 'encodr_counts'; did you mean 'encoder_counts'?"),
         ({}, ["t=time,u=volt,encoder_counts=pos"], [], "has no column 'volt'"),
@@ -116,7 +125,10 @@ def test_a_plant_is_no_description(bench):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (BELT.replace("body: motor, column", "body: moter, column"), "belt.yaml:7: drives.amplifier.body: there is no body 'moter'; did you mean 'motor'?"),
+        (
+            BELT.replace("body: motor, column", "body: moter, column"),
+            "belt.yaml:7: drives.amplifier.body: there is no body 'moter'; did you mean 'motor'?",
+        ),
         (BELT.replace("40 N/mm", "40 N"), "belt.yaml"),
         ("name: belt\n", "machine is missing; a description has bodies, joints, drives and sensors"),
         ("machine: ivu\n", "belt.yaml:1: machine is 'ivu'; a description has bodies"),

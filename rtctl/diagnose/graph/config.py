@@ -94,7 +94,9 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
     """Comment lines on top of the file."""
     case = record.case
     seconds = len(record.t) * record.dt
-    lines = [f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"]
+    lines = [
+        f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"
+    ]
     lines.append("found are in plant.physics. Changed, nominal -> fitted:")
     for path, value in model.base.items():
         old = case.values.get(path, value)

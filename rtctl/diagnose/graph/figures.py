@@ -41,7 +41,7 @@ def missing_force(d: GraphDiagnosis) -> Figure:
     return figure
 
 
-def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: str) -> None:  # noqa: ANN001
+def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: str) -> None:
     c, rows = runs.of(term, node, axis), runs.rows
     block = max(4, round(ALIKE / runs.fast.follow / d.record.dt))
     parts = {"": np.ones(len(c.x[rows]), bool)}
@@ -50,7 +50,9 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
         bins = FINER
         forward = runs.speed(node)[rows] > 0.0
         parts |= {", forwards": forward, ", backwards": ~forward}
-    found = {way: binned(*(v[rows][keep] for v in (c.x, c.y, c.law)), bins, block, np.mean) for way, keep in parts.items()}
+    found = {
+        way: binned(*(v[rows][keep] for v in (c.x, c.y, c.law)), bins, block, np.mean) for way, keep in parts.items()
+    }
     both = [k for k in found if k] if _differ(found, 3 if term else 1) else [""]
     size = max(float(np.nanmax(np.abs(found[k][1]), initial=0.0)) for k in both)
     law = max(float(np.nanmax(np.abs(found[k][3]), initial=0.0)) for k in both) if term else 0.0
@@ -62,7 +64,14 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
         ax.fill_between(across * middle, scale * (m - band), scale * (m + band), color=BEFORE, alpha=0.3, lw=0)
         ax.plot(across * middle, scale * m, marker, ms=3.5, color=BEFORE, label=f"missing{way}")
         if term:
-            ax.plot(across * middle, scale * known, line, color=AFTER, lw=1.8, label=f"law{way}" if way else "law that was found")
+            ax.plot(
+                across * middle,
+                scale * known,
+                line,
+                color=AFTER,
+                lw=1.8,
+                label=f"law{way}" if way else "law that was found",
+            )
         half = max(half, _middle(band))
     free = d.decided.unlisted
     if not term and d.located is not None and free is not None and axis == free.axis:
@@ -90,7 +99,7 @@ def _middle(half: np.ndarray) -> float:
     return float(np.median(good)) if len(good) else 0.0
 
 
-def _spectrum(ax, runs: Missing, term: str, node: str) -> None:  # noqa: ANN001
+def _spectrum(ax, runs: Missing, term: str, node: str) -> None:
     """Missing force by frequency, without the effect and with it."""
     c = runs.of(term, node, "time")
     rate = 1.0 / runs.d.record.dt
@@ -170,7 +179,7 @@ def _folded(text: str, most: int = 44) -> str:
         return text
     gaps = [i for i, sign in enumerate(text) if sign == " "]
     middle = min(gaps, key=lambda i: abs(i - len(text) // 2))
-    return f"{text[:middle]}\n{text[middle + 1:]}"
+    return f"{text[:middle]}\n{text[middle + 1 :]}"
 
 
 def parameters(d: GraphDiagnosis) -> Figure | None:

@@ -46,7 +46,6 @@ class Measures:
         self.effort = self._effort()
         self.term = ""
 
-
     def _effort(self) -> float:
         """Rms of what all drives make at the main body, N or Nm."""
         total = np.zeros(len(self.way))

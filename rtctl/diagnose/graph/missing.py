@@ -108,7 +108,11 @@ class Missing:
         if axis == "command" and record.u.shape[1]:
             number = self.sim.layout.drives.get(node, 0)
             drive = list(self.machine.drives.values())[number]
-            return record.u[:, number], f"command of {here(self.machine, list(self.machine.drives)[number])}", drive.unit
+            return (
+                record.u[:, number],
+                f"command of {here(self.machine, list(self.machine.drives)[number])}",
+                drive.unit,
+            )
         return record.t - record.t[0], "time", "s"
 
     def speed(self, node: str) -> np.ndarray:
@@ -126,7 +130,7 @@ class Missing:
         terms = [t for t in self.best.terms if (t.term, t.node) != (term, node)]  # type: ignore[attr-defined]
         return self.best._replace(terms=tuple(terms)), self.best
 
-    def _channel(self, known, node: str, out0: np.ndarray, out1: np.ndarray) -> str | None:  # noqa: ANN001
+    def _channel(self, known, node: str, out0: np.ndarray, out1: np.ndarray) -> str | None:
         """Sensor whose reading shows an effect better than the correction does; None for the correction."""
         others = [name for name in self.sim.channels if name != self.sim.main]
         if known is None or not others:

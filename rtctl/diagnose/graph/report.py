@@ -1,7 +1,7 @@
 """Report of a diagnosis of a described machine: one HTML file that needs nothing else, and a table for the terminal."""
 
 from collections import defaultdict
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -168,7 +168,9 @@ def instead(d: GraphDiagnosis) -> list[str]:
     if d.verdict == UNNAMED and d.located is not None:
         at = words.here(d.record.case.machine, d.located.node)
         machine = d.record.case.machine
-        blind = [b for b in machine.bodies if not machine.is_frame(b) and b not in {s.body for s in machine.sensors.values()}]
+        blind = [
+            b for b in machine.bodies if not machine.is_frame(b) and b not in {s.body for s in machine.sensors.values()}
+        ]
         lines = [
             f"The rest lives at {at}, by {d.located.axis}. Vary the {d.located.axis} there alone, slowly, both ways, and "
             "keep all else as it is.",
@@ -232,5 +234,3 @@ def terminal(d: GraphDiagnosis) -> RenderableType:
         text = f"{many} effect{'s' * (many > 1)} cannot be told from this recording; the report says what to record."
         parts.append(Text(text, style="dim"))
     return Group(*parts)
-
-

@@ -60,7 +60,9 @@ def make_described(table: Table, plan: Plan, believed: Believed, folder: Path | 
     refuse_taken(folder)
     units = {name: _shown(known.get(name)) for name in columns} | {"t": "s"}
     fields = [
-        pa.field(n, pa.float64(), nullable=False, metadata={"unit": units[n], "help": known[n].help if n in known else ""})
+        pa.field(
+            n, pa.float64(), nullable=False, metadata={"unit": units[n], "help": known[n].help if n in known else ""}
+        )
         for n in columns
     ]
     try:
@@ -71,7 +73,9 @@ def make_described(table: Table, plan: Plan, believed: Believed, folder: Path | 
     except OSError as error:
         raise UserError(f"{folder}: cannot be written ({error.strerror or error})") from None
     except ValueError as error:
-        raise UserError(f"the case cannot be written: {error}; numbers of the description and --case are finite") from None
+        raise UserError(
+            f"the case cannot be written: {error}; numbers of the description and --case are finite"
+        ) from None
     return Imported(folder, len(t), rate, units, tuple(notes))
 
 
@@ -88,7 +92,7 @@ def wanted_columns(believed: Believed) -> dict[str, Wanted]:
         help_ = f"{sensor.measures} of {sensor.body or sensor.joint or sensor.drive}"
         out[sensor.column] = Wanted(sensor.column, f"sensor {name}", unit, sensor.scale, counts, help_)
     inputs = believed.case.get("inputs")
-    for name, entry in (inputs.items() if isinstance(inputs, Mapping) else ()):
+    for name, entry in inputs.items() if isinstance(inputs, Mapping) else ():
         if isinstance(entry, Mapping) and isinstance(entry.get("column"), str):
             unit = "Nm" if machine.turns(str(entry.get("body"))) else "N"
             scale = entry.get("per_unit", 1.0)
@@ -120,7 +124,13 @@ def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believ
             there = ", ".join(f"{w.column} ({w.what})" for w in known.values())
             hint = f"did you mean '{near}'?" if near else f"it has {there}"
             raise UserError(f"--map {name}={given.column}: the machine has no column '{name}'; {hint}")
-        named[ours] = given if given.column else ColumnPlan(column=ours, unit=given.unit)
+        before = named.get(ours, ColumnPlan())  # --map by the column and --unit by the sensor are one
+        named[ours] = ColumnPlan(
+            column=given.column or before.column, unit=given.unit if given.unit is not None else before.unit
+        )
+    named = {
+        ours: given if given.column else given.model_copy(update={"column": ours}) for ours, given in named.items()
+    }
     for ours in (*known, *BESIDE, "t"):
         if ours not in named and ours in table.columns:
             named[ours] = ColumnPlan(column=ours)

@@ -56,7 +56,9 @@ def blank(case, u):
     sensors = read.machine.sensors
     y = {name: np.zeros(n) for name in sensors}
     grain = {name: abs(s.grain / s.scale) for name, s in sensors.items()}
-    return GraphRecord(read, np.arange(n) / RATE, 1.0 / RATE, np.full(n, np.nan), np.zeros(n), u[:, None], y, grain, None)
+    return GraphRecord(
+        read, np.arange(n) / RATE, 1.0 / RATE, np.full(n, np.nan), np.zeros(n), u[:, None], y, grain, None
+    )
 
 
 def columns_of(case, u, terms=(), push=None):

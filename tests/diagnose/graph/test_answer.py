@@ -3,6 +3,7 @@ from graph_cases import named, nothing, unnamed
 
 from rtctl.diagnose.diagnosis import NAMED, NOTHING, UNNAMED
 
+
 def test_nothing():
     d = nothing()
     assert d.verdict == NOTHING
@@ -36,6 +37,15 @@ def test_a_force_without_a_name():
 @pytest.mark.parametrize("d", [nothing, named, unnamed])
 def test_json_has_the_keys_of_the_exchange_format(d):
     data = d().as_json()
-    assert {"verdict", "effects", "located", "parameters", "fit", "cannot_test", "separating_experiment", "seconds"} <= set(data)
+    assert {
+        "verdict",
+        "effects",
+        "located",
+        "parameters",
+        "fit",
+        "cannot_test",
+        "separating_experiment",
+        "seconds",
+    } <= set(data)
     assert set(data["fit"]) == {"heldout_nrmse_before", "heldout_nrmse_after", "noise_floor"}
     assert all(len(p["ci90"]) == 2 for p in data["parameters"].values())

@@ -56,11 +56,15 @@ def test_strange_keys_are_told_with_the_nearest_name():
         ({"tolerance": {"default": -0.1}}, "tolerance.default is -0.1; it should be 0 or more, or null"),
         ({"physics": {"term": "friction.coulomb"}}, "physics should be a list of objects with 'term', 'node'"),
         ({"physics": [{"node": "rod"}]}, "physics should be a list of objects with 'term', 'node'"),
-        ({"physics": [{"term": "friction.columb", "node": "rod"}]}, "physics.0.term: there is no term 'friction.columb'; "
-         "did you mean 'friction.coulomb'?"),
+        (
+            {"physics": [{"term": "friction.columb", "node": "rod"}]},
+            "physics.0.term: there is no term 'friction.columb'; did you mean 'friction.coulomb'?",
+        ),
         ({"physics": [{"term": "friction.coulomb", "node": "rod"}]}, "physics.0: missing key 'F_C'"),
-        ({"physics": [{"term": "friction.coulomb", "node": "motor", "F_C": 1.0}]},
-         "physics.0.node: friction.coulomb cannot stand at 'motor'; it can at rod"),
+        (
+            {"physics": [{"term": "friction.coulomb", "node": "motor", "F_C": 1.0}]},
+            "physics.0.node: friction.coulomb cannot stand at 'motor'; it can at rod",
+        ),
         ({"inputs": []}, "inputs is a list; it should be an object of names and columns"),
         ({"inputs": {"wind": {"body": "rod"}}}, "inputs.wind"),
         ({"inputs": {"wind": {"body": "rodd", "column": "f"}}}, "there is no body 'rodd'; did you mean 'rod'?"),

@@ -2,6 +2,7 @@ import json
 import shutil
 
 import pytest
+from graph_cases import PENDULUM, case_of, columns_of, command, write_bundle
 from typer.testing import CliRunner
 
 from rtctl.cli.main import app
@@ -9,8 +10,6 @@ from rtctl.config.errors import UserError
 from rtctl.diagnose.engines import diagnose_into, is_described
 from rtctl.diagnose.folder import Task, one
 from rtctl.diagnose.graph.second import predicted
-
-from graph_cases import PENDULUM, case_of, columns_of, command, write_bundle
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ def model(force):
 def test_residuals_of_the_true_model_are_those_of_counting():
     e = like().raw(model(2.0))
     np.testing.assert_allclose(e.std(axis=0), QUANTISED / np.array([1300.0, 2e5]), rtol=0.6)
-    assert like().mean == round(like().sim.record.dt**-1 / RATE)
+    assert like().mean == round(like().sim.record.dt ** -1 / RATE)
 
 
 def test_loss_is_least_at_the_truth():
