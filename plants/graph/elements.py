@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from rtctl.plants.element import LOOP, Element, element
+from rtctl.plants.element import GENERAL, LOOP, Element, element
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.params import joint_place, place
 from rtctl.plants.physics import Term, standing

@@ -46,6 +46,7 @@ class Measures:
         self.effort = self._effort()
         self.term = ""
 
+
     def _effort(self) -> float:
         """Rms of what all drives make at the main body, N or Nm."""
         total = np.zeros(len(self.way))

@@ -128,13 +128,7 @@ def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.nda
 
 
 def _solved(
-    base: Fitted,
-    like: Likelihood,
-    h: Hypothesis,
-    changes: list,
-    W: np.ndarray,
-    A: np.ndarray,
-    slope: np.ndarray,
+    base: Fitted, like: Likelihood, h: Hypothesis, changes: list, W: np.ndarray, A: np.ndarray, slope: np.ndarray,
     r: np.ndarray,
 ) -> tuple[Score, np.ndarray, np.ndarray]:
     """Score of a hypothesis under the noise of the base, the step of all unknowns and its raw directions."""

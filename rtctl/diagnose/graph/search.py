@@ -86,7 +86,9 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], fl
     return merit(more) > merit(fewer) + WORTH and fewer.loss - more.loss > FORM * (base.loss - fewer.loss)
 
 
-def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]) -> bool:
+def stands(
+    base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]
+) -> bool:
     """Whether every effect of a combination adds to the combination without it, as far as that was fitted."""
     if len(f.names) < 2:
         return True

@@ -1,8 +1,8 @@
 """Simulator of a recording: any model of its machine, under the recorded commands and a tracking observer.
 
-track   the recorded command, and a correction that makes the model follow the main sensor. It pushes every body as
-        its inertia asks for, so that the rigid motion is corrected and no joint is stretched by the correction.
-open    the recorded command alone: a free run
+    track   the recorded command, and a correction that makes the model follow the main sensor. It pushes every body as
+            its inertia asks for, so that the rigid motion is corrected and no joint is stretched by the correction.
+    open    the recorded command alone: a free run
 """
 
 from copy import copy

@@ -35,7 +35,9 @@ def verdict(found: Found) -> Verdict:
     base, best = found.base, found.best
     free = free_forces(base)
     weights = posterior(found)
-    ranked = tuple(sorted(((f.names, float(w)) for f, w in zip(found.fits, weights, strict=True)), key=lambda p: -p[1]))
+    ranked = tuple(
+        sorted(((f.names, float(w)) for f, w in zip(found.fits, weights, strict=True)), key=lambda p: -p[1])
+    )
     top = strongest(base, free)
     if not best.names or explained(base, best) < HARDLY:
         if top is not None and evidence(base, top) - UNLISTED > WORTH:
