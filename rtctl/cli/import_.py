@@ -66,7 +66,8 @@ def import_(
 
     Units are those of --unit, else those that the file names, else SI. Without --map, columns that have our names
     already are taken. With --machine, OURS are the columns of the description's drives and sensors, or their names, and
-    the description, its tolerance and known physics go into the bundle. Of a file of text the names, units, separator and decimal sign are seen from the file.
+    the description, its tolerance and known physics go into the bundle. Of a file of text the names, units, separator
+    and decimal sign are seen from the file.
 
     Examples:
 

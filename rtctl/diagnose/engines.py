@@ -1,4 +1,4 @@
-"""Choice of the engine for a bundle: machines known by name (format 1), or described by bodies and joints (format 2)."""
+"""Choice of the engine for a bundle: machines known by name (format 1), or described by their parts (format 2)."""
 
 from collections.abc import Callable
 from pathlib import Path

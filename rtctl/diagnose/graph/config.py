@@ -97,7 +97,7 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
     lines = [
         f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"
     ]
-    lines.append("found are in plant.physics. Changed, nominal -> fitted:")
+    lines.append("effects that were found are in plant.physics. Changed, nominal -> fitted:")
     for path, value in model.base.items():
         old = case.values.get(path, value)
         if abs(value - old) > 5e-4 * abs(old):

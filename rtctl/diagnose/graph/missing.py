@@ -52,7 +52,7 @@ class Missing:
 
     def run(self, model: GraphModel) -> tuple[np.ndarray, np.ndarray]:
         """Readings (n, sensors) of a model on track and the correction (n,); slower where a fast one runs away."""
-        key = tuple(f"{t.term}:{t.node}" for t in model.terms) + (repr(sorted(model.base.items())),)  # type: ignore[attr-defined]
+        key = (*map(repr, model.terms), repr(sorted(model.base.items())))
         if key not in self._runs:
             for sim in (self.fast, self.sim):
                 out, push = sim.everything(model)

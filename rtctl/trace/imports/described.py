@@ -124,7 +124,13 @@ def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believ
             there = ", ".join(f"{w.column} ({w.what})" for w in known.values())
             hint = f"did you mean '{near}'?" if near else f"it has {there}"
             raise UserError(f"--map {name}={given.column}: the machine has no column '{name}'; {hint}")
-        named[ours] = given if given.column else ColumnPlan(column=ours, unit=given.unit)
+        before = named.get(ours, ColumnPlan())  # --map by the column and --unit by the sensor are one
+        named[ours] = ColumnPlan(
+            column=given.column or before.column, unit=given.unit if given.unit is not None else before.unit
+        )
+    named = {
+        ours: given if given.column else given.model_copy(update={"column": ours}) for ours, given in named.items()
+    }
     for ours in (*known, *BESIDE, "t"):
         if ours not in named and ours in table.columns:
             named[ours] = ColumnPlan(column=ours)

@@ -1,3 +1,4 @@
+import io
 import re
 
 import numpy as np
@@ -11,7 +12,7 @@ from rtctl.diagnose.graph.posterior import rivals
 
 
 def said(d):
-    console = Console(width=110, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    console = Console(width=110, record=True, file=io.StringIO())
     console.print(report.terminal(d))
     return console.export_text()
 
