@@ -133,6 +133,8 @@ def typical(term: Term, kind: str, node: str) -> Settings:
 
 def curve(term: Term, settings: Any, kind: str) -> Curve:
     """Move the stand as the term's axis asks for, and read off what the term makes of it."""
+    if term.joint is not None:
+        return spring(term, settings, kind)
     driven = term.shown.endswith(DRIVEN)
     motion = term.shown.removesuffix(DRIVEN) or MOTIONS[term.axis]
     hand = motions(motion, settings, SCALES[kind])
@@ -170,6 +172,16 @@ def curve(term: Term, settings: Any, kind: str) -> Curve:
         "pull": (none["pull"][:, link], "pull of a tape that gives in proportion, N"),
     }.get(motion, (hand.x, f"position, {way}"))  # fmt: skip
     return Curve(x, y, without, x_words, y_words, settings, kind)
+
+
+def spring(term: Term, settings: Any, kind: str) -> Curve:
+    """Pull of a joint that the term makes a spring, by its stretch; without the term it does not stretch."""
+    assert term.joint is not None
+    travel, way = SCALES[kind]["travel"], UNITS[kind][0]
+    x = np.linspace(-1e-3, 1e-3, ROWS) * travel
+    return Curve(
+        x, term.joint(settings)["stiffness"] * x, 0.0 * x, f"stretch, {way}", f"pull, {UNITS[kind][1]}", settings, kind
+    )
 
 
 def motions(motion: str, settings: Any, scales: dict[str, float]) -> Hand:

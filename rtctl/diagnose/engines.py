@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rtctl.config.errors import UserError
 from rtctl.trace.bundle import load_case
 
 DESCRIBED_FORMAT = 2
@@ -23,9 +24,17 @@ def is_described(case: dict[str, Any]) -> bool:
     return case.get("format") == DESCRIBED_FORMAT or isinstance(case.get("machine"), dict)
 
 
+def of_described(bundle: Path) -> bool:
+    """Whether a bundle is of a described machine; False where its case cannot be read, which the engine then tells."""
+    try:
+        return is_described(load_case(bundle))
+    except UserError:
+        return False
+
+
 def load(bundle: Path) -> Any:
     """The record of a bundle, checked. Raises UserError and NoAnswer as `diagnose_into`."""
-    if is_described(load_case(bundle)):
+    if of_described(bundle):
         from rtctl.diagnose.graph.record import load_record as load_graph
 
         return load_graph(bundle)
@@ -49,7 +58,7 @@ def diagnose_into(
     """
     from rtctl.diagnose.results import finite
 
-    if is_described(load_case(bundle)):
+    if of_described(bundle):
         from rtctl.diagnose.graph import answer, files
 
         found = answer.diagnose(bundle, progress)

@@ -60,6 +60,7 @@ class Measures:
             "grain": self.grain * s.span / (self.scales.get("encoder") or self.scales["sensor"]).span,
             "counts": 1.0 / per_unit(self.record.case)[-1 if node == "scale" else 0],
             "per_volt": 1.0 / volts,
+            "firm": self.stiffness(node),
             "pace": float(np.abs(np.diff(self.record.u, axis=0)).max()) / self.record.dt,
             "limit": drive.limit_volt or float(np.abs(self.record.u).max()),
             "peak": float(np.abs(self.record.u).max()),

@@ -157,10 +157,10 @@ SHAPED = under(
     Row("12.notches", "notches of it that take away 3 dB or more", "12.7, figure 12.9", 2.0, "",
         quote="a bode plot of a lead-lag controller with two notches",
         differs="the second one, at 235 Hz, takes away 0.3 dB: " + HEADS),
-    Row("12.bandwidth_running", "bandwidth of that loop while it runs", "12.7", 50.0, "Hz", bound="at least",
+    Row("12.bandwidth_running", "bandwidth of that loop while it runs", "12.7", 50.0, "Hz", 0.03, bound="at least",
         quote="a closed loop bandwidth of 50 [Hz] can be easily obtained",
         remark="read where |T| first falls below -3 dB, so with lines up to 150 Hz only: more lines have less each, "
-        "and noise makes one fall too early"),
+        "and noise makes one fall too early; equal machines that round otherwise are read as 49.7 to 51.1 Hz"),
     Row("12.gain_margin_running", "its gain margin", "12.7, figure 12.9", 11.0, "dB", 0.5, relative=False,
         bound="at least", quote=WITH_NOTCHES, chosen=LIMITS,
         remark="a count of the encoder is 0.3 dB at the frequency where it is read"),

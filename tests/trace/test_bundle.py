@@ -121,7 +121,7 @@ def table(**columns):
         (put("case.json", b"\xff\xfe"), "not text in UTF-8"),
         (put("case.json", b"[1]"), "holds a list"),
         (put("case.json", b"[" * 100_000), "nested too deeply|not JSON"),
-        (put("case.json", b'{"format": 3}'), "format is 3; this program reads format 1 and 2"),
+        (put("case.json", b'{"format": 3}'), "format is 3; this program reads formats 1 and 2"),
         (table(time=[1.0], ref=[0.0]), "no column 't'.*is it 'time'"),
         (table(t=pa.array([], pa.float64())), "holds no rows"),
         (table(t=[0.0, None]), "'t' has 1 empty cells"),
