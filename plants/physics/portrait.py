@@ -179,9 +179,8 @@ def spring(term: Term, settings: Any, kind: str) -> Curve:
     assert term.joint is not None
     travel, way = SCALES[kind]["travel"], UNITS[kind][0]
     x = np.linspace(-1e-3, 1e-3, ROWS) * travel
-    return Curve(
-        x, term.joint(settings)["stiffness"] * x, 0.0 * x, f"stretch, {way}", f"pull, {UNITS[kind][1]}", settings, kind
-    )
+    y, force = term.joint(settings)["stiffness"] * x, UNITS[kind][1]
+    return Curve(x, y, 0.0 * x, f"stretch, {way}", f"pull, {force}", settings, kind)
 
 
 def motions(motion: str, settings: Any, scales: dict[str, float]) -> Hand:

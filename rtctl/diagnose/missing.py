@@ -101,8 +101,8 @@ class Missing:
 def binned(
     x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int, middle: Callable[..., Any] = np.median
 ) -> np.ndarray:
-    """Along x: middles, medians of y (or another `middle`), half widths of their 95 % bands, and medians of the law, (4,
-    bins).
+    """Along x: middles, medians of y (or another `middle`), half widths of their 95 % bands, and medians of the law,
+    (4, bins).
 
     Neighbouring samples are not independent: the band comes from the scatter of the means of `block` rows, visit by
     visit. Each bin has the same sum of its shares of the way along x and of the samples; a gap in x leaves a column of

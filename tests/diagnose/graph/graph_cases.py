@@ -62,7 +62,7 @@ def blank(case, u):
 
 
 def columns_of(case, u, terms=(), push=None):
-    """Columns of a recording: the machine with `terms` beyond its description, and a force push (n,) on coordinate 0."""
+    """Columns of a recording: the machine with `terms` beyond its description, and a push (n,) on coordinate 0."""
     record = blank(case, u)
     sim = Simulator(record)
     if push is not None:
