@@ -33,7 +33,7 @@ class Fitted(NamedTuple):
     loss: float  # negative logarithm of the likelihood, nats
 
     @property
-    def model(self):
+    def model(self):  # noqa: ANN201
         """The model itself."""
         return self.space.model(self.x)
 

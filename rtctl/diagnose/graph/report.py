@@ -22,16 +22,16 @@ LEAST = 1e-3  # probability of a look-alike that is told where nothing is known 
 MOST_RIVALS = 4  # look-alikes of one effect in the table
 PICTURES = {
     "missing": (figures.missing_force, {
-        "": "What it takes to keep the simulation without the effect on the recorded track, by the axis where the effect "
-            "lives: means with their 95 % bands, and what the effect that was found gives instead.",
+        "": "What it takes to keep the simulation without the effect on the recorded track, by the axis where the "
+            "effect lives: means with their 95 % bands, and what the effect that was found gives instead.",
         UNNAMED: "What it takes to keep the simulation on the recorded track, by the axis where it lives: means with "
                  "their 95 % bands, and the free force that fits best.",
         NOTHING: "What it takes to keep the simulation on the recorded track: means with their 95 % bands, which hold "
                  "zero where nothing is missing.",
     }),
     "heldout": (figures.heldout, {
-        "": "Residual of each sensor on rows that no fit saw, in units of the noise of its counts or steps. The grey band "
-            "holds 95 % of that noise.",
+        "": "Residual of each sensor on rows that no fit saw, in units of the noise of its counts or steps. The grey "
+            "band holds 95 % of that noise.",
     }),
     "posterior": (figures.posterior, {
         "": "Posterior probability of each answer. A force without a name is a free function with ten values; 1e-9 is "
@@ -172,8 +172,8 @@ def instead(d: GraphDiagnosis) -> list[str]:
             b for b in machine.bodies if not machine.is_frame(b) and b not in {s.body for s in machine.sensors.values()}
         ]
         lines = [
-            f"The rest lives at {at}, by {d.located.axis}. Vary the {d.located.axis} there alone, slowly, both ways, and "
-            "keep all else as it is.",
+            f"The rest lives at {at}, by {d.located.axis}. Vary the {d.located.axis} there alone, slowly, both ways, "
+            "and keep all else as it is.",
         ]
         if blind:
             at = words.here(machine, blind[0])
