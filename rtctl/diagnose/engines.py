@@ -25,7 +25,7 @@ def is_described(case: dict[str, Any]) -> bool:
 
 def load(bundle: Path) -> Any:
     """The record of a bundle, checked. Raises UserError and NoAnswer as `diagnose_into`."""
-    if is_described(load_case(bundle)):
+    if bundle.is_dir() and is_described(load_case(bundle)):
         from rtctl.diagnose.graph.record import load_record as load_graph
 
         return load_graph(bundle)
@@ -49,7 +49,7 @@ def diagnose_into(
     """
     from rtctl.diagnose.results import finite
 
-    if is_described(load_case(bundle)):
+    if bundle.is_dir() and is_described(load_case(bundle)):
         from rtctl.diagnose.graph import answer, files
 
         found = answer.diagnose(bundle, progress)
