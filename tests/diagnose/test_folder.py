@@ -179,6 +179,7 @@ def test_our_own_fault_is_told_as_ours(tmp_path, monkeypatch):
         raise ZeroDivisionError("oh")
 
     monkeypatch.setattr(chain, "diagnose", broken)
+    (tmp_path / "case.json").write_text('{"plant": "axis"}')
     outcome = one(Task("a", tmp_path, tmp_path), report=False)
     assert outcome.code == OURS and "internal error: ZeroDivisionError('oh')" in outcome.message
 

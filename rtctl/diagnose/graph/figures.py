@@ -51,7 +51,8 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
         forward = runs.speed(node)[rows] > 0.0
         parts |= {", forwards": forward, ", backwards": ~forward}
     found = {
-        way: binned(*(v[rows][keep] for v in (c.x, c.y, c.law)), bins, block, np.mean) for way, keep in parts.items()
+        way: binned(c.x[rows][keep], c.y[rows][keep], c.law[rows][keep], bins, block, np.mean)
+        for way, keep in parts.items()
     }
     both = [k for k in found if k] if _differ(found, 3 if term else 1) else [""]
     size = max(float(np.nanmax(np.abs(found[k][1]), initial=0.0)) for k in both)

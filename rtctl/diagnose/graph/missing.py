@@ -127,7 +127,7 @@ class Missing:
         if not term:
             model = self.unnamed()
             return model, model
-        terms = [t for t in self.best.terms if (t.term, t.node) != (term, node)]  # type: ignore[attr-defined]
+        terms = [t for t in self.best.terms if (t.term, t.node) != (term, node)]
         return self.best._replace(terms=tuple(terms)), self.best
 
     def _channel(self, known, node: str, out0: np.ndarray, out1: np.ndarray) -> str | None:
@@ -156,7 +156,7 @@ def source_of(d: GraphDiagnosis) -> Fitted:
 
 def subjects(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
     """Term, node and axis of each panel: the effects that were found, else where the rest lives, else the main body."""
-    there = {(t.term, t.node) for t in d.decided.best.model.terms}  # type: ignore[attr-defined]
+    there = {(t.term, t.node) for t in d.decided.best.model.terms}
     found = [(e.name, e.node, TERMS[e.name].axis) for e in d.effects if (e.name, e.node) in there]
     if not found and d.located is not None and d.decided.unlisted is not None:
         found = [("", d.located.node, d.located.axis)]

@@ -92,7 +92,7 @@ def pictures(d: GraphDiagnosis) -> dict[str, Picture]:
     """All figures that this diagnosis has."""
     found = {}
     for name, (draw, captions) in PICTURES.items():
-        figure = draw(d)  # type: ignore[operator]
+        figure = draw(d)
         if figure is not None:
             caption = captions.get(d.verdict, captions[""])
             found[name] = Picture(svg(figure, name, f"{caption} {d.headline}"), caption)
@@ -188,9 +188,9 @@ def parameter_rows(d: GraphDiagnosis) -> list[Row]:
     for path, v in d.parameters.items():
         scale, unit = _scaled(d.record.case.values[path], v.unit)
         low, high = sorted((v.low, v.high))
-        said = (numbers.figures(scale * x, 4) for x in (d.record.case.values[path], v.value))
+        nominal, fitted = (numbers.figures(scale * x, 4) for x in (d.record.case.values[path], v.value))
         ends = " to ".join(numbers.figures(scale * x, 3) for x in (low, high))
-        rows.append(Row(path, *said, ends, unit, figures.untold(d, path)))
+        rows.append(Row(path, nominal, fitted, ends, unit, figures.untold(d, path)))
     return rows
 
 

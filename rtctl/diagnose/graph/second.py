@@ -31,8 +31,8 @@ def check_same(first: GraphRecord, second: GraphRecord) -> None:
         one, two = (set(getattr(r.case.machine, group)) for r in (first, second))
         if one != two:
             raise UserError(
-                f"{second.case.file}: machine.{group} has {', '.join(sorted(two)) or 'none'}, and the first "
-                f"recording's {', '.join(sorted(one)) or 'none'}; a second recording is of the same machine"
+                f"{second.case.file}: machine.{group} has {', '.join(sorted(two)) or 'none'}, and the first recording "
+                f"has {', '.join(sorted(one)) or 'none'}; a second recording is of the same machine"
             )
     if list(first.y) != list(second.y):
         raise UserError(

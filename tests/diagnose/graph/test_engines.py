@@ -47,7 +47,7 @@ def test_second_recording(bench, tmp_path):
     case["machine"]["joints"] = {"shaft": {"from": "rod", "to": "other"}}
     shutil.copytree(bench, tmp_path / "else")
     (tmp_path / "else" / "case.json").write_text(json.dumps(case))
-    with pytest.raises(UserError, match=r"machine\.bodies has other, rod, and the first recording's rod"):
+    with pytest.raises(UserError, match=r"machine\.bodies has other, rod, and the first recording has rod"):
         predicted(made.diagnosis, tmp_path / "else")
 
 
