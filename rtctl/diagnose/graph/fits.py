@@ -37,7 +37,7 @@ class Fitted(NamedTuple):
     loss: float  # negative logarithm of the likelihood, nats
 
     @property
-    def model(self):  # noqa: ANN201
+    def model(self):
         """The model itself."""
         model: GraphModel = self.space.model(self.x)
         return model

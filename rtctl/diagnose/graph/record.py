@@ -101,7 +101,7 @@ def _forces(path: Path, columns: dict[str, np.ndarray], case: GraphCase) -> np.n
     return out
 
 
-def _clock(path: Path, t: np.ndarray, case: GraphCase):  # noqa: ANN202
+def _clock(path: Path, t: np.ndarray, case: GraphCase):
     """Even times, tick, and what lays a column onto them."""
 
     def row(k: int) -> str:
