@@ -75,9 +75,9 @@ def _made(machine: Description) -> Layout:
             todo = [first]
             while todo:
                 here = todo.pop()
-                for other, joint, forward in near[here]:
+                for other, held, forward in near[here]:
                     if other not in bodies:
-                        bodies[other] = Body(nq, (*bodies[here].chain, (joint, forward)))
+                        bodies[other] = Body(nq, (*bodies[here].chain, (held, forward)))
                         todo.append(other)
             nq += 1
     if nq > MOST_BODIES:

@@ -11,8 +11,9 @@ PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "
 Line = tuple[str, str]
 
 
-def si(value: float, unit: str) -> str:
-    """A number with its unit and three digits, with the prefix that leaves no zeros: 21 mN, 1.2 kN/m."""
+def si(value: float | None, unit: str) -> str:
+    """A number with its unit and three digits, with the prefix that leaves no zeros: 21 mN, 1.2 kN/m; None is 0."""
+    value = value or 0.0
     plain = unit in ("", "percent") or unit.startswith("kg") or "/" in unit.replace("/m", "").replace("/rad", "")
     if value == 0 or not math.isfinite(value) or plain:
         return f"{value:.4g} {unit}".strip()
@@ -94,7 +95,7 @@ def ends_turn(machine: Description, joint: Any) -> tuple[bool, bool]:
 
 def _drives(machine: Description) -> Iterator[str]:
     for name, drive in machine.drives.items():
-        turns = machine.turns(drive.body) if drive.body else ends_turn(machine, machine.joints[drive.joint])[1]
+        turns = machine.turns(drive.body) if drive.body else ends_turn(machine, machine.joints[str(drive.joint)])[1]
         force, made = FORCE[turns], {"force": FORCE[turns], "current": "A", "voltage": "V"}[drive.kind]
         per = f" for 1 {drive.unit}" if drive.unit else ""
         where = drive.body or f"the two ends of {drive.joint}"

@@ -172,7 +172,7 @@ def _physics(where: Path, placed: Layout, given: Any) -> tuple[dict[str, Any], .
         try:
             settings.model_validate(entry)
         except ValidationError as error:
-            raise UserError(sentences(error, settings, entry, lambda _, at=at: at).splitlines()[0]) from None
+            raise UserError(f"{at}: {sentences(error, settings, entry).splitlines()[0]}") from None
         if standing(TERMS[name], there, str(entry.get("node"))) is None:
             where_it_can = ", ".join(nodes(TERMS[name], there)) or "nowhere in this machine"
             raise UserError(f"{at}.node: {name} cannot stand at '{entry.get('node')}'; it can at {where_it_can}")

@@ -1,6 +1,6 @@
 """Measures of a recording at each node: what is large and what is small there."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -69,7 +69,7 @@ class Measures:
             return joint.to if not m.is_frame(joint.to) else getattr(joint, "from")
         for group in (m.drives, m.sensors):
             if node in group:
-                element = group[node]
+                element: Any = group[node]
                 if element.body is not None:
                     return str(element.body)
                 if element.joint is not None:

@@ -26,7 +26,7 @@ def body_of(machine: Description, node: str) -> str:
     if node in machine.joints:
         return str(machine.joints[node].to)
     for group in (machine.drives, machine.sensors):
-        element = group.get(node)
+        element: Any = group.get(node)
         if element is not None:
             if element.body is not None:
                 return str(element.body)
