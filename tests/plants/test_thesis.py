@@ -4,11 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from scipy.linalg import expm
 
 import tests.plants.thesis as thesis
-
 from rtctl.idiom import tick
 from rtctl.plants import axis, ivu, ldu, linear
 from rtctl.plants.graph import plant as graph
