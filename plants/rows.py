@@ -34,8 +34,8 @@ def sum_rows(out: Any, n: int, P: Any, x: Any, nx: int, G: Any, u: Any, nu: int,
 
 
 @overload(sum_rows)
-def _sum_rows(out, n, P, x, nx, G, u, nu, f, nf):  # type: ignore[no-untyped-def]
-    return lambda out, n, P, x, nx, G, u, nu, f, nf: _sum(out, n, P, x, nx, G, u, nu, f, nf)
+def _sum_rows(out, n, P, x, nx, G, u, nu, f, nf):
+    return lambda out, n, P, x, nx, G, u, nu, f, nf: _sum(out, n, P, x, nx, G, u, nu, f, nf)  # type: ignore[call-arg]
 
 
 class _Code:
@@ -111,12 +111,12 @@ class _Code:
 
 
 @intrinsic
-def _sum(typingctx, out, n, P, x, nx, G, u, nu, f, nf):  # type: ignore[no-untyped-def]
-    def codegen(context, builder, signature, args):  # type: ignore[no-untyped-def]
+def _sum(typingctx, out, n, P, x, nx, G, u, nu, f, nf):
+    def codegen(context, builder, signature, args):
         code = _Code(context, builder, signature, args)
         zero, nu_ = ir.Constant(ir.IntType(64), 0), code.whole(7)
 
-        def lanes(at, _):  # type: ignore[no-untyped-def]
+        def lanes(at, _):
             total = code.summed(ir.Constant(WIDE, [0.0] * LANES), 2, zero, 3, code.whole(4), at)
             total = code.summed(total, 5, zero, 6, nu_, at)
             code.store(code.summed(total, 5, nu_, 8, code.whole(9), at), code.data(0), at)

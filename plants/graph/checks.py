@@ -78,20 +78,21 @@ def _check_spans(machine: "Description") -> None:
         raise ValueError(f"bodies: {len(reels)} reels; {linear.MOST_REELS} is the most that one machine can have")
     for name in reels:
         body, joints = machine.bodies[name], _joints_at(machine, name)
+        assert body.reel is not None and body.radius is not None and body.inertia is not None
         if body.radius < body.reel.core:
             raise ValueError(f"bodies.{name}.radius: {body.radius:g} m is less than the core of {body.reel.core:g} m")
         paper = 0.5 * math.pi * body.reel.density * body.reel.width * (body.radius**4 - body.reel.core**4)
         if body.inertia <= paper:
             raise ValueError(
-                f"bodies.{name}.inertia: {body.inertia:g} kg m^2 is not more than the {paper:g} kg m^2 of its tape alone; "
+                f"bodies.{name}.inertia: {body.inertia:g} kg m^2 is not more than the {paper:g} kg m^2 of its tape; "
                 "give that of the reel with its tape"
             )
         if not any(machine.joints[joint].span for joint in joints):
             raise ValueError(f"bodies.{name}.reel: no span of tape ends here; give a joint with span: open or crossed")
-        for joint in joints:
-            if machine.joints[joint].stiffness is None:
+        for held in joints:
+            if machine.joints[held].stiffness is None:
                 raise ValueError(
-                    f"joints.{joint}.stiffness is missing: {name} is a reel, whose inertia changes, and cannot move as "
+                    f"joints.{held}.stiffness is missing: {name} is a reel, whose inertia changes, and cannot move as "
                     "one with another body"
                 )
 
