@@ -7,6 +7,7 @@ Drives are those of drives.py; what winds tape is in reel.py.
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -111,7 +112,7 @@ def read(p, m):
 
 def state_space(p: GraphParams) -> tuple[np.ndarray, np.ndarray]:
     """A (nx, nx) and B (nx, nu), commands in, at the start, without weight and dry friction."""
-    fields = linear.MACHINE.fields or {}  # as plain arrays: those of a record are slow to reach from Python
+    fields: Any = linear.MACHINE.fields  # as plain arrays: those of a record are slow to reach from Python
     m = SimpleNamespace(
         **{name: np.zeros(kind.shape, kind.base) for name, (kind, *_) in fields.items() if name != "work"}
     )
