@@ -1,5 +1,6 @@
 """Checks of a description: what is inconsistent is refused with the path at fault and what would be right."""
 
+import math
 import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -77,9 +78,15 @@ def _check_spans(machine: "Description") -> None:
         raise ValueError(f"bodies: {len(reels)} reels; {linear.MOST_REELS} is the most that one machine can have")
     for name in reels:
         body, joints = machine.bodies[name], _joints_at(machine, name)
-        assert body.reel is not None and body.radius is not None  # a reel without a radius is refused as a body
+        assert body.reel is not None and body.radius is not None and body.inertia is not None
         if body.radius < body.reel.core:
             raise ValueError(f"bodies.{name}.radius: {body.radius:g} m is less than the core of {body.reel.core:g} m")
+        paper = 0.5 * math.pi * body.reel.density * body.reel.width * (body.radius**4 - body.reel.core**4)
+        if body.inertia <= paper:
+            raise ValueError(
+                f"bodies.{name}.inertia: {body.inertia:g} kg m^2 is not more than the {paper:g} kg m^2 of its tape; "
+                "give that of the reel with its tape"
+            )
         if not any(machine.joints[held].span for held in joints):
             raise ValueError(f"bodies.{name}.reel: no span of tape ends here; give a joint with span: open or crossed")
         for held in joints:
