@@ -57,8 +57,11 @@ class GraphDiagnosis(NamedTuple):
         if self.verdict == NAMED:
             text = "; ".join(said)
             return f"{text[:1].upper()}{text[1:]}."
-        names = " or ".join(words.called(machine, f"{e.name}:{e.node}") for e in self.effects)
-        return f"Something is missing, and this recording cannot tell which: {names}."
+        sure = [text for e, text in zip(self.effects, said, strict=True) if e.confidence >= SURE]
+        open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
+        first = "; ".join(sure)
+        text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
+        return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
 
     def as_json(self) -> dict[str, Any]:
         """diagnosis.json in the form of the exchange format."""
@@ -180,9 +183,11 @@ def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
 
 def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
     out, spread, machine = {}, _spread(f), record.case.machine
+    lowest, highest = f.space.bounds()  # what the owner says that it can be
     for i, path in enumerate(f.space.names):
-        value = f.model.base[path]
-        low, high = sorted((value * float(np.exp(-spread[i])), value * float(np.exp(spread[i]))))
+        value, nominal = f.model.base[path], f.space.owner.base[path]
+        ends = np.clip((f.x[i] - spread[i], f.x[i] + spread[i]), lowest[i], highest[i])
+        low, high = sorted(nominal * float(np.exp(end)) for end in ends)
         if path == START:  # kept as its exponential
             value, low, high = (float(np.log(v)) for v in (value, low, high))
         out[path] = Interval(value, low, high, words.value_unit(machine, path))

@@ -16,7 +16,7 @@ from rtctl.plants.physics import TERMS, nodes, standing
 FORMAT = 2
 KEYS = (
     "format", "sample_rate", "machine", "delay_samples", "tolerance", "physics", "inputs", "problem", "group",
-    "per_recording", "controller", "controller_known", "notes",
+    "per_recording", "controller", "loop", "controller_known", "notes",
 )  # fmt: skip
 PROBLEMS = ("driven", "free", "kinematic", "static")
 DEFAULT_TOLERANCE = 0.15
