@@ -1,7 +1,7 @@
 """A diagnosis in words that a mechanic understands: what the machine does, where, and how large it is."""
 
 import math
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -86,17 +86,33 @@ class Sizes:
         given = self.parameters[name].unit if name in self.parameters else ""
         return given or unit_at(self.model.kind, self.name, self.node, name, self.model.units)
 
+    def said(self, name: str) -> str:
+        """What a phrase leaves to words."""
+        return SPECIAL_WORDS[name](self)
+
+
+class Sized(Protocol):
+    """What a phrase asks of an effect: the node in words, and value, unit or words of a parameter by its name."""
+
+    here: str
+
+    def value(self, name: str) -> float: ...
+
+    def unit(self, name: str) -> str: ...
+
+    def said(self, name: str) -> str: ...
+
 
 class _Slot:
     """One name in a phrase."""
 
-    def __init__(self, sizes: Sizes, name: str):
+    def __init__(self, sizes: Sized, name: str):
         self.sizes, self.name = sizes, name
 
     def __format__(self, form: str) -> str:
         s, name = self.sizes, self.name
         if form == "words":
-            return SPECIAL_WORDS[name](s)
+            return s.said(name)
         value = s.value(name)
         if "|" in form:
             return form.split("|")[int(value < 0)]
@@ -109,8 +125,10 @@ class _Slot:
         return nice(abs(value) if form == "" else value, s.unit(name), int(form or 2))
 
 
-class _Slots(dict):
-    def __init__(self, sizes: Sizes):
+class Slots(dict):
+    """The names of a phrase, filled in from an effect."""
+
+    def __init__(self, sizes: Sized):
         super().__init__(here=sizes.here)
         self.sizes = sizes
 
@@ -142,8 +160,13 @@ def _jumps(s: Sizes) -> str:
 
 
 def _harmonics(s: Sizes) -> str:
-    phrase = phrase_of(s.name)
-    stem = next((part.amplitude for part in TERMS[s.name].search if isinstance(part, Turn)), "")
+    return harmonics(s.name, s)
+
+
+def harmonics(term: str, s: Sized) -> str:
+    """The harmonics of a ripple that were found: ", 2 mNm twice as often"."""
+    phrase = phrase_of(term)
+    stem = next((part.amplitude for part in TERMS[term].search if isinstance(part, Turn)), "")
     again = [(f"{stem}{n}", w) for n, w in ((2, "twice"), (3, "three times")) if s.value(f"{stem}{n}") > 0]
     base = phrase.again if phrase else ""
     return "".join(f", {nice(s.value(k), s.unit(k))} {w}{base}" for k, w in again)
@@ -159,7 +182,7 @@ def effect_clause(effect: Effect, model: Model) -> tuple[str, str]:
     if phrase is None:
         sizes = [f"{name} {nice(v.value, v.unit)}" for name, v in effect.parameters.items()]
         return f"{s.here} shows {effect.name}", ", ".join(sizes)
-    slots = _Slots(s)
+    slots = Slots(s)
     return phrase.head.format_map(slots), phrase.detail.format_map(slots)
 
 

@@ -17,7 +17,7 @@ from rtctl.diagnose.graph.prediction import Heldout, predict
 from rtctl.diagnose.graph.record import GraphRecord, load_record
 from rtctl.diagnose.graph.search import Found, Progress, search
 from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.graph.verdict import SURE, Verdict, evidence, strongest, verdict
+from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
 from rtctl.diagnose.space import COSINE, PLACE, SHAPE, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
@@ -219,6 +219,3 @@ def _cannot(found: Found) -> list[str]:
     for score in found.scores:
         norms[score.hypothesis.name] = max(norms.get(score.hypothesis.name, 0.0), score.norm)
     return [name for name, norm in norms.items() if norm < SEEN]
-
-
-__all__ = ["GraphDiagnosis", "diagnose", "diagnose_record", "evidence", "strongest"]

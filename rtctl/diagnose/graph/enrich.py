@@ -1,7 +1,5 @@
 """Richer and other forms of the effects that were found: harmonics, a second branch, another shape of the same law."""
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from rtctl.diagnose.forms import forms, is_rich
@@ -9,7 +7,6 @@ from rtctl.diagnose.graph.fits import Fitted, refit
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.hypotheses import starts_of
 from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis, Space
-from rtctl.plants.graph.elements import elements
 from rtctl.plants.physics import TERMS, standing
 
 WORTH = 2.0  # nats of evidence that another form must bring
@@ -67,12 +64,10 @@ def others(f: Fitted, index: int) -> list[Hypothesis]:
 def richer(f: Fitted, h: Hypothesis) -> list[Hypothesis]:
     """The effect with the further parameters of its richer form; none where it has none."""
     term, sim = TERMS[h.term], f.like.sim
-    there = elements(sim.layout)
-    found = standing(term, there, h.node)
+    found = standing(term, sim.elements, h.node)
     if not term.richer or is_rich(h) or (term.richer_at and (found is None or found[1].kind != term.richer_at)):
         return []
     measures = Measures(sim, f.model.base, {})
-    measures.record = SimpleNamespace(plant=there, dt=sim.record.dt)  # type: ignore[attr-defined]
     own = {c.name for c in h.coordinates}
     out = []
     for more in starts_of(h.term, h.node, term.richer, measures):  # type: ignore[arg-type]

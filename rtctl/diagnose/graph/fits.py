@@ -8,7 +8,6 @@ Source: MacKay, Information Theory, Inference, and Learning Algorithms (2003), c
 inference via coarsening, JASA 114 (2019) for the power of the likelihood.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from rtctl.diagnose.fit import fit, jacobian
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Hypothesis, Space
+from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
@@ -108,11 +107,6 @@ def refit(
             break
     loss, x, e, own = best
     return Fitted(space, x, e, jacobian(own, space, x), own, loss)
-
-
-def with_term(base: Fitted, h: Hypothesis, x: Sequence[float] | np.ndarray) -> tuple[Space, np.ndarray]:
-    """Space and start of a model with one more hypothesis, which begins at x."""
-    return base.space.add(h), np.concatenate([base.x, np.asarray(x, float)])
 
 
 def without(base: Fitted, index: int) -> tuple[Space, np.ndarray]:

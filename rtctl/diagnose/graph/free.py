@@ -11,12 +11,11 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.fit import bounded_step, parallel
-from rtctl.diagnose.graph.fits import Fitted, prior
-from rtctl.diagnose.graph.measures import SMOOTH, Measures
-from rtctl.diagnose.graph.screen import raw_jacobian
+from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.linear import DAMPING, Linear
+from rtctl.diagnose.graph.measures import Measures, speed
 from rtctl.diagnose.scales import spaced
 
 HATS = 10
@@ -37,25 +36,23 @@ class Free(NamedTuple):
 
 def free_forces(base: Fitted) -> list[Free]:
     """Free forces at every body along every axis, best first."""
-    like, sim = base.like, base.like.sim
-    Jraw = raw_jacobian(base)
-    start = like.raw(base.model, True)
+    sim, about = base.like.sim, Linear(base)
     measures = Measures(sim, base.model.base, {})
     out = []
     for node, ratio in sim.ratios.items():
         if ratio == 0.0:
             continue
         for axis, values in axes(measures, node, ratio).items():
-            out.append(_fitted(base, Jraw, start, measures, node, axis, values))
+            out.append(_fitted(about, measures, node, axis, values))
     return sorted(out, key=lambda f: -f.gain)
 
 
 def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
     """Values (n,) of each axis at a body."""
     sim = m.sim
-    x, dt = m.way * ratio, sim.record.dt
+    x = m.way * ratio
     out = {
-        "velocity": np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH / dt)) + 1), dt),
+        "velocity": speed(x, sim.record.dt),
         "position": x,
         "time": sim.record.t - sim.record.t[0],
     }
@@ -66,10 +63,8 @@ def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
     return out
 
 
-def _fitted(
-    base: Fitted, Jraw: np.ndarray, start: np.ndarray, m: Measures, node: str, axis: str, values: np.ndarray
-) -> Free:
-    like, sim = base.like, base.like.sim
+def _fitted(about: Linear, m: Measures, node: str, axis: str, values: np.ndarray) -> Free:
+    base, like, sim = about.base, about.like, about.like.sim
     low, high = np.quantile(values, (1e-3, 1.0 - 1e-3))
     knots = np.unique(spaced(np.sort(values), low, high, HATS))
     at, own = sim.layout.coordinate(node), sim.layout.ratio(node, base.model.base)
@@ -78,20 +73,20 @@ def _fitted(
     def column(hat: np.ndarray) -> np.ndarray:
         forces = np.zeros((len(values), sim.layout.nq))
         forces[:, at] = own * unit * np.interp(values, knots, hat)
-        return np.asarray(like.of_readings(sim.pushed(forces).run(base.model, n=like.rows[1], coarse=True)) - start)
+        out = sim.pushed(forces).run(base.model, n=like.rows[1], coarse=True)
+        return np.asarray(like.of_readings(out) - about.start)
 
     C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2)
-    C = np.where(np.isfinite(C), C, 0.0)
-    W, white, r = like.filtered(Jraw), like.filtered(C), like.white(base.e)
+    white, r = like.filtered(C), like.white(base.e)
     n, k = len(base.x), C.shape[2]
-    M = np.hstack([W, white])
-    weight = np.concatenate([prior(base.space), np.full(k, 1.0 / 9.0)])
+    M = np.hstack([about.white, white])
+    weight = np.concatenate([about.weight, np.full(k, 1.0 / 9.0)])
     H = M.T @ M + np.diag(weight)
     x = np.concatenate([base.x, np.zeros(k)])
     low_x, high_x = base.space.bounds()
     bounds = np.concatenate([low_x, np.full(k, -1e3)]), np.concatenate([high_x, np.full(k, 1e3)])
-    dx = bounded_step(H, M.T @ r + weight * x, x, *bounds, 1e-9)
-    e = base.e + np.tensordot(Jraw, dx[:n], axes=1) + np.tensordot(C, dx[n:], axes=1)
+    dx = bounded_step(H, M.T @ r + weight * x, x, *bounds, DAMPING)
+    e = about.left(dx, C)
     inner = base.power * (M.T @ M) + np.diag(weight)
     volume = np.linalg.slogdet(inner)[1] - np.sum(np.log(weight))
     if n:

@@ -1,7 +1,6 @@
 """Hypotheses of a recording: each term of the library at each element of the machine where it can stand."""
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -13,7 +12,6 @@ from rtctl.diagnose.hints import MOST, ORDERS, jumps, peaks, seen, spectrum, spo
 from rtctl.diagnose.hypotheses import parts_of, searched, starts_of
 from rtctl.diagnose.space import Hypothesis
 from rtctl.idiom import Settings
-from rtctl.plants.graph.elements import elements
 from rtctl.plants.physics import TERMS, nodes, standing
 
 QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it shows
@@ -26,9 +24,8 @@ def hypotheses(
     sim: Simulator, model: GraphModel, hints: dict[str, list] | None = None, beside: Sequence[Settings] = ()
 ) -> list[Hypothesis]:
     """All of them for this machine, one for each start."""
-    there = elements(sim.layout)
+    there = sim.elements
     measures = Measures(sim, model.base, hints or {})
-    measures.record = SimpleNamespace(plant=there, dt=sim.record.dt)  # type: ignore[attr-defined]
     known = set(sim.kernel.names)
     dry_too = {str(getattr(s, "node", "")) for s in beside if TERMS[str(getattr(s, "term", ""))].friction == "dry"}
     out: list[Hypothesis] = []

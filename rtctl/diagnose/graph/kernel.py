@@ -14,8 +14,7 @@ import numpy as np
 from rtctl.diagnose.kernel import SLOTS, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
-from rtctl.plants import linear
-from rtctl.plants.graph.params import Q, U, Y
+from rtctl.plants.graph.params import Q
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
@@ -208,6 +207,3 @@ def fill_slot(kern: Kernel, slot: Any, settings: Any, place: Any, h: float) -> N
     slot["kind"] = kern.names.index(term.name) + 1
     slot["node"], slot["link"], slot["channel"], slot["factor"] = place
     fill_record(slot[field(term.name)], term.build(settings, h))
-
-
-__all__ = ["JOB", "OPEN", "TRACK", "U", "Y", "fill_slot", "kernel", "linear"]

@@ -7,6 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.graph.model import rigid
 from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.plants.element import Element
 from rtctl.plants.graph.layout import NOWHERE
 from rtctl.plants.physics import TERMS
 
@@ -29,6 +30,13 @@ class Scales(NamedTuple):
         return self.low + self.span * (1.0 - share if self.sign < 0.0 else share)
 
 
+class Seen(NamedTuple):
+    """What the starts of a search ask of a recording (rtctl.diagnose.hypotheses)."""
+
+    plant: tuple[Element, ...]
+    dt: float  # s
+
+
 class Measures:
     """Measures by name and node, from the main sensor, the ratios of the joints and the recorded commands."""
 
@@ -37,7 +45,7 @@ class Measures:
         self.machine, self.layout = sim.case.machine, sim.layout
         self.way = way(sim)
         dt = sim.record.dt
-        v = np.gradient(uniform_filter1d(self.way, 2 * max(1, round(SMOOTH / dt)) + 1), dt)
+        v = speed(self.way, dt)
         moving = np.abs(v) > 0.02 * np.abs(v).max(initial=LITTLE)
         self.v_main = float(np.sqrt(np.mean(v[moving] ** 2))) if moving.any() else LITTLE
         self.a_main = float(np.std(np.gradient(v, dt)))
@@ -45,6 +53,7 @@ class Measures:
         self.u = sim.volts - np.median(sim.volts, axis=0)
         self.effort = self._effort()
         self.term = ""
+        self.record = Seen(sim.elements, dt)
 
     def _effort(self) -> float:
         """Rms of what all drives make at the main body, N or Nm."""
@@ -181,6 +190,11 @@ class Measures:
         """The highest value that the term's settings allow."""
         bounds = TERMS[self.term].settings.model_fields[parameter].metadata
         return float(min((b.le for b in bounds if hasattr(b, "le")), default=np.inf))
+
+
+def speed(x: np.ndarray, dt: float) -> np.ndarray:
+    """Rate (n,) of a position, over a few ticks."""
+    return np.asarray(np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH / dt)) + 1), dt))
 
 
 def way(sim: Simulator) -> np.ndarray:

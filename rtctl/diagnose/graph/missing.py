@@ -8,13 +8,11 @@ Source: Ohnishi, Shibata & Murakami, Motion control for advanced mechatronics, I
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.hypotheses import faster
 from rtctl.diagnose.graph.likelihood import settled
-from rtctl.diagnose.graph.measures import SMOOTH, way
+from rtctl.diagnose.graph.measures import speed, way
 from rtctl.diagnose.graph.model import GraphModel, rigid
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.words import body_of, here
@@ -96,11 +94,10 @@ class Missing:
     def abscissa(self, axis: str, node: str) -> tuple[np.ndarray, str, str]:
         """Values (n,) of an axis, its words and unit."""
         record, body = self.d.record, self.node_body(node)
-        x, dt = way(self.sim) * self.sim.ratios[body], record.dt
+        x = way(self.sim) * self.sim.ratios[body]
         turns, at = self.machine.turns(body), here(self.machine, body)
         if axis == "velocity":
-            v = np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH / dt)) + 1), dt)
-            return v, f"speed of {at}", DIMENSIONS["speed"][not turns]
+            return speed(x, record.dt), f"speed of {at}", DIMENSIONS["speed"][not turns]
         if axis == "angle" and turns:
             return np.degrees(np.mod(x, 2 * np.pi)), f"angle of {at}", "degrees"
         if axis in ("position", "angle"):
@@ -121,7 +118,7 @@ class Missing:
 
     def unnamed(self) -> GraphModel:
         """The model beside which the force without a name was found."""
-        return source_of(self.d).model
+        return self.d.decided.beside.model
 
     def _models(self, term: str, node: str) -> tuple[GraphModel, GraphModel]:
         if not term:
@@ -143,15 +140,6 @@ class Missing:
         least = dict(zip(self.sim.channels, self.d.found.like.least, strict=True))
         best = max(others, key=lambda n: change[n] / least[n])
         return best if change[best] / least[best] > CLEARER * change[self.sim.main] / least[self.sim.main] else None
-
-
-def source_of(d: GraphDiagnosis) -> Fitted:
-    """The fitted model beside which the free force of a verdict was found; the best where there is none."""
-    free, best, base = d.decided.unlisted, d.decided.best, d.found.base
-    if free is None:
-        return base
-    loss = free.gain + best.like.loss(free.e)  # a free force keeps what it gained over the model beside which it stood
-    return min((best, base), key=lambda f: abs(f.loss - loss))
 
 
 def subjects(d: GraphDiagnosis) -> list[tuple[str, str, str]]:

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.missing import source_of
 from rtctl.diagnose.graph.verdict import UNLISTED, evidence
 from rtctl.diagnose.graph.words import called, here
 
@@ -24,7 +23,7 @@ def rivals(d: GraphDiagnosis) -> list[Bar]:
     found, free, machine = d.found, d.decided.unlisted, d.record.case.machine
     entries: list[tuple[tuple[str, ...], str, float]] = [(f.names, "", found.merit(f)) for f in found.fits]
     if free is not None:
-        beside = source_of(d)
+        beside = d.decided.beside
         merit = found.merit(beside) + evidence(beside, free) - UNLISTED
         words = f"a force without a name at {here(machine, free.node)}, by {free.axis}"
         if beside.names:

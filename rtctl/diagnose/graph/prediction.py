@@ -28,14 +28,19 @@ def predict(base: Fitted, best: Fitted) -> Heldout:
     begin, end = like.rows
     cut = end - round(HELD * (end - begin))
     first, late = like.during(begin, cut), like.during(cut, end)
-    spread = np.std(like.target[begin:end], axis=0)
+    models = [
+        f.space.model(refit(first, f.space, f.x, rounds=6).x) if f.space.names or f.space.hypotheses else f.model
+        for f in (base, best)
+    ]
+    return judged(like, late, (models[0], models[1]), (begin, cut))
+
+
+def judged(
+    whole: Likelihood, late: Likelihood, models: tuple[GraphModel, GraphModel], rows: tuple[int, int]
+) -> Heldout:
+    """Errors of the base and the best model on the rows of `late`, by the spread of each sensor on those of `whole`."""
+    spread = np.std(whole.target[slice(*whole.rows)], axis=0)
     spread = np.where(spread > 0.0, spread, 1.0)
-    errors, models = [], []
-    for f in (base, best):
-        x = refit(first, f.space, f.x, rounds=6).x if f.space.names or f.space.hypotheses else f.x
-        models.append(f.space.model(x))
-        e = late.raw(models[-1])
-        errors.append(float(np.sqrt(np.mean((np.sqrt(np.mean(e**2, axis=0)) / spread) ** 2))))
-    least = like.least * np.sqrt(like.mean) / spread
-    floor = float(np.sqrt(np.mean(least**2)))
-    return Heldout(errors[0], errors[1], min(floor, errors[1]), (begin, cut), (models[0], models[1]), late)
+    before, after = (float(np.sqrt(np.mean(np.mean(late.raw(m) ** 2, axis=0) / spread**2))) for m in models)
+    floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
+    return Heldout(before, after, min(floor, after), rows, models, late)

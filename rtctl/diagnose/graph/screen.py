@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.fit import bounded_step, parallel
-from rtctl.diagnose.graph.fits import Fitted, prior
+from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis
 
 TRIES = 3
@@ -33,32 +34,27 @@ class Score(NamedTuple):
 
 
 class Screened(NamedTuple):
-    """Scores, best first, and the likelihood under the noise of what no hypothesis explains."""
+    """Scores, best first, and the model about which they hold, under the noise of what no hypothesis explains."""
 
     scores: list[Score]
-    floor: Likelihood
-    Jraw: np.ndarray  # (blocks, sensors, unknowns of the base)
+    about: Linear
 
-    def starts(self, base: Fitted, score: Score, most: int) -> list[np.ndarray]:
+    def starts(self, score: Score, most: int) -> list[np.ndarray]:
         """Places (unknowns of the base and the hypothesis) to fit from: sizes far from what a secant says as well, the
         base moved along with each; the best first."""
-        h, like = score.hypothesis, base.like
+        about, h = self.about, score.hypothesis
+        base, like = about.base, about.base.like
         space = base.space.add(h)
         sizes = np.array([c.kind in (SIZE, INVERSE) for c in h.coordinates], bool)
         xs = [score.x, *(np.where(sizes, k * score.x, score.x) for k in (FACTORS if sizes.any() else ()))]
         low, high = space.bounds()
-        weight = prior(base.space)
-        W = self.floor.filtered(self.Jraw)
-        A = W.T @ W + np.diag(weight)
         n = len(base.x)
-        start = like.raw(base.model, True)
 
         def placed(x: np.ndarray) -> tuple[float, np.ndarray]:
             at = np.clip(np.concatenate([base.x, x]), low, high)
-            e = base.e + like.raw(space.model(at), True) - start
-            slope = W.T @ self.floor.white(e) + weight * base.x
-            dx = bounded_step(A, slope, base.x, low[:n], high[:n], 1e-9)
-            return like.loss(e + np.tensordot(self.Jraw, dx, axes=1)), np.concatenate([base.x + dx, at[n:]])
+            e = base.e + like.raw(space.model(at), True) - about.start
+            dx = about.step(e)
+            return like.loss(e + np.tensordot(about.raw, dx, axes=1)), np.concatenate([base.x + dx, at[n:]])
 
         found = sorted(parallel([partial(placed, x) for x in xs]), key=lambda pair: pair[0])
         return [x for _, x in found[:most]]
@@ -75,38 +71,28 @@ class Screened(NamedTuple):
 
 def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     """Scores of all candidates."""
-    like = base.like
-    Jraw = raw_jacobian(base)
-    start = like.raw(base.model, True)
-    changes = parallel([partial(_change, base, start, h) for h in candidates])
-    like = floor_noise(base, Jraw, [change for found in changes for change, _ in found])
-    weight = prior(base.space)
-    W, r = like.filtered(Jraw), like.white(base.e)
-    A = W.T @ W + np.diag(weight)
-    slope = W.T @ r + weight * base.x
-    found = [
-        _solved(base, like, h, change, W, A, slope, r) for h, change in zip(candidates, changes, strict=True) if change
-    ]
-
-    def judged(score: Score, dx: np.ndarray, C: np.ndarray) -> Score:
-        n = len(base.x)
-        e = base.e + np.tensordot(Jraw, dx[:n], axes=1) + np.tensordot(C, dx[n:], axes=1)
-        return score._replace(gain=base.loss - like.loss(e))
-
-    out = parallel([partial(judged, *one) for one in found])
-    return Screened(sorted(out, key=lambda s: -s.gain), like, Jraw)
+    own = Linear(base)
+    changes = parallel([partial(_change, base, own.start, h) for h in candidates])
+    about = own.under(floor_noise(own, [change for found in changes for change, _ in found]))
+    r = about.like.white(base.e)
+    slope = about.slope(r)
+    scores = parallel(
+        [partial(_score, about, h, change, r, slope) for h, change in zip(candidates, changes, strict=True)]
+    )
+    return Screened(sorted(scores, key=lambda s: -s.gain), about)
 
 
-def floor_noise(base: Fitted, Jraw: np.ndarray, changes: list[np.ndarray]) -> Likelihood:
+def floor_noise(about: Linear, changes: list[np.ndarray]) -> Likelihood:
     """The likelihood with the noise of what neither a parameter nor any hypothesis explains.
 
     A noise that is estimated under the base alone holds a large effect for noise.
     """
+    base = about.base
     least = base.like.least
     columns = np.stack(changes, axis=2) if changes else np.zeros((*base.e.shape, 0))
     own = np.linalg.norm(columns / least[:, None], axis=(0, 1))
     columns = columns[:, :, own > 0.0]
-    M = np.concatenate([Jraw, columns], axis=2) / least[:, None]
+    M = np.concatenate([about.raw, columns], axis=2) / least[:, None]
     M = M.reshape(-1, M.shape[2])
     size = np.linalg.norm(M, axis=0)
     M = M[:, size > 0.0] / size[size > 0.0]
@@ -115,20 +101,6 @@ def floor_noise(base: Fitted, Jraw: np.ndarray, changes: list[np.ndarray]) -> Li
     A[np.diag_indices_from(A)] += RIDGE
     left = (e - M @ np.linalg.solve(A, M.T @ e)).reshape(base.e.shape) * least
     return base.like.told(left)
-
-
-def raw_jacobian(base: Fitted) -> np.ndarray:
-    """Derivatives (blocks, sensors, unknowns) of the residual."""
-    like, space = base.like, base.space
-    start, steps, high = like.raw(base.model, True), space.steps(), space.bounds()[1]
-
-    def column(i: int) -> np.ndarray:
-        x, step = base.x.copy(), steps[i] if base.x[i] + steps[i] <= high[i] else -steps[i]
-        x[i] += step
-        return np.asarray((like.raw(space.model(x), True) - start) / step)
-
-    columns = parallel([partial(column, i) for i in range(len(base.x))])
-    return np.stack(columns, axis=2) if columns else np.zeros((*base.e.shape, 0))
 
 
 def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.ndarray, float]]:
@@ -143,8 +115,6 @@ def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.nda
             if i >= 0:
                 at[i] += step
             change = like.raw(space.model(np.concatenate([base.x, at])), True) - start
-            if not np.isfinite(change).all():
-                return []
             size = float(np.linalg.norm(like.white(change)))
             if size <= TOO_FAR * own or i < 0 or h.coordinates[i].kind == INVERSE:
                 break
@@ -153,23 +123,17 @@ def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.nda
     return out
 
 
-def _solved(
-    base: Fitted,
-    like: Likelihood,
-    h: Hypothesis,
-    changes: list,
-    W: np.ndarray,
-    A: np.ndarray,
-    slope: np.ndarray,
-    r: np.ndarray,
-) -> tuple[Score, np.ndarray, np.ndarray]:
-    """Score of a hypothesis under the noise of the base, the step of all unknowns and its raw directions."""
+def _score(
+    about: Linear, h: Hypothesis, changes: list[tuple[np.ndarray, float]], r: np.ndarray, slope: np.ndarray
+) -> Score:
+    """Score of a hypothesis, solved for beside the parameters; r are the innovations of the base, `slope` is theirs."""
+    base, like = about.base, about.like
     n, k = len(base.x), len(changes)
     C = np.stack([change / step for change, step in changes], axis=2)
     white = like.filtered(C)
-    cross = W.T @ white
+    cross = about.white.T @ white
     own = white.T @ white
-    full = np.block([[A, cross], [cross.T, own + np.eye(k) / 9.0]])
+    full = np.block([[about.H, cross], [cross.T, own + np.eye(k) / 9.0]])
     low, high = base.space.bounds()
     x = np.concatenate([base.x, np.zeros(k)])
     if h.sizes:
@@ -178,13 +142,14 @@ def _solved(
     else:
         lows, highs = np.zeros(k), np.ones(k)
     whole = np.concatenate([slope, white.T @ r])
-    dx = bounded_step(full, whole, x, np.concatenate([low, lows]), np.concatenate([high, highs]), 1e-9)
+    dx = bounded_step(full, whole, x, np.concatenate([low, lows]), np.concatenate([high, highs]), DAMPING)
     if not h.sizes:  # it is there or not
         dx[n:] = 1.0
-    gain = -(whole @ dx + 0.5 * dx @ full @ dx)
+    power = -(whole @ dx + 0.5 * dx @ full @ dx)
     at = h.start()
     for i, value in zip(h.sizes, dx[n:], strict=False):
         at[i] += value
+    A = about.H
     alone = np.linalg.solve(A + 1e-9 * np.diag(np.diag(A)) + 1e-300 * np.eye(n), cross) if n else cross[:0]
     norm = float(np.sqrt(max(own[0, 0] - (cross[:, 0] @ alone[:, 0] if n else 0.0), 0.0)))
-    return Score(h, float(gain), float(gain), at, norm), dx, C
+    return Score(h, base.loss - like.loss(about.left(dx, C)), float(power), at, norm)

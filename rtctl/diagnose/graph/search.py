@@ -3,7 +3,7 @@
 Source: beam search over forward steps, with removal and exchange of each effect at the end.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
@@ -42,7 +42,7 @@ class Found(NamedTuple):
 
     def merit(self, f: Fitted) -> float:
         """Logarithm of the posterior, up to a constant."""
-        return f.log_evidence - self.odds * len(f.space.hypotheses) - f.seldom
+        return merit_of(f, self.odds)
 
     @property
     def best(self) -> Fitted:
@@ -57,10 +57,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     progress("screening every hypothesis")
     looked, odds = screened(base)
     known: dict[tuple[str, ...], Fitted] = {(): base}
-
-    def merit(f: Fitted) -> float:
-        return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
-
+    merit = partial(merit_of, odds=odds)
     beam, first = [base], looked
     for level in range(MOST):
         grown: list[Fitted] = []
@@ -73,20 +70,24 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
             break
         better.sort(key=merit, reverse=True)
         beam = [f for f in better if merit(f) > merit(better[0]) - FAR][:BEAM]
-        beam[0] = known[key(beam[0])] = restarted(enriched(beam[0]))
+        beam[0] = known[key(beam[0].names)] = restarted(enriched(beam[0]))
     progress("exchanging each effect")
     best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
-    for index in range(len(best.space.hypotheses)):
-        rest = refit(like, *without(best, index)) if len(best.names) > 1 else base
-        known.setdefault(key(rest), rest)
-        if len(best.names) > 1:
-            step(like, rest, screened(rest)[0], known, NAMES[-1])
+    for index in range(len(best.names) if len(best.names) > 1 else 0):
+        rest = refit(like, *without(best, index))
+        known.setdefault(key(rest.names), rest)
+        step(like, rest, screened(rest)[0], known, NAMES[-1])
     progress("asking for other forms of what was found")
     best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
     if best.names:
-        known[key(best)] = enriched(best)
+        known[key(best.names)] = enriched(best)
     standing = [f for f in known.values() if stands(base, f, known, merit)]
     return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
+
+
+def merit_of(f: Fitted, odds: float) -> float:
+    """Logarithm of the posterior of a combination, up to a constant; `odds` are those of one effect at one place."""
+    return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
 
 
 def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], float]) -> bool:
@@ -102,7 +103,7 @@ def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit:
         return True
     if len(f.names) == 1:
         return merit(f) > merit(base) + ENOUGH
-    rest = (tuple(sorted(set(f.names) - {name})) for name in f.names)
+    rest = (key(set(f.names) - {name}) for name in f.names)
     return all(adds(base, known[names], f, merit) for names in rest if names in known)
 
 
@@ -129,29 +130,27 @@ def step(
             top.setdefault(score.hypothesis.name, []).append(score)
     out = []
     for rank, chosen in enumerate(top.values()):
-        if tuple(sorted((*parent.names, chosen[0].hypothesis.name))) in known:
-            out.append(known[tuple(sorted((*parent.names, chosen[0].hypothesis.name)))])
+        names = key((*parent.names, chosen[0].hypothesis.name))
+        if names in known:
+            out.append(known[names])
             continue
         scores = chosen[: STARTS if rank < FIRST else 1]
         fits = [
-            refit(like, parent.space.add(s.hypothesis), x, floor=looked.floor)
+            refit(like, parent.space.add(s.hypothesis), x, floor=looked.about.like)
             for s in scores
-            for x in looked.starts(parent, s, STARTS if rank < FIRST else 1)
+            for x in looked.starts(s, STARTS if rank < FIRST else 1)
         ]
         best = max(fits, key=lambda f: f.log_evidence)
-        known[key(best)] = best
+        known[names] = best
         out.append(best)
     return out
 
 
-def key(f: Fitted) -> tuple[str, ...]:
+def key(names: Iterable[str]) -> tuple[str, ...]:
     """The names of a combination, in alphabetical order."""
-    return tuple(sorted(f.names))
+    return tuple(sorted(names))
 
 
 def _parent(f: Fitted, beam: list[Fitted]) -> Fitted:
     inside = [p for p in beam if set(p.names) <= set(f.names)]
     return max(inside, key=lambda p: p.log_evidence)
-
-
-__all__ = ["Found", "partial", "search"]

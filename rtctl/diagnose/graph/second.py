@@ -2,14 +2,12 @@
 
 from pathlib import Path
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.likelihood import Likelihood
-from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.graph.prediction import Heldout
+from rtctl.diagnose.graph.prediction import judged
 from rtctl.diagnose.graph.record import GraphRecord, load_record
 from rtctl.diagnose.graph.simulate import Simulator
 
@@ -21,8 +19,9 @@ def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
     """
     record = load_record(other)
     check_same(d.record, record)
+    like = Likelihood(Simulator(record))
     with threadpool_limits(1):
-        return d._replace(heldout=errors(record, d.found.base.model, d.decided.best.model))
+        return d._replace(heldout=judged(like, like, (d.found.base.model, d.decided.best.model), like.rows))
 
 
 def check_same(first: GraphRecord, second: GraphRecord) -> None:
@@ -39,14 +38,3 @@ def check_same(first: GraphRecord, second: GraphRecord) -> None:
             f"{second.case.file}: the recording shows {', '.join(second.y)}, and the first {', '.join(first.y)}; "
             "a second recording has the same sensors"
         )
-
-
-def errors(record: GraphRecord, base: GraphModel, best: GraphModel) -> Heldout:
-    """Errors of two models under the tracking observer, by the spread of each sensor, on all rows of a record."""
-    like = Likelihood(Simulator(record))
-    begin, end = like.rows
-    spread = np.std(like.target[begin:end], axis=0)
-    spread = np.where(spread > 0.0, spread, 1.0)
-    found = [float(np.sqrt(np.mean(np.mean(like.raw(m) ** 2, axis=0) / spread**2))) for m in (base, best)]
-    floor = float(np.sqrt(np.mean(like.least**2 * like.mean / spread**2)))
-    return Heldout(found[0], found[1], min(floor, found[1]), (begin, end), (base, best), like)

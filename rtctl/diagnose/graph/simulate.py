@@ -13,8 +13,8 @@ import numpy as np
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.case import START
-from rtctl.diagnose.graph.kernel import OPEN, TRACK
-from rtctl.diagnose.graph.model import GraphModel, nominal, rigid
+from rtctl.diagnose.graph.kernel import TRACK
+from rtctl.diagnose.graph.model import GraphModel, rigid
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
@@ -55,7 +55,6 @@ class Simulator:
         self.lead = round(LEAD / record.dt) if flexible else 0
         self.release = NEVER
         self.ratios = rigid(self.layout, record.case.values, str(self.body))
-        self._p: dict[int, np.dtype] = {}
 
     def _forces(self, by_body: np.ndarray | None) -> np.ndarray:
         if by_body is None:
@@ -77,12 +76,6 @@ class Simulator:
         """The same with forces (n, coordinates) on top of the measured ones."""
         other = copy(self)
         other.forces = np.ascontiguousarray(forces if len(self.forces) < 2 else self.forces + forces)
-        return other
-
-    def commanded(self, volts: np.ndarray) -> "Simulator":
-        """The same with other commands (n, drives)."""
-        other = copy(self)
-        other.volts = np.ascontiguousarray(volts)
         return other
 
     def finer(self, times: int) -> "Simulator":
@@ -187,11 +180,3 @@ _dtypes: dict[type, np.dtype] = {}
 
 def _dtype(params: Any) -> np.dtype:
     return _dtypes.setdefault(type(params), record_dtype(params))
-
-
-def simulator(record: GraphRecord) -> tuple[Simulator, GraphModel]:
-    """Simulator and nominal model of a record."""
-    return Simulator(record), nominal(record.case)
-
-
-__all__ = ["OPEN", "TRACK", "Simulator", "simulator"]

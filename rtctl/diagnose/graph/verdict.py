@@ -26,6 +26,7 @@ class Verdict(NamedTuple):
     rivals: tuple[tuple[tuple[str, float], ...], ...]  # of each effect: term:node in its place, probability
     probabilities: tuple[tuple[tuple[str, ...], float], ...]  # of combinations, best first
     unlisted: Free | None  # the free force that explains most of what no name explains
+    beside: Fitted  # the model beside which it stands
     why: str  # one sentence
 
 
@@ -38,28 +39,31 @@ def verdict(found: Found) -> Verdict:
     top = strongest(base, free)
     if not best.names or explained(base, best) < HARDLY:
         if top is not None and evidence(base, top) - UNLISTED > WORTH:
-            return Verdict(UNNAMED, base, (), (), ranked, top, f"a force at {top.node} by {top.axis} has no name")
-        return Verdict(NOTHING, base, (), (), ranked, top, "no effect is worth its numbers")
+            return Verdict(UNNAMED, base, (), (), ranked, top, base, f"a force at {top.node} by {top.axis} has no name")
+        return Verdict(NOTHING, base, (), (), ranked, top, base, "no effect is worth its numbers")
     beside = free_forces(best)
     left = strongest(best, beside)
     gained = base.loss - best.loss
-    unlisted = None
-    why = ""
+    unlisted, source, why = None, base, ""
     if left is not None and evidence(best, left) - UNLISTED > WORTH and left.gain > FORM * gained:
-        unlisted, why = left, f"beside {', '.join(best.names)} a force at {left.node} by {left.axis} is left"
+        unlisted, source, why = (
+            left,
+            best,
+            f"beside {', '.join(best.names)} a force at {left.node} by {left.axis} is left",
+        )
     elif explained(base, best) < MOSTLY:
-        unlisted = left if left is not None else top
+        unlisted, source = (left, best) if left is not None else (top, base)
         why = f"{', '.join(best.names)} takes off {100 * explained(base, best):.0f} % of what is missing"
     elif top is not None and evidence(base, top) - UNLISTED > found.merit(best) - found.merit(base):
         unlisted, why = top, f"a free force at {top.node} by {top.axis} explains more than any name"
-    if unlisted is not None or why:
-        return Verdict(UNNAMED, best, (), (), ranked, unlisted, why)
+    if why:
+        return Verdict(UNNAMED, best, (), (), ranked, unlisted, source, why)
     confidence = tuple(
         float(sum(w for f, w in zip(found.fits, weights, strict=True) if holds(f, name))) for name in terms(best)
     )
     rivals = tuple(_rivals(found, weights, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
-    return Verdict(kind, best, confidence, rivals, ranked, top, "")
+    return Verdict(kind, best, confidence, rivals, ranked, top, base, "")
 
 
 def posterior(found: Found) -> np.ndarray:

@@ -6,12 +6,11 @@ from typing import Any
 from rtctl.diagnose.diagnosis import Effect
 from rtctl.diagnose.graph.case import START
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.numbers import both, nice, percent
+from rtctl.diagnose.numbers import both, nice
 from rtctl.diagnose.quantities import DIMENSIONS
-from rtctl.diagnose.words import BY_NODE, noun, phrase_of
+from rtctl.diagnose.words import BY_NODE, Slots, harmonics, noun, phrase_of
 from rtctl.plants.graph.description import Description
 from rtctl.plants.physics import TERMS
-from rtctl.plants.physics.search import Turn
 
 
 def here(machine: Description, node: str) -> str:
@@ -69,37 +68,14 @@ def value_unit(machine: Description, path: str) -> str:
     return ""
 
 
-class _Slot:
-    def __init__(self, slots: "_Slots", name: str):
-        self.slots, self.name = slots, name
-
-    def __format__(self, form: str) -> str:
-        s, name = self.slots, self.name
-        if form == "words":
-            return s.said(name)
-        value = s.value(name)
-        if "|" in form:
-            return form.split("|")[int(value < 0)]
-        if form == "%":
-            return percent(abs(value))
-        if form == "g":
-            return f"{value:.3g}"
-        if form == "+":
-            return nice(value, s.unit(name))
-        return nice(abs(value) if form == "" else value, s.unit(name), int(form or 2))
-
-
-class _Slots(dict):
+class Sizes:
     """The numbers of an effect, by the names that its phrase uses."""
 
     def __init__(self, machine: Description, effect: Effect, model: GraphModel):
-        super().__init__(here=here(machine, effect.node))
+        self.here = here(machine, effect.node)
         self.machine, self.effect, self.model = machine, effect, model
         terms: list[Any] = list(model.terms)
         self.term: Any = next((t for t in terms if (t.term, t.node) == (effect.name, effect.node)), None)
-
-    def __missing__(self, name: str) -> _Slot:
-        return _Slot(self, name)
 
     def value(self, name: str) -> float:
         """SI value; nan where nobody knows it."""
@@ -125,10 +101,7 @@ class _Slots(dict):
             forms = phrase.forms
             return forms.get(str(getattr(self.term, "form", "")), forms.get("", "")).format(command="command")
         if name == "harmonics":
-            stem = next((p.amplitude for p in TERMS[self.effect.name].search if isinstance(p, Turn)), "")
-            found = [(f"{stem}{n}", w) for n, w in ((2, "twice"), (3, "three times")) if self.value(f"{stem}{n}") > 0]
-            again = phrase.again if phrase else ""
-            return "".join(f", {nice(self.value(k), self.unit(k))} {w}{again}" for k, w in found)
+            return harmonics(self.effect.name, self)
         if name == "jumps":
             return f"it jumps by {nice(abs(self.value('size')), self.unit('size'))}"
         return ""
@@ -139,7 +112,7 @@ def clause(machine: Description, effect: Effect, model: GraphModel) -> str:
     phrase = phrase_of(effect.name)
     if phrase is None:
         return f"{here(machine, effect.node)} shows {effect.name}"
-    slots = _Slots(machine, effect, model)
+    slots = Slots(Sizes(machine, effect, model))
     return f"{phrase.head.format_map(slots)}: {phrase.detail.format_map(slots)}"
 
 

@@ -14,7 +14,7 @@ from rtctl.plants.graph.file import Believed
 from rtctl.plants.graph.units import measured_unit
 from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
 from rtctl.trace.imports.counters import unwrapped
-from rtctl.trace.imports.make import SUFFIXES, Imported, clock_of, times_of, whole
+from rtctl.trace.imports.make import SUFFIXES, Imported, clock_of, one_length, times_of, whole
 from rtctl.trace.imports.plan import ColumnPlan, Plan
 from rtctl.trace.imports.table import Table
 from rtctl.trace.part import refuse_taken
@@ -184,16 +184,7 @@ def _signals(
         else:
             values = _converted(table, given.column, values, theirs, want, notes)
         columns[name] = values
-    lengths = {name: len(values) for name, values in columns.items()}
-    first = next(iter(columns))
-    for name, length in lengths.items():
-        if length != lengths[first]:
-            raise UserError(
-                f"{table.path}: column '{chosen[name].column}' has {length} rows where '{chosen[first].column}' has "
-                f"{lengths[first]}; map columns of one recording"
-            )
-    if not lengths[first]:
-        raise UserError(f"{table.path} holds no rows")
+    one_length(table, columns, chosen)
     if assumed:
         notes.append(f"no unit is given: {', '.join(assumed)} assumed")
     return columns, notes

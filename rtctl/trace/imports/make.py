@@ -1,6 +1,6 @@
 """Makes a bundle of a table and a plan: SI units, an even clock, finite numbers, and a case of what is believed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -135,19 +135,24 @@ def _signals(
             values, wrapped = unwrapped(name, values, per_turn(plan.case))
             notes += [wrapped] if wrapped else []
         columns[name], units[name] = values, ours
+    one_length(table, columns, wanted)
+    if assumed:
+        notes.append(f"no unit is given: {', '.join(assumed)} assumed")
+    return columns, units, notes
+
+
+def one_length(table: Table, columns: dict[str, np.ndarray], origin: Mapping[str, ColumnPlan]) -> None:
+    """Raise UserError where columns are of several lengths, or hold no rows; `origin` has the mapping of each."""
     lengths = {name: len(values) for name, values in columns.items()}
     first = next(iter(columns))
     for name, length in lengths.items():
         if length != lengths[first]:
             raise UserError(
-                f"{table.path}: column '{wanted[name].column}' has {length} rows where '{wanted[first].column}' has "
+                f"{table.path}: column '{origin[name].column}' has {length} rows where '{origin[first].column}' has "
                 f"{lengths[first]}; map columns of one recording"
             )
     if not lengths[first]:
         raise UserError(f"{table.path} holds no rows")
-    if assumed:
-        notes.append(f"no unit is given: {', '.join(assumed)} assumed")
-    return columns, units, notes
 
 
 def times_of(table: Table, column: str, theirs: str | None) -> np.ndarray:

@@ -10,9 +10,10 @@ import pyarrow.parquet as pq
 
 from rtctl.diagnose.graph.answer import diagnose_record
 from rtctl.diagnose.graph.case import read_case
+from rtctl.diagnose.graph.kernel import OPEN
 from rtctl.diagnose.graph.model import nominal, settings_of
 from rtctl.diagnose.graph.record import GraphRecord, record_of
-from rtctl.diagnose.graph.simulate import OPEN, Simulator
+from rtctl.diagnose.graph.simulate import Simulator
 
 RATE, SECONDS = 500.0, 4.0
 PENDULUM = {

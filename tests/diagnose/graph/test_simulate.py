@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from graph_cases import BELT, PENDULUM, RATE, blank, case_of, command, record
 
+from rtctl.diagnose.graph.kernel import OPEN
 from rtctl.diagnose.graph.model import nominal, rigid, settings_of
-from rtctl.diagnose.graph.simulate import OPEN, Simulator
+from rtctl.diagnose.graph.simulate import Simulator
 
 FREE = {**PENDULUM, "bodies": {"rod": {"inertia": 9.8e-3, "gravity": {"mass": 0.28, "arm": 0.17, "angle": 0.0}}}}
 
