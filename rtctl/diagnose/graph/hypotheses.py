@@ -43,8 +43,7 @@ def hypotheses(
                 or not stand.offered
                 or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
                 or (term.needs.compared and len(sim.channels) < 2)
-                or (term.falls_to and not rubs)
-                or (term.replaces and not rubs)
+                or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
             ):
                 continue
             out += starts_of(name, node, (term.sliding if slides else ()) or parts_of(name), measures)  # type: ignore[arg-type]

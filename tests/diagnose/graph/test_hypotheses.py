@@ -45,3 +45,12 @@ def test_order_of_a_ripple_is_hinted():
     sim = Simulator(record(case_of(BELT), command(0.6), [ripple]))
     found = hints(sim, nominal(sim.case), 100)["order:motor"]
     assert np.isclose(found[0], 4.0, atol=0.3)
+
+
+def test_friction_along_the_way_asks_for_dry_friction_that_it_alters():
+    def positions(dry):
+        parts = {**PENDULUM, "bodies": {"rod": {**PENDULUM["bodies"]["rod"], "dry": dry}}}
+        sim = Simulator(record(case_of(parts), command(4.0)))
+        return [h for h in hypotheses(sim, nominal(sim.case)) if h.term == "friction.position"]
+
+    assert positions(0.01) and not positions(0.0)
