@@ -18,7 +18,11 @@ from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.measures import Measures, speed
 from rtctl.diagnose.scales import spaced
 
-HATS = 10
+HATS = 10  # of a first look at each axis
+FINE = 30  # of the axes that explain most
+SECOND = 2  # axes that are looked at again
+SMOOTH = 0.25  # of the range: distance over which a free force is alike, by its prior
+SIZE = 0.3  # of the force that moves the node: standard deviation of a free force, by its prior
 TURNS = 1.5  # turns from which on an angle is another axis than the position
 
 
@@ -32,18 +36,26 @@ class Free(NamedTuple):
     volume: float  # ln of the posterior's volume over the prior's, nats
     knots: np.ndarray
     force: np.ndarray  # (hats,) N or Nm
+    prior: float  # half the square of its distance from zero, in standard deviations of the prior
 
 
 def free_forces(base: Fitted) -> list[Free]:
     """Free forces at every body along every axis, best first."""
     sim, about = base.like.sim, Linear(base)
     measures = Measures(sim, base.model.base, {})
-    out = []
+    places: dict[tuple[str, str], np.ndarray] = {}
+    taken: set[int] = set()
     for node, ratio in sim.ratios.items():
-        if ratio == 0.0:
-            continue
-        for axis, values in axes(measures, node, ratio).items():
-            out.append(_fitted(about, measures, node, axis, values))
+        at = sim.layout.coordinate(node)
+        if ratio != 0.0 and at not in taken:  # bodies that move as one feel one force
+            taken.add(at)
+            places |= {(node, axis): values for axis, values in axes(measures, node, ratio).items()}
+    places = {place: values for place, values in places.items() if np.ptp(values) > 0.0}
+    out = [_fitted(about, measures, *place, values, HATS) for place, values in places.items()]
+    out.sort(key=lambda f: -base.power * f.gain + f.volume)
+    for coarse in out[:SECOND]:
+        place = coarse.node, coarse.axis
+        out.append(_fitted(about, measures, *place, places[place], FINE))
     return sorted(out, key=lambda f: -f.gain)
 
 
@@ -63,12 +75,14 @@ def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
     return out
 
 
-def _fitted(about: Linear, m: Measures, node: str, axis: str, values: np.ndarray) -> Free:
+def _fitted(about: Linear, m: Measures, node: str, axis: str, values: np.ndarray, hats: int) -> Free:
     base, like, sim = about.base, about.like, about.like.sim
     low, high = np.quantile(values, (1e-3, 1.0 - 1e-3))
-    knots = np.unique(spaced(np.sort(values), low, high, HATS))
+    knots = np.unique(spaced(np.sort(values), low, high, hats))
     at, own = sim.layout.coordinate(node), sim.layout.ratio(node, base.model.base)
-    unit = 0.1 * m.of("force", node)
+    unit = SIZE * m.of("force", node)
+    apart = np.abs(np.subtract.outer(*[np.arange(len(knots)) / (len(knots) - 1)] * 2))
+    root = np.linalg.cholesky(np.exp(-apart / SMOOTH))  # of the prior's covariance (Ornstein and Uhlenbeck, 1930)
 
     def column(hat: np.ndarray) -> np.ndarray:
         forces = np.zeros((len(values), sim.layout.nq))
@@ -76,11 +90,11 @@ def _fitted(about: Linear, m: Measures, node: str, axis: str, values: np.ndarray
         out = sim.pushed(forces).run(base.model, n=like.rows[1], coarse=True)
         return np.asarray(like.of_readings(out) - about.start)
 
-    C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2)
+    C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2) @ root
     white, r = like.filtered(C), like.white(base.e)
     n, k = len(base.x), C.shape[2]
     M = np.hstack([about.white, white])
-    weight = np.concatenate([about.weight, np.full(k, 1.0 / 9.0)])
+    weight = np.concatenate([about.weight, np.ones(k)])
     H = M.T @ M + np.diag(weight)
     x = np.concatenate([base.x, np.zeros(k)])
     low_x, high_x = base.space.bounds()
@@ -91,4 +105,5 @@ def _fitted(about: Linear, m: Measures, node: str, axis: str, values: np.ndarray
     volume = np.linalg.slogdet(inner)[1] - np.sum(np.log(weight))
     if n:
         volume -= np.linalg.slogdet(inner[:n, :n])[1] - np.sum(np.log(weight[:n]))
-    return Free(node, axis, base.loss - like.loss(e), e, 0.5 * float(volume), knots, unit * dx[n:])
+    prior = 0.5 * float(weight @ (x + dx) ** 2 - weight[:n] @ base.x**2)
+    return Free(node, axis, base.loss - like.loss(e), e, 0.5 * float(volume), knots, unit * (root @ dx[n:]), prior)

@@ -79,14 +79,28 @@ class Likelihood:
         other.noise = [noise_of(e[:, c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
         return other
 
+    def flat(self, e: np.ndarray) -> "Likelihood":
+        """The same with white noise as loud as these residuals (blocks, sensors): least squares.
+
+        An autoregression holds a large effect for noise, so that a fit under it moves by events alone.
+        """
+        other = copy(self)
+        other.noise = [Noise(np.ones(1), max(float(np.std(e[:, c])), float(self.least[c]))) for c in range(e.shape[1])]
+        return other
+
     def loss(self, e: np.ndarray) -> float:
         """Negative logarithm of the likelihood of residuals under a noise of their own, up to a constant, nats."""
-        total = 0.0
+        return float(self.losses(e, 1)[0])
+
+    def losses(self, e: np.ndarray, count: int) -> np.ndarray:
+        """The same by segment of the rows (count,), nats: their sum is the loss."""
+        out = np.zeros(count)
         for c in range(e.shape[1]):
             own = noise_of(e[:, c], ORDER, float(self.least[c]))
             r = own.whiten(e[:, c])
-            total += len(r) * float(np.log(own.sigma)) + 0.5 * float(r @ r)
-        return total
+            segment = np.arange(own.order, len(e)) * count // len(e)
+            out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
+        return out
 
     def filtered(self, columns: np.ndarray) -> np.ndarray:
         """The same filters on many residuals at once (blocks, sensors, columns): (innovations, columns)."""

@@ -53,7 +53,7 @@ class Found(NamedTuple):
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
     """Fit the base, then what is missing beside it."""
     progress("fitting the nominal parameters")
-    base = refit(like, space)
+    base = restarted(refit(like, space))
     progress("screening every hypothesis")
     looked, odds = screened(base)
     known: dict[tuple[str, ...], Fitted] = {(): base}
@@ -136,7 +136,7 @@ def step(
             continue
         scores = chosen[: STARTS if rank < FIRST else 1]
         fits = [
-            refit(like, parent.space.add(s.hypothesis), x, floor=looked.about.like)
+            refit(like, parent.space.add(s.hypothesis), x, floor=looked.floor)
             for s in scores
             for x in looked.starts(s, STARTS if rank < FIRST else 1)
         ]
