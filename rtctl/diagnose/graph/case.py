@@ -20,7 +20,7 @@ KEYS = (
 )  # fmt: skip
 PROBLEMS = ("driven", "free", "kinematic", "static")
 DEFAULT_TOLERANCE = 0.15
-EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise", "bandwidth_hz")
+EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
 START = "start.angle"  # e to the angle, rad, that the first row of a counter has before the weight of a body
 START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
 NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
