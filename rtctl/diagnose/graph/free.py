@@ -14,6 +14,7 @@ import numpy as np
 
 from rtctl.diagnose.fit import bounded_step, parallel
 from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.measures import Measures, speed
 from rtctl.diagnose.scales import spaced
@@ -37,13 +38,15 @@ class Free(NamedTuple):
 def free_forces(base: Fitted) -> list[Free]:
     """Free forces at every body along every axis, best first."""
     sim, about = base.like.sim, Linear(base)
-    measures = Measures(sim, base.model.base, {})
+    every = [Measures(part.sim, base.model.base, {}) for part in base.like.parts]
     out = []
     for node, ratio in sim.ratios.items():
         if ratio == 0.0:
             continue
-        for axis, values in axes(measures, node, ratio).items():
-            out.append(_fitted(about, measures, node, axis, values))
+        found = [axes(measures, node, ratio) for measures in every]
+        for axis in found[0]:
+            if all(axis in own for own in found):
+                out.append(_fitted(about, every, node, axis, after(axis, [own[axis] for own in found])))
     return sorted(out, key=lambda f: -f.gain)
 
 
@@ -63,18 +66,31 @@ def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
     return out
 
 
-def _fitted(about: Linear, m: Measures, node: str, axis: str, values: np.ndarray) -> Free:
-    base, like, sim = about.base, about.like, about.like.sim
-    low, high = np.quantile(values, (1e-3, 1.0 - 1e-3))
-    knots = np.unique(spaced(np.sort(values), low, high, HATS))
-    at, own = sim.layout.coordinate(node), sim.layout.ratio(node, base.model.base)
-    unit = 0.1 * m.of("force", node)
+def after(axis: str, values: list[np.ndarray]) -> list[np.ndarray]:
+    """Values of an axis in each recording; the time of each begins where that of the one before ends."""
+    if axis != "time":
+        return values
+    ends = np.cumsum([0.0, *(v[-1] for v in values)])
+    return [v + end for v, end in zip(values, ends, strict=False)]
+
+
+def _fitted(about: Linear, every: list[Measures], node: str, axis: str, values: list[np.ndarray]) -> Free:
+    base, like = about.base, about.like
+    whole = np.sort(np.concatenate(values))
+    low, high = np.quantile(whole, (1e-3, 1.0 - 1e-3))
+    knots = np.unique(spaced(whole, low, high, HATS))
+    unit = 0.1 * max(m.of("force", node) for m in every)
+
+    def pushed(part: Likelihood, along: np.ndarray, hat: np.ndarray) -> np.ndarray:
+        sim, model = part.sim, part.sim.own(base.model)
+        forces = np.zeros((len(along), sim.layout.nq))
+        own = sim.layout.ratio(node, model.base)
+        forces[:, sim.layout.coordinate(node)] = own * unit * np.interp(along, knots, hat)
+        return part.of_readings(sim.pushed(forces).run(model, n=part.rows[1], coarse=True))
 
     def column(hat: np.ndarray) -> np.ndarray:
-        forces = np.zeros((len(values), sim.layout.nq))
-        forces[:, at] = own * unit * np.interp(values, knots, hat)
-        out = sim.pushed(forces).run(base.model, n=like.rows[1], coarse=True)
-        return np.asarray(like.of_readings(out) - about.start)
+        found = [pushed(part, along, hat) for part, along in zip(like.parts, values, strict=True)]
+        return np.asarray(np.concatenate(found) - about.start)
 
     C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2)
     white, r = like.filtered(C), like.white(base.e)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rtctl.diagnose.graph.model import rigid
+from rtctl.diagnose.graph.model import own, rigid
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.element import Element
 from rtctl.plants.graph.layout import NOWHERE
@@ -41,6 +41,7 @@ class Measures:
     """Measures by name and node, from the main sensor, the ratios of the joints and the recorded commands."""
 
     def __init__(self, sim: Simulator, values: dict[str, float], hints: dict[str, list]):
+        values = own(values, sim.record.name)
         self.sim, self.values, self.hints = sim, values, hints
         self.machine, self.layout = sim.case.machine, sim.layout
         self.way = way(sim)

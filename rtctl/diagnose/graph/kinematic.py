@@ -1,0 +1,58 @@
+"""Machine of a kinematic problem: positions that follow the first one through the joints, where no force was measured.
+
+Nobody knows forces there, and none is asked for. A joint that is rigid in the description is a spring too stiff to be
+seen, at which lost motion and an uneven ratio can act. A body that nothing brakes would fly on through lost motion; it
+rubs as little as no reading shows.
+
+Source: Lurie & Enright, Classical feedback control (2000), for the play operator: what follows stays until it is moved.
+"""
+
+import math
+
+import numpy as np
+
+from rtctl.diagnose.graph.case import GraphCase
+from rtctl.plants.graph.layout import layout
+
+QUICK = 1000.0  # rad/s, at which a stiff joint rings with what it moves
+DAMPED = 1.4  # damping of the same, twice its ratio
+SLIGHT = 0.2  # steps of the reading by which friction stretches a stiff joint
+FINE = 1e-6  # of the travel, in place of a step that nobody knows
+
+
+def followed(case: GraphCase, main: str, grain: dict[str, float], y: dict[str, np.ndarray]) -> GraphCase:
+    """The case with a spring for each rigid joint and friction for each body that has none; `main` is the sensor of
+    the motion that is given."""
+    machine, values, given = case.machine, dict(case.values), set(case.values)
+    own = str(machine.sensors[main].body)
+    joints, bodies = dict(machine.joints), dict(machine.bodies)
+    for name, joint in machine.joints.items():
+        if joint.stiffness is None:
+            mass = min(_felt(case, end, joint.to) for end in (getattr(joint, "from"), joint.to) if end in bodies)
+            made = {"stiffness": QUICK**2 * mass, "damping": DAMPED * QUICK * mass}
+            joints[name] = joint.model_copy(update=made)
+            for key, value in made.items():
+                values[f"joints.{name}.{key}"] = value
+                given.discard(f"joints.{name}.{key}")
+    for name, body in machine.bodies.items():
+        if name != own and not machine.is_frame(name) and body.dry == 0.0:
+            step = min((grain[s] for s in grain if machine.sensors[s].body == name and grain[s] > 0.0), default=0.0)
+            travel = max((float(np.ptp(y[s])) for s in y if machine.sensors[s].body == name), default=0.0)
+            mass = values[f"bodies.{name}.{'inertia' if body.turns else 'mass'}"]
+            dry = QUICK**2 * mass * max(SLIGHT * step, FINE * travel)
+            bodies[name] = body.model_copy(update={"dry": dry})
+            values[f"bodies.{name}.dry"] = dry
+            given.discard(f"bodies.{name}.dry")
+    changed = machine.model_copy(update={"joints": joints, "bodies": bodies})
+    made = tuple(path for path in values if path not in given)
+    return case._replace(machine=changed, layout=layout(changed), values=values, made=made)
+
+
+def _felt(case: GraphCase, name: str, far: str) -> float:
+    """Inertia or mass of one end of a joint, as its far end feels it."""
+    body = case.machine.bodies[name]
+    if case.machine.is_frame(name):
+        return math.inf
+    mass = case.values[f"bodies.{name}.{'inertia' if body.turns else 'mass'}"]
+    ends = [case.layout.ratio(end, case.values) for end in (name, far)]
+    return float(mass * (ends[0] / ends[1]) ** 2) if all(ends) else float(mass)
