@@ -21,7 +21,7 @@ KEYS = (
 PROBLEMS = ("driven", "free", "kinematic", "static")
 DEFAULT_TOLERANCE = 0.15
 EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise", "bandwidth_hz")
-START = "start.angle"  # e to the angle, rad, that the first row of a counter has before the weight of a body
+START = "start.angle"  # e to the angle, rad, by which the zero of a position is off before the weight of a body
 FIRST_POSITION, FIRST_SPEED = "start.position", "start.speed"  # of a free response, as START, in units of the record
 STARTS = (START, FIRST_POSITION, FIRST_SPEED)  # each recording has its own
 HELD_PROBLEMS = ("static", "kinematic")  # the main sensor's motion is given
@@ -98,8 +98,8 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         raise UserError(sentences(error, Description, given, lambda _: f"{where}: machine").splitlines()[0]) from None
     placed = layout(machine)
     values = dict(machine.paths())
-    counters = any(s.counts_per_unit is not None for s in machine.sensors.values())
-    if counters and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
+    angles = any(s.measures == "position" for s in machine.sensors.values())
+    if angles and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
         values[START] = 1.0
     physics = _physics(where, placed, case.get("physics"))
     values |= _numbers(physics)

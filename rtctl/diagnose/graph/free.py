@@ -104,7 +104,7 @@ def _fitted(about: Linear, every: list[Measures], node: str, axis: str, values: 
     dx = bounded_step(H, M.T @ r + weight * x, x, *bounds, DAMPING)
     e = about.left(dx, C)
     inner = base.power * (M.T @ M) + np.diag(weight)
-    volume = np.linalg.slogdet(inner)[1] - np.sum(np.log(weight))
+    volume = np.linalg.slogdet(inner)[1] - np.sum(np.log(weight[n:]))
     if n:
-        volume -= np.linalg.slogdet(inner[:n, :n])[1] - np.sum(np.log(weight[:n]))
+        volume -= np.linalg.slogdet(inner[:n, :n])[1]
     return Free(node, axis, base.loss - like.loss(e), e, 0.5 * float(volume), knots, unit * dx[n:])

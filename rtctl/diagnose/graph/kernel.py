@@ -71,7 +71,11 @@ def hold(job, p, m, k, share, path, pace):
         if job.held[i] == 0:
             continue
         a, b = path[one, i], path[two, i]
-        c, d = (T * pace[one, i], T * pace[two, i]) if two > one else (0.0, 0.0)
+        c, d = T * pace[one, i], T * pace[two, i]
+        if k < 0:
+            c = d = 0.0
+        elif two == one:  # after the last row it goes on
+            b = a + c
         x = a + s * (c + s * (3.0 * (b - a) - 2.0 * c - d + s * (2.0 * (a - b) + c + d)))
         v = (c + s * (2.0 * (3.0 * (b - a) - 2.0 * c - d) + s * 3.0 * (2.0 * (a - b) + c + d))) / T
         job.need[i] += (v - m.x[p.nq + i]) / m.Gamma_T[m.nu + i, p.nq + i]

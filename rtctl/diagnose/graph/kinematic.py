@@ -10,21 +10,26 @@ Source: Lurie & Enright, Classical feedback control (2000), for the play operato
 import math
 
 import numpy as np
+from scipy.signal import savgol_filter
 
 from rtctl.diagnose.graph.case import GraphCase
+from rtctl.diagnose.graph.model import rigid
 from rtctl.plants.graph.layout import layout
 
 QUICK = 1000.0  # rad/s, at which a stiff joint rings with what it moves
 DAMPED = 1.4  # damping of the same, twice its ratio
-SLIGHT = 0.2  # steps of the reading by which friction stretches a stiff joint
-FINE = 1e-6  # of the travel, in place of a step that nobody knows
+SLIGHT = 0.2  # steps of the reading by which friction stretches a stiff joint at least
+BRAKES = 2.0  # times the force that the given motion takes: what follows must not fly on
+OVER = 7  # rows, over which an acceleration is taken
 
 
-def followed(case: GraphCase, main: str, grain: dict[str, float], y: dict[str, np.ndarray]) -> GraphCase:
+def followed(case: GraphCase, main: str, grain: dict[str, float], x: np.ndarray, dt: float) -> GraphCase:
     """The case with a spring for each rigid joint and friction for each body that has none; `main` is the sensor of
-    the motion that is given."""
+    the motion x (n,) that is given."""
     machine, values, given = case.machine, dict(case.values), set(case.values)
     own = str(machine.sensors[main].body)
+    bends = np.quantile(np.abs(savgol_filter(x, OVER, 3, deriv=2, delta=dt)), 0.999) if len(x) >= OVER else 0.0
+    ratios = rigid(case.layout, values, own)
     joints, bodies = dict(machine.joints), dict(machine.bodies)
     for name, joint in machine.joints.items():
         if joint.stiffness is None:
@@ -37,9 +42,8 @@ def followed(case: GraphCase, main: str, grain: dict[str, float], y: dict[str, n
     for name, body in machine.bodies.items():
         if name != own and not machine.is_frame(name) and body.dry == 0.0:
             step = min((grain[s] for s in grain if machine.sensors[s].body == name and grain[s] > 0.0), default=0.0)
-            travel = max((float(np.ptp(y[s])) for s in y if machine.sensors[s].body == name), default=0.0)
             mass = values[f"bodies.{name}.{'inertia' if body.turns else 'mass'}"]
-            dry = QUICK**2 * mass * max(SLIGHT * step, FINE * travel)
+            dry = mass * max(QUICK**2 * SLIGHT * step, BRAKES * abs(ratios[name]) * float(bends), 1e-12)
             bodies[name] = body.model_copy(update={"dry": dry})
             values[f"bodies.{name}.dry"] = dry
             given.discard(f"bodies.{name}.dry")

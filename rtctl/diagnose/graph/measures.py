@@ -67,7 +67,8 @@ class Measures:
             bodies = [drive.body] if drive.body else [self.machine.joints[str(drive.joint)].to]
             total += gain * self.ratios.get(str(bodies[0]), 0.0) * self.u[:, number]
         found = float(np.sqrt(np.mean(total**2)))
-        return max(found, 0.1 * self.inertia(str(self.sim.body)) * self.a_main, LITTLE)
+        inertial = self.inertia(str(self.sim.body)) * self.a_main  # all that acts, where nothing drives
+        return max(found, (0.1 if self.layout.drives else 1.0) * inertial, LITTLE)
 
     def body_of(self, node: str) -> str:
         """The body that a node belongs to: its own, that at the far end of a joint, that of a drive or sensor."""
@@ -102,7 +103,7 @@ class Measures:
     def of(self, measure: str, node: str) -> float:
         """The measure in SI at a node."""
         s = self.scale(node)
-        volts = max(float(np.sqrt(np.mean(self.sim.volts**2))), LITTLE)
+        volts = max(self.volts(""), LITTLE)
         stiffness = self.stiffness(node)
         peak = float(np.abs(self.sim.volts).max(initial=0.0))
         table = {

@@ -108,7 +108,9 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
         record = record._replace(y=y | made, grain=grain | dict.fromkeys(made, 0.0))
     _check_problem(path, record)
     record = record._replace(scales=_scales(record))
-    return record if case.problem != "kinematic" else record._replace(case=followed(case, record.main, grain, y))
+    if case.problem != "kinematic":
+        return record
+    return record._replace(case=followed(case, record.main, grain, y[record.main], dt))
 
 
 def _on(path: Path, columns: dict[str, np.ndarray], drive: Any) -> np.ndarray | float:
@@ -137,8 +139,15 @@ def _made(case: GraphCase, u: np.ndarray, main: str) -> dict[str, np.ndarray]:
 
 
 def _check_problem(path: Path, record: GraphRecord) -> None:
-    """Raise NoAnswer where the recording lacks what its kind of problem is about."""
-    problem, machine = record.case.problem, record.case.machine
+    """Raise NoAnswer where the recording lacks what its problem is about, UserError where an input is what it tells."""
+    problem, machine, bodies = record.case.problem, record.case.machine, record.case.layout.bodies
+    for name, entry in record.case.inputs.items():
+        own = machine.sensors[record.main].body if entry.measures == "position" else None
+        if own is not None and bodies[entry.body].coordinate == bodies[own].coordinate:
+            raise UserError(
+                f"{record.case.file}: inputs.{name}.body: '{entry.body}' moves with the body of sensor {record.main}; a "
+                "position that is an input is that of another body, beyond a spring"
+            )
     if problem not in HELD_PROBLEMS:
         return
     shown = {name: machine.sensors[name] for name in record.y if name in machine.sensors}
