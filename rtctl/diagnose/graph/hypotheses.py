@@ -20,6 +20,10 @@ QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 ROWS = 8000  # of a spectrum
+ABOUT = {  # kinds of element that a problem tells of: positions of no force, a measured force of no command
+    "kinematic": ("joint", "sensor"),
+    "static": ("body", "joint", "sensor"),
+}
 
 
 def hypotheses(
@@ -38,6 +42,8 @@ def hypotheses(
             found = standing(term, there, node)
             assert found is not None
             stand, element = found
+            if element.kind not in ABOUT.get(sim.case.problem, (element.kind,)):
+                continue
             slides = "slides" in element.traits
             rubs = measures.dry(node) > SLIGHT * measures.of("force", node) or node in dry_too
             if (

@@ -130,7 +130,8 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
         if k >= 0:
             for c in range(p.ny):
                 out[k, c] = m.y[c]
-            push[k] = job.correction
+            if job.mode == 1:
+                push[k] = job.correction
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0
@@ -142,9 +143,10 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
             substep(job, p, m, t, forces, at)
             if job.holds != 0:
                 hold(job, p, m, k, (i + 1.0) / job.substeps, path, pace)
-                if job.mode == 2 and k >= 0:
-                    for j in range(p.nq):
-                        push[k] += job.need[j] * job.share[j] / job.substeps
+                for row in ((k if i == 0 else -1), (k + 1 if i == job.substeps - 1 else -1)):
+                    if job.mode == 2 and 0 <= row < n:  # mean of just before a row and just after it
+                        for j in range(p.nq):
+                            push[row] += 0.5 * job.need[j] * job.share[j]
         if not (abs(m.y[main]) < 1e12):
             return max(k, 0)
     return n

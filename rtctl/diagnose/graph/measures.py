@@ -109,7 +109,7 @@ class Measures:
         table = {
             "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low,
             "drag": s.force / s.speed, "drag2": s.force / s.speed**2, "stiff": s.force / s.span,
-            "twist": s.force / stiffness, "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
+            "twist": self.twist(node, s.force / stiffness), "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
             "swell": s.force / (s.speed * s.span**2), "stiffness": stiffness, "firm": self.firm(node),
             "compliance": 1.0 / s.force, "inertia": self.inertia(node), "seconds": 1.0,
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
@@ -173,6 +173,19 @@ class Measures:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""
         s = self.scale(node)
         return self.values.get(f"joints.{node}.stiffness", s.force / s.span)
+
+    def twist(self, node: str, usual: float) -> float:
+        """Deflection of a joint: `usual` by its force, in a kinematic problem as the positions differ."""
+        sim, sensors = self.sim, self.machine.sensors
+        if sim.case.problem != "kinematic":
+            return usual
+        apart = []
+        for name in sim.channels:
+            ratio = self.ratios.get(str(sensors[name].body), 0.0)
+            if sensors[name].measures == "position" and ratio != 0.0:
+                off = float(np.std(sim.record.y[name] - ratio * self.way)) / abs(ratio)
+                apart.append(off * abs(self.ratios.get(self.body_of(node), 1.0)))
+        return max([usual, *apart])
 
     def firm(self, node: str) -> float:
         """Stiffness of a joint with which the lighter of its two sides rings at a tenth of the sample rate."""

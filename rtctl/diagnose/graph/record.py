@@ -110,7 +110,8 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     record = record._replace(scales=_scales(record))
     if case.problem != "kinematic":
         return record
-    return record._replace(case=followed(case, record.main, grain, y[record.main], dt))
+    fine = {name: grain[name] or float(np.std(np.diff(y[name], 2))) / 10.0 for name in y}
+    return record._replace(case=followed(case, record.main, fine, y[record.main], dt))
 
 
 def _on(path: Path, columns: dict[str, np.ndarray], drive: Any) -> np.ndarray | float:

@@ -30,6 +30,7 @@ FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
 FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
+STEADY = 0.4  # rad a substep, of the quickest ring in which lost motion is crossed
 LEAD = 0.5  # s at the first row, in which springs come to rest
 NEVER = np.iinfo(np.int64).max  # row
 ABSENT = np.zeros((1, 1))
@@ -50,6 +51,8 @@ class Simulator:
         usual = FOLLOW_SPEED if self.shows_speed else FOLLOW
         self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP - 1e-9)))
+        if self.case.problem == "kinematic":
+            self.substeps = max(self.substeps, int(np.ceil(record.dt * self._ring() / STEADY)))
         self.seen = np.ascontiguousarray(record.y[self.main])
         self.volts = np.ascontiguousarray(record.u)
         self.forces = self._forces(record.forces)
@@ -63,6 +66,16 @@ class Simulator:
         self.lead = round(LEAD / record.dt) if flexible and self.case.problem != "free" else 0
         self.release = NEVER
         self.ratios = rigid(self.layout, record.case.values, str(self.body))
+
+    def _ring(self) -> float:
+        """Highest frequency, rad/s, at which a body beside the held one rings with a joint."""
+        p = GraphModel(self.layout, self.case.values).params(SUBSTEP)
+        held, out = self.layout.coordinate(str(self.body)), 0.0
+        for k in range(p.nl):
+            for at, lever in ((p.link_i[k], p.link_a[k]), (p.link_j[k], p.link_b[k])):
+                if at != held:
+                    out = max(out, float(np.sqrt(p.link_c[k] * lever**2 / p.inertia[at])))
+        return out
 
     def column(self, channel: str) -> int:
         """Column of a channel in what a run returns: that of its sensor, the last one for the force of the drives."""
@@ -140,17 +153,27 @@ class Simulator:
         self._begin(states, model, float(seen[0]))
         path, pace = self._held(job, model, params, start)
         out, push = np.full((n, params.ny), np.nan), np.zeros(n)
+        static = self.case.problem == "static"  # forces were measured: the commands that made them do not count
         done = k.module.run(
-            job, p, states, slots, self.volts[:n], self._pushing(model)[:n],
+            job, p, states, slots, (np.zeros_like if static else np.asarray)(self.volts[:n]), self._pushing(model)[:n],
             seen, path[:n], pace[:n], out, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         if start:
             out[:, self.layout.sensors[self.main]] -= start
-        if self.case.problem == "static":  # what the drives would have to make
-            made = next((record.y[name] for name in self.channels if name not in self.layout.sensors), np.zeros(n))
-            out = np.column_stack([out, made[:n] + push])
+        if static:  # what the drives would have to make, as their nominal gain tells it
+            name = next((c for c in self.channels if c not in self.layout.sensors), "")
+            made, share = (record.y[name][:n], self._told(name, model)) if name else (np.zeros(n), 1.0)
+            out = np.column_stack([out, push * share])
+            push = push - made / share
         return out, push
+
+    def _told(self, drive: str, model: GraphModel) -> float:
+        """Force of a drive by its nominal gain over that by the model's."""
+        path, one, two = f"drives.{drive}", self.case.values, model.base
+        gains = [v[f"{path}.gain"] * v.get(f"{path}.torque_constant", 1.0) / v.get(f"{path}.resistance", 1.0)
+                 for v in (one, two)]  # fmt: skip
+        return gains[0] / gains[1]
 
     def _held(self, job: np.ndarray, model: GraphModel, params: Any, start: float) -> tuple[np.ndarray, np.ndarray]:
         """Positions and speeds (n, coordinates) of what moves as recorded; the job is told which."""

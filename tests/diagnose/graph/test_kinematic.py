@@ -9,24 +9,27 @@ from rtctl.diagnose.diagnosis import NAMED, NOTHING
 from rtctl.diagnose.graph.answer import diagnose_record
 
 RATE, GAP = 50.0, 3e-5  # of the table, m
-T = np.arange(1000) / RATE
-TURN = 20.0 * np.sin(2 * np.pi * 0.2 * T) + 6.0 * np.sin(2 * np.pi * 0.47 * T)
+FINE = 20  # steps of lost motion a row: it turns between rows
+T = np.arange(500 * FINE) / RATE / FINE
+WHOLE = 20.0 * np.sin(2 * np.pi * 0.2 * T) + 6.0 * np.sin(2 * np.pi * 0.47 * T)
+TURN = WHOLE[::FINE]
 
 
-def play(x, gap):
-    """What follows x (n,) with lost motion: the play operator."""
+def play(turn, gap):
+    """What follows a motion (times finer than the rows) with lost motion, at the rows: the play operator."""
+    x = 8e-4 * turn
     out, at = [], x[0]
     for value in x:
         at = min(max(at, value - gap / 2), value + gap / 2)
         out.append(at)
-    return np.array(out)
+    return np.array(out)[::FINE]
 
 
 @cache
 def found(kind):
     way = 8e-4 * TURN
     if kind == "gap":
-        way = play(way, GAP)
+        way = play(WHOLE, GAP)
     if kind == "ratio":
         way = way + 2e-5 * (np.sin(TURN + 0.7) - np.sin(0.7))
     case = case_of(SCREW, RATE, problem="kinematic", tolerance={"default": 0.05, "joints.nut.ratio": 0.001})
