@@ -124,7 +124,9 @@ class Drive(Settings):
     body: str | None = Field(None, description="body that is driven")
     joint: str | None = Field(None, description="joint whose two ends are pushed apart, instead of a body")
     column: str = Field("u", description="column of the recorded command")
-    enabled: str | None = Field(None, description="recorded column that is 1 where the drive is on and 0 where it is off")
+    enabled: str | None = Field(
+        None, description="recorded column that is 1 where the drive is on and 0 where it is off"
+    )
     unit: str = Field("V", max_length=20, description="unit of the command: V, A, N, Nm, % ...")
     kind: Literal["force", "current", "voltage"] = Field("force", description="what a unit of command gives")
     gain: float = Field(1.0, description="N or Nm, A, or V for a unit of command")

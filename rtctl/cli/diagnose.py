@@ -45,7 +45,8 @@ def diagnose(
     together: Annotated[
         bool,
         typer.Option(
-            "--together", help="The bundles, or all in the folder, are recordings of one described machine: one verdict."
+            "--together",
+            help="The bundles, or all in the folder, are recordings of one described machine: one verdict.",
         ),
     ] = False,
     terms: Annotated[

@@ -11,7 +11,7 @@ from scipy.signal import savgol_filter
 
 from rtctl.diagnose.graph.record import GraphRecord
 
-OVER = 0.06  # s, over which the motion of a static problem is a cubic
+OVER = 0.15  # s, over which the motion of a static problem is a cubic
 LEAST = 7  # rows, of the same
 
 

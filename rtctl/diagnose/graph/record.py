@@ -121,7 +121,9 @@ def _on(path: Path, columns: dict[str, np.ndarray], drive: Any) -> np.ndarray | 
     on = _column(path, columns, drive.enabled, "0 or 1, whether the drive is on")
     bad = np.flatnonzero((on != 0.0) & (on != 1.0))
     if len(bad):
-        raise UserError(f"{path}: column '{drive.enabled}', row {bad[0]}: {on[bad[0]]:g}; it should be 0 (off) or 1 (on)")
+        raise UserError(
+            f"{path}: column '{drive.enabled}', row {bad[0]}: {on[bad[0]]:g}; it should be 0 (off) or 1 (on)"
+        )
     return on
 
 
@@ -157,7 +159,9 @@ def _check_problem(path: Path, record: GraphRecord) -> None:
     if problem == "kinematic" and sum(s.measures == "position" for s in shown.values()) < 2:
         raise NoAnswer(f"{path}: a kinematic problem compares two positions at least; the recording shows one")
     if problem == "static" and len(record.y) < 2:
-        raise NoAnswer(f"{path}: a static problem needs a measured force: a drive's column or a sensor of force or current")
+        raise NoAnswer(
+            f"{path}: a static problem needs a measured force: a drive's column or a sensor of force or current"
+        )
 
 
 def _scales(record: GraphRecord) -> tuple[float, float, float]:

@@ -112,9 +112,7 @@ def screened(parent: Fitted) -> tuple[Screened, float]:
     sim = parent.like.sim
     model = parent.model
     candidates = [
-        h
-        for h in hypotheses(sim, model, combined(parent.like, model), model.terms)
-        if h.name not in parent.names
+        h for h in hypotheses(sim, model, combined(parent.like, model), model.terms) if h.name not in parent.names
     ]
     names = {h.name for h in candidates}
     return screen(parent, candidates), float(np.log(max(len(names), 1)))

@@ -113,9 +113,7 @@ class Simulator:
         other.substeps *= times
         return other
 
-    def run(
-        self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False
-    ) -> np.ndarray:
+    def run(self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False) -> np.ndarray:
         """Readings (n, sensors of the machine) in SI, with the force of the drives after them where it was measured;
         nan from the tick on at which the model ran away. The mode is that of the problem where none is given.
 

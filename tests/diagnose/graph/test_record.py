@@ -72,5 +72,7 @@ def test_refusals(change, kind, sentence):
 def test_too_few_rows():
     case = case_of(PENDULUM)
     least = len(read_case(case, "bench").fitted) + 10
-    with pytest.raises(NoAnswer, match=f"holds {least - 1} rows; {least - 10} unknown numbers and the noise need {least}"):
+    with pytest.raises(
+        NoAnswer, match=f"holds {least - 1} rows; {least - 10} unknown numbers and the noise need {least}"
+    ):
         of({name: values[: least - 1] for name, values in COLUMNS.items()}, case)
