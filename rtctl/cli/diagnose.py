@@ -46,7 +46,7 @@ def diagnose(
         bool,
         typer.Option(
             "--together",
-            help="The bundles, or all in the folder, are recordings of one described machine: one verdict.",
+            help="The bundles, or all in the folder, are of one described machine: one verdict.",
         ),
     ] = False,
     terms: Annotated[

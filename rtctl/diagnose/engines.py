@@ -60,8 +60,8 @@ def of_one_machine(bundles: Sequence[Path], together: bool) -> None:
     if not together and len(set(groups.values()) | {""}) != 2:
         told = ", ".join(f"{bundle}: {group or 'none'}" for bundle, group in groups.items())
         raise UserError(
-            f"several recordings are one machine where their case.json names one group ({told}); give --together if they "
-            "are of one machine, else diagnose each by itself or the folder that holds them"
+            f"several recordings are one machine where their case.json names one group ({told}); give --together if "
+            "they are of one machine, else diagnose each by itself or the folder that holds them"
         )
     if not together and "" in groups.values():
         bundle = next(bundle for bundle, group in groups.items() if not group)

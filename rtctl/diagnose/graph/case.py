@@ -69,13 +69,8 @@ class GraphCase(NamedTuple):
         out = []
         for path, value in self.values.items():
             key = path.rsplit(".", 1)[-1]
-            if (
-                path not in self.made
-                and value != 0.0
-                and (key not in NEVER or path.startswith("physics."))
-                and self.tolerance(path) > 1e-3
-                and self._acts(path)
-            ):
+            moves = key not in NEVER or path.startswith("physics.")
+            if path not in self.made and value != 0.0 and moves and self.tolerance(path) > 1e-3 and self._acts(path):
                 out.append(path)
         return tuple(out)
 

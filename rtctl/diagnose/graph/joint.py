@@ -167,6 +167,6 @@ def _check_values(first: GraphRecord, other: GraphRecord, differ: set[str]) -> N
         a, b = one.get(path, 0.0), two.get(path, 0.0)
         if abs(a - b) > SAME * max(abs(a), abs(b)):
             raise UserError(
-                f"{other.case.file}: {path} is {b:g}, and {a:g} in {first.case.file}; say per_recording: [{path}] in both "
-                "where it differs between recordings, else give one value"
+                f"{other.case.file}: {path} is {b:g}, and {a:g} in {first.case.file}; say per_recording: [{path}] in "
+                "both where it differs between recordings, else give one value"
             )

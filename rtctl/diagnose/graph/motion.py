@@ -1,7 +1,7 @@
-"""Recorded motion of bodies that move as they were recorded: the main sensor's of a static or kinematic problem, inputs.
+"""Recorded motion of bodies that are held to it: that of the main sensor in a static or kinematic problem, and inputs.
 
-Force follows from acceleration, which counts alone would make of a step: the motion of a static problem is smoothed over
-a time that a force law does not see. A kinematic problem asks for positions, and takes them as they are.
+Force follows from acceleration, and single counts have a large one: the motion of a static problem is smoothed over a
+time in which a force law hardly changes. A kinematic problem asks for positions, and takes them as they are.
 """
 
 from typing import NamedTuple

@@ -148,8 +148,8 @@ def _check_problem(path: Path, record: GraphRecord) -> None:
         own = machine.sensors[record.main].body if entry.measures == "position" else None
         if own is not None and bodies[entry.body].coordinate == bodies[own].coordinate:
             raise UserError(
-                f"{record.case.file}: inputs.{name}.body: '{entry.body}' moves with the body of sensor {record.main}; a "
-                "position that is an input is that of another body, beyond a spring"
+                f"{record.case.file}: inputs.{name}.body: '{entry.body}' moves with the body of sensor {record.main}; "
+                "a position that is an input is that of another body, beyond a spring"
             )
     if problem not in HELD_PROBLEMS:
         return

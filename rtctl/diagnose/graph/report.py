@@ -98,8 +98,8 @@ def together(d: GraphDiagnosis) -> str:
         return ""
     names = [r.name for r in d.records]
     return (
-        f"{len(names)} recordings of one machine: {', '.join(names[:-1])} and {names[-1]}. Numbers and effects are shared; "
-        f"the figures show {names[0]}."
+        f"{len(names)} recordings of one machine: {', '.join(names[:-1])} and {names[-1]}. Numbers and effects are "
+        f"shared; the figures show {names[0]}."
     )
 
 

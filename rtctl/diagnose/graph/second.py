@@ -21,9 +21,7 @@ def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
     record = load_record(other)
     check_same(d.record, record)
     if len(d.found.like.parts) > 1:
-        raise UserError(
-            "--heldout goes with one recording; of several that are taken together the last part is held out"
-        )
+        raise UserError("--heldout goes with one recording; of several together the last part is held out")
     like = Likelihood(Simulator(record))
     with threadpool_limits(1):
         return d._replace(heldout=judged(like, like, (d.found.base.model, d.decided.best.model), like.rows))
