@@ -124,6 +124,9 @@ class Drive(Settings):
     body: str | None = Field(None, description="body that is driven")
     joint: str | None = Field(None, description="joint whose two ends are pushed apart, instead of a body")
     column: str = Field("u", description="column of the recorded command")
+    enabled: str | None = Field(
+        None, description="recorded column that is 1 where the drive is on and 0 where it is off"
+    )
     unit: str = Field("V", max_length=20, description="unit of the command: V, A, N, Nm, % ...")
     kind: Literal["force", "current", "voltage"] = Field("force", description="what a unit of command gives")
     gain: float = Field(1.0, description="N or Nm, A, or V for a unit of command")
@@ -152,6 +155,8 @@ class Drive(Settings):
             raise ValueError(f"torque_constant is missing; a {self.kind} drive needs it (Nm/A, or N/A)")
         if self.kind == "voltage" and self.resistance is None:
             raise ValueError("resistance is missing; a voltage drive needs it (ohm)")
+        if self.kind == "voltage" and self.enabled is not None:
+            raise ValueError("enabled: a voltage drive that is off makes no current; give its measured current instead")
         if self.zero and (self.bandwidth_hz is None or self.kind == "voltage"):
             raise ValueError("zero: it is that of the low pass of a force or current drive; give bandwidth_hz as well")
         return self
@@ -192,12 +197,12 @@ class Sensor(Settings):
 
 
 class Input(Settings):
-    """A recorded column that acts on a body beside the drives."""
+    """A recorded column that acts on a body beside the drives: a force, or a position that the body is held to."""
 
     body: str
     column: str
-    measures: Literal["force"] = "force"
-    per_unit: float = Field(1.0, description="column units for one N or Nm")
+    measures: Literal["force", "position"] = "force"
+    per_unit: float = Field(1.0, description="column units for one N or Nm, or for one rad or m")
 
 
 class Description(Settings):

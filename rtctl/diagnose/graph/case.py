@@ -21,7 +21,10 @@ KEYS = (
 PROBLEMS = ("driven", "free", "kinematic", "static")
 DEFAULT_TOLERANCE = 0.15
 EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
-START = "start.angle"  # e to the angle, rad, that the first row of a counter has before the weight of a body
+START = "start.angle"  # e to the angle, rad, by which the zero of a position is off before the weight of a body
+FIRST_POSITION, FIRST_SPEED = "start.position", "start.speed"  # of a free response, as START, in units of the record
+STARTS = (START, FIRST_POSITION, FIRST_SPEED)  # each recording has its own
+HELD_PROBLEMS = ("static", "kinematic")  # the main sensor's motion is given
 START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
 NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
 
@@ -44,16 +47,19 @@ class GraphCase(NamedTuple):
     notes: str
     warnings: tuple[str, ...]
     file: Path
+    made: tuple[str, ...] = ()  # paths of values that the program took, where nobody gave any
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
         if path == START and path not in self.tolerances:
             return START_TOLERANCE
+        if path in STARTS and path not in self.tolerances:
+            return math.inf
         for end in (path, *(path.rsplit(".", n)[0] for n in range(1, path.count(".") + 1))):
             if end in self.tolerances:
                 found = self.tolerances[end]
                 return math.inf if found is None else found
-        if path.rsplit(".", 1)[-1] in EXACT:
+        if path.rsplit(".", 1)[-1] in EXACT and not path.startswith("physics."):
             return 0.0
         return math.inf if self.default_tolerance is None else self.default_tolerance
 
@@ -63,13 +69,14 @@ class GraphCase(NamedTuple):
         out = []
         for path, value in self.values.items():
             key = path.rsplit(".", 1)[-1]
-            if value != 0.0 and key not in NEVER and self.tolerance(path) > 1e-3 and self._acts(path):
+            moves = key not in NEVER or path.startswith("physics.")
+            if path not in self.made and value != 0.0 and moves and self.tolerance(path) > 1e-3 and self._acts(path):
                 out.append(path)
         return tuple(out)
 
     def _acts(self, path: str) -> bool:
         """Whether a number has a part in the motion: the damping of a drive without a bandwidth has none."""
-        if path == START:
+        if path in STARTS or path.startswith("physics."):
             return True
         group, name, *rest = path.split(".")
         if group == "drives" and rest == ["damping"]:
@@ -92,20 +99,25 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         raise UserError(sentences(error, Description, given, lambda _: f"{where}: machine").splitlines()[0]) from None
     placed = layout(machine)
     values = dict(machine.paths())
-    counters = any(s.counts_per_unit is not None for s in machine.sensors.values())
-    if counters and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
+    angles = any(s.measures == "position" for s in machine.sensors.values())
+    if angles and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
         values[START] = 1.0
-    tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
+    physics = _physics(where, placed, case.get("physics"))
+    values |= _numbers(physics)
     problem = case.get("problem", "driven")
     if problem not in PROBLEMS:
         raise UserError(f"{where}: problem is {problem!r}; it should be one of {', '.join(PROBLEMS)}")
+    if problem == "free":
+        values |= {FIRST_POSITION: 1.0, FIRST_SPEED: 1.0}
+    tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
+    differ = _differ(where, case.get("per_recording"), values)
     rate = _number(where, "sample_rate", case.get("sample_rate"))
     if rate is not None and rate <= 0.0:
         raise UserError(f"{where}: sample_rate is {rate:g}; it should be above 0 Hz, or null where the clock is uneven")
     delay = _number(where, "delay_samples", case.get("delay_samples"))
     if delay is None:
         delay = 0.0
-        if machine.drives:
+        if machine.drives and problem == "driven":
             warnings.append(f"{where}: delay_samples is missing; 0 is taken")
     if not 0.0 <= delay <= 100.0:
         raise UserError(f"{where}: delay_samples is {delay:g}; it should be between 0 and 100")
@@ -115,13 +127,13 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         values=values,
         tolerances=tolerances,
         default_tolerance=default,
-        physics=_physics(where, placed, case.get("physics")),
+        physics=physics,
         inputs=_inputs(where, machine, case.get("inputs")),
         problem=problem,
         delay_samples=delay,
         sample_rate=rate,
         group=str(case.get("group") or ""),
-        per_recording=tuple(map(str, case.get("per_recording") or ())),
+        per_recording=differ,
         notes=str(case.get("notes") or ""),
         warnings=tuple(warnings),
         file=where,
@@ -177,6 +189,36 @@ def _physics(where: Path, placed: Layout, given: Any) -> tuple[dict[str, Any], .
             where_it_can = ", ".join(nodes(TERMS[name], there)) or "nowhere in this machine"
             raise UserError(f"{at}.node: {name} cannot stand at '{entry.get('node')}'; it can at {where_it_can}")
     return tuple(given)
+
+
+def _numbers(physics: tuple[dict[str, Any], ...]) -> dict[str, float]:
+    """Every number that the owner gives of a known term, by dotted path; zeros and whole numbers by choice are none."""
+    out = {}
+    for i, entry in enumerate(physics):
+        settings = TERMS[str(entry["term"])].settings.model_validate(entry)
+        for key in entry:
+            value = getattr(settings, key, None)
+            if isinstance(value, float) and value != 0.0 and key not in TERMS[str(entry["term"])].counted:
+                out[f"physics.{i}.{key}"] = value
+    return out
+
+
+def _differ(where: Path, given: Any, values: dict[str, float]) -> tuple[str, ...]:
+    """Paths whose values each recording has for itself."""
+    if given is None:
+        return ()
+    if not isinstance(given, list) or not all(isinstance(path, str) for path in given):
+        raise UserError(f"{where}: per_recording should be a list of dotted paths, such as bodies.load.mass")
+    out: list[str] = []
+    for path in given:
+        found = [one for one in values if one == path or one.startswith(f"{path}.")]
+        if not found:
+            hint = nearest(path, values)
+            raise UserError(
+                f"{where}: per_recording: there is no value {path}" + (f"; did you mean '{hint}'?" if hint else "")
+            )
+        out += found
+    return tuple(dict.fromkeys(out))
 
 
 def _inputs(where: Path, machine: Description, given: Any) -> dict[str, Input]:

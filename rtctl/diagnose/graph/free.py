@@ -46,19 +46,23 @@ def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
     """Free forces at every body along every axis, under a prior for each of the `shares` of the force that moves the
     body; those with most evidence first."""
     sim, about = base.like.sim, Linear(base)
-    measures = Measures(sim, base.model.base, {})
-    places: dict[tuple[str, str], np.ndarray] = {}
+    every = [Measures(part.sim, base.model.base, {}) for part in base.like.parts]
+    places: dict[tuple[str, str], list[np.ndarray]] = {}
     taken: set[int] = set()
     for node, ratio in sim.ratios.items():
         at = sim.layout.coordinate(node)
-        if ratio != 0.0 and at not in taken:  # bodies that move as one feel one force
-            taken.add(at)
-            places |= {(node, axis): values for axis, values in axes(measures, node, ratio).items()}
-    places = {place: values for place, values in places.items() if np.ptp(values) > 0.0}
-    out = [free for place, values in places.items() for free in _fitted(about, measures, *place, values, HATS, shares)]
+        if ratio == 0.0 or at in taken:  # bodies that move as one feel one force
+            continue
+        taken.add(at)
+        found = [axes(measures, node, ratio) for measures in every]
+        for axis in found[0]:
+            if all(axis in own for own in found):
+                places[node, axis] = after(axis, [own[axis] for own in found])
+    places = {place: values for place, values in places.items() if np.ptp(np.concatenate(values)) > 0.0}
+    out = [free for place, values in places.items() for free in _fitted(about, every, *place, values, HATS, shares)]
     out.sort(key=lambda f: -f.evidence)
     for place in list(dict.fromkeys((f.node, f.axis) for f in out))[:SECOND]:
-        out += _fitted(about, measures, *place, places[place], FINE, shares)
+        out += _fitted(about, every, *place, places[place], FINE, shares)
     return sorted(out, key=lambda f: -f.evidence)
 
 
@@ -78,23 +82,42 @@ def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
     return out
 
 
+def after(axis: str, values: list[np.ndarray]) -> list[np.ndarray]:
+    """Values of an axis in each recording; the time of each begins where that of the one before ends."""
+    if axis != "time":
+        return values
+    ends = np.cumsum([0.0, *(v[-1] for v in values)])
+    return [v + end for v, end in zip(values, ends, strict=False)]
+
+
 def _fitted(
-    about: Linear, m: Measures, node: str, axis: str, values: np.ndarray, hats: int, shares: Sequence[float]
+    about: Linear,
+    every: list[Measures],
+    node: str,
+    axis: str,
+    values: list[np.ndarray],
+    hats: int,
+    shares: Sequence[float],
 ) -> list[Free]:
-    base, like, sim = about.base, about.base.like, about.base.like.sim
-    low, high = np.quantile(values, (1e-3, 1.0 - 1e-3))
-    knots = np.unique(spaced(np.sort(values), low, high, hats))
-    at, own = sim.layout.coordinate(node), sim.layout.ratio(node, base.model.base)
-    whole = m.of("force", node)
+    base, like = about.base, about.base.like
+    along = np.sort(np.concatenate(values))
+    low, high = np.quantile(along, (1e-3, 1.0 - 1e-3))
+    knots = np.unique(spaced(along, low, high, hats))
+    whole = max(m.of("force", node) for m in every)
     unit = SIZE * whole
     apart = np.abs(np.subtract.outer(*[np.arange(len(knots)) / (len(knots) - 1)] * 2))
     root = np.linalg.cholesky(np.exp(-apart / SMOOTH))  # of the prior's covariance (Ornstein and Uhlenbeck, 1930)
 
-    def column(hat: np.ndarray) -> np.ndarray:
+    def pushed(part: Likelihood, values: np.ndarray, hat: np.ndarray) -> np.ndarray:
+        sim, model = part.sim, part.sim.own(base.model)
         forces = np.zeros((len(values), sim.layout.nq))
-        forces[:, at] = own * unit * np.interp(values, knots, hat)
-        out = sim.pushed(forces).run(base.model, n=like.rows[1], coarse=True)
-        return np.asarray(like.of_readings(out) - about.start)
+        own = sim.layout.ratio(node, model.base)
+        forces[:, sim.layout.coordinate(node)] = own * unit * np.interp(values, knots, hat)
+        return part.of_readings(sim.pushed(forces).run(model, n=part.rows[1], coarse=True))
+
+    def column(hat: np.ndarray) -> np.ndarray:
+        found = [pushed(part, own, hat) for part, own in zip(like.parts, values, strict=True)]
+        return np.asarray(np.concatenate(found) - about.start)
 
     C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2) @ root
     out = []
@@ -104,7 +127,7 @@ def _fitted(
         solved.append(_solved(about, C * scale, like.told(max(solved, key=lambda s: s.evidence).e)))
         best = max(solved, key=lambda s: s.evidence)
         force = unit * scale * (root @ best.z)
-        rms = float(np.sqrt(np.mean(np.interp(values[:: len(values) // 2000 + 1], knots, force) ** 2))) / whole
+        rms = float(np.sqrt(np.mean(np.interp(along[:: len(along) // 2000 + 1], knots, force) ** 2))) / whole
         out.append(Free(node, axis, share, best.gain, best.e, best.evidence, knots, force, rms))
     return out
 
@@ -131,9 +154,9 @@ def _solved(about: Linear, C: np.ndarray, noise: Likelihood) -> _Solved:
     dx = bounded_step(H, M.T @ r + weight * x, x, *bounds, DAMPING)
     e = about.left(dx, C)
     inner = base.power * (M.T @ M) + np.diag(weight)
-    volume = np.linalg.slogdet(inner)[1] - np.sum(np.log(weight))
+    volume = np.linalg.slogdet(inner)[1]
     if n:
-        volume -= np.linalg.slogdet(inner[:n, :n])[1] - np.sum(np.log(weight[:n]))
+        volume -= np.linalg.slogdet(inner[:n, :n])[1]
     prior = 0.5 * float(weight @ (x + dx) ** 2 - weight[:n] @ base.x**2)
     gain = base.loss - base.like.loss(e)
     return _Solved(gain, base.power * gain - prior - 0.5 * float(volume), e, dx[n:])

@@ -1,10 +1,12 @@
 """Hypotheses of a recording: each term of the library at each element of the machine where it can stand."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.measures import Measures, way
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
@@ -18,6 +20,10 @@ QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 ROWS = 8000  # of a spectrum
+ABOUT = {  # kinds of element that a problem tells of: positions of no force, a measured force of no command
+    "kinematic": ("joint", "sensor"),
+    "static": ("body", "joint", "sensor"),
+}
 
 
 def hypotheses(
@@ -36,6 +42,8 @@ def hypotheses(
             found = standing(term, there, node)
             assert found is not None
             stand, element = found
+            if element.kind not in ABOUT.get(sim.case.problem, (element.kind,)):
+                continue
             slides = "slides" in element.traits
             rubs = measures.dry(node) > SLIGHT * measures.of("force", node) or node in dry_too
             if (
@@ -47,6 +55,20 @@ def hypotheses(
             ):
                 continue
             out += starts_of(name, node, (term.sliding if slides else ()) or parts_of(name), measures)  # type: ignore[arg-type]
+    return out
+
+
+def combined(like: Likelihood, model: GraphModel) -> dict[str, list]:
+    """Hints of all recordings, in turns: those of the first first, no suggestion twice."""
+    found = [hints(part.sim, model, part.rows[0]) for part in like.parts]
+    out = found[0]
+    for kind in out if len(found) > 1 else ():
+        if kind.startswith("jump"):  # at a time of one recording
+            continue
+        merged: list[Any] = []
+        for rank in range(MOST):
+            merged += [h[kind][rank] for h in found if rank < len(h.get(kind, ())) and h[kind][rank] not in merged]
+        out[kind] = merged[:MOST]
     return out
 
 
@@ -76,14 +98,14 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
             found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
             found[f"order:{node}"] = []
     for name in sim.channels:
-        body = sim.case.machine.sensors[name].body
+        body = sim.case.machine.sensors[name].body if name in sim.case.machine.sensors else None
         if body is not None and not sim.case.machine.turns(body):
             found[f"wavelength:{name}"] = found.get(f"wavelength:{body}", [])
     found["spot"] = spots(x, d, MOST)
     for name in sim.channels:
         grain = record.grain[name]
-        if grain > 0.0 and sim.case.machine.sensors[name].measures == "position":
-            error = (record.y[name] - read[:, sim.layout.sensors[name]]) / grain
+        if grain > 0.0 and name in sim.layout.sensors and sim.case.machine.sensors[name].measures == "position":
+            error = (record.y[name] - read[:, sim.column(name)]) / grain
             found[f"jump:{name}"] = [
                 (float(record.t[k] - record.t[0]), size * grain) for k, size in jumps(error, 1.0)
             ]  # fmt: skip

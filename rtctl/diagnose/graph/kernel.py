@@ -19,7 +19,7 @@ from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
-OPEN, TRACK = range(2)
+OPEN, TRACK, HELD = range(3)
 SPECIAL = frozenset({"reel", "capstan", "wheel", "span", "contact", "guided", "wrapped", "edges", "loaded"})
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
@@ -52,8 +52,34 @@ def substep(job, p, m, t, forces, row):
     force(t, m)
     last(t, m)
     for i in range(p.nq):
-        m.f[i] += job.correction * job.push[i]
+        m.f[i] += job.correction * job.push[i] + job.need[i]
     linear.advance(m)
+
+
+@compiled
+def hold(job, p, m, k, share, path, pace):
+    """Put the held coordinates where they are at `share` of tick k, and into job.need the force that it takes.
+
+    Between rows a cubic runs through positions `path` and speeds `pace` (n, coordinates). The force is the one that
+    would have given the speed at the end of the substep: dry friction answers to it as to any other.
+    """
+    n = path.shape[0]
+    one = min(max(k, 0), n - 1)
+    two = min(one + 1, n - 1) if k >= 0 else one
+    s, T = share, 1.0 / job.rate
+    for i in range(p.nq):
+        if job.held[i] == 0:
+            continue
+        a, b = path[one, i], path[two, i]
+        c, d = T * pace[one, i], T * pace[two, i]
+        if k < 0:
+            c = d = 0.0
+        elif two == one:  # after the last row it goes on
+            b = a + c
+        x = a + s * (c + s * (3.0 * (b - a) - 2.0 * c - d + s * (2.0 * (a - b) + c + d)))
+        v = (c + s * (2.0 * (3.0 * (b - a) - 2.0 * c - d) + s * 3.0 * (2.0 * (a - b) + c + d))) / T
+        job.need[i] += (v - m.x[p.nq + i]) / m.Gamma_T[m.nu + i, p.nq + i]
+        m.x[i], m.x[p.nq + i] = x - job.shift[i], v
 
 
 @compiled
@@ -64,12 +90,13 @@ def look(p, m, t):
 
 
 @entry
-def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
+def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     """Simulate len(seen) ticks after `lead` ticks at the first row; readings go to out (n, sensors), SI.
 
     jobs.mode 0 applies the recorded `volts` (n, drives) and `forces` (n, coordinates) alone; 1 adds a correction that
-    makes the main sensor follow `seen` (n,) up to row jobs.release, and leaves it in `push` (n,). Returns the row at
-    which the model ran away, n where it did not.
+    makes the main sensor follow `seen` (n,) up to row jobs.release, and leaves it in `push` (n,); 2 holds the main
+    sensor's coordinate on `seen`, and leaves the force that it takes in `push`. Coordinates of jobs.held move as `path`
+    and `pace` (n, coordinates) say. Returns the row at which the model ran away, n where it did not.
     """
     job, p, s, t = jobs[0], ps[0], ss[0], ts[0]
     m = s.m
@@ -81,6 +108,12 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
             m.t = 0.0
         look(p, m, t)
         at = max(k, 0)
+        if job.mode == 2:  # what the sensor errs by is no motion
+            i, a = p.sensor_i[main], p.sensor_a[main]
+            for _ in range(2):
+                job.shift[i] = (m.y[main] - a * m.x[i]) / a
+                m.x[i] = path[at, i] - job.shift[i]
+                look(p, m, t)
         job.correction = 0.0
         if job.mode == 1 and k < job.release:
             e = seen[at] - m.y[main]
@@ -97,7 +130,8 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
         if k >= 0:
             for c in range(p.ny):
                 out[k, c] = m.y[c]
-            push[k] = job.correction
+            if job.mode == 1:
+                push[k] = job.correction
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0
@@ -107,6 +141,12 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
                 for c in range(drives):
                     m.volts[c] += share * volts[row, c]
             substep(job, p, m, t, forces, at)
+            if job.holds != 0:
+                hold(job, p, m, k, (i + 1.0) / job.substeps, path, pace)
+                for row in ((k if i == 0 else -1), (k + 1 if i == job.substeps - 1 else -1)):
+                    if job.mode == 2 and 0 <= row < n:  # mean of just before a row and just after it
+                        for j in range(p.nq):
+                            push[row] += 0.5 * job.need[j] * job.share[j]
         if not (abs(m.y[main]) < 1e12):
             return max(k, 0)
     return n
@@ -127,6 +167,11 @@ JOB = state(
     a=float,
     push=(float, Q),  # what one unit of correction pushes each coordinate with
     correction=float,
+    holds=int,  # 1: some coordinate is held
+    held=(int, Q),  # 1: the coordinate moves as `path` says
+    shift=(float, Q),  # what the reading of a held coordinate is off by
+    need=(float, Q),  # force that holds it, N or Nm
+    share=(float, Q),  # what of it counts at the main sensor's body
     e=float,
     d=float,
 )

@@ -32,13 +32,16 @@ class Likelihood:
         self.sim = sim
         record = sim.record
         self.mean = max(1, round(1.0 / (RATE * record.dt)))
-        self.channels = [sim.layout.sensors[name] for name in sim.channels]
+        self.channels = [sim.column(name) for name in sim.channels]
         begin = min(settled(sim), len(record.t) // 4)
         self.rows = (begin, len(record.t)) if rows is None else rows
         self.target = np.stack([record.y[name] for name in sim.channels], axis=1)
         grain = np.array([record.grain[name] for name in sim.channels])
         smooth = np.std(np.diff(self.target, 2, axis=0), axis=0) / 10.0
         self.least = np.where(grain > 0.0, QUANTISED * grain, np.maximum(smooth, 1e-12)) / np.sqrt(self.mean)
+        if sim.case.problem == "kinematic":  # the counts of the first position are in what follows it
+            passed = np.array([sim.ratios.get(str(sensor_body(sim, name)), 0.0) for name in sim.channels])
+            self.least = np.hypot(self.least, QUANTISED * record.grain[sim.main] * passed / np.sqrt(self.mean))
         self.noise: list[Noise] = list(noise) if noise is not None else [
             Noise(np.ones(1), float(max(least, 1e-300))) for least in self.least
         ]  # fmt: skip
@@ -62,8 +65,15 @@ class Likelihood:
         if not (np.abs(e) < wild).all():  # ran away: no noise explains it
             e[~(np.abs(e) < wild).all(axis=1)] = wild
             e[::2] *= -1.0
-        beside = np.array([name != self.sim.main for name in self.sim.channels])
+        beside = np.array([self._floats(name) for name in self.sim.channels])
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
+
+    def _floats(self, name: str) -> bool:
+        """Whether the constant of a channel says nothing."""
+        if self.sim.case.problem != "static":
+            return name != self.sim.main
+        sensors = self.sim.case.machine.sensors
+        return name in sensors and sensors[name].measures == "position"
 
     def white(self, e: np.ndarray) -> np.ndarray:
         """Innovations of residuals (blocks, sensors), sensor after sensor."""
@@ -111,6 +121,23 @@ class Likelihood:
         """Number of innovations."""
         return sum((self.rows[1] - self.rows[0]) // self.mean - noise.order for noise in self.noise)
 
+    @property
+    def parts(self) -> Sequence["Likelihood"]:
+        """The likelihood of each recording: this one."""
+        return (self,)
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Standard deviation of each channel, SI; 1 where it is constant."""
+        found = np.std(self.target[slice(*self.rows)], axis=0)
+        return np.asarray(np.where(found > 0.0, found, 1.0))
+
+    def split(self, share: float) -> tuple["Likelihood", "Likelihood"]:
+        """The same of the first rows, and of the last `share` of them."""
+        begin, end = self.rows
+        cut = end - round(share * (end - begin))
+        return self.during(begin, cut), self.during(cut, end)
+
     def during(self, begin: int, end: int) -> "Likelihood":
         """The same of rows `begin` to `end`."""
         other = copy(self)
@@ -118,8 +145,19 @@ class Likelihood:
         return other
 
 
+def sensor_body(sim: Simulator, name: str) -> str | None:
+    """Body of a channel; None where it looks at none."""
+    found = sim.case.machine.sensors.get(name)
+    return None if found is None else found.body
+
+
 def settled(sim: Simulator) -> int:
-    """First row that counts: the machine has moved and forgotten how it stood before the recording began."""
+    """First row that counts: the machine has moved and forgotten how it stood before the recording began.
+
+    Of a free response it is the first of all: the state there is fitted.
+    """
+    if sim.case.problem == "free":
+        return 0
     y = sim.seen
     moved = int(np.argmax(np.abs(y - y[0]) > 0.01 * np.ptp(y)))
     return min(moved + round(FORGET / sim.follow / sim.record.dt), len(y) // 5)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rtctl.diagnose.graph.model import rigid
+from rtctl.diagnose.graph.model import own, rigid
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.element import Element
 from rtctl.plants.graph.layout import NOWHERE
@@ -41,6 +41,7 @@ class Measures:
     """Measures by name and node, from the main sensor, the ratios of the joints and the recorded commands."""
 
     def __init__(self, sim: Simulator, values: dict[str, float], hints: dict[str, list]):
+        values = own(values, sim.record.name)
         self.sim, self.values, self.hints = sim, values, hints
         self.machine, self.layout = sim.case.machine, sim.layout
         self.way = way(sim)
@@ -66,7 +67,8 @@ class Measures:
             bodies = [drive.body] if drive.body else [self.machine.joints[str(drive.joint)].to]
             total += gain * self.ratios.get(str(bodies[0]), 0.0) * self.u[:, number]
         found = float(np.sqrt(np.mean(total**2)))
-        return max(found, 0.1 * self.inertia(str(self.sim.body)) * self.a_main, LITTLE)
+        inertial = self.inertia(str(self.sim.body)) * self.a_main  # all that acts, where nothing drives
+        return max(found, (0.1 if self.layout.drives else 1.0) * inertial, LITTLE)
 
     def body_of(self, node: str) -> str:
         """The body that a node belongs to: its own, that at the far end of a joint, that of a drive or sensor."""
@@ -101,13 +103,14 @@ class Measures:
     def of(self, measure: str, node: str) -> float:
         """The measure in SI at a node."""
         s = self.scale(node)
-        volts = max(float(np.sqrt(np.mean(self.sim.volts**2))), LITTLE)
+        volts = max(self.volts(""), LITTLE)
         stiffness = self.stiffness(node)
         peak = float(np.abs(self.sim.volts).max(initial=0.0))
         table = {
             "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low,
             "drag": s.force / s.speed, "drag2": s.force / s.speed**2, "stiff": s.force / s.span,
-            "twist": s.force / stiffness, "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
+            "twist": self.twist(node, s.force / stiffness),
+            "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
             "swell": s.force / (s.speed * s.span**2), "stiffness": stiffness, "firm": self.firm(node),
             "compliance": 1.0 / s.force, "inertia": self.inertia(node), "seconds": 1.0,
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
@@ -171,6 +174,19 @@ class Measures:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""
         s = self.scale(node)
         return self.values.get(f"joints.{node}.stiffness", s.force / s.span)
+
+    def twist(self, node: str, usual: float) -> float:
+        """Deflection of a joint: `usual` by its force, in a kinematic problem as the positions differ."""
+        sim, sensors = self.sim, self.machine.sensors
+        if sim.case.problem != "kinematic":
+            return usual
+        apart = []
+        for name in sim.channels:
+            ratio = self.ratios.get(str(sensors[name].body), 0.0)
+            if sensors[name].measures == "position" and ratio != 0.0:
+                off = float(np.std(sim.record.y[name] - ratio * self.way)) / abs(ratio)
+                apart.append(off * abs(self.ratios.get(self.body_of(node), 1.0)))
+        return max([usual, *apart])
 
     def firm(self, node: str) -> float:
         """Stiffness of a joint with which the lighter of its two sides rings at a tenth of the sample rate."""

@@ -8,6 +8,9 @@ from rtctl.plants.graph.layout import Layout, layout
 from rtctl.plants.graph.params import GraphParams, build
 from rtctl.plants.physics import TERMS
 
+PHYSICS = "physics."  # head of the paths of the owner's terms
+RECORDING = "@"  # between the path of a number and the recording that it belongs to
+
 
 class GraphModel(NamedTuple):
     """Numbers (SI) and the terms of the `physics:` list."""
@@ -15,6 +18,20 @@ class GraphModel(NamedTuple):
     layout: Layout
     base: dict[str, float]
     terms: tuple[Settings, ...] = ()
+
+    def known(self) -> int:
+        """Number of the terms that the owner knows, which come first."""
+        return len({path.split(".")[1] for path in self.base if path.startswith(PHYSICS)})
+
+    def resolved(self) -> "GraphModel":
+        """The same with the numbers of the owner's terms as `base` has them."""
+        found: dict[int, dict[str, float]] = {}
+        for path, value in self.base.items():
+            if path.startswith(PHYSICS) and RECORDING not in path:
+                _, number, key = path.split(".")
+                found.setdefault(int(number), {})[key] = value
+        terms = [t.model_copy(update=found[i]) if i in found else t for i, t in enumerate(self.terms)]
+        return self._replace(terms=tuple(terms))
 
     def add(self, *terms: Settings) -> "GraphModel":
         """The same with more terms."""
@@ -44,6 +61,15 @@ class GraphModel(NamedTuple):
 def nominal(case: GraphCase) -> GraphModel:
     """The owner's model: the description and the terms that the owner knows."""
     return GraphModel(case.layout, dict(case.values), tuple(settings_of(entry) for entry in case.physics))
+
+
+def own(values: dict[str, float], name: str) -> dict[str, float]:
+    """Numbers as one recording has them: those of its own in the place of the shared ones."""
+    if not any(RECORDING in path for path in values):
+        return values
+    out = {path: value for path, value in values.items() if RECORDING not in path}
+    out |= {path.partition(RECORDING)[0]: value for path, value in values.items() if path.endswith(RECORDING + name)}
+    return out
 
 
 def settings_of(entry: dict[str, Any]) -> Settings:

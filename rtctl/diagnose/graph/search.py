@@ -11,7 +11,7 @@ import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.fits import Fitted, explained, refit, without
-from rtctl.diagnose.graph.hypotheses import hints, hypotheses
+from rtctl.diagnose.graph.hypotheses import combined, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened, screen
 from rtctl.diagnose.space import Space
@@ -113,9 +113,7 @@ def screened(parent: Fitted) -> tuple[Screened, float]:
     sim = parent.like.sim
     model = parent.model
     candidates = [
-        h
-        for h in hypotheses(sim, model, hints(sim, model, parent.like.rows[0]), model.terms)
-        if h.name not in parent.names
+        h for h in hypotheses(sim, model, combined(parent.like, model), model.terms) if h.name not in parent.names
     ]
     names = {h.name for h in candidates}
     return screen(parent, candidates), float(np.log(max(len(names), 1)))

@@ -3,6 +3,8 @@
 track   the recorded command, and a correction that makes the model follow the main sensor. It pushes every body as
         its inertia asks for, so that the rigid motion is corrected and no joint is stretched by the correction.
 open    the recorded command alone: a free run
+held    the main sensor's coordinate moves as it was recorded, and the force that it takes is what the model predicts:
+        of a static problem, where forces were measured, and of a kinematic one, where other positions follow
 """
 
 from copy import copy
@@ -12,9 +14,10 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import START
-from rtctl.diagnose.graph.kernel import TRACK
-from rtctl.diagnose.graph.model import GraphModel, rigid
+from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, START
+from rtctl.diagnose.graph.kernel import HELD, TRACK
+from rtctl.diagnose.graph.model import GraphModel, own, rigid
+from rtctl.diagnose.graph.motion import Path, main_path, paths
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
@@ -27,6 +30,7 @@ FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
 FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
+STEADY = 0.4  # rad a substep, of the quickest ring in which lost motion is crossed
 LEAD = 0.5  # s at the first row, in which springs come to rest
 NEVER = np.iinfo(np.int64).max  # row
 ABSENT = np.zeros((1, 1))
@@ -47,14 +51,39 @@ class Simulator:
         usual = FOLLOW_SPEED if self.shows_speed else FOLLOW
         self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP - 1e-9)))
+        if self.case.problem == "kinematic":
+            self.substeps = max(self.substeps, int(np.ceil(record.dt * self._ring() / STEADY)))
         self.seen = np.ascontiguousarray(record.y[self.main])
         self.volts = np.ascontiguousarray(record.u)
         self.forces = self._forces(record.forces)
-        self.channels = [name for name in self.layout.sensors if name in record.y]
+        self.mode = HELD if self.case.problem in HELD_PROBLEMS else TRACK
+        self.held: Path | None = main_path(record) if self.mode == HELD else None
+        self.inputs = paths(record)
+        self.channels = [n for n in (*self.layout.sensors, *self.case.machine.drives) if n in record.y]
+        if self.mode == HELD:
+            self.channels.remove(self.main)
         flexible = bool(self.layout.links) or any(b.weights for b in record.case.machine.bodies.values())
-        self.lead = round(LEAD / record.dt) if flexible else 0
+        self.lead = round(LEAD / record.dt) if flexible and self.case.problem != "free" else 0
         self.release = NEVER
         self.ratios = rigid(self.layout, record.case.values, str(self.body))
+
+    def _ring(self) -> float:
+        """Highest frequency, rad/s, at which a body beside the held one rings with a joint."""
+        p = GraphModel(self.layout, self.case.values).params(SUBSTEP)
+        held, out = self.layout.coordinate(str(self.body)), 0.0
+        for k in range(p.nl):
+            for at, lever in ((p.link_i[k], p.link_a[k]), (p.link_j[k], p.link_b[k])):
+                if at != held:
+                    out = max(out, float(np.sqrt(p.link_c[k] * lever**2 / p.inertia[at])))
+        return out
+
+    def column(self, channel: str) -> int:
+        """Column of a channel in what a run returns: that of its sensor, the last one for the force of the drives."""
+        return self.layout.sensors.get(channel, len(self.layout.sensors))
+
+    def own(self, model: GraphModel) -> GraphModel:
+        """The model with the numbers of this recording."""
+        return model._replace(base=own(model.base, self.record.name), layout=self.layout)
 
     def _forces(self, by_body: np.ndarray | None) -> np.ndarray:
         if by_body is None:
@@ -84,19 +113,21 @@ class Simulator:
         other.substeps *= times
         return other
 
-    def run(self, model: GraphModel, mode: int = TRACK, n: int | None = None, coarse: bool = False) -> np.ndarray:
-        """Readings (n, sensors of the machine) in SI; nan from the tick on at which the model ran away.
+    def run(self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False) -> np.ndarray:
+        """Readings (n, sensors of the machine) in SI, with the force of the drives after them where it was measured;
+        nan from the tick on at which the model ran away. The mode is that of the problem where none is given.
 
         `coarse` takes steps of twice the length: good for differences, not for verdicts.
         """
         return self.everything(model, mode, n, coarse)[0]
 
     def everything(
-        self, model: GraphModel, mode: int = TRACK, n: int | None = None, coarse: bool = False
+        self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings, and the correction (n,), in N or Nm at the main sensor's body."""
         record, k = self.record, self.kernel
-        model = model.built()
+        mode = self.mode if mode is None else mode
+        model = self.own(model).resolved().built()
         n = len(self.seen) if n is None else n
         stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
         substeps = self.substeps * (2 if stiff else 1)
@@ -118,15 +149,46 @@ class Simulator:
         start = float(np.log(model.base.get(START, 1.0)))
         seen = self.seen[:n] + start if start else self.seen[:n]
         self._begin(states, model, float(seen[0]))
+        path, pace = self._held(job, model, params, start)
         out, push = np.full((n, params.ny), np.nan), np.zeros(n)
+        static = self.case.problem == "static"  # forces were measured: the commands that made them do not count
         done = k.module.run(
-            job, p, states, slots, self.volts[:n], self._pushing(model)[:n],
-            seen, out, push,
+            job, p, states, slots, (np.zeros_like if static else np.asarray)(self.volts[:n]), self._pushing(model)[:n],
+            seen, path[:n], pace[:n], out, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         if start:
             out[:, self.layout.sensors[self.main]] -= start
+        if static:  # what the drives would have to make, as their nominal gain tells it
+            name = next((c for c in self.channels if c not in self.layout.sensors), "")
+            made, share = (record.y[name][:n], self._told(name, model)) if name else (np.zeros(n), 1.0)
+            out = np.column_stack([out, push * share])
+            push = push - made / share
         return out, push
+
+    def _told(self, drive: str, model: GraphModel) -> float:
+        """Force of a drive by its nominal gain over that by the model's."""
+        path, one, two = f"drives.{drive}", self.case.values, model.base
+        gains = [v[f"{path}.gain"] * v.get(f"{path}.torque_constant", 1.0) / v.get(f"{path}.resistance", 1.0)
+                 for v in (one, two)]  # fmt: skip
+        return gains[0] / gains[1]
+
+    def _held(self, job: np.ndarray, model: GraphModel, params: Any, start: float) -> tuple[np.ndarray, np.ndarray]:
+        """Positions and speeds (n, coordinates) of what moves as recorded; the job is told which."""
+        moved = list(self.inputs)
+        if job["mode"][0] == HELD:
+            assert self.held is not None
+            moved.append(self.held._replace(x=self.held.x + start) if start else self.held)
+        if not moved:
+            return ABSENT, ABSENT
+        path, pace = np.zeros((2, len(self.seen), model.layout.nq))
+        job["holds"] = 1
+        for one in moved:
+            at, ratio = model.layout.coordinate(one.body), model.layout.ratio(one.body, model.base)
+            path[:, at], pace[:, at] = one.x / ratio, one.v / ratio
+            job["held"][0, at] = 1
+            job["share"][0, at] = 1.0 / ratio if one is moved[-1] else 0.0
+        return path, pace
 
     def _pushing(self, model: GraphModel) -> np.ndarray:
         """Forces by the coordinates of a model that may have more of them than the description."""
@@ -143,16 +205,21 @@ class Simulator:
 
     def _begin(self, states: np.ndarray, model: GraphModel, first: float) -> None:
         """Put every coordinate where the first row of the main sensor has it, the joints unstretched."""
-        x = states["m"]["x"][0]
+        x, v = states["m"]["x"][0], 0.0
+        if self.case.problem == "free":
+            first += self.record.scales[0] * float(np.log(model.base[FIRST_POSITION]))
+            v = self.record.scales[2] + self.record.scales[1] * float(np.log(model.base[FIRST_SPEED]))
         for name, ratio in self.ratios.items():
-            own = model.layout.ratio(name, model.base)
-            value = ratio * first / own
+            own_ratio = model.layout.ratio(name, model.base)
+            value = ratio * first / own_ratio
             at = model.layout.coordinate(name)
             if self.shows_speed:
                 x[model.layout.nq + at] = value
                 states["m"]["v_before"][0, at] = value
             else:
                 x[at] = value
+            if v:
+                x[model.layout.nq + at] = states["m"]["v_before"][0, at] = ratio * v / own_ratio
 
     def _job(self, model: GraphModel, params: Any, mode: int, substeps: int) -> np.ndarray:
         job = np.zeros(1, kernel.JOB)
@@ -165,8 +232,8 @@ class Simulator:
         inertia = 0.0
         push = np.zeros(len(j["push"]))
         for name, ratio in self.ratios.items():
-            at, own = model.layout.coordinate(name), model.layout.ratio(name, model.base)
-            push[at] = params.inertia[at] * ratio / own
+            at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
+            push[at] = params.inertia[at] * ratio / own_ratio
         for at in range(model.layout.nq):
             inertia += push[at] ** 2 / params.inertia[at]
         j["push"] = push / inertia  # a unit of correction is a unit of force at the main body
