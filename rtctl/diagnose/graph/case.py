@@ -10,7 +10,7 @@ from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
 from rtctl.plants.graph.description import Description, Input
 from rtctl.plants.graph.elements import elements
-from rtctl.plants.graph.layout import Layout, layout
+from rtctl.plants.graph.layout import NOWHERE, Layout, layout
 from rtctl.plants.physics import TERMS, nodes, standing
 
 FORMAT = 2
@@ -23,7 +23,7 @@ DEFAULT_TOLERANCE = 0.15
 EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
 START = "start.angle"  # e to the angle, rad, by which the zero of a position is off before the weight of a body
 FIRST_POSITION, FIRST_SPEED = "start.position", "start.speed"  # of a free response, as START, in units of the record
-STARTS = (START, FIRST_POSITION, FIRST_SPEED)  # each recording has its own
+OWN_START = "start.bodies."  # head of the first position and speed of a body that a spring joins to the others
 HELD_PROBLEMS = ("static", "kinematic")  # the main sensor's motion is given
 START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
 NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
@@ -53,7 +53,7 @@ class GraphCase(NamedTuple):
         """Share by which a value may be wrong; inf where it may be anything."""
         if path == START and path not in self.tolerances:
             return START_TOLERANCE
-        if path in STARTS and path not in self.tolerances:
+        if is_start(path) and path not in self.tolerances:
             return math.inf
         for end in (path, *(path.rsplit(".", n)[0] for n in range(1, path.count(".") + 1))):
             if end in self.tolerances:
@@ -76,7 +76,7 @@ class GraphCase(NamedTuple):
 
     def _acts(self, path: str) -> bool:
         """Whether a number has a part in the motion: the damping of a drive without a bandwidth has none."""
-        if path in STARTS or path.startswith("physics."):
+        if is_start(path) or path.startswith("physics."):
             return True
         group, name, *rest = path.split(".")
         if group == "drives" and rest == ["damping"]:
@@ -109,6 +109,8 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         raise UserError(f"{where}: problem is {problem!r}; it should be one of {', '.join(PROBLEMS)}")
     if problem == "free":
         values |= {FIRST_POSITION: 1.0, FIRST_SPEED: 1.0}
+    if problem not in HELD_PROBLEMS:
+        values |= dict.fromkeys(_own_starts(machine, placed), 1.0)
     tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
     differ = _differ(where, case.get("per_recording"), values)
     rate = _number(where, "sample_rate", case.get("sample_rate"))
@@ -189,6 +191,28 @@ def _physics(where: Path, placed: Layout, given: Any) -> tuple[dict[str, Any], .
             where_it_can = ", ".join(nodes(TERMS[name], there)) or "nowhere in this machine"
             raise UserError(f"{at}.node: {name} cannot stand at '{entry.get('node')}'; it can at {where_it_can}")
     return tuple(given)
+
+
+def is_start(path: str) -> bool:
+    """Whether a path is of the state at the first row, which each recording has for itself."""
+    return path.startswith("start.")
+
+
+def _own_starts(machine: Description, placed: Layout) -> list[str]:
+    """Paths of the first position and speed of every coordinate but that of the followed sensor, which corrects itself:
+    a machine that rings as the recording begins is not at rest."""
+    if not placed.links:
+        return []
+    followed = [
+        s.body for kind in ("position", "speed") for s in machine.sensors.values() if s.measures == kind and s.body
+    ]
+    taken = {NOWHERE, *(placed.bodies[str(body)].coordinate for body in followed[:1])}
+    out = []
+    for name, body in placed.bodies.items():
+        if body.coordinate not in taken:
+            taken.add(body.coordinate)
+            out += [f"{OWN_START}{name}.position", f"{OWN_START}{name}.speed"]
+    return out
 
 
 def _numbers(physics: tuple[dict[str, Any], ...]) -> dict[str, float]:

@@ -17,7 +17,7 @@ from rtctl.config.load import Dumper
 from rtctl.config.units import to_si
 from rtctl.config.yaml_file import Document
 from rtctl.diagnose.export import entry_of
-from rtctl.diagnose.graph.case import STARTS
+from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.model import PHYSICS, GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.words import value_unit
@@ -37,7 +37,7 @@ def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] 
         _drop(machine, path.split("."))
     values = own(model.base, record.name)
     for path, value in values.items():
-        if path in case.made or path in STARTS or path.startswith(PHYSICS):
+        if path in case.made or is_start(path) or path.startswith(PHYSICS):
             continue
         if value != case.values.get(path):
             value = float(f"{value:.6g}")
@@ -113,7 +113,7 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
     lines.append("effects that were found are in plant.physics. Changed, nominal -> fitted:")
     for path, value in own(model.base, record.name).items():
         old = case.values.get(path, value)
-        if path not in STARTS and abs(value - old) > 5e-4 * abs(old):
+        if not is_start(path) and abs(value - old) > 5e-4 * abs(old):
             unit = value_unit(case.machine, path)
             lines.append(f"  {path}: {old:.4g} -> {value:.4g} {unit}".rstrip())
     return "".join(f"# {line}\n" for line in lines)

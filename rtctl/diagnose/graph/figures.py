@@ -7,9 +7,8 @@ from scipy.signal import welch
 from rtctl.diagnose.diagnosis import NOTHING
 from rtctl.diagnose.figures import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.case import STARTS
+from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.missing import Missing, subjects
-from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.posterior import rivals
 from rtctl.diagnose.graph.words import called, channel_unit, here, value_unit
 from rtctl.diagnose.missing import binned
@@ -183,7 +182,7 @@ def _folded(text: str, most: int = 44) -> str:
 
 def parameters(d: GraphDiagnosis) -> Figure | None:
     """Fitted numbers over the nominal ones with 90 % intervals; grey where the interval is the owner's tolerance."""
-    names = [path for path in d.parameters if path.partition(RECORDING)[0] not in STARTS]
+    names = [path for path in d.parameters if not is_start(path)]
     if not names:
         return None
     space, owner = d.found.base.space, d.nominal

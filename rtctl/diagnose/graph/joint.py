@@ -12,7 +12,7 @@ from copy import copy
 import numpy as np
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph.case import STARTS
+from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import RECORDING, GraphModel, nominal
 from rtctl.diagnose.graph.noise import Noise
@@ -119,7 +119,7 @@ def together(records: Sequence[GraphRecord]) -> tuple[Likelihood, Space]:
     for other in records[1:]:
         check_same(first, other)
         _check_values(first, other, differ)
-    own = [path for path in first.case.values if path in differ or path in STARTS]
+    own = [path for path in first.case.values if path in differ or is_start(path)]
     model = nominal(first.case)
     base = dict(model.base)
     for record in records:
@@ -172,7 +172,7 @@ def _check_values(first: GraphRecord, other: GraphRecord, differ: set[str]) -> N
         )
     one, two = first.case.values, other.case.values
     for path in {**one, **two}:
-        if path in differ or path in STARTS or path in first.case.made:
+        if path in differ or is_start(path) or path in first.case.made:
             continue
         a, b = one.get(path, 0.0), two.get(path, 0.0)
         if abs(a - b) > SAME * max(abs(a), abs(b)):

@@ -106,6 +106,9 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     for k in range(-job.lead, n):
         if k == 0:
             m.t = 0.0
+            for i in range(p.nq):
+                m.x[i] += job.first_x[i]
+                m.x[p.nq + i] += job.first_v[i]
         look(p, m, t)
         at = max(k, 0)
         if job.mode == 2:  # what the sensor errs by is no motion
@@ -167,6 +170,8 @@ JOB = state(
     a=float,
     push=(float, Q),  # what one unit of correction pushes each coordinate with
     correction=float,
+    first_x=(float, Q),  # how far each coordinate is from rest at the first row, and its speed
+    first_v=(float, Q),
     holds=int,  # 1: some coordinate is held
     held=(int, Q),  # 1: the coordinate moves as `path` says
     shift=(float, Q),  # what the reading of a held coordinate is off by

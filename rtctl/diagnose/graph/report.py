@@ -13,9 +13,8 @@ from rtctl.diagnose import numbers
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Interval
 from rtctl.diagnose.graph import figures, words
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.case import STARTS
+from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.missing import machine_words
-from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.report import COLOR, Picture, interval, svg
 from rtctl.diagnose.words import need, noun, phrase_of
 from rtctl.plants.physics import TERMS
@@ -201,7 +200,7 @@ def parameter_rows(d: GraphDiagnosis) -> list[Row]:
     """The fitted numbers with their nominal values."""
     rows = []
     for path, v in d.parameters.items():
-        start = path.partition(RECORDING)[0] in STARTS
+        start = is_start(path)
         scale, unit = _scaled(v.value if start else d.nominal[path], v.unit)
         low, high = sorted((v.low, v.high))
         nominal, fitted = (numbers.figures(scale * x, 4) for x in (d.nominal[path], v.value))

@@ -14,7 +14,7 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, START
+from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths
@@ -76,6 +76,21 @@ class Simulator:
                 if at != held:
                     out = max(out, float(np.sqrt(p.link_c[k] * lever**2 / p.inertia[at])))
         return out
+
+    def _own_scales(self, params: Any, at: int) -> tuple[float, float]:
+        """Scales of the first position and speed of a coordinate: those of a ring as quick as the machine moves."""
+        x = self.seen
+        rate = np.std(x) if self.shows_speed else np.sqrt(np.mean(np.gradient(x, self.record.dt) ** 2))
+        ratio = next((r / self.layout.ratio(name, self.case.values) for name, r in self.ratios.items()
+                      if r and self.layout.coordinate(name) == at), 1.0)  # fmt: skip
+        stiffness = sum(
+            params.link_c[k] * lever**2
+            for k in range(params.nl)
+            for end, lever in ((params.link_i[k], params.link_a[k]), (params.link_j[k], params.link_b[k]))
+            if end == at
+        )
+        speed = float(rate) * abs(ratio)
+        return speed * float(np.sqrt(params.inertia[at] / stiffness)) if stiffness else 0.0, speed
 
     def column(self, channel: str) -> int:
         """Column of a channel in what a run returns: that of its sensor, the last one for the force of the drives."""
@@ -239,6 +254,11 @@ class Simulator:
         j["push"] = push / inertia  # a unit of correction is a unit of force at the main body
         j["P"], j["D"] = self.follow**2 * inertia, 1.4 * self.follow * inertia
         j["a"] = -np.expm1(-10.0 * self.follow * dt)
+        for path, value in model.base.items():
+            if path.startswith(OWN_START):
+                name, what = path.removeprefix(OWN_START).rsplit(".", 1)
+                at, column = model.layout.coordinate(name), ("position", "speed").index(what)
+                j[("first_x", "first_v")[column]][at] = self._own_scales(params, at)[column] * float(np.log(value))
         return job
 
 

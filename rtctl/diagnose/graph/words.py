@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from rtctl.diagnose.diagnosis import Effect
-from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, START, STARTS
+from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, START, is_start
 from rtctl.diagnose.graph.model import PHYSICS, RECORDING, GraphModel
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.numbers import both, nice
@@ -76,7 +76,7 @@ def value_unit(machine: Description, path: str) -> str:
     path = path.partition(RECORDING)[0]
     if path == START:
         return "rad"
-    if path in STARTS or path.startswith(PHYSICS):
+    if is_start(path) or path.startswith(PHYSICS):
         return ""
     group, name, *rest = path.split(".")
     key = rest[-1]
