@@ -27,17 +27,23 @@ def elements(layout: Layout) -> tuple[Element, ...]:
     for drive in machine.drives.values():
         if drive.joint is not None:
             driven |= {getattr(machine.joints[drive.joint], "from"), machine.joints[drive.joint].to}
+    springs = [joint for joint in machine.joints.values() if joint.stiffness is not None]
+    sprung = {end for joint in springs for end in (getattr(joint, "from"), joint.to)}
     out: list[Element] = []
     for name, body in machine.bodies.items():
         if layout.bodies[name].coordinate != NOWHERE:
             traits = ["general", "turns rotor" if body.turns else "slides", "bounded"]
             traits += ["driven" if name in driven else "load"]
             traits += ["dry"] if body.dry > 0.0 else []
+            traits += ["sprung"] if name in sprung else []
+            traits += ["heavy"] if any(weight.incline is None for weight in body.weights) else []
             out.append(element(name, "body", " ".join(traits)))
     for name, joint in machine.joints.items():
         out.append(element(name, "joint", "general rigid" if joint.stiffness is None else "general spring shaft"))
     for number, (name, drive) in enumerate(machine.drives.items()):
-        out.append(element(name, "drive", f"general {drive.kind}" + (" supply" if number == 0 else "")))
+        traits = ["general", drive.kind, *(["supply"] if number == 0 else [])]
+        traits += ["several"] if len(machine.drives) > 1 else []
+        out.append(element(name, "drive", " ".join(traits)))
     for name, sensor in machine.sensors.items():
         if sensor.body is None or sensor.measures not in ("position", "speed"):
             continue

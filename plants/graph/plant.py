@@ -80,11 +80,14 @@ def take(p, m):
 def weigh(p, m):
     """Forces of what is not linear, on top of the forces m.f: weight of every body, and reels that wind."""
     for k in range(p.weights):
+        m.weight[p.weight_i[k]] = 0.0
+    for k in range(p.weights):
         i, a = p.weight_i[k], p.weight_a[k]
         force = p.weight_force[k]
         if p.weight_turns[k] != 0:
             force *= math.sin(a * m.qm[i] + p.weight_angle[k])
         m.f[i] -= a * force
+        m.weight[i] -= a * force
     if p.winds != 0:
         if reel.grow(p, m):
             discretise(p, m)

@@ -14,7 +14,7 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.presliding import bend
-from rtctl.plants.physics.search import At, Choice, Size, Turn, Where
+from rtctl.plants.physics.search import At, Choice, Rest, Size, Turn, Where
 from rtctl.plants.physics.story import PASSES, TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
@@ -174,7 +174,10 @@ SPRING = Term(
     settings=SpringSettings,
     build=build_spring,
     act={"force": "{m}.f[{i}] += {r} * load.spring({p}, {r} * {m}.qm[{i}])"},
-    stands=(stand("body", "bounded"),),
+    stands=(
+        stand("body", "general bounded", ways=((Size("k", "stiff", 0.2, signed=True), Rest("x0", "force", 0.3)),)),
+        stand("body", "bounded"),
+    ),
     look_alikes={
         "drive.offset": "the same short move at both ends of the travel: an offset is the same everywhere",
         "load.cable_chain": "approach one place from both sides slowly: a spring pulls the same, a chain does not",

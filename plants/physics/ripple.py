@@ -113,7 +113,7 @@ COGGING = Term(
     settings=CoggingSettings,
     build=build_cogging,
     act={"force": "{m}.f[{i}] += {r} * ripple.cogging({p}, {r} * {m}.qm[{i}])"},
-    stands=(stand("body", "driven"),),
+    stands=(stand("body", "driven"), stand("body", "general")),
     look_alikes={
         "load.imbalance": "turn slowly and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: cogging stays, an eccentric reel follows the tension",
@@ -157,6 +157,7 @@ ENCODER = Term(
     stands=(
         stand("sensor", "position turns slides", usual=False),
         stand("sensor", "position turns"),
+        stand("sensor", "general position slides", usual=False),
     ),
     look_alikes={
         "ripple.capstan": "on the LDU look at both sensors: a disc off centre does not move the carriage; on the IVU "
