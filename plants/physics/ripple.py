@@ -19,6 +19,7 @@ from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 TURN = 2.0 * math.pi
+DISC = Turn("A", "phi", "one", 0.002)
 
 
 class CoggingSettings(Settings):
@@ -156,6 +157,7 @@ ENCODER = Term(
     act={"reading": "{m}.y[{c}] = ripple.encoder({p}, {m}.y[{c}])"},
     stands=(
         stand("sensor", "position turns slides", usual=False),
+        stand("sensor", "general position turns", ways=((DISC,), (DISC, Hint("order", "order")))),
         stand("sensor", "position turns"),
         stand("sensor", "general position slides", usual=False),
     ),
@@ -182,7 +184,7 @@ ENCODER = Term(
     ),
     units={"A": "position", "A2": "position", "A3": "position"},
     needs=Needs(turns=0.5),
-    search=(Turn("A", "phi", "one", 0.002),),
+    search=(DISC,),
     sliding=(Turn("A", "phi", "one", 1e-05), Hint("turn", "wavelength", 0.4, lengths=(0.0, 0.045))),
     richer=(Turn("A2", "phi2", "one", 0.0005), Turn("A3", "phi3", "one", 0.0005)),
     other_name=OtherName("turn", "guide.thickness", "wavelength"),

@@ -57,7 +57,7 @@ def hypotheses(
 
 
 def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
-    """Suggestions by kind (and node): order, wavelength, spot, grip of each joint, and jump (time, size) of each sensor.
+    """Suggestions by kind (and node): order, wavelength, spot, grip of a joint, and jump (time, size) of a sensor.
 
     A sensor that the model does not follow shows orders and wavelengths in its own error.
 
@@ -83,6 +83,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
             waves = waves_of(x * ratio)
             found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
             found[f"order:{node}"] = []
+    errors: dict[str, np.ndarray] = {}  # of the sensors that the model does not follow
     for name in sim.channels:
         sensor = sim.case.machine.sensors[name]
         ratio = sim.ratios.get(str(sensor.body), 0.0) if sensor.measures == "position" else 0.0
@@ -92,11 +93,18 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         error = (record.y[name] - read[:, sim.layout.sensors[name]])[begin:][::thin]
         if name == sim.main or not np.isfinite(error).all():
             found[f"{kind}:{name}"] = found[f"{kind}:{sensor.body}"]
-        elif kind == "order":
-            found[f"order:{name}"] = peaks(ORDERS, spectrum(x * ratio, error, ORDERS), MOST)
-        else:
-            waves = waves_of(x * ratio)
-            found[f"wavelength:{name}"] = peaks(waves, spectrum(x * ratio, error, 2 * np.pi / waves), MOST)
+            continue
+        errors[name] = error
+        waves = 2 * np.pi / ORDERS if kind == "order" else waves_of(x * ratio)
+        tops = peaks(2 * np.pi / waves, spectrum(x * ratio, error, 2 * np.pi / waves), MOST)
+        found[f"{kind}:{name}"] = tops if kind == "order" else [2 * np.pi / top for top in tops]
+    for name, joint in sim.case.machine.joints.items():
+        for end in ("from", "to"):
+            body = getattr(joint, end)
+            orders = found.get(f"order:{body}", [])
+            for error in errors.values() if orders else ():
+                orders = peaks(ORDERS, spectrum(x * sim.ratios[body], error, ORDERS), MOST)
+            found[f"order_{end}:{name}"] = orders
     for name in sim.layout.links:
         at = gauges.layout.sensors.get(GAUGE + name)
         pull = np.abs(read[begin:, at]) if at is not None else np.full(1, np.nan)
