@@ -105,7 +105,7 @@ class Measures:
         stiffness = self.stiffness(node)
         peak = float(np.abs(self.sim.volts).max(initial=0.0))
         table = {
-            "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low,
+            "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low, "per_span2": s.span**-2,
             "drag": s.force / s.speed, "drag2": s.force / s.speed**2, "stiff": s.force / s.span,
             "twist": s.force / stiffness, "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
             "swell": s.force / (s.speed * s.span**2), "stiffness": stiffness, "firm": self.firm(node),
