@@ -7,7 +7,7 @@ from rtctl.plants.element import LOOP, Element, element
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.layout import layout as layout_of
-from rtctl.plants.graph.params import joint_place, place
+from rtctl.plants.graph.params import place
 from rtctl.plants.physics import TERMS, Term, nodes, standing
 
 
@@ -27,17 +27,26 @@ def elements(layout: Layout) -> tuple[Element, ...]:
     for drive in machine.drives.values():
         if drive.joint is not None:
             driven |= {getattr(machine.joints[drive.joint], "from"), machine.joints[drive.joint].to}
+    springs = [joint for joint in machine.joints.values() if joint.stiffness is not None]
+    sprung = {end for joint in springs for end in (getattr(joint, "from"), joint.to)}
     out: list[Element] = []
     for name, body in machine.bodies.items():
         if layout.bodies[name].coordinate != NOWHERE:
             traits = ["general", "turns rotor" if body.turns else "slides", "bounded"]
             traits += ["driven" if name in driven else "load"]
             traits += ["dry"] if body.dry > 0.0 else []
+            traits += ["sprung"] if name in sprung else []
+            traits += ["heavy"] if any(weight.incline is None for weight in body.weights) else []
             out.append(element(name, "body", " ".join(traits)))
     for name, joint in machine.joints.items():
-        out.append(element(name, "joint", "general rigid" if joint.stiffness is None else "general spring shaft"))
+        traits = ["general rigid" if joint.stiffness is None else "general spring shaft"]
+        traits += ["turns"] if machine.turns(getattr(joint, "from")) else []
+        traits += ["turned"] if machine.turns(joint.to) else []
+        out.append(element(name, "joint", " ".join(traits)))
     for number, (name, drive) in enumerate(machine.drives.items()):
-        out.append(element(name, "drive", f"general {drive.kind}" + (" supply" if number == 0 else "")))
+        traits = ["general", drive.kind, *(["supply"] if number == 0 else [])]
+        traits += ["several"] if len(machine.drives) > 1 else []
+        out.append(element(name, "drive", " ".join(traits)))
     for name, sensor in machine.sensors.items():
         if sensor.body is None or sensor.measures not in ("position", "speed"):
             continue
@@ -61,11 +70,13 @@ def check_node(machine: Description, path: str, term: str, node: str) -> None:
 
 def place_of(layout: Layout, values: dict[str, float], settings: Any) -> Spot:
     """Where an entry of a `physics:` list acts."""
-    return spot(TERMS[settings.term], settings.node, layout, elements(layout), values)
+    return spot(TERMS[settings.term], settings, layout, elements(layout), values)
 
 
-def spot(term: Term, node: str, layout: Layout, there: tuple[Element, ...], values: dict[str, float]) -> Spot:
-    """Where a term acts at a node. Raises ValueError where it cannot stand there."""
+def spot(term: Term, settings: Any, layout: Layout, there: tuple[Element, ...], values: dict[str, float]) -> Spot:
+    """Where a term acts at its node: in a joint as its far end moves, or the end that its settings name. Raises
+    ValueError where it cannot stand there."""
+    node = settings.node
     found = standing(term, there, node)
     if found is None:
         raise ValueError(f"{term.name} cannot stand at '{node}'")
@@ -73,8 +84,8 @@ def spot(term: Term, node: str, layout: Layout, there: tuple[Element, ...], valu
     if kind == "body":
         return Spot(layout.coordinate(node), 0, 0, layout.ratio(node, values))
     if kind == "joint":
-        i, a, _, _ = joint_place(layout, node, values)
-        return Spot(i, layout.links.get(node, 0), 0, a)
+        end = getattr(machine.joints[node], getattr(settings, "end", "to"))
+        return Spot(layout.coordinate(end), layout.links.get(node, 0), 0, layout.ratio(end, values))
     if kind == "drive":
         i, a, _, _ = place(layout, machine.drives[node], values)
         return Spot(i, 0, layout.drives[node], a)

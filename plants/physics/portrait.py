@@ -133,7 +133,7 @@ def typical(term: Term, kind: str, node: str) -> Settings:
 
 def curve(term: Term, settings: Any, kind: str) -> Curve:
     """Move the stand as the term's axis asks for, and read off what the term makes of it."""
-    if term.joint is not None:
+    if term.joint is not None and not term.act:
         return spring(term, settings, kind)
     driven = term.shown.endswith(DRIVEN)
     motion = term.shown.removesuffix(DRIVEN) or MOTIONS[term.axis]

@@ -18,8 +18,10 @@ from rtctl.plants.graph import params as graph_params
 from rtctl.plants.graph import plant
 from rtctl.plants.graph.description import Description, Sensor
 from rtctl.plants.graph.elements import place_of
+from rtctl.plants.graph.joints import sprung
 from rtctl.plants.graph.units import WAY
 from rtctl.plants.linear import MOST_BODIES
+from rtctl.plants.physics import TERMS
 
 BITS = 16  # of a drive whose converter nobody knows
 FINE = 1e-6  # column units, resolution of a number whose resolution nobody knows
@@ -103,9 +105,10 @@ def graph_of(machine: Description, h: float) -> tuple[graph_layout.Layout, dict[
 
 def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
     """Blocks and lines of the emulated machine, advanced by substeps of `h` s."""
-    machine: Description = config.machine
+    machine, _ = sprung(config.machine, config.plant.physics)
     layout, values, params = graph_of(machine, h)
-    terms = physics_lines(config.plant.physics, config.kind, h, lambda entry: place_of(layout, values, entry))
+    acting = [entry for entry in config.plant.physics if TERMS[entry.term].act]
+    terms = physics_lines(acting, config.kind, h, lambda entry: place_of(layout, values, entry))
     outputs = [
         Block(f"output{n}", converter(config, n), at_mio_16de.ANALOG_OUTPUT_STATE) for n in range(len(machine.drives))
     ]

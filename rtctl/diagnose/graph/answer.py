@@ -17,7 +17,7 @@ from rtctl.diagnose.graph.prediction import Heldout, predict
 from rtctl.diagnose.graph.record import GraphRecord, load_record
 from rtctl.diagnose.graph.search import Found, Progress, search
 from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
-from rtctl.diagnose.space import COSINE, PLACE, SHAPE, SINE, SIZE
+from rtctl.diagnose.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.plants.physics import TERMS
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
@@ -181,6 +181,9 @@ def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
             low, high = value * float(np.exp(-half[i])), value * float(np.exp(half[i]))
         elif c.kind in (SIZE, PLACE, COSINE):
             low, high = value - c.scale * half[i], value + c.scale * half[i]
+        elif c.kind == REST:  # of a push, by the stiffness before it
+            reach = abs(c.scale * half[i] / values[h.coordinates[i - 1].name])
+            low, high = value - reach, value + reach
         else:
             low = high = value
         out[name] = Interval(value, float(low), float(high), unit)

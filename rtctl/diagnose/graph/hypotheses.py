@@ -14,6 +14,9 @@ from rtctl.diagnose.hints import MOST, ORDERS, jumps, peaks, seen, spectrum, spo
 from rtctl.diagnose.hypotheses import parts_of, searched, starts_of
 from rtctl.diagnose.space import Hypothesis
 from rtctl.idiom import Settings
+from rtctl.plants.graph.description import Sensor
+from rtctl.plants.graph.layout import layout
+from rtctl.plants.linear import MOST_SENSORS
 from rtctl.plants.physics import TERMS, nodes, standing
 
 QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it shows
@@ -24,6 +27,8 @@ ABOUT = {  # kinds of element that a problem tells of: positions of no force, a 
     "kinematic": ("joint", "sensor"),
     "static": ("body", "joint", "sensor"),
 }
+HOLDING = (0.995, 0.97, 0.9)  # shares of the time that a joint may hold
+GAUGE = "gauge of "  # before the name of a joint
 
 
 def hypotheses(
@@ -54,7 +59,8 @@ def hypotheses(
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
             ):
                 continue
-            out += starts_of(name, node, (term.sliding if slides else ()) or parts_of(name), measures)  # type: ignore[arg-type]
+            for parts in stand.ways or ((term.sliding if slides else ()) or parts_of(name),):
+                out += starts_of(name, node, parts, measures)  # type: ignore[arg-type]
     return out
 
 
@@ -73,13 +79,16 @@ def combined(like: Likelihood, model: GraphModel) -> dict[str, list]:
 
 
 def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
-    """Suggestions by kind (and node): order, wavelength, spot, and jump (time, size) of each sensor.
+    """Suggestions by kind (and node): order, wavelength, spot, grip of a joint, and jump (time, size) of a sensor.
+
+    A sensor that the model does not follow shows orders and wavelengths in its own error.
 
     Source: order tracking by least squares on cosine and sine of the angle; the correction of the observer as the
     missing force (Ohnishi, Shibata & Murakami 1996).
     """
     record = sim.record
-    read, _ = sim.everything(model)
+    gauges = gauged(model)
+    read, _ = sim.everything(gauges)
     _, push = faster(sim).everything(model)
     x, d = way(sim)[begin:], push[begin:]
     if not np.isfinite(d).all():
@@ -93,14 +102,37 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         if ratio != 0.0 and sim.case.machine.turns(node):
             found[f"order:{node}"] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
         elif ratio != 0.0:
-            span = float(np.ptp(x)) * abs(ratio) or 1.0
-            waves = span * np.geomspace(0.02, 2.0, 2 * WAVES)
+            waves = waves_of(x * ratio)
             found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
             found[f"order:{node}"] = []
+    errors: dict[str, np.ndarray] = {}  # of the sensors that the model does not follow
     for name in sim.channels:
-        body = sim.case.machine.sensors[name].body if name in sim.case.machine.sensors else None
-        if body is not None and not sim.case.machine.turns(body):
-            found[f"wavelength:{name}"] = found.get(f"wavelength:{body}", [])
+        if name not in sim.case.machine.sensors:
+            continue
+        sensor = sim.case.machine.sensors[name]
+        ratio = sim.ratios.get(str(sensor.body), 0.0) if sensor.measures == "position" else 0.0
+        if ratio == 0.0:
+            continue
+        kind = "order" if sim.case.machine.turns(str(sensor.body)) else "wavelength"
+        error = (record.y[name] - read[:, sim.column(name)])[begin:][::thin]
+        if name == sim.main or not np.isfinite(error).all():
+            found[f"{kind}:{name}"] = found[f"{kind}:{sensor.body}"]
+            continue
+        errors[name] = error
+        waves = 2 * np.pi / ORDERS if kind == "order" else waves_of(x * ratio)
+        tops = peaks(2 * np.pi / waves, spectrum(x * ratio, error, 2 * np.pi / waves), MOST)
+        found[f"{kind}:{name}"] = tops if kind == "order" else [2 * np.pi / top for top in tops]
+    for name, joint in sim.case.machine.joints.items():
+        for end in ("from", "to"):
+            body = getattr(joint, end)
+            orders = found.get(f"order:{body}", [])
+            for error in errors.values() if orders else ():
+                orders = peaks(ORDERS, spectrum(x * sim.ratios[body], error, ORDERS), MOST)
+            found[f"order_{end}:{name}"] = orders
+    for name in sim.layout.links:
+        at = gauges.layout.sensors.get(GAUGE + name)
+        pull = np.abs(read[begin:, at]) if at is not None else np.full(1, np.nan)
+        found[f"grip:{name}"] = [float(np.quantile(pull, q)) for q in HOLDING] if np.isfinite(pull).all() else []
     found["spot"] = spots(x, d, MOST)
     for name in sim.channels:
         grain = record.grain[name]
@@ -110,6 +142,22 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
                 (float(record.t[k] - record.t[0]), size * grain) for k, size in jumps(error, 1.0)
             ]  # fmt: skip
     return found
+
+
+def waves_of(x: np.ndarray) -> np.ndarray:
+    """Wavelengths that are tried along a way x (n,), m."""
+    return (float(np.ptp(x)) or 1.0) * np.geomspace(0.02, 2.0, 2 * WAVES)
+
+
+def gauged(model: GraphModel) -> GraphModel:
+    """The model with a gauge of the force in each of its springs, as far as a machine may have so many sensors."""
+    machine = model.layout.machine
+    room = MOST_SENSORS - len(machine.sensors)
+    more = {
+        GAUGE + name: Sensor(joint=name, measures="force", column=GAUGE + name)
+        for name in list(model.layout.links)[:room]
+    }
+    return model._replace(layout=layout(machine.model_copy(update={"sensors": {**machine.sensors, **more}})))
 
 
 def faster(sim: Simulator) -> Simulator:

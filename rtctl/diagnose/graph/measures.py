@@ -107,12 +107,12 @@ class Measures:
         stiffness = self.stiffness(node)
         peak = float(np.abs(self.sim.volts).max(initial=0.0))
         table = {
-            "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low,
+            "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low, "per_span2": s.span**-2,
             "drag": s.force / s.speed, "drag2": s.force / s.speed**2, "stiff": s.force / s.span,
             "twist": self.twist(node, s.force / stiffness),
             "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
             "swell": s.force / (s.speed * s.span**2), "stiffness": stiffness, "firm": self.firm(node),
-            "compliance": 1.0 / s.force, "inertia": self.inertia(node), "seconds": 1.0,
+            "compliance": 1.0 / s.force, "yield": s.speed / s.force, "inertia": self.inertia(node), "seconds": 1.0,
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
             "duration": len(self.way) * self.sim.record.dt, "volts": max(self.volts(node), 0.05 * volts),
             "per_volt": 1.0 / volts, "peak": max(peak, LITTLE), "pace": self.pace(node),

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from rtctl.diagnose.graph.case import GraphCase
 from rtctl.idiom import Settings
+from rtctl.plants.graph.joints import sprung
 from rtctl.plants.graph.layout import Layout, layout
 from rtctl.plants.graph.params import GraphParams, build
 from rtctl.plants.physics import TERMS
@@ -39,19 +40,13 @@ class GraphModel(NamedTuple):
 
     def built(self) -> "GraphModel":
         """The same with the joints that its terms make springs as springs of the description."""
-        base, machine = dict(self.base), self.layout.machine
-        found: dict[str, Any] = {}
-        for settings in self.terms:
-            s: Any = settings
-            made = TERMS[s.term].joint
-            if made is not None and s.node in machine.joints:
-                numbers = made(s)
-                base |= {f"joints.{s.node}.{key}": value for key, value in numbers.items()}
-                found[s.node] = machine.joints[s.node].model_copy(update=dict.fromkeys(numbers, 1.0))
-        if not found:
+        machine, numbers = sprung(self.layout.machine, self.terms)
+        if not numbers:
             return self
-        elastic = machine.model_copy(update={"joints": {**machine.joints, **found}})
-        return self._replace(layout=layout(elastic), base=base)
+        same = {name: joint.model_copy(update={"stiffness": 1.0, "damping": 1.0})
+                for name, joint in machine.joints.items() if f"joints.{name}.stiffness" in numbers}  # fmt: skip
+        known = machine.model_copy(update={"joints": {**machine.joints, **same}})  # one layout for all their numbers
+        return self._replace(layout=layout(known), base={**self.base, **numbers})
 
     def params(self, h: float) -> GraphParams:
         """Params of the plant for substeps of `h` s."""

@@ -154,11 +154,11 @@ class Simulator:
         if len(model.terms) > SLOTS:
             raise UserError(f"physics: has {len(model.terms)} terms; {SLOTS} is the most that can be simulated")
         slots = np.zeros(1, k.slots)
-        acting = [t for t in ordered(list(model.terms)) if TERMS[str(getattr(t, "term", ""))].joint is None]
+        acting = [t for t in ordered(list(model.terms)) if TERMS[str(getattr(t, "term", ""))].act]
         there = self.elements if model.layout is self.layout else elements(model.layout)
         for slot, settings in zip(slots[0]["q"], acting, strict=False):
             s: Any = settings
-            kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s.node, model.layout, there, model.base), h)
+            kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s, model.layout, there, model.base), h)
         job = self._job(model, params, mode, substeps)
         states = np.zeros(1, GRAPH_STATE)
         start = float(np.log(model.base.get(START, 1.0)))
