@@ -84,5 +84,5 @@ def test_a_drive_acts_where_it_is_on():
     case["machine"] = {**PENDULUM, "drives": {"motor": motor}}
     on = np.where(np.arange(N) < 120, 1.0, 0.0)
     np.testing.assert_array_equal(of({**COLUMNS, "torque_on": on}, case).u[:, 0], COLUMNS["u"] * on)
-    with pytest.raises(UserError, match="column 'torque_on', row 120: 0.5; it should be 0"):
+    with pytest.raises(UserError, match=r"column 'torque_on', row 120: 0\.5; it should be 0"):
         of({**COLUMNS, "torque_on": np.where(on > 0, 1.0, 0.5)}, case)
