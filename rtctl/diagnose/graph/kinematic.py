@@ -51,8 +51,8 @@ def followed(case: GraphCase, main: str, fine: dict[str, float], x: np.ndarray, 
             values[f"bodies.{name}.dry"] = dry
             given.discard(f"bodies.{name}.dry")
     changed = machine.model_copy(update={"joints": joints, "bodies": bodies})
-    made = tuple(path for path in values if path not in given)
-    return case._replace(machine=changed, layout=layout(changed), values=values, made=made)
+    taken = tuple(path for path in values if path not in given)
+    return case._replace(machine=changed, layout=layout(changed), values=values, made=taken)
 
 
 def _felt(case: GraphCase, name: str, far: str) -> float:

@@ -76,3 +76,13 @@ def test_too_few_rows():
         NoAnswer, match=f"holds {least - 1} rows; {least - 10} unknown numbers and the noise need {least}"
     ):
         of({name: values[: least - 1] for name, values in COLUMNS.items()}, case)
+
+
+def test_a_drive_acts_where_it_is_on():
+    case = case_of(PENDULUM)
+    motor = {**PENDULUM["drives"]["motor"], "enabled": "torque_on"}
+    case["machine"] = {**PENDULUM, "drives": {"motor": motor}}
+    on = np.where(np.arange(N) < 120, 1.0, 0.0)
+    np.testing.assert_array_equal(of({**COLUMNS, "torque_on": on}, case).u[:, 0], COLUMNS["u"] * on)
+    with pytest.raises(UserError, match=r"column 'torque_on', row 120: 0\.5; it should be 0"):
+        of({**COLUMNS, "torque_on": np.where(on > 0, 1.0, 0.5)}, case)
