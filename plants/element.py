@@ -33,7 +33,7 @@ TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
         "contact": "passes on force by friction",
         "rigid": "has no spring in the equations",
         "ground": "ends at the frame",
-        "turns": "its first end turns",
+        "turning": "its first end turns",
         "turned": "its far end turns",
     },
     "drive": {

@@ -40,7 +40,7 @@ def elements(layout: Layout) -> tuple[Element, ...]:
             out.append(element(name, "body", " ".join(traits)))
     for name, joint in machine.joints.items():
         traits = ["general rigid" if joint.stiffness is None else "general spring shaft"]
-        traits += ["turns"] if machine.turns(getattr(joint, "from")) else []
+        traits += ["turning"] if machine.turns(getattr(joint, "from")) else []
         traits += ["turned"] if machine.turns(joint.to) else []
         out.append(element(name, "joint", " ".join(traits)))
     for number, (name, drive) in enumerate(machine.drives.items()):

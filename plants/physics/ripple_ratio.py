@@ -117,7 +117,7 @@ RATIO = Term(
         "last": "ripple_ratio.levered({p}, {m}, {l}, {i}, {r})",
     },
     stands=(
-        stand("joint", "general spring turns turned", ways=(*NEAR, *FAR)),
+        stand("joint", "general spring turning turned", ways=(*NEAR, *FAR)),
         stand("joint", "general spring turned", ways=FAR),
         stand("joint", "general spring", ways=NEAR),
         stand("joint", "general rigid", usual=False, ways=RIGID),

@@ -1,10 +1,10 @@
 from functools import cache
 
 import numpy as np
-from graph_cases import BELT, PENDULUM, case_of, command, record
+from graph_cases import BELT, PENDULUM, blank, case_of, command, record
 
 from rtctl.diagnose.graph.hypotheses import hints, hypotheses
-from rtctl.diagnose.graph.kernel import kernel
+from rtctl.diagnose.graph.kernel import OPEN, kernel
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.physics import TERMS
@@ -60,7 +60,7 @@ SCREW = {
     "bodies": {"motor": {"inertia": 2e-4, "dry": 0.01}, "screw": {"inertia": 1e-4}, "table": {"mass": 20.0}},
     "joints": {"coupling": {"from": "motor", "to": "screw", "ratio": 1.0, "stiffness": 40.0, "damping": 0.02},
                "nut": {"from": "screw", "to": "table", "ratio": 1.6e-3}},
-    "drives": {name: {"body": "motor", "column": "u", "kind": "force", "gain": 0.05} for name in ("one", "two")},
+    "drives": {name: {"body": "motor", "column": name, "kind": "force", "gain": 0.05} for name in ("one", "two")},
     "sensors": {"encoder": {"body": "motor", "measures": "position", "column": "counts", "counts_per_unit": 1000.0},
                 "scale": {"body": "table", "measures": "position", "column": "scale", "counts_per_unit": 1e6}},
 }  # fmt: skip
@@ -69,9 +69,12 @@ SCREW = {
 @cache
 def of_screw():
     u = command(4.0)
-    sim = Simulator(record(case_of(SCREW), u)._replace(u=np.stack([u, u], axis=1)))
-    model = nominal(sim.case)
-    return sim, hypotheses(sim, model, hints(sim, model, 100))
+    still = blank(case_of(SCREW), u)._replace(u=np.stack([u, u], axis=1))
+    model = nominal(still.case)
+    moved = Simulator(still).run(model, mode=OPEN)
+    sim = Simulator(still._replace(y={name: moved[:, k] for k, name in enumerate(still.y)}))
+    waves = {"order:motor": [4.0], "order:screw": [4.0], "wavelength:table": [1e-3], "wavelength:scale": [1e-3]}
+    return sim, hypotheses(sim, model, hints(sim, model, 100) | waves)
 
 
 def test_terms_stand_where_the_table_of_nodes_says():
