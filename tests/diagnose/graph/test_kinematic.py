@@ -10,7 +10,7 @@ from rtctl.diagnose.graph.answer import diagnose_record
 
 RATE, GAP = 50.0, 3e-5  # of the table, m
 FINE = 20  # steps of lost motion a row: it turns between rows
-T = np.arange(500 * FINE) / RATE / FINE
+T = np.arange(400 * FINE) / RATE / FINE
 WHOLE = 20.0 * np.sin(2 * np.pi * 0.2 * T) + 6.0 * np.sin(2 * np.pi * 0.47 * T)
 TURN = WHOLE[::FINE]
 
