@@ -15,7 +15,7 @@ import numpy as np
 from rtctl.diagnose.fit import fit, jacobian
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Space
+from rtctl.diagnose.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
@@ -78,7 +78,7 @@ def prior(space: Space) -> np.ndarray:
     return np.array(out)
 
 
-SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0}  # standard deviation of a size, in typical sizes
+SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0, REST: 3.0}  # standard deviation of a size, in typical sizes
 
 
 def refit(

@@ -98,7 +98,9 @@ class Simulator:
 
     def own(self, model: GraphModel) -> GraphModel:
         """The model with the numbers of this recording."""
-        return model._replace(base=own(model.base, self.record.name), layout=self.layout)
+        gauged = model.layout.sensors.keys() != self.layout.sensors.keys()
+        layout = model.layout if gauged else self.layout
+        return model._replace(base=own(model.base, self.record.name), layout=layout)
 
     def _forces(self, by_body: np.ndarray | None) -> np.ndarray:
         if by_body is None:
