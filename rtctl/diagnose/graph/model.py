@@ -4,8 +4,9 @@ from typing import Any, NamedTuple
 
 from rtctl.diagnose.graph.case import GraphCase
 from rtctl.idiom import Settings
+from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.layout import Layout, layout
-from rtctl.plants.graph.params import GraphParams, build
+from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.physics import TERMS
 
 
@@ -38,7 +39,7 @@ class GraphModel(NamedTuple):
 
     def params(self, h: float) -> GraphParams:
         """Params of the plant for substeps of `h` s."""
-        return build(self.layout, self.base, h)
+        return machine_params(self.layout, self.base, h)
 
 
 def nominal(case: GraphCase) -> GraphModel:
