@@ -113,6 +113,22 @@ def at_start(code: Mechanics, p: Any, c: Coupled, dq: Any = None, v: Any = None)
     return M, H
 
 
+def felt(layout: Layout, values: dict[str, float]) -> list[str]:
+    """Bodies of the mechanics whose position M or h depends on."""
+    code = code_of(layout.machine)
+    if code is None:
+        return []
+    p = machine_params(layout, values, 1e-3)
+    out = []
+    for k, name in enumerate(bodies_of(layout.machine)):
+        moved = np.zeros(p.nq)
+        moved[p.coupled.i[k]] = 0.5
+        one, two = at_start(code, p, p.coupled, v=np.ones(p.nq)), at_start(code, p, p.coupled, moved, np.ones(p.nq))
+        if any(not np.allclose(x, y, rtol=1e-9, atol=1e-15) for x, y in zip(one, two, strict=True)):
+            out.append(name)
+    return out
+
+
 def linearised(code: Mechanics, p: Any) -> tuple[np.ndarray, np.ndarray]:
     """A (nx, nx) and B (nx, nu) about the start, without weight of bodies and dry friction."""
     A, B = plant.state_space(p)

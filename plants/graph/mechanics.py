@@ -45,7 +45,9 @@ class MechanicsSettings(Settings):
 
     kind: str = Field(description="file and name in it, ./furuta.py:Furuta; its path is relative to the config")
     sha256: str = Field(default="", description="hash of the file's text; written by the program")
-    bodies: list[str] = Field(default=[], description="bodies for its coordinates, in their order; same names if absent")
+    bodies: list[str] = Field(
+        default=[], description="bodies for its coordinates, in their order; same names if absent"
+    )
     at: dict[str, float] = Field(default={}, description="position of a body at the start, rad or m; 0 if absent")
     parameters: dict[str, float] = Field(default={}, description="numbers of the file's settings")
 
@@ -138,7 +140,9 @@ def check(machine: Any) -> None:
             )
     for name, body in machine.bodies.items():
         if body.reel is not None:
-            raise ValueError(f"bodies.{name}.reel: a machine with mechanics has no reel, whose inertia changes; leave it out")
+            raise ValueError(
+                f"bodies.{name}.reel: a machine with mechanics has no reel, whose inertia changes; leave it out"
+            )
     for name in machine.mechanics.at:
         if name not in machine.bodies:
             raise ValueError(f"mechanics.at.{name}: there is no such body")

@@ -44,11 +44,14 @@ def register(source: Source, path: Path | None = None) -> Mechanics:
         module = load(source)
         settings = getattr(module, f"{source.name}Settings", None)
         if not (isinstance(settings, type) and issubclass(settings, Settings)):
-            raise source.error(None, f"there is no class {source.name}Settings; write class {source.name}Settings(Settings):")
+            raise source.error(
+                None, f"there is no class {source.name}Settings; write class {source.name}Settings(Settings):"
+            )
         names = getattr(module, "COORDINATES", None)
         if not (isinstance(names, tuple) and names and all(isinstance(name, str) for name in names)):
             raise source.error(
-                source.line_of("COORDINATES"), 'COORDINATES should be a tuple of names of bodies: COORDINATES = ("arm",)'
+                source.line_of("COORDINATES"),
+                'COORDINATES should be a tuple of names of bodies: COORDINATES = ("arm",)',
             )
         if not callable(getattr(module, "build", None)):
             raise source.error(None, "there is no function build; write def build(settings, h):")
@@ -58,9 +61,7 @@ def register(source: Source, path: Path | None = None) -> Mechanics:
         params = coupled.params_class(source.name)
         steps = coupled.steps(module, name)
         sys.modules[name] = steps  # compiled code that refers to it finds it here
-        found = Mechanics(
-            source.name, _digest(source), module, settings, steps, params, str(path or source.file)
-        )
+        found = Mechanics(source.name, _digest(source), module, settings, steps, params, str(path or source.file))
         params.code = found  # type: ignore[attr-defined]
     graph.register(found)
     return found
@@ -127,7 +128,8 @@ def checked(machine: Any, source: Source) -> None:
     if not np.allclose(own, own.T, rtol=1e-9, atol=1e-12 * np.abs(own).max()):
         j, k = np.unravel_index(np.argmax(np.abs(own - own.T)), own.shape)
         raise source.error(
-            source.line_of("M"), f"M is not symmetric: out[{j}, {k}] is {own[j, k]:.6g} and out[{k}, {j}] {own[k, j]:.6g}"
+            source.line_of("M"),
+            f"M is not symmetric: out[{j}, {k}] is {own[j, k]:.6g} and out[{k}, {j}] {own[k, j]:.6g}",
         )
 
 

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
-from rtctl.diagnose.graph.case import START
+from rtctl.diagnose.graph.case import BEGINS
 from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import nominal
@@ -188,7 +188,7 @@ def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
         value, nominal = f.model.base[path], f.space.owner.base[path]
         ends = np.clip((f.x[i] - spread[i], f.x[i] + spread[i]), lowest[i], highest[i])
         low, high = sorted(nominal * float(np.exp(end)) for end in ends)
-        if path == START:  # kept as its exponential
+        if path.startswith(f"{BEGINS}."):  # kept as its exponential
             value, low, high = (float(np.log(v)) for v in (value, low, high))
         out[path] = Interval(value, low, high, words.value_unit(machine, path))
     return out

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
+from rtctl.plants.graph.coupled import felt
 from rtctl.plants.graph.description import Description, Input
 from rtctl.plants.graph.elements import elements
 from rtctl.plants.graph.layout import Layout, layout
@@ -22,6 +23,7 @@ PROBLEMS = ("driven", "free", "kinematic", "static")
 DEFAULT_TOLERANCE = 0.15
 EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise", "bandwidth_hz")
 START = "start.angle"  # e to the angle, rad, that the first row of a counter has before the weight of a body
+BEGINS = "start"  # start.BODY: the same of each body of mechanics from a file, whose position its motion depends on
 START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
 NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
 
@@ -47,7 +49,7 @@ class GraphCase(NamedTuple):
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
-        if path == START and path not in self.tolerances:
+        if path.startswith(f"{BEGINS}.") and path not in self.tolerances:
             return START_TOLERANCE
         for end in (path, *(path.rsplit(".", n)[0] for n in range(1, path.count(".") + 1))):
             if end in self.tolerances:
@@ -69,7 +71,7 @@ class GraphCase(NamedTuple):
 
     def _acts(self, path: str) -> bool:
         """Whether a number has a part in the motion: the damping of a drive without a bandwidth has none."""
-        if path == START:
+        if path.startswith(f"{BEGINS}."):
             return True
         group, name, *rest = path.split(".")
         if group == "drives" and rest == ["damping"]:
@@ -95,6 +97,9 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
     counters = any(s.counts_per_unit is not None for s in machine.sensors.values())
     if counters and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
         values[START] = 1.0
+    for name in felt(placed, values):
+        if any(s.body == name and s.counts_per_unit is not None for s in machine.sensors.values()):
+            values[f"{BEGINS}.{name}"] = 1.0
     tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
     problem = case.get("problem", "driven")
     if problem not in PROBLEMS:

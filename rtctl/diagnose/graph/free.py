@@ -42,15 +42,15 @@ def free_forces(base: Fitted) -> list[Free]:
     for node, ratio in sim.ratios.items():
         if ratio == 0.0:
             continue
-        for axis, values in axes(measures, node, ratio).items():
+        for axis, values in axes(measures, node).items():
             out.append(_fitted(about, measures, node, axis, values))
     return sorted(out, key=lambda f: -f.gain)
 
 
-def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
+def axes(m: Measures, node: str) -> dict[str, np.ndarray]:
     """Values (n,) of each axis at a body."""
     sim = m.sim
-    x = m.way * ratio
+    x = m.way(node)
     out = {
         "velocity": speed(x, sim.record.dt),
         "position": x,

@@ -59,15 +59,16 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
     record = sim.record
     read, _ = sim.everything(model)
     _, push = faster(sim).everything(model)
-    x, d = way(sim)[begin:], push[begin:]
-    if not np.isfinite(d).all():
-        d = np.zeros_like(d)
-    thin = max(1, len(x) // ROWS)
-    rate = uniform_filter1d(np.abs(np.gradient(x)) / record.dt, 51)[::thin]
-    x, d = x[::thin], d[::thin]
+    push = push[begin:] if np.isfinite(push[begin:]).all() else np.zeros_like(push[begin:])
+    thin = max(1, len(push) // ROWS)
+    ways = [way(sim, number)[begin:] for number in range(len(sim.followed))]
+    rates = [uniform_filter1d(np.abs(np.gradient(x)) / record.dt, 51)[::thin] for x in ways]
+    ways, push = [x[::thin] for x in ways], push[::thin]
     quick = QUICK * faster(sim).follow
     found: dict[str, list] = {}
     for node, ratio in sim.ratios.items():
+        number = sim.leader(node)
+        x, d, rate = ways[number], push[:, number], rates[number]
         if ratio != 0.0 and sim.case.machine.turns(node):
             found[f"order:{node}"] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
         elif ratio != 0.0:
@@ -79,7 +80,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         body = sim.case.machine.sensors[name].body
         if body is not None and not sim.case.machine.turns(body):
             found[f"wavelength:{name}"] = found.get(f"wavelength:{body}", [])
-    found["spot"] = spots(x, d, MOST)
+    found["spot"] = spots(ways[0], push[:, 0], MOST)
     for name in sim.channels:
         grain = record.grain[name]
         if grain > 0.0 and sim.case.machine.sensors[name].measures == "position":

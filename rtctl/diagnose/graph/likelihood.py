@@ -62,7 +62,8 @@ class Likelihood:
         if not (np.abs(e) < wild).all():  # ran away: no noise explains it
             e[~(np.abs(e) < wild).all(axis=1)] = wild
             e[::2] *= -1.0
-        beside = np.array([name != self.sim.main for name in self.sim.channels])
+        followed = {one.sensor for one in self.sim.followed}
+        beside = np.array([name not in followed for name in self.sim.channels])
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
 
     def white(self, e: np.ndarray) -> np.ndarray:

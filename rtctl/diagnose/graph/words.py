@@ -4,12 +4,13 @@ import math
 from typing import Any
 
 from rtctl.diagnose.diagnosis import Effect
-from rtctl.diagnose.graph.case import START
+from rtctl.diagnose.graph.case import BEGINS
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.numbers import both, nice
 from rtctl.diagnose.quantities import DIMENSIONS
 from rtctl.diagnose.words import BY_NODE, Slots, harmonics, noun, phrase_of
 from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.mechanics import code_of
 from rtctl.plants.physics import TERMS
 
 
@@ -51,9 +52,12 @@ def value_unit(machine: Description, path: str) -> str:
     """Unit of a number of the description by its dotted path."""
     from rtctl.plants.graph.units import BODY, GRAVITY, drive_units, joint_units
 
-    if path == START:
-        return "rad"
     group, name, *rest = path.split(".")
+    if group == BEGINS:
+        return "rad" if machine.turns(name) else "m"
+    if group == "mechanics":
+        code = code_of(machine)
+        return code.unit(rest[-1]) if code is not None else ""
     key = rest[-1]
     if group == "bodies" and "gravity" in rest:
         return GRAVITY.get(key, "")
