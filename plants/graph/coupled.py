@@ -14,7 +14,7 @@ Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I (199
 
 import math
 from collections import namedtuple
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ from rtctl.plants.graph import params as graph_params
 from rtctl.plants.graph import plant
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.mechanics import Mechanics, bodies_of, code_of
-from rtctl.plants.graph.params import GraphParams, Q
+from rtctl.plants.graph.params import POSITION, GraphParams, Q
 
 REACH = 0.35  # of an eigenvalue times a step: Runge-Kutta's error of phase is then 1e-4 of a radian for each
 MOST_INNER = 400  # steps a substep
@@ -48,7 +48,7 @@ class Coupled(NamedTuple):
 
 
 def params_class(name: str) -> type:
-    """Params of a plant with mechanics: those of every machine, and `coupled`; its `code` is set by who registers it."""
+    """Params of a plant with mechanics: those of every machine, and `coupled`; who registers it sets its `code`."""
     return type(f"{name}GraphParams", (namedtuple("Params", (*GraphParams._fields, "coupled")),), {})  # type: ignore[misc]
 
 
@@ -84,8 +84,8 @@ def machine_params(layout: Layout, values: dict[str, float], h: float) -> Any:
     ok = np.isfinite(M).all() and (np.linalg.eigvalsh(M) > 0.0).all()
     if not ok:
         raise ValueError(
-            f"mechanics.parameters: M of {code.name} is not positive definite at the start; look at its numbers and at the "
-            "inertias of its bodies"
+            f"mechanics.parameters: M of {code.name} is not positive definite at the start; look at its numbers and at "
+            "the inertias of its bodies"
         )
     inertia = p.inertia.copy()
     inertia[: p.nq] = 1.0 / np.diag(np.linalg.inv(M))
@@ -153,6 +153,15 @@ def place(p, m):
     """Positions at the start; speeds are zero."""
     for i in range(p.nq):
         m.x[i] = p.coupled.q0[i]
+
+
+@tick
+def zero(p, m):
+    """Let sensors of a position show 0 where the machine starts."""
+    q0 = p.coupled.q0
+    for c in range(p.ny):
+        if p.sensor_kind[c] == POSITION:
+            m.y[c] -= p.sensor_a[c] * q0[p.sensor_i[c]] + p.sensor_b[c] * q0[p.sensor_j[c]]
 
 
 @tick
@@ -235,10 +244,14 @@ def close(p, m, mobility):
 
 
 def steps(mechanics: Any, name: str) -> ModuleType:
-    """Module `name` with the compiled integration around the functions M and h of a module: `place`, `advance`, `play`."""
+    """Module `name` with the compiled integration around M and h of a module: `place`, `zero`, `advance`, `play`."""
     M_of, h_of = mechanics.M, mechanics.h
 
-    @tick
+    def kept(function: Any) -> Any:  # on disk, under the hash of the file's text that is part of `name`
+        function.__module__, function.kept = name, True
+        return tick(function)
+
+    @kept
     def couple(p, m, x, what):
         """Matrix of the machine's inertia into work[1], and h by coordinates into work[2, 4], in state x; the positions
         alone where `what` is 0."""
@@ -265,7 +278,7 @@ def steps(mechanics: Any, name: str) -> ModuleType:
             for k in range(n):
                 W[2, 4, c.i[k]] += c.a[k] * h[k]
 
-    @tick
+    @kept
     def rates(p, m, x, out):
         """Rates of the state x (nx,) into out (nx,)."""
         nq, W = p.nq, m.work
@@ -281,7 +294,7 @@ def steps(mechanics: Any, name: str) -> ModuleType:
             out[nq + i] = b[i]
         drive_rates(p, m, x, out)
 
-    @tick
+    @kept
     def integrate(p, m):
         """x_next after a substep under m.u and m.push."""
         W, nx = m.work, p.nx
@@ -303,7 +316,7 @@ def steps(mechanics: Any, name: str) -> ModuleType:
             for i in range(nx):
                 x[i] += h * total[i]
 
-    @tick
+    @kept
     def advance(p, m):
         """One substep with the inputs m.u and the smooth forces m.f held; dry friction m.dry closes it."""
         nq, W = p.nq, m.work
@@ -331,7 +344,7 @@ def steps(mechanics: Any, name: str) -> ModuleType:
         for i in range(p.nx):
             m.x[i] = m.x_next[i]
 
-    @tick
+    @kept
     def play(p, s, u, substeps, y):
         """As played.play, of a machine with these mechanics."""
         m = s.m
@@ -339,6 +352,7 @@ def steps(mechanics: Any, name: str) -> ModuleType:
         place(p, m)
         for k in range(len(u)):
             plant.read(p, m)
+            zero(p, m)
             for c in range(p.ny):
                 y[k, c] = m.y[c]
             for d in range(p.nu):
@@ -350,5 +364,5 @@ def steps(mechanics: Any, name: str) -> ModuleType:
                 advance(p, m)
 
     made = ModuleType(name)
-    made.__dict__.update(vars(SimpleNamespace(advance=advance, place=place, play=play, rates=rates)))
+    vars(made).update(advance=advance, place=place, zero=zero, play=play)
     return made

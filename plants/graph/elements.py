@@ -7,6 +7,7 @@ from rtctl.plants.element import LOOP, Element, element
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.layout import layout as layout_of
+from rtctl.plants.graph.mechanics import bodies_of
 from rtctl.plants.graph.params import joint_place, place
 from rtctl.plants.physics import TERMS, Term, nodes, standing
 
@@ -27,11 +28,13 @@ def elements(layout: Layout) -> tuple[Element, ...]:
     for drive in machine.drives.values():
         if drive.joint is not None:
             driven |= {getattr(machine.joints[drive.joint], "from"), machine.joints[drive.joint].to}
+    coupled = bodies_of(machine)
     out: list[Element] = []
     for name, body in machine.bodies.items():
         if layout.bodies[name].coordinate != NOWHERE:
             traits = ["general", "turns rotor" if body.turns else "slides", "bounded"]
             traits += ["driven" if name in driven else "load"]
+            traits += [] if name in coupled else ["single"]
             traits += ["dry"] if body.dry > 0.0 else []
             out.append(element(name, "body", " ".join(traits)))
     for name, joint in machine.joints.items():

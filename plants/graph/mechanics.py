@@ -1,7 +1,7 @@
 """Mechanics of a machine from a file: the functions M(q) and h(q, v) of M(q) q'' + h(q, v) = F, and who may give them.
 
     machine:
-      mechanics: {kind: ./furuta.py:Furuta, parameters: {m: 24 g, l: 64.5 mm}, at: {pendulum: 0 deg}}
+      mechanics: {kind: ./furuta.py:Furuta, parameters: {m: 24 g, d: 64.5 mm}, at: {pendulum: 0 deg}}
 
 The code of a file is registered by whoever loads it from a path that the user named (rtctl.own.mechanics). A
 description carries its name, the hash of its text and its numbers, and never the text.
@@ -48,7 +48,9 @@ class MechanicsSettings(Settings):
     bodies: list[str] = Field(
         default=[], description="bodies for its coordinates, in their order; same names if absent"
     )
-    at: dict[str, float] = Field(default={}, description="position of a body at the start, rad or m; 0 if absent")
+    at: dict[str, float] = Field(
+        default={}, description="position of a body at the start, where its sensors show 0, rad or m"
+    )
     parameters: dict[str, float] = Field(default={}, description="numbers of the file's settings")
 
 
@@ -85,8 +87,8 @@ def resolved(data: Any) -> Any:
     found = _known.get(str(data.get("sha256"))) or _given.get(name)
     if found is None:
         raise ValueError(
-            f"mechanics.kind: the code of {data['kind']} is not given, and no code is taken from a bundle; name the file "
-            f"by path: --mechanics {file or data['kind']}, or --machine CONFIG of the config that names it"
+            f"mechanics.kind: the code of {data['kind']} is not given, and no code is taken from a bundle; name the "
+            f"file by path: --mechanics {file or data['kind']}, or --machine CONFIG of the config that names it"
         )
     given = data.get("parameters") or {}
     try:

@@ -109,9 +109,10 @@ def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
     layout, values, params = graph_of(machine, h)
     code = code_of(machine)
     steps = code.steps.__name__ if code is not None else "linear"
-    start, given = ("plant.start(p.plant, s.plant)",), ""
+    start, shown, given = ("plant.start(p.plant, s.plant)",), (), ""
     if code is not None:
         start, given = (*start, f"{steps}.place(p.plant, s.plant.m)"), "p.plant, "
+        shown = (f"{steps}.zero(p.plant, s.plant.m)",)
     terms = physics_lines(config.plant.physics, config.kind, h, lambda entry: place_of(layout, values, entry))
     outputs = [
         Block(f"output{n}", converter(config, n), at_mio_16de.ANALOG_OUTPUT_STATE) for n in range(len(machine.drives))
@@ -148,7 +149,7 @@ def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
         ),
     )
     sample = (
-        ("sensors", ("plant.read(p.plant, s.plant.m)", *terms.reading)),
+        ("sensors", ("plant.read(p.plant, s.plant.m)", *shown, *terms.reading)),
         ("scan", tuple(line for _, _, lines in sensors for line in lines)),
         ("truth", ("described_plant.tell(p.truth, s.plant.m, rx.truth)",)),
     )

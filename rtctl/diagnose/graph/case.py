@@ -98,7 +98,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
     if counters and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
         values[START] = 1.0
     for name in felt(placed, values):
-        if any(s.body == name and s.counts_per_unit is not None for s in machine.sensors.values()):
+        if any(s.body == name and s.measures == "position" for s in machine.sensors.values()):
             values[f"{BEGINS}.{name}"] = 1.0
     tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
     problem = case.get("problem", "driven")

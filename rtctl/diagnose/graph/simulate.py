@@ -62,7 +62,6 @@ class Simulator:
         usual = self.followed[0].bandwidth
         self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP - 1e-9)))
-        self.seen = np.ascontiguousarray(record.y[self.main])
         self.watched = np.stack([record.y[one.sensor] for one in self.followed], axis=1)
         self.volts = np.ascontiguousarray(record.u)
         self.forces = self._forces(record.forces)
@@ -73,6 +72,15 @@ class Simulator:
         self.lead = round(LEAD / record.dt) if flexible else 0
         self.release = NEVER
         self.ratios = self.moves(record.case.values)
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Main sensor (n,), SI."""
+        return np.asarray(self.watched[:, 0])
+
+    @seen.setter
+    def seen(self, values: np.ndarray) -> None:
+        self.watched = np.column_stack([values, self.watched[:, 1:]])
 
     def moves(self, values: dict[str, float]) -> dict[str, float]:
         """Motion of each body for one unit of the followed body that joints connect it with; 0 where there is none."""
@@ -236,11 +244,11 @@ def followed(record: GraphRecord) -> tuple[Followed, ...]:
 
 
 def start_of(sim: Simulator, one: Followed, base: dict[str, float]) -> float:
-    """Position of a followed body where its column shows 0, rad or m: a counter begins at 0 where the machine stood."""
+    """Position of a followed body where its column shows 0, rad or m."""
     machine = sim.case.machine
     first = base.get(START, 1.0) if one.sensor == sim.main else 1.0
     offset = float(np.log(first * base.get(f"{BEGINS}.{one.body}", 1.0)))
-    if machine.mechanics is not None and machine.sensors[one.sensor].counts_per_unit is not None:
+    if machine.mechanics is not None and not one.shows_speed:
         offset += machine.mechanics.at.get(one.body, 0.0)
     return offset
 
