@@ -13,6 +13,7 @@ Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I (199
 """
 
 import math
+import traceback
 from collections import namedtuple
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -102,9 +103,14 @@ def at_start(code: Mechanics, p: Any, c: Coupled, dq: Any = None, v: Any = None)
     v = np.zeros(p.nq) if v is None else v
     i, a, n = c.i[: c.n], c.a[: c.n], c.n
     own, h = np.zeros((n, n)), np.zeros(n)
-    with interpreted():
-        code.module.M(c.p, c.J, a * q[i], own)
-        code.module.h(c.p, c.J, a * q[i], a * v[i], h)
+    try:
+        with interpreted():
+            code.module.M(c.p, c.J, a * q[i], own)
+            code.module.h(c.p, c.J, a * q[i], a * v[i], h)
+    except Exception as error:  # whatever a user's file raises
+        frames = traceback.extract_tb(error.__traceback__)
+        line = next((f":{f.lineno}" for f in reversed(frames) if f.filename == code.module.__file__), "")
+        raise ValueError(f"mechanics.kind: {code.module.__file__}{line}: {type(error).__name__}: {error}") from error
     M, H = np.diag(c.base[: p.nq]), np.zeros(p.nq)
     for k in range(n):
         H[i[k]] += a[k] * h[k]
@@ -125,6 +131,21 @@ def felt(layout: Layout, values: dict[str, float]) -> list[str]:
         moved[p.coupled.i[k]] = 0.5
         one, two = at_start(code, p, p.coupled, v=np.ones(p.nq)), at_start(code, p, p.coupled, moved, np.ones(p.nq))
         if any(not np.allclose(x, y, rtol=1e-9, atol=1e-15) for x, y in zip(one, two, strict=True)):
+            out.append(name)
+    return out
+
+
+def pulled(layout: Layout, values: dict[str, float]) -> list[str]:
+    """Bodies of the mechanics that h pulls at, at rest at the start or a little beside it."""
+    code = code_of(layout.machine)
+    if code is None:
+        return []
+    p = machine_params(layout, values, 1e-3)
+    out = []
+    for k, name in enumerate(bodies_of(layout.machine)):
+        i = int(p.coupled.i[k])
+        forces = [at_start(code, p, p.coupled, dq=d * np.eye(p.nq)[i])[1][i] for d in (0.0, SMALL)]
+        if any(forces):
             out.append(name)
     return out
 

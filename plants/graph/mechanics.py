@@ -94,7 +94,7 @@ def resolved(data: Any) -> Any:
     try:
         settings = found.settings.model_validate(given)
     except ValidationError as error:
-        first = error.errors()[0]
+        first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")  # a wrong name explains a lack
         raise ValueError(f"mechanics.parameters.{'.'.join(map(str, first['loc']))}: {_words(first, found)}") from None
     numbers = {key: float(value) for key, value in settings.model_dump().items() if isinstance(value, int | float)}
     return {**data, "sha256": found.sha256, "parameters": numbers, "at": _places(data.get("at"))}

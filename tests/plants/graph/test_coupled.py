@@ -7,7 +7,7 @@ import pytest
 from coupled_machines import NAMES, data_of, free, functions, params
 from scipy.integrate import solve_ivp
 
-from rtctl.plants.graph.coupled import felt
+from rtctl.plants.graph.coupled import felt, machine_params, pulled
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import layout
 from rtctl.plants.graph.linearised import linearised
@@ -77,7 +77,7 @@ def test_equations_are_those_of_lagrange(name, place):
 def test_a_free_swing_is_that_of_another_integrator_and_keeps_its_energy(name):
     machine = free(name, 2.5)
     p, n = params(machine, 1e-3), 10_000
-    q = played(p, np.zeros((n, 1)), 1)
+    q = played(p, np.zeros((n, 1)), 1) + np.array([0.0, 2.5])
     of = functions(p)
 
     def rates(t: float, z: np.ndarray) -> np.ndarray:
@@ -86,12 +86,12 @@ def test_a_free_swing_is_that_of_another_integrator_and_keeps_its_energy(name):
 
     length = 2000
     true = solve_ivp(rates, (0.0, 2.0), [0.0, 2.5, 0.0, 0.0], rtol=1e-9, atol=1e-10, t_eval=np.arange(length) * 1e-3)
-    np.testing.assert_allclose(q[:length] + [0.0, 2.5], true.y[:2].T, atol=2e-6)
-    v = np.gradient(q + [0.0, 2.5], 1e-3, axis=0)
+    np.testing.assert_allclose(q[:length], true.y[:2].T, atol=2e-6)
+    v = np.gradient(q, 1e-3, axis=0)
     number = machine.mechanics.parameters
-    M = [of(x, x)[0] for x in q + [0.0, 2.5]]
+    M = [of(x, x)[0] for x in q]
     weight = number["m"] * G_N * number["d"]
-    E = np.array([0.5 * w @ m @ w for w, m in zip(v, M, strict=True)]) - weight * np.cos(q[:, 1] + 2.5)
+    E = np.array([0.5 * w @ m @ w for w, m in zip(v, M, strict=True)]) - weight * np.cos(q[:, 1])
     top = (E[5:-5] + weight).max()  # above where it hangs
     late, early = np.mean(E[-1000:-5]), np.mean(E[5:1000])
     assert abs(late - early) < 1e-4 * top
@@ -163,12 +163,11 @@ def test_the_linear_model_is_that_of_the_swing():
 def test_positions_that_the_motion_depends_on():
     machine = free("furuta", 0.0)
     assert felt(layout(machine), dict(machine.paths())) == ["pendulum"]
+    assert pulled(layout(machine), dict(machine.paths())) == ["pendulum"]
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused():
     machine = free("furuta", 0.0)
     values = {**dict(machine.paths()), "bodies.pendulum.inertia": -1.0}
-    from rtctl.plants.graph.coupled import machine_params
-
     with pytest.raises(ValueError, match="M of Furuta is not positive definite"):
         machine_params(layout(machine), values, 1e-3)
