@@ -50,7 +50,7 @@ class Coupled(NamedTuple):
 
 def params_class(name: str) -> type:
     """Params of a plant with mechanics: those of every machine, and `coupled`; who registers it sets its `code`."""
-    return type(f"{name}GraphParams", (namedtuple("Params", (*GraphParams._fields, "coupled")),), {})  # type: ignore[misc]
+    return type(f"{name}GraphParams", (namedtuple("Params", (*GraphParams._fields, "coupled")),), {})
 
 
 def machine_params(layout: Layout, values: dict[str, float], h: float) -> Any:

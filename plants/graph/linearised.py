@@ -9,7 +9,7 @@ analysis, IEEE Trans. PAS 101 (1982) for the participation of states.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,7 @@ class Mode(NamedTuple):
     bodies: tuple[str, ...]  # that take part most; none where it is a drive's own
 
 
-def linearised(p: GraphParams) -> tuple[np.ndarray, np.ndarray]:
+def linearised(p: Any) -> tuple[np.ndarray, np.ndarray]:
     """A (nx, nx) and B (nx, nu) around the start, with the weight of bodies that turn as a spring."""
     code = getattr(type(p), "code", None)
     A, B = state_space(p) if code is None else coupled.linearised(code, p)

@@ -109,7 +109,9 @@ def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
     layout, values, params = graph_of(machine, h)
     code = code_of(machine)
     steps = code.steps.__name__ if code is not None else "linear"
-    start, shown, given = ("plant.start(p.plant, s.plant)",), (), ""
+    start: tuple[str, ...] = ("plant.start(p.plant, s.plant)",)
+    shown: tuple[str, ...] = ()
+    given = ""
     if code is not None:
         start, given = (*start, f"{steps}.place(p.plant, s.plant.m)"), "p.plant, "
         shown = (f"{steps}.zero(p.plant, s.plant.m)",)
