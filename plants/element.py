@@ -20,6 +20,7 @@ TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
         "wrapped": "tape lies around it, whose two tensions add up in its bearing",
         "bounded": "its way has two ends",
         "guided": "runs along a strip whose thickness moves it",
+        "single": "has an inertia of its own, which no file of mechanics couples with that of others",
         "reel": "winds what changes its radius",
         "capstan": "turns a length of tape or strip into an angle",
         "sprung": "a joint with a spring ends at it",

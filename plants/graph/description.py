@@ -12,6 +12,8 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, create_model, model_validator
 
 from rtctl.idiom import Settings
+from rtctl.plants.graph import mechanics as coupling
+from rtctl.plants.graph.mechanics import MechanicsSettings
 from rtctl.plants.graph.units import check_place, in_si
 
 FRAME = "frame"
@@ -214,6 +216,9 @@ class Description(Settings):
     joints: dict[str, Joint] = Field(default={})
     drives: dict[str, Drive] = Field(default={})
     sensors: dict[str, Sensor] = Field(min_length=1)
+    mechanics: MechanicsSettings | None = Field(
+        default=None, description="file with M(q) and h(q, v), where bodies move each other by more than joints"
+    )
     symbols: dict[str, list[str]] = Field(
         default={}, description="symbol of the literature: dotted paths of the numbers that it stands for"
     )
@@ -221,13 +226,19 @@ class Description(Settings):
     @model_validator(mode="before")
     @classmethod
     def _units(cls, data: Any) -> Any:
-        return in_si(data) if isinstance(data, Mapping) else data
+        if not isinstance(data, Mapping):
+            return data
+        data = in_si(data)
+        if data.get("mechanics") is not None:
+            data["mechanics"] = coupling.resolved(data["mechanics"])
+        return data
 
     @model_validator(mode="after")
     def _sound(self) -> "Description":
         from rtctl.plants.graph.checks import check
 
         check(self)
+        coupling.check(self)
         return self
 
     def turns(self, body: str) -> bool:
@@ -243,6 +254,8 @@ class Description(Settings):
         for group in ("bodies", "joints", "drives", "sensors"):
             for name, element in getattr(self, group).items():
                 yield from _numbers(f"{group}.{name}", element)
+        if self.mechanics is not None:
+            yield from ((f"mechanics.parameters.{key}", value) for key, value in self.mechanics.parameters.items())
 
 
 def _numbers(path: str, element: Any) -> Iterator[tuple[str, float]]:

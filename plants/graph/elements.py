@@ -7,6 +7,7 @@ from rtctl.plants.element import LOOP, Element, element
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.layout import layout as layout_of
+from rtctl.plants.graph.mechanics import bodies_of
 from rtctl.plants.graph.params import place
 from rtctl.plants.physics import TERMS, Term, nodes, standing
 
@@ -29,11 +30,13 @@ def elements(layout: Layout) -> tuple[Element, ...]:
             driven |= {getattr(machine.joints[drive.joint], "from"), machine.joints[drive.joint].to}
     springs = [joint for joint in machine.joints.values() if joint.stiffness is not None]
     sprung = {end for joint in springs for end in (getattr(joint, "from"), joint.to)}
+    coupled = bodies_of(machine)
     out: list[Element] = []
     for name, body in machine.bodies.items():
         if layout.bodies[name].coordinate != NOWHERE:
             traits = ["general", "turns rotor" if body.turns else "slides", "bounded"]
             traits += ["driven" if name in driven else "load"]
+            traits += [] if name in coupled else ["single"]
             traits += ["dry"] if body.dry > 0.0 else []
             traits += ["sprung"] if name in sprung else []
             traits += ["heavy"] if any(weight.incline is None for weight in body.weights) else []

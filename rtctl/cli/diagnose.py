@@ -55,6 +55,16 @@ def diagnose(
             "--term", metavar="FILE:NAME", help="A term of your own, ./windage.py:Windage, to be tried as well."
         ),
     ] = None,
+    mechanics: Annotated[
+        str | None,
+        typer.Option("--mechanics", metavar="FILE", help="Your file of the machine's M(q) and h(q, v), ./furuta.py."),
+    ] = None,
+    machine: Annotated[
+        Path | None,
+        typer.Option(
+            "--machine", metavar="YAML", help="Your config that names such a file; nothing else is taken of it."
+        ),
+    ] = None,
     closed_loop: Annotated[
         bool, typer.Option("--closed-loop", help="Record the machine of a CONFIG, diagnose it, write its model.")
     ] = False,
@@ -87,6 +97,8 @@ def diagnose(
 
       rtctl diagnose runs/ivu-20250102-101500 --term ./windage.py:Windage
 
+      rtctl diagnose bench --mechanics ./furuta.py
+
       rtctl diagnose recordings --jobs 2 --no-report
 
       rtctl diagnose turns-left turns-right --together
@@ -97,6 +109,7 @@ def diagnose(
 
     console = DiagnoseConsole(json)
     _register(terms or [])
+    _couple(mechanics, machine)
     if closed_loop:
         if heldout is not None:
             _refuse("--heldout", "goes with a BUNDLE, not with --closed-loop")
@@ -124,6 +137,8 @@ def diagnose(
     elif found:
         if terms:
             _refuse("--term", "goes with one bundle, not with a folder of them")
+        if mechanics is not None or machine is not None:
+            _refuse("--mechanics and --machine", "go with one bundle, not with a folder of them")
         length = common.seconds(limit, "--limit")
         assert length is not None
         _folder(console, found, jobs, length, report, again, json)
@@ -142,6 +157,17 @@ def _register(terms: list[str]) -> None:
             register_file(word, Path())
         except OwnError as error:
             raise UserError(f"--term {word}: {error}") from error
+
+
+def _couple(mechanics: str | None, machine: Path | None) -> None:
+    """The mechanics of a file that the user names are known from here on; none is taken from a bundle."""
+    if mechanics is not None or machine is not None:
+        from rtctl.own.mechanics import give, give_machine
+
+        if machine is not None:
+            give_machine(machine)
+        if mechanics is not None:
+            give(mechanics)
 
 
 def _refuse(option: str, why: str) -> None:

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
-from rtctl.diagnose.graph.case import FIRST_POSITION, OWN_START, START, is_start
+from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.model import RECORDING
@@ -200,7 +200,7 @@ def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
         ends = np.clip((f.x[i] - spread[i], f.x[i] + spread[i]), lowest[i], highest[i])
         low, high = sorted(nominal * float(np.exp(end)) for end in ends)
         plain, _, name = path.partition(RECORDING)
-        if plain == START:  # kept as its exponential
+        if is_start(plain) and plain not in (FIRST_POSITION, FIRST_SPEED):  # kept as its exponential
             value, low, high = (float(np.log(v)) for v in (value, low, high))
         elif is_start(plain):
             first = next(p.sim.record for p in f.like.parts if p.sim.record.name == name)

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
+from rtctl.plants.graph.coupled import felt
 from rtctl.plants.graph.description import Description, Input
 from rtctl.plants.graph.elements import elements
 from rtctl.plants.graph.layout import NOWHERE, Layout, layout
@@ -25,6 +26,7 @@ START = "start.angle"  # e to the angle, rad, by which the zero of a position is
 FIRST_POSITION, FIRST_SPEED = "start.position", "start.speed"  # of a free response, as START, in units of the record
 OWN_START = "start.bodies."  # head of the first position and speed of a body that a spring joins to the others
 HELD_PROBLEMS = ("static", "kinematic")  # the main sensor's motion is given
+BEGINS = "start"  # start.BODY: the same of each body of mechanics from a file, whose position its motion depends on
 START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
 NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
 
@@ -51,7 +53,7 @@ class GraphCase(NamedTuple):
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
-        if path == START and path not in self.tolerances:
+        if path.startswith(f"{BEGINS}.") and path not in self.tolerances:
             return START_TOLERANCE
         if is_start(path) and path not in self.tolerances:
             return math.inf
@@ -102,6 +104,9 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
     angles = any(s.measures == "position" for s in machine.sensors.values())
     if angles and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
         values[START] = 1.0
+    for name in felt(placed, values):
+        if any(s.body == name and s.measures == "position" for s in machine.sensors.values()):
+            values[f"{BEGINS}.{name}"] = 1.0
     physics = _physics(where, placed, case.get("physics"))
     values |= _numbers(physics)
     problem = case.get("problem", "driven")

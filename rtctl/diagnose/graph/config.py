@@ -22,6 +22,7 @@ from rtctl.diagnose.graph.model import PHYSICS, GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.words import value_unit
 from rtctl.plants.graph.file import checked
+from rtctl.plants.graph.mechanics import code_of
 
 NO_NAME = "machine"
 
@@ -42,6 +43,9 @@ def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] 
         if value != case.values.get(path):
             value = float(f"{value:.6g}")
         _put(machine, path.split("."), _with_unit(value, value_unit(case.machine, path)))
+    code = code_of(case.machine)
+    if code is not None:  # the path by which the user gave it, good from any folder
+        machine["mechanics"]["kind"] = f"{code.file}:{code.name}"
     physics = [entry_of(term) for term in model._replace(base=values).resolved().terms]
     if config is not None:
         plant = {key: value for key, value in dict(config.get("plant") or {}).items() if key != "physics"}

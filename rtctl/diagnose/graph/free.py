@@ -54,7 +54,7 @@ def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
         if ratio == 0.0 or at in taken:  # bodies that move as one feel one force
             continue
         taken.add(at)
-        found = [axes(measures, node, ratio) for measures in every]
+        found = [axes(measures, node) for measures in every]
         for axis in found[0]:
             if all(axis in own for own in found):
                 places[node, axis] = after(axis, [own[axis] for own in found])
@@ -66,10 +66,10 @@ def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
     return sorted(out, key=lambda f: -f.evidence)
 
 
-def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
+def axes(m: Measures, node: str) -> dict[str, np.ndarray]:
     """Values (n,) of each axis at a body."""
     sim = m.sim
-    x = m.way * ratio
+    x = m.way(node)
     out = {
         "velocity": speed(x, sim.record.dt),
         "position": x,

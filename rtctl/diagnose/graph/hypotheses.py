@@ -90,15 +90,16 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
     gauges = gauged(model)
     read, _ = sim.everything(gauges)
     _, push = faster(sim).everything(model)
-    x, d = way(sim)[begin:], push[begin:]
-    if not np.isfinite(d).all():
-        d = np.zeros_like(d)
-    thin = max(1, len(x) // ROWS)
-    rate = uniform_filter1d(np.abs(np.gradient(x)) / record.dt, 51)[::thin]
-    x, d = x[::thin], d[::thin]
+    push = push[begin:] if np.isfinite(push[begin:]).all() else np.zeros_like(push[begin:])
+    thin = max(1, len(push) // ROWS)
+    ways = [way(sim, number)[begin:] for number in range(len(sim.followed))]
+    rates = [uniform_filter1d(np.abs(np.gradient(x)) / record.dt, 51)[::thin] for x in ways]
+    ways, push = [x[::thin] for x in ways], push[::thin]
     quick = QUICK * faster(sim).follow
     found: dict[str, list] = {}
     for node, ratio in sim.ratios.items():
+        number = sim.leader(node)
+        x, d, rate = ways[number], push[:, number], rates[number]
         if ratio != 0.0 and sim.case.machine.turns(node):
             found[f"order:{node}"] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
         elif ratio != 0.0:
@@ -114,6 +115,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         if ratio == 0.0:
             continue
         kind = "order" if sim.case.machine.turns(str(sensor.body)) else "wavelength"
+        x = ways[sim.leader(str(sensor.body))]
         error = (record.y[name] - read[:, sim.column(name)])[begin:][::thin]
         if name == sim.main or not np.isfinite(error).all():
             found[f"{kind}:{name}"] = found[f"{kind}:{sensor.body}"]
@@ -125,7 +127,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
     for name, joint in sim.case.machine.joints.items():
         for end in ("from", "to"):
             body = getattr(joint, end)
-            orders = found.get(f"order:{body}", [])
+            orders, x = found.get(f"order:{body}", []), ways[sim.leader(body)]
             for error in errors.values() if orders else ():
                 orders = peaks(ORDERS, spectrum(x * sim.ratios[body], error, ORDERS), MOST)
             found[f"order_{end}:{name}"] = orders
@@ -133,7 +135,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         at = gauges.layout.sensors.get(GAUGE + name)
         pull = np.abs(read[begin:, at]) if at is not None else np.full(1, np.nan)
         found[f"grip:{name}"] = [float(np.quantile(pull, q)) for q in HOLDING] if np.isfinite(pull).all() else []
-    found["spot"] = spots(x, d, MOST)
+    found["spot"] = spots(ways[0], push[:, 0], MOST)
     for name in sim.channels:
         grain = record.grain[name]
         if grain > 0.0 and name in sim.layout.sensors and sim.case.machine.sensors[name].measures == "position":

@@ -14,6 +14,7 @@ import numpy as np
 from rtctl.diagnose.kernel import SLOTS, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
+from rtctl.plants.graph.mechanics import Mechanics
 from rtctl.plants.graph.params import Q
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.term import SITES, Term
@@ -52,8 +53,10 @@ def substep(job, p, m, t, forces, row):
     force(t, m)
     last(t, m)
     for i in range(p.nq):
-        m.f[i] += job.correction * job.push[i] + job.need[i]
-    linear.advance(m)
+        m.f[i] += job.need[i]
+        for c in range(job.follows):
+            m.f[i] += job.correction[c] * job.push[c, i]
+    {advance}
 
 
 @compiled
@@ -93,16 +96,17 @@ def look(p, m, t):
 def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     """Simulate len(seen) ticks after `lead` ticks at the first row; readings go to out (n, sensors), SI.
 
-    jobs.mode 0 applies the recorded `volts` (n, drives) and `forces` (n, coordinates) alone; 1 adds a correction that
-    makes the main sensor follow `seen` (n,) up to row jobs.release, and leaves it in `push` (n,); 2 holds the main
-    sensor's coordinate on `seen`, and leaves the force that it takes in `push`. Coordinates of jobs.held move as `path`
-    and `pace` (n, coordinates) say. Returns the row at which the model ran away, n where it did not.
+    jobs.mode 0 applies the recorded `volts` (n, drives) and `forces` (n, coordinates) alone; 1 adds corrections that
+    make the followed sensors follow `seen` (n, followed) up to row jobs.release, and leaves them in `push` (n,
+    followed); 2 holds the first of their coordinates on `path`, and leaves the force that it takes in `push`.
+    Coordinates of jobs.held move as `path` and `pace` (n, coordinates) say. Returns the row at which the model ran
+    away, n where it did not.
     """
     job, p, s, t = jobs[0], ps[0], ss[0], ts[0]
     m = s.m
     graph.start(p, s)
     n, drives = volts.shape
-    main = job.main
+    main = job.main[0]
     for k in range(-job.lead, n):
         if k == 0:
             m.t = 0.0
@@ -117,24 +121,26 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
                 job.shift[i] = (m.y[main] - a * m.x[i]) / a
                 m.x[i] = path[at, i] - job.shift[i]
                 look(p, m, t)
-        job.correction = 0.0
-        if job.mode == 1 and k < job.release:
-            e = seen[at] - m.y[main]
-            if job.speed != 0:  # a rectified speed says how fast, not which way
-                if m.y[main] * m.x[p.nq + p.sensor_i[main]] * p.sensor_a[main] < 0.0:
-                    e = -e
-                job.e, job.d = 0.0, e
-            else:
-                if k == -job.lead:
-                    job.e = e
-                job.d += job.a * ((e - job.e) * job.rate - job.d)
-                job.e = e
-            job.correction = job.P * job.e + job.D * job.d
+        for c in range(job.follows):
+            job.correction[c] = 0.0
+            if job.mode == 1 and k < job.release:
+                y = job.main[c]
+                e = seen[at, c] - m.y[y]
+                if job.speed[c] != 0:  # a rectified speed says how fast, not which way
+                    if m.y[y] * m.x[p.nq + p.sensor_i[y]] * p.sensor_a[y] < 0.0:
+                        e = -e
+                    job.e[c], job.d[c] = 0.0, e
+                else:
+                    if k == -job.lead:
+                        job.e[c] = e
+                    job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
+                    job.e[c] = e
+                job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
         if k >= 0:
             for c in range(p.ny):
                 out[k, c] = m.y[c]
-            if job.mode == 1:
-                push[k] = job.correction
+            for c in range(job.follows if job.mode == 1 else 0):
+                push[k, c] = job.correction[c]
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0
@@ -163,13 +169,14 @@ JOB = state(
     delay=int,  # substeps from a write until it acts
     part=float,  # and a part of one
     rate=float,  # Hz
-    main=int,  # number of the sensor that is followed
-    speed=int,  # 1: it shows a speed
-    P=float,  # of the correction, in units of `push` a rad or m
-    D=float,
-    a=float,
-    push=(float, Q),  # what one unit of correction pushes each coordinate with
-    correction=float,
+    follows=int,
+    main=(int, Q),  # numbers of the sensors that are followed
+    speed=(int, Q),  # 1: it shows a speed
+    P=(float, Q),  # of the correction, in units of `push` a rad or m
+    D=(float, Q),
+    a=(float, Q),
+    push=(float, (Q, Q)),  # what one unit of each correction pushes each coordinate with
+    correction=(float, Q),
     first_x=(float, Q),  # how far each coordinate is from rest at the first row, and its speed
     first_v=(float, Q),
     holds=int,  # 1: some coordinate is held
@@ -177,8 +184,8 @@ JOB = state(
     shift=(float, Q),  # what the reading of a held coordinate is off by
     need=(float, Q),  # force that holds it, N or Nm
     share=(float, Q),  # what of it counts at the main sensor's body
-    e=float,
-    d=float,
+    e=(float, Q),
+    d=(float, Q),
 )
 
 
@@ -201,12 +208,16 @@ def special(term: Term) -> bool:
     return all(stand.needs & SPECIAL for stand in term.stands)
 
 
-def source() -> str:
-    """The module's text."""
+def source(code: Mechanics | None = None) -> str:
+    """The module's text; of machines with mechanics from a file it imports their integration by the file's hash."""
     known = terms()
-    modules = sorted({t.build.__module__ for t in known})
-    imports = "\n".join(generate.imported(m) for m in modules)
-    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), RUN]
+    modules = {t.build.__module__ for t in known}
+    run = RUN.replace("{advance}", "linear.advance(m)")
+    if code is not None:
+        modules.add(code.steps.__name__)
+        run = RUN.replace("{advance}", f"{code.steps.__name__}.advance(p, m)")
+    imports = "\n".join(generate.imported(m) for m in sorted(modules))
+    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), run]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
 
 
@@ -239,10 +250,12 @@ def sources_hash() -> str:
 
 
 @cache
-def kernel() -> Kernel:
-    """The kernel, compiled or taken from the cache."""
+def kernel(code: Mechanics | None = None) -> Kernel:
+    """The kernel of all machines, or of those with the mechanics of a file; compiled, or taken from the cache."""
     known = terms()
-    path = generate.write_text("fit_graph", source(), sources_hash())
+    path = generate.write_text(
+        "fit_graph" if code is None else f"fit_{code.name.lower()}", source(code), sources_hash()
+    )
     params = [(field(t.name), record_dtype(sample(t))) for t in known]
     states = [(field(t.name), t.state) for t in known if t.state is not None]
     head = [("kind", np.int64), ("node", np.int64), ("link", np.int64), ("channel", np.int64), ("factor", np.float64)]

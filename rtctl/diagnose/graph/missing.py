@@ -13,7 +13,7 @@ from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.hypotheses import faster
 from rtctl.diagnose.graph.likelihood import settled
 from rtctl.diagnose.graph.measures import speed, way
-from rtctl.diagnose.graph.model import GraphModel, rigid
+from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.words import body_of, channel_unit, here
 from rtctl.diagnose.quantities import DIMENSIONS
@@ -76,7 +76,8 @@ class Missing:
             unit = channel_unit(self.machine, channel)
             return Curve(x, x_words, x_unit, y, law, f"missing reading of {here(self.machine, channel)}", unit, title)
         body = self.node_body(node)
-        factor = 1.0 / (rigid(self.sim.layout, self.sim.own(full).base, str(self.sim.body)).get(body, 0.0) or 1.0)
+        factor, number = 1.0 / (self.sim.moves(self.sim.own(full).base).get(body, 0.0) or 1.0), self.sim.leader(body)
+        push0, push1 = push0[:, number], push1[:, number]
         turns = self.machine.turns(body)
         what = "torque" if turns else "force"
         unit = DIMENSIONS["force"][not turns]
@@ -92,7 +93,7 @@ class Missing:
     def abscissa(self, axis: str, node: str) -> tuple[np.ndarray, str, str]:
         """Values (n,) of an axis, its words and unit."""
         record, body = self.d.record, self.node_body(node)
-        x = way(self.sim) * self.sim.ratios[body]
+        x = way(self.sim, self.sim.leader(body)) * self.sim.ratios[body]
         turns, at = self.machine.turns(body), here(self.machine, body)
         if axis == "velocity":
             return speed(x, record.dt), f"speed of {at}", DIMENSIONS["speed"][not turns]

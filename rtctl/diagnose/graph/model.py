@@ -4,9 +4,10 @@ from typing import Any, NamedTuple
 
 from rtctl.diagnose.graph.case import GraphCase
 from rtctl.idiom import Settings
+from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.joints import sprung
 from rtctl.plants.graph.layout import Layout, layout
-from rtctl.plants.graph.params import GraphParams, build
+from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.physics import TERMS
 
 PHYSICS = "physics."  # head of the paths of the owner's terms
@@ -50,7 +51,7 @@ class GraphModel(NamedTuple):
 
     def params(self, h: float) -> GraphParams:
         """Params of the plant for substeps of `h` s."""
-        return build(self.layout, self.base, h)
+        return machine_params(self.layout, self.base, h)
 
 
 def nominal(case: GraphCase) -> GraphModel:

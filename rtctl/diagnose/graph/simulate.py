@@ -8,13 +8,13 @@ held    the main sensor's coordinate moves as it was recorded, and the force tha
 """
 
 from copy import copy
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, OWN_START, START
+from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths
@@ -23,6 +23,7 @@ from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.graph.elements import elements, spot
 from rtctl.plants.graph.layout import NOWHERE
+from rtctl.plants.graph.mechanics import code_of
 from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.physics import TERMS, ordered
 
@@ -36,24 +37,38 @@ NEVER = np.iinfo(np.int64).max  # row
 ABSENT = np.zeros((1, 1))
 
 
+class Followed(NamedTuple):
+    """A sensor that the model is made to follow."""
+
+    sensor: str
+    body: str
+    shows_speed: bool
+
+    @property
+    def bandwidth(self) -> float:
+        """Usual bandwidth of its observer, rad/s."""
+        return FOLLOW_SPEED if self.shows_speed else FOLLOW
+
+
 class Simulator:
     """A recording, ready to be simulated by models; one call is one run, and calls may go on in several threads."""
 
     def __init__(self, record: GraphRecord, follow: float | None = None):
         self.record, self.case = record, record.case
-        self.kernel = kernel.kernel()
+        self.kernel = kernel.kernel(code_of(record.case.machine))
         self.layout = record.case.layout
         self.elements = elements(self.layout)
         self.main = record.main
         sensor = record.case.machine.sensors[self.main]
         self.shows_speed = sensor.measures == "speed"
         self.body = sensor.body
-        usual = FOLLOW_SPEED if self.shows_speed else FOLLOW
+        self.followed = followed(record)
+        usual = self.followed[0].bandwidth
         self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP - 1e-9)))
         if self.case.problem == "kinematic":
             self.substeps = max(self.substeps, int(np.ceil(record.dt * self._ring() / STEADY)))
-        self.seen = np.ascontiguousarray(record.y[self.main])
+        self.watched = np.stack([record.y[one.sensor] for one in self.followed], axis=1)
         self.volts = np.ascontiguousarray(record.u)
         self.forces = self._forces(record.forces)
         self.mode = HELD if self.case.problem in HELD_PROBLEMS else TRACK
@@ -62,10 +77,36 @@ class Simulator:
         self.channels = [n for n in (*self.layout.sensors, *self.case.machine.drives) if n in record.y]
         if self.mode == HELD:
             self.channels.remove(self.main)
-        flexible = bool(self.layout.links) or any(b.weights for b in record.case.machine.bodies.values())
+        machine = record.case.machine
+        flexible = bool(self.layout.links) or any(b.weights for b in machine.bodies.values())
+        flexible = flexible and machine.mechanics is None  # which swings on while its sensors are held
         self.lead = round(LEAD / record.dt) if flexible and self.case.problem != "free" else 0
         self.release = NEVER
-        self.ratios = rigid(self.layout, record.case.values, str(self.body))
+        self.ratios = self.moves(record.case.values)
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Main sensor (n,), SI."""
+        return np.asarray(self.watched[:, 0])
+
+    @seen.setter
+    def seen(self, values: np.ndarray) -> None:
+        self.watched = np.column_stack([values, self.watched[:, 1:]])
+
+    def moves(self, values: dict[str, float]) -> dict[str, float]:
+        """Motion of each body for one unit of the followed body that joints connect it with; 0 where there is none."""
+        out: dict[str, float] = {}
+        for one in self.followed:
+            for name, ratio in rigid(self.layout, values, one.body).items():
+                out[name] = out.get(name) or ratio
+        return out
+
+    def leader(self, body: str) -> int:
+        """Number of the followed sensor with which joints connect a body; 0 where there is none."""
+        for number, one in enumerate(self.followed):
+            if rigid(self.layout, self.case.values, one.body).get(body, 0.0) != 0.0:
+                return number
+        return 0
 
     def _ring(self) -> float:
         """Highest frequency, rad/s, at which a body beside the held one rings with a joint."""
@@ -141,7 +182,7 @@ class Simulator:
     def everything(
         self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Readings, and the correction (n,), in N or Nm at the main sensor's body."""
+        """Readings, and the corrections (n, followed), in N or Nm at the body of each followed sensor."""
         record, k = self.record, self.kernel
         mode = self.mode if mode is None else mode
         model = self.own(model).resolved().built()
@@ -163,24 +204,25 @@ class Simulator:
             kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s, model.layout, there, model.base), h)
         job = self._job(model, params, mode, substeps)
         states = np.zeros(1, GRAPH_STATE)
-        start = float(np.log(model.base.get(START, 1.0)))
-        seen = self.seen[:n] + start if start else self.seen[:n]
-        self._begin(states, model, float(seen[0]))
-        path, pace = self._held(job, model, params, start)
-        out, push = np.full((n, params.ny), np.nan), np.zeros(n)
+        offsets = np.array([start_of(self, one, model.base) for one in self.followed])
+        seen = np.ascontiguousarray(self.watched[:n] + offsets)
+        self._begin(states, model, seen[0])
+        path, pace = self._held(job, model, params, float(offsets[0]))
+        out, push = np.full((n, params.ny), np.nan), np.zeros((n, len(self.followed)))
         static = self.case.problem == "static"  # forces were measured: the commands that made them do not count
         done = k.module.run(
             job, p, states, slots, (np.zeros_like if static else np.asarray)(self.volts[:n]), self._pushing(model)[:n],
             seen, path[:n], pace[:n], out, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
-        if start:
-            out[:, self.layout.sensors[self.main]] -= start
+        for one, offset in zip(self.followed, offsets, strict=True):
+            if offset:
+                out[:, self.layout.sensors[one.sensor]] -= offset
         if static:  # what the drives would have to make, as their nominal gain tells it
             name = next((c for c in self.channels if c not in self.layout.sensors), "")
             made, share = (record.y[name][:n], self._told(name, model)) if name else (np.zeros(n), 1.0)
-            out = np.column_stack([out, push * share])
-            push = push - made / share
+            out = np.column_stack([out, push[:, 0] * share])
+            push[:, 0] -= made / share
         return out, push
 
     def _told(self, drive: str, model: GraphModel) -> float:
@@ -220,23 +262,31 @@ class Simulator:
                 out[:, model.layout.coordinate(name)] += self.forces[:, at]
         return out
 
-    def _begin(self, states: np.ndarray, model: GraphModel, first: float) -> None:
-        """Put every coordinate where the first row of the main sensor has it, the joints unstretched."""
-        x, v = states["m"]["x"][0], 0.0
+    def _begin(self, states: np.ndarray, model: GraphModel, first: np.ndarray) -> None:
+        """Put every coordinate where the first row of the followed sensors has it, the joints unstretched."""
+        x = states["m"]["x"][0]
+        mechanics = self.case.machine.mechanics
+        for name, place in (mechanics.at if mechanics is not None else {}).items():
+            x[model.layout.coordinate(name)] = place / model.layout.ratio(name, model.base)
+        first, rate = first.copy(), 0.0
         if self.case.problem == "free":
-            first += self.record.scales[0] * float(np.log(model.base[FIRST_POSITION]))
-            v = self.record.scales[2] + self.record.scales[1] * float(np.log(model.base[FIRST_SPEED]))
-        for name, ratio in self.ratios.items():
-            own_ratio = model.layout.ratio(name, model.base)
-            value = ratio * first / own_ratio
-            at = model.layout.coordinate(name)
-            if self.shows_speed:
-                x[model.layout.nq + at] = value
-                states["m"]["v_before"][0, at] = value
-            else:
-                x[at] = value
-            if v:
-                x[model.layout.nq + at] = states["m"]["v_before"][0, at] = ratio * v / own_ratio
+            first[0] += self.record.scales[0] * float(np.log(model.base[FIRST_POSITION]))
+            rate = self.record.scales[2] + self.record.scales[1] * float(np.log(model.base[FIRST_SPEED]))
+        for number in range(len(self.followed) - 1, -1, -1):
+            one = self.followed[number]
+            for name, ratio in rigid(self.layout, self.case.values, one.body).items():
+                if ratio == 0.0:
+                    continue
+                value = ratio * first[number] / model.layout.ratio(name, model.base)
+                at = model.layout.coordinate(name)
+                if one.shows_speed:
+                    x[model.layout.nq + at] = value
+                    states["m"]["v_before"][0, at] = value
+                else:
+                    x[at] = value
+                if rate and number == 0:
+                    speed = ratio * rate / model.layout.ratio(name, model.base)
+                    x[model.layout.nq + at] = states["m"]["v_before"][0, at] = speed
 
     def _job(self, model: GraphModel, params: Any, mode: int, substeps: int) -> np.ndarray:
         job = np.zeros(1, kernel.JOB)
@@ -245,23 +295,53 @@ class Simulator:
         j["mode"], j["substeps"], j["rate"], j["release"] = mode, substeps, 1.0 / dt, self.release
         j["lead"] = self.lead if mode == TRACK else 0
         j["part"], j["delay"] = np.modf(self.case.delay_samples * substeps)
-        j["main"], j["speed"] = model.layout.sensors[self.main], self.shows_speed
-        inertia = 0.0
-        push = np.zeros(len(j["push"]))
-        for name, ratio in self.ratios.items():
-            at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
-            push[at] = params.inertia[at] * ratio / own_ratio
-        for at in range(model.layout.nq):
-            inertia += push[at] ** 2 / params.inertia[at]
-        j["push"] = push / inertia  # a unit of correction is a unit of force at the main body
-        j["P"], j["D"] = self.follow**2 * inertia, 1.4 * self.follow * inertia
-        j["a"] = -np.expm1(-10.0 * self.follow * dt)
+        j["follows"] = len(self.followed)
+        for number, one in enumerate(self.followed):
+            j["main"][number], j["speed"][number] = model.layout.sensors[one.sensor], one.shows_speed
+            inertia = 0.0
+            push = np.zeros(j["push"].shape[1])
+            for name, ratio in rigid(self.layout, self.case.values, one.body).items():
+                at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
+                if ratio != 0.0:
+                    push[at] = params.inertia[at] * ratio / own_ratio
+            for at in range(model.layout.nq):
+                inertia += push[at] ** 2 / params.inertia[at]
+            j["push"][number] = push / inertia  # a unit of correction is a unit of force at the followed body
+            follow = self.follow * one.bandwidth / self.followed[0].bandwidth
+            j["P"][number], j["D"][number] = follow**2 * inertia, 1.4 * follow * inertia
+            j["a"][number] = -np.expm1(-10.0 * follow * dt)
         for path, value in model.base.items():
             if path.startswith(OWN_START):
                 name, what = path.removeprefix(OWN_START).rsplit(".", 1)
                 at, column = model.layout.coordinate(name), ("position", "speed").index(what)
                 j[("first_x", "first_v")[column]][at] = self._own_scales(params, at)[column] * float(np.log(value))
         return job
+
+
+def followed(record: GraphRecord) -> tuple[Followed, ...]:
+    """Sensors that the observer follows: the main one, and of each body that joints do not connect with one of them."""
+    case = record.case
+    sensors = case.machine.sensors
+    order = [record.main, *(n for wanted in ("position", "speed") for n, s in sensors.items() if s.measures == wanted)]
+    out: list[Followed] = []
+    reached: set[str] = set()
+    for name in order:
+        body = str(sensors[name].body)
+        if name not in record.y or body in reached or (out and sensors[name].body is None):
+            continue
+        out.append(Followed(name, body, sensors[name].measures == "speed"))
+        reached |= {other for other, ratio in rigid(case.layout, case.values, body).items() if ratio != 0.0}
+    return tuple(out)
+
+
+def start_of(sim: Simulator, one: Followed, base: dict[str, float]) -> float:
+    """Position of a followed body where its column shows 0, rad or m."""
+    machine = sim.case.machine
+    first = base.get(START, 1.0) if one.sensor == sim.main else 1.0
+    offset = float(np.log(first * base.get(f"{BEGINS}.{one.body}", 1.0)))
+    if machine.mechanics is not None and not one.shows_speed:
+        offset += machine.mechanics.at.get(one.body, 0.0)
+    return offset
 
 
 _dtypes: dict[type, np.dtype] = {}

@@ -4,13 +4,14 @@ import math
 from typing import Any
 
 from rtctl.diagnose.diagnosis import Effect
-from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, START, is_start
+from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
 from rtctl.diagnose.graph.model import PHYSICS, RECORDING, GraphModel
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.numbers import both, nice
 from rtctl.diagnose.quantities import DIMENSIONS
 from rtctl.diagnose.words import BY_NODE, Slots, harmonics, noun, phrase_of
 from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.mechanics import code_of
 from rtctl.plants.graph.units import measured_unit
 from rtctl.plants.physics import TERMS
 
@@ -76,9 +77,14 @@ def value_unit(machine: Description, path: str) -> str:
     path = path.partition(RECORDING)[0]
     if path == START:
         return "rad"
+    group, name, *rest = path.split(".")
+    if group == BEGINS and name in machine.bodies and not rest:
+        return "rad" if machine.turns(name) else "m"
     if is_start(path) or path.startswith(PHYSICS):
         return ""
-    group, name, *rest = path.split(".")
+    if group == "mechanics":
+        code = code_of(machine)
+        return code.unit(rest[-1]) if code is not None else ""
     key = rest[-1]
     if group == "bodies" and "gravity" in rest:
         return GRAVITY.get(key, "")

@@ -69,7 +69,7 @@ def test_the_first_stand_that_fits_counts():
 
 
 def test_what_described_machines_are_asked_about_no_plant_is():
-    drag, fan = TERMS["friction.quadratic"], (element("fan", "body", "turns general"),)
+    drag, fan = TERMS["friction.quadratic"], (element("fan", "body", "turns general single"),)
     assert standing(drag, fan, "fan")[0].offered
     assert not any(standing(drag, kind, node)[0].offered for kind, there in by_kind(drag).items() for node in there)
     assert {name for name, term in TERMS.items() if not by_kind(term) and nodes(term, fan)} == {
