@@ -53,10 +53,9 @@ class GraphCase(NamedTuple):
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
-        if path.startswith(f"{BEGINS}.") and path not in self.tolerances:
-            return START_TOLERANCE
         if is_start(path) and path not in self.tolerances:
-            return math.inf
+            rung = path in (FIRST_POSITION, FIRST_SPEED) or path.startswith(OWN_START)
+            return math.inf if rung or self.problem == "free" else START_TOLERANCE
         for end in (path, *(path.rsplit(".", n)[0] for n in range(1, path.count(".") + 1))):
             if end in self.tolerances:
                 found = self.tolerances[end]
