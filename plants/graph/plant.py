@@ -15,7 +15,7 @@ from rtctl.idiom import state, tick
 from rtctl.plants import linear
 from rtctl.plants.graph import reel
 from rtctl.plants.graph.drives import current, drive
-from rtctl.plants.graph.params import ACCELERATION, POSITION, SPEED, TENSION, GraphParams
+from rtctl.plants.graph.params import ACCELERATION, SPEED, TENSION, GraphParams
 from rtctl.plants.graph.spring import spring
 
 GRAPH_STATE = state(m=linear.MACHINE)
@@ -105,12 +105,11 @@ def read(p, m):
     """What each sensor would show, in SI units, into m.y."""
     nq = p.nq
     for c in range(p.ny):
-        kind = p.sensor_kind[c]
+        kind = p.sensor_kind[c]  # POSITION is 0, SPEED 1
         i, a, j, b = p.sensor_i[c], p.sensor_a[c], p.sensor_j[c], p.sensor_b[c]
-        if kind == POSITION:
-            m.y[c] = a * m.x[i] + b * m.x[j]
-        elif kind == SPEED:
-            m.y[c] = a * m.x[nq + i] + b * m.x[nq + j]
+        if kind <= SPEED:
+            at = kind * nq
+            m.y[c] = a * m.x[at + i] + b * m.x[at + j]
         elif kind == ACCELERATION:  # mean of the last substep
             m.y[c] = (a * (m.x[nq + i] - m.v_before[i]) + b * (m.x[nq + j] - m.v_before[j])) / m.h
         elif kind == TENSION:
