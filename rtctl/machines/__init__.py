@@ -12,12 +12,10 @@ from rtctl.machines.base import DESCRIBED, Column, Diagram, MachineSettings, Pla
 from rtctl.own import model
 from rtctl.own.files import OwnError
 
-MODULES: dict[str, Any] = {"ivu": ivu, "ldu": ldu, "axis": axis}
 CONFIGS: dict[str, type[MachineSettings]] = {
-    "ivu": ivu.IvuConfig,
-    "ldu": ldu.LduConfig,
-    "axis": axis.AxisConfig,
+    kind.model_fields["machine"].default: kind for kind in (ivu.IvuConfig, ldu.LduConfig, axis.AxisConfig)
 }
+MODULES: dict[str, Any] = dict(zip(CONFIGS, (ivu, ldu, axis), strict=True))
 EVERY: dict[str, type[MachineSettings]] = {**CONFIGS, DESCRIBED: described.DescribedConfig}  # of every kind
 
 
