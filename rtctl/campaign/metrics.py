@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.config.units import ANGLES
-from rtctl.loop import safety
 from rtctl.loop.fused import Run
 from rtctl.machines import Machine
+from rtctl.tick import safety
 from rtctl.trace.metrics import machine_steps
 
 

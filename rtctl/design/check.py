@@ -17,9 +17,10 @@ from rtctl.config.errors import NoAnswer
 from rtctl.config.load import set_path, set_paths
 from rtctl.design import margins, response
 from rtctl.design.margins import Margins
-from rtctl.loop import fused, safety
+from rtctl.loop import fused
 from rtctl.machines.base import DESCRIBED
 from rtctl.machines.profiles import profile_of
+from rtctl.tick import safety
 
 PERIODS = 3  # averaged, after one in which the loop forgets how it began
 SURE = 0.05  # deviation of the mean loop gain over the periods, above which a line is left out

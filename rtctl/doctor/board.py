@@ -14,9 +14,9 @@ from rtctl.doctor.finding import Finding
 from rtctl.drivers import at_mio_16de as mio
 from rtctl.drivers import daq_stc, optical_sensor
 from rtctl.drivers.board import Board
-from rtctl.loop import frames
 from rtctl.machines.profile import REELS, SCALE
 from rtctl.machines.profiles import profile_of
+from rtctl.tick import frames
 
 REST_READS = 200
 REST_CODES = 4  # peak to peak; the thesis's board has 0.5 LSB of dither

@@ -5,8 +5,8 @@ from rtctl.faults.notes import NOTES
 from rtctl.faults.play import Outcome
 from rtctl.faults.processes import Survived
 from rtctl.faults.table import Table
-from rtctl.loop.faults import KINDS
 from rtctl.machines.profiles import profile_of
+from rtctl.tick.faults import KINDS
 
 HEAD = """# Faults
 

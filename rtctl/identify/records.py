@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
-from rtctl.loop import safety
 from rtctl.loop.fused import Run
 from rtctl.machines.profile import Columns, Profile
 from rtctl.machines.profiles import profile_of
+from rtctl.tick import safety
 from rtctl.trace.bundle import Bundle
 
 SWINGING = 0.02  # share of saturated samples above which the excitation alone is not to blame

@@ -27,10 +27,11 @@ from rtctl.config.files import write_text as write_file
 from rtctl.config.private import made
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import excitation, reference
-from rtctl.loop import faults, frames, runner, shm_link
+from rtctl.loop import runner, shm_link
 from rtctl.machines import Machine
 from rtctl.machines.base import Block, Column
 from rtctl.sources import sources_hash
+from rtctl.tick import faults, frames
 
 HEADER = '''"""{title}
 
@@ -41,8 +42,9 @@ import numpy as np
 from numba import njit
 
 from rtctl.idiom import glue as compiled
-from rtctl.loop import clock, faults, histogram, mailbox, ring, safety
-from rtctl.loop.memory import borrowed
+from rtctl.loop import histogram, mailbox, ring
+from rtctl.tick import clock, faults, safety
+from rtctl.tick.memory import borrowed
 from rtctl.machines import {machine} as machine
 {imports}
 
@@ -205,7 +207,7 @@ def generate(machine: Machine, link: str) -> Generated:
         shm_link.check_architecture()
     path = write(machine, link)
     if machine.config.own:
-        from rtctl.own.machine import require  # here: the plain tick has nothing of the user's own
+        from rtctl.machines.own_check import require  # here: the plain tick has nothing of the user's own
 
         require(machine, path)
     return Generated(

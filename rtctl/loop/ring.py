@@ -7,7 +7,7 @@ it did not get. Rows are numbered from 0, so rows written = rows read + rows los
 import numpy as np
 
 from rtctl.idiom import state, tick
-from rtctl.loop.memory import Segment, release
+from rtctl.tick.memory import Segment, release
 
 RING = state(
     head=int,  # rows written; the loop writes it

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 from rtctl.config.load import Widen
 from rtctl.laws import excitation, reference
-from rtctl.loop import faults
 from rtctl.machines import axis, described, ivu, ldu, own_plant
 from rtctl.machines.base import DESCRIBED, Column, Diagram, MachineSettings, PlantDiagram, Signals
 from rtctl.own import model
 from rtctl.own.files import OwnError
+from rtctl.tick import faults
 
 CONFIGS: dict[str, type[MachineSettings]] = {
     kind.model_fields["machine"].default: kind for kind in (ivu.IvuConfig, ldu.LduConfig, axis.AxisConfig)

@@ -9,12 +9,12 @@ from typing import Any
 from rtctl.config.errors import UserError
 from rtctl.config.load import get_path
 from rtctl.drivers import at_mio_16de, ldu_amplifier
-from rtctl.loop.faults import CODES
 from rtctl.machines import Machine
 from rtctl.machines.base import DESCRIBED
 from rtctl.machines.profile import AMPLIFIER, Range
 from rtctl.machines.profiles import PROFILES, profile_of
 from rtctl.soak.described import DESCRIBED_GAINS, described_counts, described_range, full_commands, rounding_of
+from rtctl.tick.faults import CODES
 
 
 def range_of(machine: Machine) -> Range:
