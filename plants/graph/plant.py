@@ -108,13 +108,12 @@ def read(p, m):
     """What each sensor would show, in SI units, into m.y."""
     nq = p.nq
     for c in range(p.ny):
-        kind = p.sensor_kind[c]
+        kind = p.sensor_kind[c]  # POSITION is 0, SPEED 1
         i, a, j, b = p.sensor_i[c], p.sensor_a[c], p.sensor_j[c], p.sensor_b[c]
-        if kind == POSITION:
-            m.y[c] = a * m.x[i] + b * m.x[j]
-            m.y_rate[c] = a * m.x[nq + i] + b * m.x[nq + j]
-        elif kind == SPEED:
-            m.y[c] = a * m.x[nq + i] + b * m.x[nq + j]
+        if kind <= SPEED:
+            at = kind * nq
+            m.y[c] = a * m.x[at + i] + b * m.x[at + j]
+            m.y_rate[c] = a * m.x[nq + i] + b * m.x[nq + j] if kind == POSITION else 0.0
         elif kind == ACCELERATION:  # mean of the last substep
             m.y[c] = (a * (m.x[nq + i] - m.v_before[i]) + b * (m.x[nq + j] - m.v_before[j])) / m.h
         elif kind == TENSION:

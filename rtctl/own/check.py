@@ -15,9 +15,9 @@ from numba.core import ir as numba_ir
 
 from rtctl.config.errors import UserError, nearest
 from rtctl.idiom import fill_record, record_dtype
-from rtctl.loop import clock
 from rtctl.own.files import OwnError, Source
 from rtctl.own.parts import Parts, arguments
+from rtctl.tick import clock
 
 TICKS = 20_000  # measured
 FIRST = 20  # of them, to see whether the rest is worth while

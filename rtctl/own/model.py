@@ -18,6 +18,7 @@ from pydantic import Field, create_model
 from rtctl.own import law, mechanics, plant, term
 from rtctl.own.files import OwnError, Source, is_own, is_trusted, read, split
 from rtctl.own.parts import Parts, own
+from rtctl.plants.physics.place import PLANTS
 
 Key = tuple[Any, ...]
 LAW, PLANT, PHYSICS = ("law", "position", "kind"), ("plant", "kind"), ("plant", "physics")
@@ -186,7 +187,7 @@ def _plant(source: Source, base: Any, machine: str) -> Any:
     """The file's settings with what the config of every plant has: rate, substep, an empty list of terms, no FMU."""
     parts = own(source, plant.FUNCTIONS)
     plant.check_sensors(parts, machine)
-    parts.call("step", "own", plant.INPUTS[machine])
+    parts.call("step", "own", PLANTS[machine].OWN.inputs)
     kept: dict[str, Any] = {n: (base.model_fields[n].annotation, base.model_fields[n]) for n in ("rate", "substep")}
     none: Any = Field(
         default=[], max_length=0, description="an own plant has no nodes for terms: write them into its step"
