@@ -75,7 +75,7 @@ def machine_params(layout: Layout, values: dict[str, float], h: float) -> Any:
         J[k] = values[f"bodies.{name}.{key}"]
         base[i[k]] -= a[k] ** 2 * J[k]
     q0 = np.zeros(Q)
-    for name, at in layout.machine.mechanics.at.items():
+    for name, at in layout.machine.mechanics.at.items():  # type: ignore[union-attr, unused-ignore]
         place = layout.bodies[name]
         if place.coordinate != NOWHERE:
             q0[place.coordinate] = at / layout.ratio(name, values)

@@ -62,7 +62,7 @@ def register(source: Source, path: Path | None = None) -> Mechanics:
         steps = coupled.steps(module, name)
         sys.modules[name] = steps  # compiled code that refers to it finds it here
         found = Mechanics(source.name, _digest(source), module, settings, steps, params, str(path or source.file))
-        params.code = found
+        params.code = found  # type: ignore[attr-defined, unused-ignore]
     graph.register(found)
     return found
 
