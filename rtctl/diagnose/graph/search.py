@@ -26,7 +26,7 @@ BEAM = 2
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
-FORM = 0.05  # share of what the effects before it gained, which a further one must gain: no law is exact
+FORM = 0.1  # of the amplitude that the effects before it took off, which a further one must take off: no law is exact
 FAR = 30.0  # nats behind the best at which a combination is dropped
 
 Progress = Callable[[str], None]
@@ -92,10 +92,17 @@ def merit_of(f: Fitted, odds: float) -> float:
 
 
 def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], float]) -> bool:
-    """Whether a further effect is worth its numbers, and more than what the form of the others leaves."""
-    if merit(more) < merit(fewer) + WORTH or fewer.loss - more.loss < FORM * (base.loss - fewer.loss):
+    """Whether a further effect is worth its numbers, and more than what the laws of the others may be wrong by."""
+    if merit(more) < merit(fewer) + WORTH:
         return False
-    return not fewer.names or explained(fewer, more) > PART
+    return not fewer.names or (explained(fewer, more) > PART and amplitude(base, fewer, more) > FORM)
+
+
+def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
+    """What a further effect takes off the residual over what all take off, rms, of the sensor that shows most of it."""
+    further = np.sqrt(np.mean((fewer.e - more.e) ** 2, axis=0))
+    whole = np.sqrt(np.mean((base.e - more.e) ** 2, axis=0))
+    return float(np.max(further / np.maximum(whole, 1e-300)))
 
 
 def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]) -> bool:
@@ -148,7 +155,7 @@ def step(
     }
     out = list(firsts.values())
     for term in sorted(firsts, key=lambda term: -firsts[term].log_evidence)[:BEAM]:
-        out += [refitted(scores, STARTS) for scores in list(top[term].values())[1 : 1 + OTHERS]]
+        out += [refitted(scores, 1) for scores in list(top[term].values())[1 : 1 + OTHERS]]
     return out
 
 
