@@ -20,7 +20,7 @@ from rtctl.diagnose.graph.search import Found
 
 SEGMENTS = 32
 DRAWS = 300
-DISCREPANCY = 0.2  # of the missing force: standard deviation of what the law of a name may be wrong by
+DISCREPANCY = 0.1  # of the missing force: standard deviation of what the law of a name may be wrong by
 UNLISTED = 3.0  # nats: prior odds against a force that has no name
 BESIDE = 3  # combinations beside which free forces are asked for
 LEAST = 1e-4  # of the force that moves a node: a discrepancy that is smaller is none

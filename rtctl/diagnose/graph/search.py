@@ -26,7 +26,7 @@ BEAM = 2
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
-FORM = 0.1  # of the amplitude that the effects before it took off, which a further one must take off: no law is exact
+FORM = 0.05  # of the amplitude that the effects before it took off, which a further one must take off: no law is exact
 FAR = 30.0  # nats behind the best at which a combination is dropped
 
 Progress = Callable[[str], None]

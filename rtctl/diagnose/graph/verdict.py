@@ -38,7 +38,7 @@ def verdict(found: Found) -> Verdict:
     fits = {r.fit.names: r.fit for r in table}
     top = max((r for r in table if r.unlisted), key=lambda r: r.merit, default=None)
     free, beside = (None, found.base) if top is None else (top.free, top.fit)
-    best = fits[max((names for names in named if names), key=lambda names: named[names], default=())]
+    best = fits[certain(ranked)]
 
     def answer(kind: str, model: Fitted, why: str) -> Verdict:
         return Verdict(kind, model, (), (), ranked, free, beside, why, table)
@@ -54,6 +54,19 @@ def verdict(found: Found) -> Verdict:
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
     return answer(kind, best, "")._replace(confidence=confidence, rivals=others)
+
+
+def certain(ranked: tuple[tuple[tuple[str, ...], float], ...]) -> tuple[str, ...]:
+    """The likeliest combination, without an effect that may as well be absent."""
+    best = next((names for names, _ in ranked if names), ())
+    for name in best:
+        rest = tuple(other for other in best if other != name)
+        term = name.partition(":")[0]
+        sure = sum(p for names, p in ranked if holds(names, term)) >= SURE
+        absent = sum(p for names, p in ranked if set(names) == set(rest)) > 1.0 - SURE
+        if rest and absent and not sure:
+            return next(names for names, _ in ranked if set(names) == set(rest))
+    return best
 
 
 def terms(f: Fitted) -> list[str]:
