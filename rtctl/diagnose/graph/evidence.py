@@ -16,7 +16,8 @@ import numpy as np
 
 from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.free import SIZE, Free, free_forces
-from rtctl.diagnose.graph.search import Found
+from rtctl.diagnose.graph.measures import Measures
+from rtctl.diagnose.graph.search import Found, amplitude
 
 SEGMENTS = 32
 DRAWS = 300
@@ -45,18 +46,36 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     base = found.base
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
     entries: list[tuple[Fitted, Free | None, float]] = [(f, None, found.merit(f)) for f in fits]
-    missing = free_forces(base)
-    whole = DISCREPANCY * missing[0].rms if missing else 0.0
-    entries += _beside(found, base, missing)
+    entries += _beside(found, base, free_forces(base))
     for fit in found.fits[:BESIDE]:
         if fit.names:
+            whole = DISCREPANCY * missing_force(base, fit)
             shares = (SIZE, *((whole,) if whole > LEAST else ()))
+            free = free_forces(fit, shares)
             for share in shares:
-                entries += _beside(found, fit, [f for f in free_forces(fit, shares) if f.share == share])
+                entries += _beside(
+                    found, fit, [f for f in free if f.share == share and (share < SIZE or large(base, fit, f))]
+                )
     losses = [base.power * _losses(found, fit.e if free is None else free.e) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
     return tuple(sorted(out, key=lambda r: -r.probability))
+
+
+def large(base: Fitted, fit: Fitted, free: Free) -> bool:
+    """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
+    return amplitude(base.e, fit.e, free.e) > DISCREPANCY
+
+
+def missing_force(base: Fitted, fit: Fitted) -> float:
+    """Rms of the force that the effects of a fit take the place of, in forces that move the followed body.
+
+    It is what the observer's correction has less of, so that it stands for an effect in a sensor or a drive as well.
+    """
+    sim = base.like.parts[0].sim
+    before, after = (sim.everything(sim.own(f.model))[1][base.like.rows[0] :, 0] for f in (base, fit))
+    change = float(np.sqrt(np.mean((before - after) ** 2)))
+    return change / Measures(sim, base.model.base, {}).of("force", str(sim.body)) if np.isfinite(change) else 0.0
 
 
 def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:

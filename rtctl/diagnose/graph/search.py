@@ -95,13 +95,14 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], fl
     """Whether a further effect is worth its numbers, and more than what the laws of the others may be wrong by."""
     if merit(more) < merit(fewer) + WORTH:
         return False
-    return not fewer.names or (explained(fewer, more) > PART and amplitude(base, fewer, more) > FORM)
+    return not fewer.names or (explained(fewer, more) > PART and amplitude(base.e, fewer.e, more.e) > FORM)
 
 
-def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
-    """What a further effect takes off the residual over what all take off, rms, of the sensor that shows most of it."""
-    further = np.sqrt(np.mean((fewer.e - more.e) ** 2, axis=0))
-    whole = np.sqrt(np.mean((base.e - more.e) ** 2, axis=0))
+def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
+    """What a further effect takes off the residual (blocks, sensors) over what all take off, rms, of the sensor that
+    shows most of it."""
+    further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
+    whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
     return float(np.max(further / np.maximum(whole, 1e-300)))
 
 

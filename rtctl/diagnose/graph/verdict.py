@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.graph.evidence import Rival, rivals
-from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.fits import Fitted, explained
 from rtctl.diagnose.graph.free import Free
 from rtctl.diagnose.graph.search import Found
 
 SURE = 0.9  # probability from which a name is given, or that something is missing
+MOSTLY = 0.5  # share of the residual's power above the noise that names have to take off
 ALIKE = 3  # names of an ambiguous answer
 
 
@@ -50,6 +51,9 @@ def verdict(found: Found) -> Verdict:
         also = f"beside {', '.join(beside.names)} " if beside.names else ""
         why = f"{also}a force at {free.node} by {free.axis} without a name has a probability of {100 * unlisted:.0f} %"
         return answer(UNNAMED, beside, why)
+    share = explained(found.base, best)
+    if share < MOSTLY:
+        return answer(UNNAMED, best, f"{', '.join(best.names)} takes off {100 * share:.0f} % of what is missing")
     confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
