@@ -61,6 +61,14 @@ def load_drive(p, m, i):
     return p.mu * abs(F) / m.G[nq + i, nu + i]
 
 
+@tick
+def pressed(p, m, i, j, k):
+    """As `load`, of the links `j` and `k` where both end at node `i`, else of `j`; of the drives where there is none."""
+    if j < 0:
+        return load_drive(p, m, i)
+    return load(p, m, i, j, k if k >= 0 and (m.link_i[k] == i or m.link_j[k] == i) else j)
+
+
 LOAD = Term(
     name="friction.load",
     words="dry friction that grows with load: the tighter the tape or the harder the push, the more it drags",
@@ -70,6 +78,7 @@ LOAD = Term(
     build=build_load,
     act={
         "force": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {l}, {l})",
+        "force:described": "{m}.dry[{i}] += friction_load.pressed({p}, {m}, {i}, {l}, {k})",
         "force:ivu": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {p}.one, {p}.two)",
         "force:axis": "{m}.dry[{i}] += friction_load.load_drive({p}, {m}, {i})",
     },

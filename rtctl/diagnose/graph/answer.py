@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import START
-from rtctl.diagnose.graph.fits import Fitted, prior
+from rtctl.diagnose.graph.fits import Fitted, prior, refit
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.prediction import Heldout, predict
@@ -20,6 +20,7 @@ from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
 from rtctl.diagnose.space import COSINE, PLACE, SHAPE, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
+from rtctl.trace.bundle import load_case
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
 Z90 = 1.645
@@ -108,7 +109,17 @@ def diagnose(folder: Path | str, progress: Progress = lambda _: None) -> GraphDi
 
     Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
     """
-    return diagnose_record(load_record(folder), progress)
+    return diagnose_record(load(folder), progress)
+
+
+def load(folder: Path | str) -> GraphRecord:
+    """The record of a bundle of either exchange format. Raises as `diagnose`."""
+    if load_case(Path(folder)).get("plant") is None:
+        return load_record(folder)
+    from rtctl.diagnose.graph.known import graph_record
+    from rtctl.diagnose.record import load_record as load_known
+
+    return graph_record(load_known(folder))
 
 
 def diagnose_record(record: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:
@@ -116,15 +127,18 @@ def diagnose_record(record: GraphRecord, progress: Progress = lambda _: None) ->
     began = time.monotonic()
     with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
         sim = Simulator(record)
-        like = Likelihood(sim)
-        found = search(like, Space(nominal(record.case), record.case.fitted, record.case.tolerance), progress)
+        space = Space(nominal(record.case), record.case.fitted, record.case.tolerance)
+        if record.edges:  # a model that follows the others tells which way they went
+            progress("telling the directions of edges")
+            sim = sim.directed(refit(Likelihood(sim), space).model)
+        found = search(Likelihood(sim), space, progress)
         progress("weighing names against forces without one")
         decided = verdict(found)
         progress("predicting rows that were not fitted")
         heldout = predict(found.base, decided.best)
         effects = _effects(decided)
         return GraphDiagnosis(
-            record=record,
+            record=sim.record,
             found=found,
             decided=decided,
             effects=effects,
@@ -190,7 +204,7 @@ def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
         low, high = sorted(nominal * float(np.exp(end)) for end in ends)
         if path == START:  # kept as its exponential
             value, low, high = (float(np.log(v)) for v in (value, low, high))
-        out[path] = Interval(value, low, high, words.value_unit(machine, path))
+        out[record.case.called.get(path, path)] = Interval(value, low, high, words.value_unit(machine, path))
     return out
 
 

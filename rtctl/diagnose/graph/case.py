@@ -44,6 +44,8 @@ class GraphCase(NamedTuple):
     notes: str
     warnings: tuple[str, ...]
     file: Path
+    format: int = FORMAT  # whose names of effects may be given
+    called: dict[str, str] = {}  # noqa: RUF012  # path -> symbol by which the owner calls it
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
@@ -61,8 +63,11 @@ class GraphCase(NamedTuple):
     def fitted(self) -> tuple[str, ...]:
         """Paths of the values that a fit may move, in the order of the description."""
         out = []
+        behind = {path for paths in self.machine.symbols.values() for path in paths[1:]}  # they move with the first
         for path, value in self.values.items():
             key = path.rsplit(".", 1)[-1]
+            if path in behind:
+                continue
             if value != 0.0 and key not in NEVER and self.tolerance(path) > 1e-3 and self._acts(path):
                 out.append(path)
         return tuple(out)
@@ -74,6 +79,8 @@ class GraphCase(NamedTuple):
         group, name, *rest = path.split(".")
         if group == "drives" and rest == ["damping"]:
             return self.machine.drives[name].bandwidth_hz is not None
+        if group == "bodies" and rest[0] == "reel":  # paper that does not land changes nothing
+            return bool(self.values.get(f"bodies.{name}.reel.thickness"))
         if group == "drives" and rest == ["inductance"]:
             return self.machine.drives[name].kind == "voltage"
         return True

@@ -20,7 +20,7 @@ from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
 OPEN, TRACK = range(2)
-SPECIAL = frozenset({"reel", "capstan", "wheel", "span", "contact", "guided", "wrapped", "edges", "loaded"})
+KIND = "described"  # of the lines of a term that a described machine has
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
 
@@ -143,12 +143,7 @@ class Kernel(NamedTuple):
 
 def terms() -> tuple[Term, ...]:
     """The library's terms that can stand in a described machine."""
-    return tuple(term for term in TERMS.values() if any(site in term.act for site in SITES) and not special(term))
-
-
-def special(term: Term) -> bool:
-    """Whether a term stands only at elements that no described machine has: reels, tapes, strips, contacts."""
-    return all(stand.needs & SPECIAL for stand in term.stands)
+    return tuple(term for term in TERMS.values() if any(term.act_at(site, KIND) for site in SITES))
 
 
 def source() -> str:
@@ -169,11 +164,11 @@ def _site(site: str, known: tuple[Term, ...]) -> str:
         "            break",
     ]
     for number, term in enumerate(known, 1):
-        act = term.act.get(site)
+        act = term.act_at(site, KIND)
         if act is not None:
             name = field(term.name)
             line = act.format(p=f"t.q[k].{name}", s=f"t.z[k].{name}", m="m", i="t.q[k].node", r="t.q[k].factor",
-                              l="t.q[k].link", c="t.q[k].channel")  # fmt: skip
+                              l="t.q[k].link", k="t.q[k].other", c="t.q[k].channel")  # fmt: skip
             lines += [f"        if kind == {number}:", *(f"            {part}" for part in line.split("\n"))]
     return "\n".join(lines)
 
@@ -195,7 +190,8 @@ def kernel() -> Kernel:
     path = generate.write_text("fit_graph", source(), sources_hash())
     params = [(field(t.name), record_dtype(sample(t))) for t in known]
     states = [(field(t.name), t.state) for t in known if t.state is not None]
-    head = [("kind", np.int64), ("node", np.int64), ("link", np.int64), ("channel", np.int64), ("factor", np.float64)]
+    whole = ("kind", "node", "link", "channel", "other")
+    head = [*((name, np.int64) for name in whole), ("factor", np.float64)]
     slot = np.dtype(head + params, align=True)
     slots = state(q=(slot, SLOTS), z=(np.dtype([*states, ("spare", np.float64)], align=True), SLOTS))
     return Kernel(generate.load(path), tuple(t.name for t in known), slot, slots)
@@ -205,5 +201,6 @@ def fill_slot(kern: Kernel, slot: Any, settings: Any, place: Any, h: float) -> N
     """Put one term of a `physics:` list into a slot, at a place of the machine."""
     term = TERMS[settings.term]
     slot["kind"] = kern.names.index(term.name) + 1
-    slot["node"], slot["link"], slot["channel"], slot["factor"] = place
+    for name in place._fields:
+        slot[name] = getattr(place, name)
     fill_record(slot[field(term.name)], term.build(settings, h))

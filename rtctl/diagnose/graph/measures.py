@@ -8,7 +8,8 @@ from scipy.ndimage import uniform_filter1d
 from rtctl.diagnose.graph.model import rigid
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.element import Element
-from rtctl.plants.graph.layout import NOWHERE
+from rtctl.plants.graph.elements import contacts
+from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.physics import TERMS
 
 SMOOTH = 5e-3  # s, over which a speed is taken
@@ -88,11 +89,17 @@ class Measures:
 
     def scale(self, node: str) -> Scales:
         """Scales of a node."""
-        ratio = self.ratios.get(self.body_of(node), 1.0) or 1.0
+        ratio = self.ratio(node)
         ends = sorted((float(self.way.min()) * ratio, float(self.way.max()) * ratio))
         return Scales(
             abs(ratio) * self.v_main, max(ends[1] - ends[0], LITTLE), self.effort / abs(ratio), ends[0], np.sign(ratio)
         )
+
+    def ratio(self, node: str) -> float:
+        """What a node moves for one unit of the main sensor's body; tape, and what a contact drives, in their own."""
+        at = lever(self.layout, self.values, node, bool(self.term) and TERMS[self.term].contact)
+        body, arm = at if at is not None else (self.body_of(node), 1.0)
+        return arm * (self.ratios.get(body, 1.0) or 1.0)
 
     def turns(self, node: str) -> bool:
         """Whether what a node belongs to turns."""
@@ -190,6 +197,20 @@ class Measures:
         """The highest value that the term's settings allow."""
         bounds = TERMS[self.term].settings.model_fields[parameter].metadata
         return float(min((b.le for b in bounds if hasattr(b, "le")), default=np.inf))
+
+
+def lever(layout: Layout, values: dict[str, float], node: str, contact: bool) -> tuple[str, float] | None:
+    """Body and arm of what a span of tape, or where `contact` says so a contact, passes on; None of any other node."""
+    machine = layout.machine
+    touching = contacts(machine).get(node) if contact else None
+    if touching is not None and touching.joint:
+        return str(machine.joints[touching.joint].to), 1.0
+    if touching is not None:
+        return node, values[f"bodies.{node}.radius"]
+    if node in machine.joints and machine.joints[node].span is not None:
+        body = str(machine.joints[node].to)
+        return body, values[f"bodies.{body}.radius"]
+    return None
 
 
 def speed(x: np.ndarray, dt: float) -> np.ndarray:

@@ -26,6 +26,7 @@ class GraphRecord(NamedTuple):
     y: dict[str, np.ndarray]  # sensor -> (n,) SI; a counter's value is the middle of its count
     grain: dict[str, float]  # sensor -> step of its numbers, SI; 0 where nobody knows it
     forces: np.ndarray | None  # (n, bodies in order) measured inputs, N or Nm
+    edges: dict[str, np.ndarray] = {}  # noqa: RUF012  # sensor without direction -> (n,) its counts
 
     @property
     def main(self) -> str:
@@ -67,6 +68,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
         u[:, d] = even(_column(path, columns, drive.column, f"{drive.unit}, command"))
     y: dict[str, np.ndarray] = {}
     grain: dict[str, float] = {}
+    edges: dict[str, np.ndarray] = {}
     for name, sensor in machine.sensors.items():
         if sensor.column not in columns and len(machine.sensors) > 1 and y:
             continue
@@ -80,6 +82,9 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
                     "a counter counts"
                 )
             raw = unwrap(raw)[0] + 0.5
+        if not sensor.direction:
+            edges[name] = even(raw)
+            continue
         y[name] = even(raw) / sensor.scale
         grain[name] = abs(sensor.grain / sensor.scale)
     if u.size and not np.ptp(u, axis=0).any() and case.problem == "driven":
@@ -88,7 +93,8 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     first = next(iter(y))
     if np.ptp(y[first]) == 0.0:
         raise NoAnswer(f"{path}: column '{machine.sensors[first].column}' never changes; nothing moved")
-    return GraphRecord(case, t, dt, even(np.asarray(ref, float)), even(w), u, y, grain, _forces(path, columns, case))
+    forces = _forces(path, columns, case)
+    return GraphRecord(case, t, dt, even(np.asarray(ref, float)), even(w), u, y, grain, forces, edges)
 
 
 def _forces(path: Path, columns: dict[str, np.ndarray], case: GraphCase) -> np.ndarray | None:

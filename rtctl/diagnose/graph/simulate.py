@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rtctl.config.errors import UserError
+from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.case import START
 from rtctl.diagnose.graph.kernel import TRACK
@@ -27,7 +28,7 @@ FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
 FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
-LEAD = 0.5  # s at the first row, in which springs come to rest
+LEAD = 1.0  # s at the first row, in which springs come to rest
 NEVER = np.iinfo(np.int64).max  # row
 ABSENT = np.zeros((1, 1))
 
@@ -55,6 +56,28 @@ class Simulator:
         self.lead = round(LEAD / record.dt) if flexible else 0
         self.release = NEVER
         self.ratios = rigid(self.layout, record.case.values, str(self.body))
+        self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
+
+    def directed(self, model: GraphModel) -> "Simulator":
+        """The same with the sensors that know no direction as the model tells the directions of their edges, where it
+        does: between two edges they are on a line."""
+        found: dict[str, Edges] = {}
+        y, grain = dict(self.record.y), dict(self.record.grain)
+        out = self.run(model) if self.record.edges else np.empty((0, 0))
+        for name, counts in self.record.edges.items():
+            y.pop(name, None)
+            scale, c, main = self.case.machine.sensors[name].scale, self.layout.sensors[name], self.layout.sensors[self.main]
+            gear = float(np.polyfit(out[:, main], out[:, c], 1)[0]) if np.isfinite(out).all() else np.nan
+            told = edges(counts, scale * (out[:, c] + gear * (self.seen - out[:, main])), c)
+            if told is not None:
+                found[name] = told
+                ticks = told.rows - 1 + told.share
+                y[name] = np.interp(np.arange(len(counts)), ticks, told.at / scale)
+                grain[name] = 1.0 / abs(scale)
+        other = copy(self)
+        other.record, other.edges = self.record._replace(y=y, grain=grain), found
+        other.channels = [name for name in self.layout.sensors if name in y]
+        return other
 
     def _forces(self, by_body: np.ndarray | None) -> np.ndarray:
         if by_body is None:
