@@ -31,6 +31,14 @@ def diagnose(
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Where the results go; BUNDLE/diagnosis if absent."),
     ] = None,
+    engine: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="rules, or likelihood: which of the two judges a reel unit, linear drive or axis. A described machine "
+            "is always judged by its likelihood.",
+        ),
+    ] = "rules",
     json: JsonOption = False,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     jobs: Annotated[
@@ -81,6 +89,10 @@ def diagnose(
     """
     from rtctl.cli.diagnose_console import DiagnoseConsole
 
+    from rtctl.diagnose.engines import ENGINES
+
+    if engine not in ENGINES:
+        _refuse(f"--engine {engine}", f"is not known; it is {' or '.join(ENGINES)}")
     console = DiagnoseConsole(json)
     _register(terms or [])
     if closed_loop:
@@ -96,7 +108,7 @@ def diagnose(
     from rtctl.diagnose.folder import tasks
 
     bundle = Path(what)
-    found = tasks(bundle, out, heldout)
+    found = tasks(bundle, out, heldout, engine)
     if found:
         if terms:
             _refuse("--term", "goes with one bundle, not with a folder of them")
@@ -104,7 +116,7 @@ def diagnose(
         assert length is not None
         _folder(console, found, jobs, length, report, again, json)
     else:
-        _bundle(console, bundle, heldout, out, report, json)
+        _bundle(console, bundle, heldout, out, report, json, engine)
 
 
 def _register(terms: list[str]) -> None:
@@ -126,13 +138,14 @@ def _refuse(option: str, why: str) -> None:
     raise UserError(f"{option} {why}; see rtctl diagnose --help")
 
 
-def _bundle(console: Any, bundle: Path, other: Path | None, out: Path | None, report: bool, json: bool) -> None:
+def _bundle(console: Any, bundle: Path, other: Path | None, out: Path | None, report: bool, json: bool, engine: str
+) -> None:
     from rtctl.diagnose.engines import diagnose_into
     from rtctl.diagnose.results import FOLDER
 
     folder = out if out is not None else bundle / FOLDER
     with console.stages() as stage:
-        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage)
+        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage, engine)
     console.notes([*made.diagnosis.record.case.warnings, *made.faults])
     if json:
         common.print_json(made.data)

@@ -14,7 +14,7 @@ import numpy as np
 from rtctl.diagnose.kernel import SLOTS, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
-from rtctl.plants.graph.params import Q
+from rtctl.plants.graph.params import Q, Y
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
@@ -75,12 +75,13 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
     m = s.m
     graph.start(p, s)
     n, drives = volts.shape
-    main = job.main
-    for k in range(-job.lead, n):
+    main, stride = job.main, job.stride
+    first = -(job.lead // stride) * stride
+    for k in range(first, n + stride - 1, stride):
         if k == 0:
             m.t = 0.0
         look(p, m, t)
-        at = max(k, 0)
+        at = min(max(k, 0), n - 1)
         job.correction = 0.0
         if job.mode == 1 and k < job.release:
             e = seen[at] - m.y[main]
@@ -89,23 +90,29 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
                     e = -e
                 job.e, job.d = 0.0, e
             else:
-                if k == -job.lead:
+                if k == first:
                     job.e = e
                 job.d += job.a * ((e - job.e) * job.rate - job.d)
                 job.e = e
             job.correction = job.P * job.e + job.D * job.d
         if k >= 0:
             for c in range(p.ny):
-                out[k, c] = m.y[c]
-            push[k] = job.correction
+                for back in range(1, min(stride, k + 1)):  # rows in between lie on a line
+                    if k - back < n:
+                        out[k - back, c] = m.y[c] + (job.before[c] - m.y[c]) * back / stride
+                if k < n:
+                    out[k, c] = m.y[c]
+                job.before[c] = m.y[c]
+            push[at] = job.correction
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0
             for late in range(2 if job.part > 0.0 else 1):  # mean of two, as in physics/timing.py
-                row = min(max(k + (i - job.delay - late) // job.substeps, 0), n - 1)
-                share = job.part if late == 1 else 1.0 - job.part
-                for c in range(drives):
-                    m.volts[c] += share * volts[row, c]
+                share = (job.part if late == 1 else 1.0 - job.part) / stride
+                for tick in range(stride):
+                    row = min(max(k + tick + (i - job.delay - late) // job.substeps, 0), n - 1)
+                    for c in range(drives):
+                        m.volts[c] += share * volts[row, c]
             substep(job, p, m, t, forces, at)
         if not (abs(m.y[main]) < 1e12):
             return max(k, 0)
@@ -115,6 +122,7 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
 JOB = state(
     mode=int,
     substeps=int,
+    stride=int,  # ticks a substep, where it is longer than one
     lead=int,  # ticks
     release=int,  # row at which the correction ends
     delay=int,  # substeps from a write until it acts
@@ -129,6 +137,7 @@ JOB = state(
     correction=float,
     e=float,
     d=float,
+    before=(float, Y),
 )
 
 

@@ -61,16 +61,16 @@ class Likelihood:
         e = self.target[begin:end] - out[begin:end, self.channels]
         keep = len(e) // self.mean * self.mean
         e = e[:keep].reshape(-1, self.mean, e.shape[1]).mean(axis=1)
+        for c, name in enumerate(self.sim.channels):
+            if name in self.sim.edges:
+                e[:, c] = self._by_edges(name, out, len(e))
         wild = WILD * self.least
         if not (np.abs(e) < wild).all():  # ran away: no noise explains it
             e[~(np.abs(e) < wild).all(axis=1)] = wild
             e[::2] *= -1.0
         beside = np.array([name != self.sim.main for name in self.sim.channels])
-        e = e - np.where(beside, e.mean(axis=0), 0.0)
-        for c, name in enumerate(self.sim.channels):
-            if name in self.sim.edges:
-                e[:, c] = self._by_edges(name, out, len(e))
-        return np.asarray(e)
+        beside &= np.array([name not in self.sim.edges for name in self.sim.channels])
+        return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
 
     def _by_edges(self, name: str, out: np.ndarray, blocks: int) -> np.ndarray:
         """Residual (blocks,) of a sensor that shows edges: their mean in each block, 0 where there is none."""

@@ -21,14 +21,17 @@ from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.graph.elements import elements, spot
 from rtctl.plants.graph.layout import NOWHERE
-from rtctl.plants.graph.plant import GRAPH_STATE
+from rtctl.plants.graph.params import build
+from rtctl.plants.graph.plant import GRAPH_STATE, state_space
 from rtctl.plants.physics import TERMS, ordered
 
 FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
 FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
+COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
-LEAD = 1.0  # s at the first row, in which springs come to rest
+LEAD = 1.0  # s at the first row, at most, in which springs come to rest
+FORGOTTEN = 5.0  # time constants of what swings longest, after which it does so no more
 NEVER = np.iinfo(np.int64).max  # row
 ABSENT = np.zeros((1, 1))
 
@@ -52,11 +55,19 @@ class Simulator:
         self.volts = np.ascontiguousarray(record.u)
         self.forces = self._forces(record.forces)
         self.channels = [name for name in self.layout.sensors if name in record.y]
-        flexible = bool(self.layout.links) or any(b.weights for b in record.case.machine.bodies.values())
-        self.lead = round(LEAD / record.dt) if flexible else 0
+        self.lead = round(self._rest() / record.dt)
         self.release = NEVER
         self.ratios = rigid(self.layout, record.case.values, str(self.body))
         self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
+
+    def _rest(self) -> float:
+        """Time in s at the first row in which what swings comes to rest."""
+        weighs = any(body.weights for body in self.case.machine.bodies.values())
+        if weighs or not self.layout.links:
+            return LEAD if weighs else 0.0
+        poles = np.linalg.eigvals(state_space(build(self.layout, self.case.values, self.record.dt))[0])
+        swings = poles[np.abs(poles.imag) > 1e-3 * np.abs(poles)]
+        return min(LEAD, FORGOTTEN / max(float(-swings.real.max()), 1e-9)) if len(swings) else LEAD
 
     def directed(self, model: GraphModel) -> "Simulator":
         """The same with the sensors that know no direction as the model tells the directions of their edges, where it
@@ -123,8 +134,10 @@ class Simulator:
         n = len(self.seen) if n is None else n
         stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
         substeps = self.substeps * (2 if stiff else 1)
-        substeps = (substeps + 1) // 2 if coarse else substeps
-        h = record.dt / substeps
+        coarse = coarse and not any(TERMS[str(getattr(t, "term", ""))].slips for t in model.terms)  # a matter of ticks
+        stride = max(1, int(COARSEST / record.dt)) if coarse and self.substeps == 1 else 1
+        substeps = 1 if stride > 1 else (substeps + 1) // 2 if coarse else substeps
+        h = record.dt * stride / substeps
         params = model.params(h)
         p = np.zeros(1, _dtype(params))
         fill_record(p[0], params)
@@ -136,7 +149,7 @@ class Simulator:
         for slot, settings in zip(slots[0]["q"], acting, strict=False):
             s: Any = settings
             kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s.node, model.layout, there, model.base), h)
-        job = self._job(model, params, mode, substeps)
+        job = self._job(model, params, mode, substeps, stride)
         states = np.zeros(1, GRAPH_STATE)
         start = float(np.log(model.base.get(START, 1.0)))
         seen = self.seen[:n] + start if start else self.seen[:n]
@@ -177,10 +190,11 @@ class Simulator:
             else:
                 x[at] = value
 
-    def _job(self, model: GraphModel, params: Any, mode: int, substeps: int) -> np.ndarray:
+    def _job(self, model: GraphModel, params: Any, mode: int, substeps: int, stride: int) -> np.ndarray:
         job = np.zeros(1, kernel.JOB)
         j = job[0]
-        dt = self.record.dt
+        dt = self.record.dt * stride
+        j["stride"] = stride
         j["mode"], j["substeps"], j["rate"], j["release"] = mode, substeps, 1.0 / dt, self.release
         j["lead"] = self.lead if mode == TRACK else 0
         j["part"], j["delay"] = np.modf(self.case.delay_samples * substeps)
