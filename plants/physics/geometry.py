@@ -16,7 +16,6 @@ from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.graph import reel
-from rtctl.plants.physics.ripple_tape import tape_of
 from rtctl.plants.physics.search import Choice, Size
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term

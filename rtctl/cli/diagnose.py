@@ -88,7 +88,6 @@ def diagnose(
       rtctl diagnose --closed-loop ivu --for 25s --reference constant_speed
     """
     from rtctl.cli.diagnose_console import DiagnoseConsole
-
     from rtctl.diagnose.engines import ENGINES
 
     if engine not in ENGINES:
@@ -138,7 +137,8 @@ def _refuse(option: str, why: str) -> None:
     raise UserError(f"{option} {why}; see rtctl diagnose --help")
 
 
-def _bundle(console: Any, bundle: Path, other: Path | None, out: Path | None, report: bool, json: bool, engine: str
+def _bundle(
+    console: Any, bundle: Path, other: Path | None, out: Path | None, report: bool, json: bool, engine: str
 ) -> None:
     from rtctl.diagnose.engines import diagnose_into
     from rtctl.diagnose.results import FOLDER

@@ -83,10 +83,6 @@ def described(record: Record, base: dict[str, float]) -> Description:
             _put(data, path.split("."), base[symbol])
     if of_case(case).rotary:
         _turn(data)
-    for name, joint in list(data["joints"].items()):
-        if joint.get("stiffness") == 0.0 and not joint.get("damping"):  # nothing that holds
-            del data["joints"][name]
-            data["symbols"] = {s: p for s, p in data["symbols"].items() if not p[0].startswith(f"joints.{name}.")}
     _drives(data, case)
     _sensors(data, record)
     return Description.model_validate(data)

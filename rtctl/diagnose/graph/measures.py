@@ -177,7 +177,7 @@ class Measures:
     def stiffness(self, node: str) -> float:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""
         s = self.scale(node)
-        return self.values.get(f"joints.{node}.stiffness", s.force / s.span)
+        return self.values.get(f"joints.{node}.stiffness", 0.0) or s.force / s.span
 
     def firm(self, node: str) -> float:
         """Stiffness of a joint with which the lighter of its two sides rings at a tenth of the sample rate."""

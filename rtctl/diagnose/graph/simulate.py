@@ -77,7 +77,11 @@ class Simulator:
         out = self.run(model) if self.record.edges else np.empty((0, 0))
         for name, counts in self.record.edges.items():
             y.pop(name, None)
-            scale, c, main = self.case.machine.sensors[name].scale, self.layout.sensors[name], self.layout.sensors[self.main]
+            scale, c, main = (
+                self.case.machine.sensors[name].scale,
+                self.layout.sensors[name],
+                self.layout.sensors[self.main],
+            )
             gear = float(np.polyfit(out[:, main], out[:, c], 1)[0]) if np.isfinite(out).all() else np.nan
             told = edges(counts, scale * (out[:, c] + gear * (self.seen - out[:, main])), c)
             if told is not None:
