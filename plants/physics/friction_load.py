@@ -63,7 +63,7 @@ def load_drive(p, m, i):
 
 @tick
 def pressed(p, m, i, j, k):
-    """As `load`, of the links `j` and `k` where both end at node `i`, else of `j`; of the drives where there is none."""
+    """As `load`, of the links `j` and `k` where both end at node `i`, else of `j`; without a link of the drives."""
     if j < 0:
         return load_drive(p, m, i)
     return load(p, m, i, j, k if k >= 0 and (m.link_i[k] == i or m.link_j[k] == i) else j)

@@ -60,9 +60,9 @@ def diagnose_into(
 ) -> Diagnosed:
     """Diagnose the bundle and write the results into `out`; `other` is a second recording of the same machine.
 
-    Where `base` is given, no link may lead out of it. `engine` is that of a machine of format 1; a described machine has
-    but one. Raises UserError for a bundle that cannot be read and for a disk
-    that does not take the results, NoAnswer for a bundle that supports no verdict.
+    Where `base` is given, no link may lead out of it. `engine` is that of a machine of format 1; a described machine
+    has but one. Raises UserError for a bundle that cannot be read and for a disk that does not take the results,
+    NoAnswer for a bundle that supports no verdict.
     """
     from rtctl.diagnose.results import finite
 

@@ -77,7 +77,7 @@ def graph_case(record: Record) -> GraphCase:
 def described(record: Record, base: dict[str, float]) -> Description:
     """The machine as its owner believes it."""
     case = record.case
-    data = PLANTS[case.plant].described().layout.machine.model_dump(exclude_unset=True)  # type: ignore[attr-defined]
+    data = PLANTS[case.plant].described().layout.machine.model_dump(exclude_unset=True)
     for symbol, paths in list(data["symbols"].items()):
         for path in paths:
             _put(data, path.split("."), base[symbol])

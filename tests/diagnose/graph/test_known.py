@@ -13,7 +13,7 @@ from rtctl.diagnose.space import Space
 RATE, N = 500.0, 1200
 CASE = {
     "format": 1, "plant": "ivu", "sample_rate": RATE, "delay_samples": 1.0, "controller": {"kind": "none"},
-    "parameters": {"R1": 0.036, "R2": 0.024, "c1": 500.0, "tau_F1": 3e-3, "d_tape": 1e-4},
+    "parameters": {"R1": 0.036, "R2": 0.024, "c1": 500.0, "tau_F1": 3e-3, "d_tape": 1e-6},
     "sensors": {"capstan_counts_per_rev": 10000, "reel_counts_per_rev": 209},
     "drive": {"amp_per_volt": [0.2, 0.25], "limit_volt": 10.0, "bandwidth_hz": 300.0},
     "reaches": {"parameter_tolerance": 0.1, "radius_tolerance": 0.02},
@@ -23,11 +23,15 @@ CASE = {
 def known():
     t = np.arange(N) / RATE
     angle = 20.0 * np.sin(2 * np.pi * 0.4 * t)
-    gone = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(angle)))])
+
+    def edges(radius):
+        at = np.floor(angle * 0.0125 / radius * 209 / (2 * np.pi))
+        return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(at)))])
+
     columns = {
         "t": t, "ref": angle, "w": 0.0 * t, "u1": 0.5 + np.sin(t), "u2": 0.5 - np.sin(t),
         "capstan_counts": np.floor(angle * 10000 / (2 * np.pi)),
-        **{f"reel{i}_counts": np.floor(gone * 0.0125 / R * 209 / (2 * np.pi)) for i, R in ((1, 0.036), (2, 0.024))},
+        "reel1_counts": edges(0.036), "reel2_counts": edges(-0.024),
     }  # fmt: skip
     return graph_record(check(columns, read_case(CASE, "."), "."))
 
@@ -35,7 +39,7 @@ def known():
 def test_symbols_are_numbers_of_the_description():
     case = known().case
     assert case.values["joints.tape1.stiffness"] == 500.0
-    assert case.values["bodies.reel2.reel.thickness"] == 1e-4
+    assert case.values["bodies.reel2.reel.thickness"] == 1e-6
     assert case.values["drives.drive2.gain"] == 0.25
     assert case.values["drives.drive1.bandwidth_hz"] == 300.0
     assert case.machine.drives["drive1"].unit == "V"
@@ -52,7 +56,7 @@ def test_numbers_of_one_symbol_move_together():
     assert both[0] in case.fitted
     assert both[1] not in case.fitted
     model = Space(nominal(case), (both[0],), case.tolerance).model(np.array([0.05]))
-    assert model.base[both[0]] == model.base[both[1]] == pytest.approx(1e-4 * np.exp(0.05))
+    assert model.base[both[0]] == model.base[both[1]] == pytest.approx(1e-6 * np.exp(0.05))
 
 
 def test_tape_turns_reels_by_their_radii():
