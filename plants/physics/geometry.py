@@ -16,6 +16,7 @@ from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.graph import reel
+from rtctl.plants.physics.ripple_tape import tape_of
 from rtctl.plants.physics.search import Choice, Size
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
@@ -106,6 +107,20 @@ def turn(p, m, j, k):
         turned(p, m, k, p.other)
 
 
+@tick
+def wind_at(p, m, i):
+    """`wind` of reel `i` of the IVU, whose tapes are the first two links."""
+    j = tape_of(m, i)
+    wind(p, m, j, 1 - j)
+
+
+@tick
+def turn_at(p, m, i):
+    """`turn` of the same."""
+    j = tape_of(m, i)
+    turn(p, m, j, 1 - j)
+
+
 RADIUS_CHANGE = Term(
     name="geometry.radius_change",
     words="the reel fills or empties: its radius and its inertia change as the tape moves",
@@ -114,9 +129,9 @@ RADIUS_CHANGE = Term(
     settings=RadiusChangeSettings,
     build=build_radius_change,
     act={
-        "force": "geometry.wind({p}, {m}, geometry.tape_of({m}, {i}), 1 - geometry.tape_of({m}, {i}))",
+        "force": "geometry.wind_at({p}, {m}, {i})",
         "force:described": "geometry.wind({p}, {m}, {l}, {k})",
-        "last": "geometry.turn({p}, {m}, geometry.tape_of({m}, {i}), 1 - geometry.tape_of({m}, {i}))",
+        "last": "geometry.turn_at({p}, {m}, {i})",
         "last:described": "geometry.turn({p}, {m}, {l}, {k})",
     },
     stands=(stand("body", "reel"),),
