@@ -22,8 +22,8 @@ def wind(p, s, volts, substeps, x, ripple):
             m.u[0], m.u[1] = volts[k, 0], volts[k, 1]
             linear.midpoint(m)
             graph.weigh(p.graph, m)
-            ripple_tape.reel(ripple, m, ivu.REEL2)
-            ripple_tape.reel_arm(ripple, m, ivu.REEL2)
+            ripple_tape.reel(ripple, m, ivu.REEL2, 1)
+            ripple_tape.reel_arm(ripple, m, ivu.REEL2, 1)
             linear.advance(m)
         for i in range(m.nx):
             x[k, i] = m.x[i]
