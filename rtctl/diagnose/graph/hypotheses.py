@@ -9,7 +9,7 @@ from rtctl.diagnose.graph.measures import Measures, lever, way
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.hints import MOST, ORDERS, jumps, peaks, seen, spectrum, spots
-from rtctl.diagnose.hypotheses import parts_of, searched, starts_of
+from rtctl.diagnose.hypotheses import parts_of, searched, shows_alone, starts_of
 from rtctl.diagnose.space import Hypothesis
 from rtctl.idiom import Settings
 from rtctl.plants.graph.elements import contacts, undriven
@@ -47,7 +47,7 @@ def hypotheses(
                 or not term.in_format(sim.case.format)
                 or ("contact" in element.traits and "contact" not in stand.needs)
                 or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
-                or (term.needs.compared and len(sim.channels) < 2)
+                or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, False))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
             ):
                 continue
