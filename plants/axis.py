@@ -20,6 +20,7 @@ from rtctl.plants.graph import plant
 from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.graph.symbols import Machine, machine
+from rtctl.plants.shown import Own, Shown
 
 CARRIAGE = 0
 NODES = {"carriage": CARRIAGE}
@@ -86,3 +87,24 @@ def params(symbols: Mapping[str, float], h: float) -> AxisParams:
 def state_space(p: AxisParams) -> tuple[np.ndarray, np.ndarray]:
     """A (2, 2) and B (2, 1), volts in, without dry friction."""
     return plant.state_space(p.graph)
+
+
+NAME = "axis"
+SPOTS: dict[str, tuple[int, str, int]] = {}  # node -> coordinate, factor, channel, where NODES does not say it
+SHOWN = Shown(
+    axes=(),
+    drives=(),
+    parameters={"k": 200.0},
+    units=("m", "N"),
+    scales={"force": 20.4, "speed": 0.1, "travel": 0.1, "inertia": 95.1, "stiffness": 200.0, "contact": 20.0},
+    ratios=lambda p: [1.0],
+)
+OWN = Own(
+    inputs={"u": "volts"},
+    sensors=("x",),
+    truth=("x", "v"),
+    unit="m",
+    node="carriage",
+    drag=50.0,
+    gains=("gain: 39000 V/m", "tau_d: 6 ms", "derivative_filter: 100 Hz"),
+)

@@ -5,7 +5,7 @@ node may name several elements: a motor and the shaft behind it, a wheel and the
 physical: they say what an element is or does, never on which machine it is.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
     "body": {
@@ -20,8 +20,11 @@ TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
         "wrapped": "tape lies around it, whose two tensions add up in its bearing",
         "bounded": "its way has two ends",
         "guided": "runs along a strip whose thickness moves it",
+        "single": "has an inertia of its own, which no file of mechanics couples with that of others",
         "reel": "winds what changes its radius",
         "capstan": "turns a length of tape or strip into an angle",
+        "sprung": "a joint with a spring ends at it",
+        "heavy": "carries a weight whose pull changes with its angle",
         "wheel": "is driven at its rim",
     },
     "joint": {
@@ -31,12 +34,15 @@ TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
         "contact": "passes on force by friction",
         "rigid": "has no spring in the equations",
         "ground": "ends at the frame",
+        "turning": "its first end turns",
+        "turned": "its far end turns",
     },
     "drive": {
         "voltage": "its command is a voltage at the motor",
         "current": "its command is a current, held by an amplifier",
         "force": "its command is a force or a torque",
         "supply": "the first of the drives on one supply",
+        "several": "one of several drives",
     },
     "sensor": {
         "position": "shows a position",
@@ -76,6 +82,7 @@ class Stand(NamedTuple):
     usual: bool = True  # the typical sizes of the effect are those of a place like this
     again: bool = False  # the effect does here what it does at another node already: a search leaves it out
     offered: bool = True  # every record is asked about it; else only where another name may stand for it
+    ways: tuple[tuple[Any, ...], ...] = ()  # how it is looked for here, each another way; without any as everywhere
 
 
 LOOP = Element("loop", "loop")
@@ -86,9 +93,20 @@ def element(node: str, kind: str, traits: str = "") -> Element:
     return Element(node, kind, _traits(kind, traits))
 
 
-def stand(kind: str, needs: str = "", *, usual: bool = True, again: bool = False, offered: bool = True) -> Stand:
-    """Stand with the traits that it needs as words. Raises ValueError for a kind or a trait that there is not."""
-    return Stand(kind, _traits(kind, needs), usual, again, offered)
+def stand(
+    kind: str,
+    needs: str = "",
+    *,
+    usual: bool = True,
+    again: bool = False,
+    offered: bool = True,
+    ways: tuple[tuple[Any, ...], ...] = (),
+) -> Stand:
+    """Stand with the traits that it needs as words; `ways` are parts of a search (plants/physics/search.py).
+
+    Raises ValueError for a kind or a trait that there is not.
+    """
+    return Stand(kind, _traits(kind, needs), usual, again, offered, ways)
 
 
 def _traits(kind: str, words: str) -> frozenset[str]:

@@ -32,6 +32,7 @@ from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.graph.reel import reel_inertia
 from rtctl.plants.graph.symbols import Machine, machine
+from rtctl.plants.shown import Own, Shown
 
 MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 = range(5)
 NODES = {"motor1": MOTOR1, "reel1": REEL1, "capstan": CAPSTAN, "reel2": REEL2, "motor2": MOTOR2}
@@ -192,3 +193,26 @@ def params(
 def state_space(p: IvuParams) -> tuple[np.ndarray, np.ndarray]:
     """A (14, 14) and B (14, 2), volts in, at the starting radii and without dry friction, for design and tests."""
     return plant.state_space(p.graph)
+
+
+NAME = "ivu"
+SPOTS = {"encoder": (CAPSTAN, "", SENSORS.get("encoder", 0))}  # node -> coordinate, factor, channel
+SHOWN = Shown(
+    axes=("angle", "tension", "command"),
+    drives=([(0.2, 2e3, 0.7, 0.0)] * 2,),
+    parameters={"k1": 0.0, "k2": 0.0},
+    units=("rad", "Nm"),
+    scales={"force": 2.5e-3, "speed": 2.0, "travel": 6.0, "inertia": 1.5e-3, "stiffness": 450.0, "contact": 1.0},
+    ratios=lambda p: [p.R_c / p.R1, p.R_c / p.R1, 1.0, -p.R_c / p.R2, -p.R_c / p.R2],
+    links={"capstan": 1},
+    stretches=True,
+)
+OWN = Own(
+    inputs={"u1": "u1", "u2": "u2"},
+    sensors=("capstan", "reel1", "reel2"),
+    truth=("T1", "T2", "capstan", "motor1", "motor2", "R1", "R2"),
+    unit="rad",
+    node="reel1",
+    drag=2e-5,
+    gains=("gain: 31 V/rad", "tau_d: 160 ms", "derivative_filter: 40 Hz"),
+)

@@ -28,6 +28,7 @@ from rtctl.plants.graph import plant
 from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.graph.symbols import Machine, machine
+from rtctl.plants.shown import Own, Shown
 
 MOTOR, WHEEL, CAPSTAN, ENCODER = range(4)
 NODES = {"motor": MOTOR, "wheel": WHEEL, "capstan": CAPSTAN, "encoder": ENCODER}
@@ -147,3 +148,29 @@ def params(symbols: Mapping[str, float], h: float, drive: tuple[float, float]) -
 def state_space(p: LduParams) -> tuple[np.ndarray, np.ndarray]:
     """A (10, 10) and B (10, 1), amperes in, without dry friction, for design and tests."""
     return plant.state_space(p.graph)
+
+
+NAME = "ldu"
+SPOTS = {  # node -> coordinate, factor, channel
+    "carriage": (CAPSTAN, "R_c", SENSORS["scale"]),
+    "scale": (CAPSTAN, "R_c", SENSORS["scale"]),
+    "loop": (CAPSTAN, "R_c", 0),  # what all sensors share: the carriage for the scale
+}
+SHOWN = Shown(
+    axes=(),
+    drives=((6e3, 0.7),),
+    parameters={},
+    units=("rad", "Nm"),
+    scales={"force": 1e-3, "speed": 10.0, "travel": 6.0, "inertia": 1e-5, "stiffness": 7.6, "contact": 7.0},
+    ratios=lambda p: [p.N, 1.0, 1.0, 1.0],
+)
+OWN = Own(
+    inputs={"u": "volts", "i": "ldu_amplifier.drive(p.amplifier, volts, forward)"},
+    sensors=("encoder", "scale"),
+    truth=("scale", "v", "i"),
+    unit="m",
+    node="carriage",
+    drag=50.0,
+    gains=("gain: 6400 V/m", "tau_d: 27 ms", "derivative_filter: 200 Hz"),
+    cutoff=200.0,
+)

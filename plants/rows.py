@@ -33,7 +33,7 @@ def sum_rows(out: Any, n: int, P: Any, x: Any, nx: int, G: Any, u: Any, nu: int,
         out[i] = a
 
 
-@overload(sum_rows)
+@overload(sum_rows, inline="always")
 def _sum_rows(out, n, P, x, nx, G, u, nu, f, nf):
     return lambda out, n, P, x, nx, G, u, nu, f, nf: _sum(out, n, P, x, nx, G, u, nu, f, nf)  # type: ignore[call-arg]
 

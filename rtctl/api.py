@@ -12,7 +12,7 @@ from rtctl.config.errors import UserError
 from rtctl.config.load import set_paths
 from rtctl.daemon.client import Client
 from rtctl.loop import fused
-from rtctl.loop.safety import RUNNING
+from rtctl.tick.safety import RUNNING
 from rtctl.trace import compare
 from rtctl.trace.bundle import Bundle, load_bundle
 from rtctl.trace.metrics import machine_steps

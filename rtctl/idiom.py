@@ -40,6 +40,12 @@ def tick(function: Callable[..., Any]) -> Any:
     return Step(function)
 
 
+def glue(function: Callable[..., Any]) -> Any:
+    """As `tick`, for generated code: numba counts no references in it, so that whatever would take memory from the heap
+    does not compile."""
+    return Step(function, _nrt=False)
+
+
 class _Interpreter(threading.local):
     runs = False  # whether steps that are called in this thread are to be interpreted
 
@@ -66,11 +72,11 @@ class Step:
     calls a few times only is not worth compiling at all: see `interpret`.
     """
 
-    def __init__(self, function: Callable[..., Any]):
+    def __init__(self, function: Callable[..., Any], **options: Any):
         update_wrapper(self, function)
         self.py_func = function
-        self._inner = njit(**OPTIONS, **INNER)(function)
-        self._outer = njit(**OPTIONS)(function)
+        self._inner = njit(**OPTIONS, **INNER, **options)(function)
+        self._outer = njit(**OPTIONS, **options)(function)
         self._inner._cache, self._outer._cache = StepCache(function, "inner"), StepCache(function, "outer")
         self._numba_type_ = typeof(self._inner)  # what a name stands for in compiled code
 

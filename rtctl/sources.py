@@ -17,7 +17,7 @@ NEVER_COMPILED = {
     "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "foxglove", "identify", "manual", "own",
     "proof", "reproduce", "scope", "soak", "terminal", "trace",
     "api.py", "board.py", "boards.py", "comedi.py", "emulated.py", "fmu.py", "fmu_file.py", "nidaqmx.py",
-    "wiring.py",
+    "wiring.py", "profile.py", "profiles.py", "told.py", "own_check.py", "shown.py",
 }  # fmt: skip
 
 

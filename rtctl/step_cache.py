@@ -87,7 +87,10 @@ def _safe(folder: Path) -> None:
 @cache
 def is_kept(function: Callable[..., Any]) -> bool:
     """Whether a step is rtctl's own and stands at the top of its file: what is defined within a function depends on
-    that function's arguments, and a person's own file on others of theirs."""
+    that function's arguments, and a person's own file on others of theirs. A function with the attribute `kept` says
+    by its module's name, a hash, what it depends on."""
+    if getattr(function, "kept", False):
+        return True
     return function.__qualname__ == function.__name__ and inspect.getfile(function) in _names()
 
 

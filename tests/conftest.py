@@ -23,9 +23,9 @@ from rtctl.config.load import set_path
 from rtctl.loop import generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
-from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
+from rtctl.tick.memory import Segment
 from rtctl.trace.replay import replay
 
 TESTS = Path(__file__).parent

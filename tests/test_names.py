@@ -1,4 +1,4 @@
-"""No code outside the library of terms speaks of a term by its name: what is told about one stands in its own file."""
+"""No code compares with the name of a term or of a machine: what is told about one stands in its own file."""
 
 import ast
 from pathlib import Path
@@ -9,6 +9,17 @@ from rtctl.plants.physics import TERMS
 
 ROOT = Path(__file__).parents[1] / "rtctl"
 BY_NAME = ("reproduce", "proof", "own/templates")  # published results, independent equations, and what a user writes
+MACHINES = {"ivu", "ldu", "axis"}
+DECLARED = tuple(f"rtctl/machines/{name}" for name in MACHINES) + tuple(f"plants/{name}.py" for name in MACHINES)
+ALLOWED = (*DECLARED, "rtctl/reproduce/", "rtctl/proof/")
+OLD = {  # modules of rtctl/diagnose/ that compare with the name of a machine, and how often: none may be added
+    "base": 2, "carry": 5, "case": 17, "chain": 2, "conceal": 1, "decide": 1, "emulate": 2, "experiment": 3,
+    "export": 4, "figures": 2, "heldout": 1, "hints": 11, "hypotheses": 1, "jitter": 1, "kernel": 3, "law_params":
+    4, "measure": 1, "missing": 4, "model": 6, "motions": 3, "name": 1, "ordinary": 4, "preflight": 4, "problem": 4,
+    "quantities": 1, "record": 6, "release": 1, "repair": 1, "report": 1, "rest": 1, "rubbing": 2, "scales": 3,
+    "scan": 1, "simulate": 18, "stands": 2, "tacho": 1, "turn": 1, "uncertainty": 1, "words": 2, "yardstick": 4
+}  # fmt: skip
+LOOKS_UP = ("get", "pop", "setdefault", "startswith", "endswith", "removeprefix")
 FAMILIES = {name.partition(".")[0] for name in TERMS}
 
 
@@ -34,3 +45,60 @@ def test_no_module_compares_with_the_name_of_a_term():
 def test_a_name_is_seen_wherever_it_stands(text):
     assert told(text)
     assert not told('"""The term drive.lag comes late."""')
+
+
+def words(node: ast.AST) -> set[str]:
+    """Texts of a constant, of the items of a list and of the keys of a table."""
+    if isinstance(node, ast.Constant):
+        return {node.value} if isinstance(node.value, str) else set()
+    inner = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
+    return {word for item in inner if item is not None for word in words(item)}
+
+
+def asked(node: ast.AST) -> list[ast.AST]:
+    """What a piece of code compares with, looks up, or has as a key."""
+    if isinstance(node, ast.Compare):
+        return [node.left, *node.comparators]
+    if isinstance(node, ast.Dict):
+        return [node]
+    if isinstance(node, ast.MatchValue):
+        return [node.value]
+    if isinstance(node, ast.Subscript) and getattr(node.value, "id", "") != "Literal":
+        return [node.slice]
+    if isinstance(node, ast.Call) and getattr(node.func, "attr", "") in LOOKS_UP:
+        return list(node.args[:1])
+    return []
+
+
+def by_machine(text: str) -> list[int]:
+    """Lines of a module that ask for the name of a machine."""
+    return [
+        getattr(node, "lineno", getattr(getattr(node, "pattern", None), "lineno", 0))
+        for node in ast.walk(ast.parse(text))
+        if any(MACHINES & words(part) for part in asked(node))
+    ]
+
+
+def test_no_module_compares_with_the_name_of_a_machine():
+    found = {}
+    for folder in ("rtctl", "plants", "drivers"):
+        for path in sorted((ROOT.parent / folder).rglob("*.py")):
+            where = path.relative_to(ROOT.parent).as_posix()
+            known = OLD.get(path.stem, 0) if path.parent == ROOT / "diagnose" else 0
+            if not where.startswith(ALLOWED) and len(lines := by_machine(path.read_text("utf-8"))) > known:
+                found[where] = lines
+    assert found == {}
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['kind == "ivu"', 'kind not in ("ldu", "axis")', '{"ivu": 1}[kind]', 'table["ldu"]', 'table.get("axis")',
+     'kind in {"axis": 1}', 'match kind:\n    case "ivu": pass'],
+)  # fmt: skip
+def test_a_comparison_with_a_machine_is_seen(text):
+    assert by_machine(text)
+
+
+@pytest.mark.parametrize("text", ['"""ivu == ldu"""', 'machine: Literal["ivu"] = "ivu"', 'load("ivu")'])
+def test_the_name_of_a_machine_may_be_a_value(text):
+    assert not by_machine(text)

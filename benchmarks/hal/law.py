@@ -13,9 +13,9 @@ from numba import njit, types
 
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import low_pass, pd
-from rtctl.loop import clock
-from rtctl.loop.memory import intrinsic
 from rtctl.loop.realtime import RealTime
+from rtctl.tick import clock
+from rtctl.tick.memory import intrinsic
 
 STATE = state(first=pd.PD_STATE, smooth=low_pass.BIQUAD_STATE, second=pd.PD_STATE, a=float, b=float, c=float)
 X86 = platform.machine() in ("x86_64", "AMD64")

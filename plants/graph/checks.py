@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rtctl.config.errors import nearest
 from rtctl.plants import linear
+from rtctl.plants.graph.mechanics import bodies_of
 
 if TYPE_CHECKING:
     from rtctl.plants.graph.description import Description
@@ -157,6 +158,9 @@ def _check_seen(machine: "Description") -> None:
         if len(ends) == 2:
             near[ends[0]].add(ends[1])
             near[ends[1]].add(ends[0])
+    moved = [name for name in bodies_of(machine) if name in near]
+    for name in moved:
+        near[name] |= set(moved) - {name}
     reached: set[str] = set()
     todo = list(_looked_at(machine))
     while todo:

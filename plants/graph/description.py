@@ -12,6 +12,8 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, create_model, model_validator
 
 from rtctl.idiom import Settings
+from rtctl.plants.graph import mechanics as coupling
+from rtctl.plants.graph.mechanics import MechanicsSettings
 from rtctl.plants.graph.units import check_place, in_si
 
 FRAME = "frame"
@@ -127,6 +129,9 @@ class Drive(Settings):
     body: str | None = Field(None, description="body that is driven")
     joint: str | None = Field(None, description="joint whose two ends are pushed apart, instead of a body")
     column: str = Field("u", description="column of the recorded command")
+    enabled: str | None = Field(
+        None, description="recorded column that is 1 where the drive is on and 0 where it is off"
+    )
     unit: str = Field("V", max_length=20, description="unit of the command: V, A, N, Nm, % ...")
     kind: Literal["force", "current", "voltage"] = Field("force", description="what a unit of command gives")
     gain: float = Field(1.0, description="N or Nm, A, or V for a unit of command")
@@ -155,6 +160,8 @@ class Drive(Settings):
             raise ValueError(f"torque_constant is missing; a {self.kind} drive needs it (Nm/A, or N/A)")
         if self.kind == "voltage" and self.resistance is None:
             raise ValueError("resistance is missing; a voltage drive needs it (ohm)")
+        if self.kind == "voltage" and self.enabled is not None:
+            raise ValueError("enabled: a voltage drive that is off makes no current; give its measured current instead")
         if self.zero and (self.bandwidth_hz is None or self.kind == "voltage"):
             raise ValueError("zero: it is that of the low pass of a force or current drive; give bandwidth_hz as well")
         return self
@@ -196,12 +203,12 @@ class Sensor(Settings):
 
 
 class Input(Settings):
-    """A recorded column that acts on a body beside the drives."""
+    """A recorded column that acts on a body beside the drives: a force, or a position that the body is held to."""
 
     body: str
     column: str
-    measures: Literal["force"] = "force"
-    per_unit: float = Field(1.0, description="column units for one N or Nm")
+    measures: Literal["force", "position"] = "force"
+    per_unit: float = Field(1.0, description="column units for one N or Nm, or for one rad or m")
 
 
 class Description(Settings):
@@ -213,6 +220,9 @@ class Description(Settings):
     joints: dict[str, Joint] = Field(default={})
     drives: dict[str, Drive] = Field(default={})
     sensors: dict[str, Sensor] = Field(min_length=1)
+    mechanics: MechanicsSettings | None = Field(
+        default=None, description="file with M(q) and h(q, v), where bodies move each other by more than joints"
+    )
     symbols: dict[str, list[str]] = Field(
         default={}, description="symbol of the literature: dotted paths of the numbers that it stands for"
     )
@@ -220,13 +230,19 @@ class Description(Settings):
     @model_validator(mode="before")
     @classmethod
     def _units(cls, data: Any) -> Any:
-        return in_si(data) if isinstance(data, Mapping) else data
+        if not isinstance(data, Mapping):
+            return data
+        data = in_si(data)
+        if data.get("mechanics") is not None:
+            data["mechanics"] = coupling.resolved(data["mechanics"])
+        return data
 
     @model_validator(mode="after")
     def _sound(self) -> "Description":
         from rtctl.plants.graph.checks import check
 
         check(self)
+        coupling.check(self)
         return self
 
     def turns(self, body: str) -> bool:
@@ -242,6 +258,8 @@ class Description(Settings):
         for group in ("bodies", "joints", "drives", "sensors"):
             for name, element in getattr(self, group).items():
                 yield from _numbers(f"{group}.{name}", element)
+        if self.mechanics is not None:
+            yield from ((f"mechanics.parameters.{key}", value) for key, value in self.mechanics.parameters.items())
 
 
 def _numbers(path: str, element: Any) -> Iterator[tuple[str, float]]:

@@ -7,8 +7,11 @@ from rtctl.plants.element import LOOP, Element, element
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.layout import layout as layout_of
-from rtctl.plants.graph.params import joint_place, place
+from rtctl.plants.graph.mechanics import bodies_of
+from rtctl.plants.graph.params import place
 from rtctl.plants.physics import TERMS, Term, nodes, standing
+
+BY_LINK = frozenset({"loaded", "reel", "capstan", "wheel"})  # traits of a body on which a certain link acts
 
 
 class Spot(NamedTuple):
@@ -25,9 +28,10 @@ def elements(layout: Layout) -> tuple[Element, ...]:
     """Every element of a described machine, in the order of the description."""
     machine = layout.machine
     driven = driven_bodies(machine)
-    rubs = {body for drive in machine.drives.values() if (body := rubbing(machine, drive)) is not None}
+    rubs = {found for drive in machine.drives.values() if (found := rubbing(machine, drive)) is not None}
     moving = [name for name in machine.bodies if layout.bodies[name].coordinate != NOWHERE]
-    pressed = {end for name, joint in machine.joints.items() if name in layout.links for end in ends_of(joint)}
+    sprung = {end for name, joint in machine.joints.items() if name in layout.links for end in ends_of(joint)}
+    coupled = bodies_of(machine)
     touching = contacts(machine)
     rims = {getattr(machine.joints[c.joint], "from") for c in touching.values() if c.joint in layout.links}
     lone = len(moving) == 1 and len(machine.sensors) == 1
@@ -36,11 +40,15 @@ def elements(layout: Layout) -> tuple[Element, ...]:
         body = machine.bodies[name]
         traits = ["general", "turns rotor" if body.turns else "slides", "bounded"]
         traits += ["driven" if name in driven else "load"]
+        traits += [] if name in coupled else ["single"]
         traits += ["dry"] if body.dry > 0.0 else []
         traits += ["rubs"] if name in rubs else []
-        traits += ["loaded"] if name in pressed or name in driven else []
+        traits += ["sprung"] if name in sprung else []
+        traits += ["heavy"] if any(weight.incline is None for weight in body.weights) else []
         winds = body.reel is not None and any(machine.joints[span].to == name for span in spans(machine, name))
         traits += ["reel"] if winds else []
+        pushed = name in driven and not {"sprung", "heavy"} & set(traits)  # by nothing but its drive
+        traits += ["loaded"] if winds or name in touching or pushed else []
         traits += ["wheel"] if name in rims else []
         traits += ["capstan"] if name in touching and name not in rims else []
         traits += ["wrapped"] if name in touching and not touching[name].joint else []
@@ -51,13 +59,17 @@ def elements(layout: Layout) -> tuple[Element, ...]:
         if joint.stiffness is not None:
             traits += ["span" if joint.span is not None else "shaft"]
             traits += ["ground"] if any(machine.is_frame(end) for end in ends_of(joint)) else []
+        traits += ["turning"] if machine.turns(getattr(joint, "from")) else []
+        traits += ["turned"] if machine.turns(joint.to) else []
         out.append(element(name, "joint", " ".join(traits)))
     for name, contact in touching.items():
         spring = contact.joint in layout.links
         what = "contact span" if not contact.joint else "contact spring shaft" if spring else "contact rigid"
         out.append(element(name, "joint", what))
     for number, (name, drive) in enumerate(machine.drives.items()):
-        out.append(element(name, "drive", f"general {drive.kind}" + (" supply" if number == 0 else "")))
+        traits = ["general", drive.kind, *(["supply"] if number == 0 else [])]
+        traits += ["several"] if len(machine.drives) > 1 else []
+        out.append(element(name, "drive", " ".join(traits)))
     for name, sensor in machine.sensors.items():
         if sensor.body is None or sensor.measures not in ("position", "speed"):
             continue
@@ -188,27 +200,31 @@ def check_node(machine: Description, path: str, term: str, node: str) -> None:
 
 def place_of(layout: Layout, values: dict[str, float], settings: Any) -> Spot:
     """Where an entry of a `physics:` list acts."""
-    return spot(TERMS[settings.term], settings.node, layout, elements(layout), values)
+    return spot(TERMS[settings.term], settings, layout, elements(layout), values)
 
 
-def spot(term: Term, node: str, layout: Layout, there: tuple[Element, ...], values: dict[str, float]) -> Spot:
-    """Where a term acts at a node. Raises ValueError where it cannot stand there."""
+def spot(term: Term, settings: Any, layout: Layout, there: tuple[Element, ...], values: dict[str, float]) -> Spot:
+    """Where a term acts at its node: in a joint as its far end moves, or the end that its settings name. Raises
+    ValueError where it cannot stand there."""
+    node = settings.node
     found = standing(term, there, node)
     if found is None:
         raise ValueError(f"{term.name} cannot stand at '{node}'")
     element, machine = found[1], layout.machine
     kind = element.kind
     if kind == "body":
-        contact, (link, other) = contacts(machine).get(node), _presses(layout, node)
+        contact, (link, other) = contacts(machine).get(node), (NOWHERE, NOWHERE)
+        if found[0].needs & BY_LINK:
+            link, other = _presses(layout, node)
         moved = machine.joints[contact.joint].to if contact is not None and contact.joint else node
         channel = NOWHERE if machine.turns(moved) else _sensor_of(layout, moved)
         return Spot(layout.coordinate(node), link, channel, layout.ratio(node, values), other)
     if "contact" in element.traits:
         return _contact(contacts(machine)[node], node, layout, values)
     if kind == "joint":
-        i, a, _, _ = joint_place(layout, node, values)
-        other = _beside(layout, node) if machine.joints[node].span is not None else NOWHERE
-        return Spot(i, layout.links.get(node, 0), 0, a, other)
+        end = getattr(machine.joints[node], getattr(settings, "end", "to"))
+        other = _beside(layout, node) if "span" in found[0].needs else NOWHERE
+        return Spot(layout.coordinate(end), layout.links.get(node, NOWHERE), 0, layout.ratio(end, values), other)
     if kind == "drive":
         i, a, _, _ = place(layout, machine.drives[node], values)
         return Spot(i, NOWHERE, layout.drives[node], a)

@@ -9,10 +9,11 @@ analysis, IEEE Trans. PAS 101 (1982) for the participation of states.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rtctl.plants.graph import coupled
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.graph.plant import state_space
@@ -29,15 +30,20 @@ class Mode(NamedTuple):
     bodies: tuple[str, ...]  # that take part most; none where it is a drive's own
 
 
-def linearised(p: GraphParams) -> tuple[np.ndarray, np.ndarray]:
+def linearised(p: Any) -> tuple[np.ndarray, np.ndarray]:
     """A (nx, nx) and B (nx, nu) around the start, with the weight of bodies that turn as a spring."""
-    A, B = state_space(p)
+    code = getattr(type(p), "code", None)
+    A, B = state_space(p) if code is None else coupled.linearised(code, p)
     for k in range(p.weights):
         if p.weight_turns[k]:
             i, a = int(p.weight_i[k]), float(p.weight_a[k])
-            A[p.nq + i, i] -= (
-                a * a * float(p.weight_force[k]) * math.cos(float(p.weight_angle[k])) / float(p.inertia[i])
-            )
+            q = float(p.coupled.q0[i]) if code is not None else 0.0
+            pull = a * a * float(p.weight_force[k]) * math.cos(a * q + float(p.weight_angle[k]))
+            if code is None:
+                A[p.nq + i, i] -= pull / float(p.inertia[i])
+            else:
+                inverse = np.linalg.inv(coupled.at_start(code, p, p.coupled)[0])
+                A[p.nq : 2 * p.nq, i] -= pull * inverse[:, i]
     return A, B
 
 

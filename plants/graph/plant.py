@@ -80,11 +80,14 @@ def take(p, m):
 def weigh(p, m):
     """Forces of what is not linear, on top of the forces m.f: weight of every body, and reels that wind."""
     for k in range(p.weights):
+        m.weight[p.weight_i[k]] = 0.0
+    for k in range(p.weights):
         i, a = p.weight_i[k], p.weight_a[k]
         force = p.weight_force[k]
         if p.weight_turns[k] != 0:
             force *= math.sin(a * m.qm[i] + p.weight_angle[k])
         m.f[i] -= a * force
+        m.weight[i] -= a * force
     if p.winds != 0:
         if reel.grow(p, m):
             discretise(p, m)
@@ -95,7 +98,7 @@ def weigh(p, m):
 def tension(m, j):
     """Pull in link `j` at the end of the substep, with what terms added to it at its middle, N or Nm."""
     i1, a, i2, b = m.link_i[j], m.link_a[j], m.link_j[j], m.link_b[j]
-    e = a * m.x[i1] + b * m.x[i2] + m.link_e[j]
+    e = a * m.x[i1] + b * m.x[i2] + m.link_e[j] + 0.5 * m.h * m.link_v[j]
     v = a * m.x[m.nq + i1] + b * m.x[m.nq + i2] + m.link_v[j]
     return m.link_c[j] * e + m.link_k[j] * v + m.link_T[j]
 
@@ -105,12 +108,12 @@ def read(p, m):
     """What each sensor would show, in SI units, into m.y."""
     nq = p.nq
     for c in range(p.ny):
-        kind = p.sensor_kind[c]
+        kind = p.sensor_kind[c]  # POSITION is 0, SPEED 1
         i, a, j, b = p.sensor_i[c], p.sensor_a[c], p.sensor_j[c], p.sensor_b[c]
-        if kind == POSITION:
-            m.y[c] = a * m.x[i] + b * m.x[j]
-        elif kind == SPEED:
-            m.y[c] = a * m.x[nq + i] + b * m.x[nq + j]
+        if kind <= SPEED:
+            at = kind * nq
+            m.y[c] = a * m.x[at + i] + b * m.x[at + j]
+            m.y_rate[c] = a * m.x[nq + i] + b * m.x[nq + j] if kind == POSITION else 0.0
         elif kind == ACCELERATION:  # mean of the last substep
             m.y[c] = (a * (m.x[nq + i] - m.v_before[i]) + b * (m.x[nq + j] - m.v_before[j])) / m.h
         elif kind == TENSION:

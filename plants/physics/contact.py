@@ -5,9 +5,11 @@ shaft of the LDU rolls on the transmission wheel, and the capstan on the strip. 
 elongation of the links beside it:
 
     slip    |T - c d - k d'| <= F_max,  d' against it              T - c d - k d' = +-F_max while it slides
-    creep   d' = kappa (T - c d - k d') |v|                        the thesis's chapters 11.2 and 12.5
+    creep   d' = (kappa |v| + rate) (T - c d - k d')               the thesis's chapters 11.2 and 12.5
 
-with T the pull of the linear model, c and k of the links that share the contact and v the speed of the surface. Both
+with T the pull of the linear model, c and k of the links that share the contact and v the speed of the surface, of the
+far end of a joint of a described machine, which slips and creeps in the same ways. There `rate` is creep that goes on
+at standstill, as of a belt or a clamped hub. Both
 are linear in d over a substep and are stepped by their exponential: exact for a constant T, any stiffness, no limit on
 h. Force times d' is never negative: sliding only takes energy.
 
@@ -30,6 +32,7 @@ from rtctl.plants.physics.term import Node, Term
 from rtctl.plants.physics.transmission import undone
 
 STRIP = "capstan"  # node of the LDU whose contact is rigid
+BY_WAY = (Size("kappa", "compliance", 0.001),)
 LINK1, LINK2 = 1, 2  # of the LDU: the halves of its capstan, before and behind the strip
 
 
@@ -43,14 +46,17 @@ class SlipSettings(Settings):
 
 
 class CreepSettings(Settings):
-    """kappa is the size."""
+    """kappa and rate are the sizes."""
 
     term: Literal["transmission.creep"] = "transmission.creep"
     node: Node
     kappa: float = quantity(
-        unit="", ge=0, le=1e3, help="way lost per way and force, 1/N (1/Nm of the motor at a wheel)"
+        0.0, unit="", ge=0, le=1e3, help="way lost per way and force, 1/N (1/Nm of the motor at a wheel)"
     )
     R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip creeps")
+    rate: float = quantity(
+        0.0, unit="", ge=0, le=1e6, help="way lost per second and force, at a joint of a described machine"
+    )
 
 
 class SlipParams(NamedTuple):
@@ -65,6 +71,7 @@ class CreepParams(NamedTuple):
     kappa: float
     R_c: float
     strip: int
+    rate: float
 
 
 CONTACT_STATE = state(d=float, fallen=float, rate=float)  # offset in the links; of the carriage, m and m/s
@@ -77,7 +84,7 @@ def build_slip(settings: SlipSettings, h: float) -> SlipParams:
 
 def build_creep(settings: CreepSettings, h: float) -> CreepParams:
     """As `build_slip`."""
-    return CreepParams(h, settings.kappa, settings.R_c, int(settings.node == STRIP))
+    return CreepParams(h, settings.kappa, settings.R_c, int(settings.node == STRIP), settings.rate)
 
 
 @tick
@@ -127,6 +134,24 @@ def creep_tape(p, s, m, i):
     before = s.d
     change = micro(s, grip, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h)
     share(m, s.d, (s.d - before) / p.h, change)
+
+
+@tick
+def slip_joint(p, s, m, j):
+    """Slip in link `j`."""
+    T = undone(m, j)
+    before = s.d
+    change = slide(s, p.F_max, T, m.link_c[j], m.link_k[j], p.h)
+    linear.slid(m, j, s.d, (s.d - before) / p.h, change)
+
+
+@tick
+def creep_joint(p, s, m, j):
+    """Creep in link `j`, with the way of its far end and with time."""
+    grip = p.kappa * abs(m.link_a[j] * m.vm[m.link_i[j]]) + p.rate
+    before = s.d
+    change = micro(s, grip, linear.tension(m, j), m.link_c[j], m.link_k[j], p.h)
+    linear.slid(m, j, s.d, (s.d - before) / p.h, change)
 
 
 @tick
@@ -191,7 +216,7 @@ def slip(p, s, m, i, r, j, k):
         change = slide(s, p.F_max, T, m.link_c[j] + m.link_c[k], m.link_k[j] + m.link_k[k], p.h)
         share_spans(m, i, j, k, s.d, (s.d - before) / p.h, change)
     elif j >= 0:
-        linear.pull(m, j, slide(s, p.F_max, undone(m, j), m.link_c[j], m.link_k[j], p.h))
+        slip_joint(p, s, m, j)
     else:
         gain = p.h * m.G[m.nq + i, m.nu + i] * r * r  # speed that a newton gives what is moved
         free = s.rate + gain * carried(m, i, r)
@@ -213,8 +238,7 @@ def creep(p, s, m, i, r, j, k):
         change = micro(s, grip, T, m.link_c[j] + m.link_c[k], m.link_k[j] + m.link_k[k], p.h)
         share_spans(m, i, j, k, s.d, (s.d - before) / p.h, change)
     elif j >= 0:
-        grip = p.kappa * abs(m.link_a[j] * m.vm[m.link_i[j]])
-        linear.pull(m, j, micro(s, grip, linear.tension(m, j), m.link_c[j], m.link_k[j], p.h))
+        creep_joint(p, s, m, j)
     else:
         s.fallen += p.h * p.kappa * carried(m, i, r) * abs(r * m.vm[i])
 
@@ -234,6 +258,7 @@ SLIP = Term(
     settings=SlipSettings,
     build=build_slip,
     act={
+        "force": "contact.slip_joint({p}, {s}, {m}, {l})",
         "force:described": "contact.slip({p}, {s}, {m}, {i}, {r}, {l}, {k})",
         "reading:described": "contact.behind({s}, {m}, {c})",
         "force:ivu": "contact.slip_tape({p}, {s}, {m})",
@@ -241,7 +266,7 @@ SLIP = Term(
         "reading:ldu": "{m}.y[1] -= {s}.fallen",
     },
     moves=True,
-    stands=(stand("joint", "contact"),),
+    stands=(stand("joint", "contact"), stand("joint", "general spring", usual=False)),
     look_alikes={
         "transmission.creep": "one way, softly and hard: creep is lost both times, slip only when hard",
         "sensor.missed_counts": "hard acceleration at low top speed: counts go at speed, slip at force",
@@ -278,6 +303,7 @@ CREEP = Term(
     settings=CreepSettings,
     build=build_creep,
     act={
+        "force": "contact.creep_joint({p}, {s}, {m}, {l})",
         "force:described": "contact.creep({p}, {s}, {m}, {i}, {r}, {l}, {k})",
         "reading:described": "contact.behind({s}, {m}, {c})",
         "force:ivu": "contact.creep_tape({p}, {s}, {m}, {i})",
@@ -288,6 +314,7 @@ CREEP = Term(
     stands=(
         stand("joint", "contact span"),
         stand("joint", "contact", usual=False),
+        stand("joint", "general spring", usual=False, ways=(BY_WAY, (Size("rate", "yield", 0.001),))),
     ),
     look_alikes={
         "sensor.scale": "out with load and back without: a wrong scale errs the same both ways, creep by the load",
@@ -309,9 +336,9 @@ CREEP = Term(
     check=(
         "Mark both sides of the contact and see whether the marks part over a long gentle move; look at its pressure."
     ),
-    units={"kappa": "per_force"},
+    units={"kappa": "per_force", "rate": "yield"},
     needs=Needs(second=(stand("joint", "contact rigid"),)),
-    search=(Size("kappa", "compliance", 0.001),),
+    search=BY_WAY,
     contact=True,
     stiff=True,
     draws={"kappa": Draw(0.001, 0.01, "per_contact")},

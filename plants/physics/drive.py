@@ -19,6 +19,8 @@ from rtctl.plants.physics.term import Node, Term
 
 DEADBAND_FORMS = ("shift", "cut", "floor")
 SAG_FORMS = ("current", "power", "drawn")
+FEEDS = ("all", "own")
+SAG = (Size("k", "per_volt", 0.05), Choice("form", ("current", "power")))
 
 
 class OffsetSettings(Settings):
@@ -176,7 +178,10 @@ def ramp(s, u, step):
 
 
 class SupplySagSettings(Settings):
-    """k is the size. current: they draw |volts|; power: their square; drawn: what is left of |volts| once it sags."""
+    """k is the size. current: they draw |volts|; power: their square; drawn: what is left of |volts| once it sags.
+
+    A supply feeds all drives, or the one at the node alone.
+    """
 
     term: Literal["drive.supply_sag"] = "drive.supply_sag"
     node: Node
@@ -185,12 +190,14 @@ class SupplySagSettings(Settings):
         default="current", description="what loads the supply: |volts|, their square, or what is left of |volts|"
     )
     tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of the supply's capacitor; 0: it has none")
+    feeds: Literal["all", "own"] = Field(default="all", description="all drives, or the drive at the node alone")
 
 
 class SupplySagParams(NamedTuple):
     k: float
     form: int
     share: float  # of the way to the load of now, a substep
+    own: int  # 1: it feeds one drive
 
 
 SUPPLY_SAG_STATE = state(load=float)
@@ -199,14 +206,15 @@ SUPPLY_SAG_STATE = state(load=float)
 def build_supply_sag(settings: SupplySagSettings, h: float) -> SupplySagParams:
     """Exact step of the capacitor under a load that is held."""
     share = -math.expm1(-h / settings.tau) if settings.tau > 0.0 else 1.0
-    return SupplySagParams(settings.k, SAG_FORMS.index(settings.form), share)
+    return SupplySagParams(settings.k, SAG_FORMS.index(settings.form), share, FEEDS.index(settings.feeds))
 
 
 @tick
-def supply_sag(p, s, volts):
-    """Lower all `volts` (n,) by what all of them together have drawn."""
+def supply_sag(p, s, volts, c):
+    """Lower the `volts` (n,) of all drives that the supply of drive `c` feeds by what they together have drawn."""
     load = 0.0
-    for i in range(volts.shape[0]):
+    first, behind = (c, c + 1) if p.own == 1 else (0, volts.shape[0])
+    for i in range(first, behind):
         load += volts[i] * volts[i] if p.form == 1 else abs(volts[i])
     if p.form == 2:  # what flows has sagged already: load' = (load0 (1 - k load) - load) / tau, exact
         more = 1.0 + p.k * load
@@ -214,7 +222,7 @@ def supply_sag(p, s, volts):
     else:
         s.load += p.share * (load - s.load)
     gain = max(1.0 - p.k * s.load, 0.0)
-    for i in range(volts.shape[0]):
+    for i in range(first, behind):
         volts[i] *= gain
 
 
@@ -357,8 +365,12 @@ SUPPLY_SAG = Term(
     source="Krishnan 2001",
     settings=SupplySagSettings,
     build=build_supply_sag,
-    act={"command": "drive.supply_sag({p}, {s}, {m}.volts)"},
-    stands=(stand("drive", "supply"),),
+    act={"command": "drive.supply_sag({p}, {s}, {m}.volts, {c})"},
+    stands=(
+        stand("drive", "general several supply", ways=(SAG, (*SAG, Choice("feeds", ("own",))))),
+        stand("drive", "general several", ways=((*SAG, Choice("feeds", ("own",))),)),  # one for all is at the first
+        stand("drive", "supply"),
+    ),
     look_alikes={
         "drive.saturation": "a hard push of one motor alone and of both: sag asks what the other draws",
         "drive.thermal": "the same burst cold and after a minute: sag is there from the first moment",
@@ -381,7 +393,7 @@ SUPPLY_SAG = Term(
         "cables and its rating."
     ),
     units={"k": "1/V"},
-    search=(Size("k", "per_volt", 0.05), Choice("form", ("current", "power"))),
+    search=SAG,
     richer=(Shape("tau", "seconds", (0.02,), 30.0),),
     variants=Choice("form", ("current", "power", "drawn")),
     draws={"k": Draw(0.03, 0.15, "per_volt")},

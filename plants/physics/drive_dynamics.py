@@ -102,16 +102,19 @@ class ThermalParams(NamedTuple):
     end: float  # exp(-h/tau)
     per_volt2: float
     channel: int
+    a: float  # of a described machine, whose node is always a drive: losses of its gain and of what it works against
+    ease: float
 
 
 THERMAL_STATE = state(heat=float)
 
 
 def build_thermal(settings: ThermalSettings, h: float) -> ThermalParams:
-    """Exact decay over `h` s; a node that is no drive has the friction of what that drive moves."""
+    """Exact decay over `h` s; a node of a plant that is no drive has the friction of what that drive moves."""
     losses = (settings.a, settings.ease) if settings.node.startswith("drive") else (0.0, settings.a)
     form, channel = THERMAL_FORMS.index(settings.form), 1 if settings.node.endswith("2") else 0
-    return ThermalParams(*losses, form, math.exp(-h / settings.tau), settings.V_ref**-2, channel)
+    warm = math.exp(-h / settings.tau)
+    return ThermalParams(*losses, form, warm, settings.V_ref**-2, channel, settings.a, settings.ease)
 
 
 @tick
@@ -125,20 +128,24 @@ def left(p, lost):
 
 
 @tick
-def thermal_gain(p, s, volts):
-    """Warm the motor by its own of the `volts` (n,) over a substep and lower them by what it has lost."""
-    u = volts[p.channel]
+def thermal_gain(p, s, volts, c, loss):
+    """Warm the motor by volts `c` of the `volts` (n,) over a substep and lower them by what it has lost."""
+    u = volts[c]
     load = u * u * p.per_volt2
-    volts[p.channel] = u * left(p, p.gain * s.heat)
+    volts[c] = u * left(p, loss * s.heat)
     s.heat = load + (s.heat - load) * p.end
 
 
 @tick
-def thermal_friction(p, s, dry):
+def thermal_friction(p, s, dry, loss):
     """Dry friction of a warm motor whose cold one is `dry`, Nm or N."""
-    return dry * left(p, p.friction * s.heat)
+    return dry * left(p, loss * s.heat)
 
 
+BY_NAME = (  # of a plant whose nodes are motors as well as drives
+    "drive_dynamics.thermal_gain({p}, {s}, {m}.volts, {p}.channel, {p}.gain)",
+    "{m}.dry[{i}] = drive_dynamics.thermal_friction({p}, {s}, {m}.dry[{i}], {p}.friction)",
+)
 LAG = Term(
     name="drive.lag",
     words="it comes late and soft: the drive needs a moment to build up what is asked for",
@@ -181,8 +188,10 @@ THERMAL = Term(
     settings=ThermalSettings,
     build=build_thermal,
     act={
-        "command": "drive_dynamics.thermal_gain({p}, {s}, {m}.volts)",
-        "force": "{m}.dry[{i}] = drive_dynamics.thermal_friction({p}, {s}, {m}.dry[{i}])",
+        "command": "drive_dynamics.thermal_gain({p}, {s}, {m}.volts, {c}, {p}.a)",
+        "force": "{m}.dry[{i}] = drive_dynamics.thermal_friction({p}, {s}, {m}.dry[{i}], {p}.ease)",
+        **{f"command:{kind}": BY_NAME[0] for kind in ("ivu", "ldu", "axis")},
+        **{f"force:{kind}": BY_NAME[1] for kind in ("ivu", "ldu", "axis")},
     },
     stands=(
         stand("drive"),

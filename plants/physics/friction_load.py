@@ -1,7 +1,8 @@
 """Dry friction that grows with what presses on the bearing: the tape's tension, or the force that a contact carries.
 
 A limit of mu |T| R at the node: mu of the contact or bearing, T in the spring beside it, R its lever on the node. The
-axis has no spring in its drive, there the force of the drive itself presses (a screw or a worm under thrust).
+axis has no spring in its drive, there the force of the drive itself presses (a screw or a worm under thrust). A body
+of a described machine is pressed by all joints with springs that end at it, or by the weight that it carries.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), section 2; Hamel, Modele de frottement a
 l'entree des reducteurs, for gears under load; thesis 11.2 and 12.5 for the contacts of the linear drive.
@@ -9,14 +10,20 @@ l'entree des reducteurs, for gears under load; thesis 11.2 and 12.5 for the cont
 
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
 from rtctl.plants.element import stand
-from rtctl.plants.physics.search import Size
+from rtctl.plants.physics.search import Choice, Size
 from rtctl.plants.physics.story import Phrase
 from rtctl.plants.physics.term import Node, Term
 
 BESIDE = {"capstan": (0, 1), "reel1": (0, 0), "reel2": (1, 1), "motor1": (2, 2), "motor2": (3, 3)}  # links of the ivu
+
+BY = ("joints", "weight")
+JOINTS = (Size("mu", "one", 0.05, signed=True),)
+WEIGHT = (*JOINTS, Choice("by", ("weight",)))
 
 
 class LoadSettings(Settings):
@@ -25,17 +32,36 @@ class LoadSettings(Settings):
     term: Literal["friction.load"] = "friction.load"
     node: Node
     mu: float = quantity(unit="", ge=-1.0, le=1.0, help="friction as a share of the force that presses, at its lever")
+    by: Literal["joints", "weight"] = Field(
+        default="joints", description="what presses at a body of a described machine: its joints, or its weight"
+    )
 
 
 class LoadParams(NamedTuple):
     mu: float
+    weight: int  # 1: by weight
     one: int  # links of the ivu whose pull presses on the node
     two: int
 
 
 def build_load(settings: LoadSettings, h: float) -> LoadParams:
     """Nothing to discretise."""
-    return LoadParams(settings.mu, *BESIDE.get(settings.node, (0, 0)))
+    return LoadParams(settings.mu, BY.index(settings.by), *BESIDE.get(settings.node, (0, 0)))
+
+
+@tick
+def load_all(p, m, i):
+    """Limit of dry friction at coordinate `i`, N or Nm, under the weight or all joints with springs that end there."""
+    if p.weight == 1:
+        return p.mu * abs(m.weight[i])
+    T = 0.0
+    for j in range(m.nl):
+        pull = abs(linear.tension(m, j))
+        if m.link_i[j] == i:
+            T += abs(m.link_a[j]) * pull
+        if m.link_j[j] == i:
+            T += abs(m.link_b[j]) * pull
+    return p.mu * T
 
 
 @tick
@@ -63,10 +89,17 @@ def load_drive(p, m, i):
 
 @tick
 def pressed(p, m, i, j, k):
-    """As `load`, of the links `j` and `k` where both end at node `i`, else of `j`; without a link of the drives."""
-    if j < 0:
-        return load_drive(p, m, i)
-    return load(p, m, i, j, k if k >= 0 and (m.link_i[k] == i or m.link_j[k] == i) else j)
+    """As `load`, of the links `j` and `k` where both end at node `i`, else of `j`.
+
+    Where no link is named it is as `load_all`, and of the drives at a node at which no link ends.
+    """
+    if j >= 0:
+        return load(p, m, i, j, k if k >= 0 and (m.link_i[k] == i or m.link_j[k] == i) else j)
+    ends = p.weight
+    for n in range(m.nl):
+        if m.link_i[n] == i or m.link_j[n] == i:
+            ends = 1
+    return load_all(p, m, i) if ends > 0 else load_drive(p, m, i)
 
 
 LOAD = Term(
@@ -77,8 +110,9 @@ LOAD = Term(
     settings=LoadSettings,
     build=build_load,
     act={
-        "force": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {l}, {l})",
+        "force": "{m}.dry[{i}] += friction_load.load_all({p}, {m}, {i})",
         "force:described": "{m}.dry[{i}] += friction_load.pressed({p}, {m}, {i}, {l}, {k})",
+        "force:ldu": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {l}, {l})",
         "force:ivu": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {p}.one, {p}.two)",
         "force:axis": "{m}.dry[{i}] += friction_load.load_drive({p}, {m}, {i})",
     },
@@ -86,6 +120,9 @@ LOAD = Term(
         stand("body", "loaded wrapped"),
         stand("body", "loaded reel"),
         stand("body", "loaded"),
+        stand("body", "general sprung heavy", ways=(JOINTS, WEIGHT)),
+        stand("body", "general sprung", ways=(JOINTS,)),
+        stand("body", "general heavy", ways=(WEIGHT,)),
     ),
     look_alikes={
         "friction.coulomb": "the same motion at three tensions: Coulomb friction stays the same",
@@ -103,6 +140,6 @@ LOAD = Term(
         need="moves under several loads",
     ),
     check="Pull slowly with and without the load; look at the bearing that carries it.",
-    search=(Size("mu", "one", 0.05, signed=True),),
+    search=JOINTS,
     makes_up=True,
 )

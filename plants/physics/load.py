@@ -14,12 +14,13 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.presliding import bend
-from rtctl.plants.physics.search import At, Choice, Size, Turn, Where
+from rtctl.plants.physics.search import At, Choice, Rest, Size, Turn, Where
 from rtctl.plants.physics.story import PASSES, TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 HILL = math.sqrt(math.e)  # steepest slope of exp(-x^2 / 2) is 1 / HILL, at x = 1
 FORMS = ("drag", "hill", "push")
+PULL = (Size("k", "stiff", 0.2, signed=True), Rest("x0", "force", 0.3))
 
 
 class SpringSettings(Settings):
@@ -29,22 +30,33 @@ class SpringSettings(Settings):
     node: Node
     k: float = quantity(unit="", ge=-1e6, le=1e6, help="stiffness, N/m or Nm/rad by node; negative pushes away")
     x0: float = quantity(0.0, unit="", ge=-1e3, le=1e3, help="where it does not pull, m or rad by node")
+    bend: float = quantity(
+        0.0, unit="", ge=-1e12, le=1e12, help="1/m^2 or 1/rad^2: it stiffens far from x0, or yields where negative"
+    )
 
 
 class SpringParams(NamedTuple):
     k: float
     x0: float
+    bend: float
 
 
 def build_spring(settings: SpringSettings, h: float) -> SpringParams:
     """Nothing to discretise; stable while h sqrt(k / mass) stays below one."""
-    return SpringParams(settings.k, settings.x0)
+    return SpringParams(settings.k, settings.x0, settings.bend)
 
 
 @tick
 def spring(p, x):
-    """Force on the node at `x`, N or Nm."""
-    return -p.k * (x - p.x0)
+    """Force on the node at `x`, N or Nm: in proportion near its rest, far off by the square or never more than a limit.
+
+    Both branches have the slope of one law at a bend of 0.
+    """
+    d = x - p.x0
+    if p.bend == 0.0:
+        return -p.k * d
+    root = math.sqrt(1.0 + abs(p.bend) * d * d)
+    return -p.k * d * (root if p.bend > 0.0 else 1.0 / root)
 
 
 class CableChainSettings(Settings):
@@ -169,12 +181,15 @@ def bump(p, m, i, r):
 SPRING = Term(
     name="load.spring",
     words="something pulls it back like a spring: a cable chain, a hose, a tilted rail that bends",
-    equation="F = -k (x - x0)",
+    equation="F = -k (x - x0), times or by sqrt(1 + |bend| (x - x0)^2)",
     source="Altintas 2011",
     settings=SpringSettings,
     build=build_spring,
     act={"force": "{m}.f[{i}] += {r} * load.spring({p}, {r} * {m}.qm[{i}])"},
-    stands=(stand("body", "bounded"),),
+    stands=(
+        stand("body", "general bounded", ways=(PULL, (*PULL, Size("bend", "per_span2", 4.0, signed=True)))),
+        stand("body", "bounded"),
+    ),
     look_alikes={
         "drive.offset": "the same short move at both ends of the travel: an offset is the same everywhere",
         "load.cable_chain": "approach one place from both sides slowly: a spring pulls the same, a chain does not",

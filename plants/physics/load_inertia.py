@@ -81,7 +81,7 @@ INERTIA = Term(
     settings=InertiaSettings,
     build=build_inertia,
     act={"last": "load_inertia.turned({p}, {m}, {i}, {r})"},
-    stands=(stand("body", "general turns"),),
+    stands=(stand("body", "general turns single"),),
     look_alikes={
         "load.imbalance": "turn slowly, then fast: imbalance stays as it is, an inertia grows with the square of speed",
         "ripple.cogging": "turn slowly by hand: cogging is felt, an inertia is not",

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from rtctl.plants import axis, ivu, ldu
 
-PLANTS = {"ivu": ivu, "ldu": ldu, "axis": axis}
+PLANTS = {plant.NAME: plant for plant in (ivu, ldu, axis)}
 
 
 class Place(NamedTuple):
@@ -19,10 +19,5 @@ def place(kind: str, node: str) -> Place:
     plant = PLANTS[kind]
     index, factor = plant.NODES.get(node, plant.RUBS.get(node, 0)), ""
     channel = plant.DRIVES.get(node, plant.SENSORS.get(node, 0))
-    if kind == "ldu" and node in ("carriage", "scale"):
-        index, factor, channel = ldu.CAPSTAN, "R_c", ldu.SENSORS["scale"]
-    elif kind == "ldu" and node == "loop":  # what all sensors share: the carriage for the scale
-        index, factor = ldu.CAPSTAN, "R_c"
-    elif kind == "ivu" and node == "encoder":
-        index = ivu.CAPSTAN
+    index, factor, channel = plant.SPOTS.get(node, (index, factor, channel))
     return Place(index, plant.LINKS.get(node, 0), channel, factor)

@@ -41,7 +41,8 @@ def anywhere(term: Term) -> dict[str, tuple[str, ...]]:
 
 
 def _general(element: Element) -> Element:
-    return element._replace(traits=element.traits | {GENERAL})
+    alone = {"single"} if element.kind == "body" else set()
+    return element._replace(traits=element.traits | {GENERAL} | alone)
 
 
 def having(plant: Plant, kind: str, trait: str) -> tuple[str, ...]:

@@ -20,16 +20,6 @@ from rtctl.plants.physics.term import SITES, Term
 ROWS = 600
 SAMPLE = 2e-3  # s
 VOLTS, TENSION, STILL = 3.0, 1.5, 1.0  # V and N to either side; V that is held
-IVU_FIRST = "angle", "tension", "command"  # axes that a tape unit shows best; the others are shown on an axis
-ORDER = "axis", "ivu", "ldu"
-DRIVES: dict[str, tuple] = {"axis": (), "ivu": ([(0.2, 2e3, 0.7, 0.0)] * 2,), "ldu": ((6e3, 0.7),)}
-STAND: dict[str, dict[str, float]] = {"axis": {"k": 200.0}, "ivu": {"k1": 0.0, "k2": 0.0}, "ldu": {}}
-UNITS = {"axis": ("m", "N"), "ivu": ("rad", "Nm"), "ldu": ("rad", "Nm")}  # of way and push, where nothing slides
-SCALES = {  # what the typical sizes are multiples of
-    "axis": {"force": 20.4, "speed": 0.1, "travel": 0.1, "inertia": 95.1, "stiffness": 200.0, "contact": 20.0},
-    "ivu": {"force": 2.5e-3, "speed": 2.0, "travel": 6.0, "inertia": 1.5e-3, "stiffness": 450.0, "contact": 1.0},
-    "ldu": {"force": 1e-3, "speed": 10.0, "travel": 6.0, "inertia": 1e-5, "stiffness": 7.6, "contact": 7.0},
-}
 MOTIONS = {  # by the term's axis
     "velocity": "speeds", "position": "to and fro", "angle": "turn", "command": "commands", "time": "wait",
     "frequency": "step", "tension": "pull",
@@ -107,15 +97,15 @@ class Hand(NamedTuple):
 
 def portrait(term: Term) -> Curve:
     """The curve of a term at a typical size, at the first node of the plant that shows its axis best."""
-    order = ("ivu", *ORDER) if term.axis in IVU_FIRST else ORDER
     where = anywhere(term)
+    order = sorted(sorted(PLANTS), key=lambda kind: term.axis not in PLANTS[kind].SHOWN.axes)
     kind = next(k for k in order if k in where)
     return curve(term, typical(term, kind, where[kind][0]), kind)
 
 
 def typical(term: Term, kind: str, node: str) -> Settings:
     """Settings in the middle of what is met in practice."""
-    of = SCALES[kind]
+    of = PLANTS[kind].SHOWN.scales
     of = of | {
         "": 1.0, "dry": of["force"], "force/speed": of["force"] / of["speed"],
         "force/speed^2": of["force"] / of["speed"] ** 2, "sample period": SAMPLE,
@@ -133,18 +123,18 @@ def typical(term: Term, kind: str, node: str) -> Settings:
 
 def curve(term: Term, settings: Any, kind: str) -> Curve:
     """Move the stand as the term's axis asks for, and read off what the term makes of it."""
-    if term.joint is not None:
+    if term.joint is not None and not term.act:
         return spring(term, settings, kind)
     driven = term.shown.endswith(DRIVEN)
     motion = term.shown.removesuffix(DRIVEN) or MOTIONS[term.axis]
-    hand = motions(motion, settings, SCALES[kind])
+    shown_by = PLANTS[kind].SHOWN
+    hand = motions(motion, settings, shown_by.scales)
     hand = hand._replace(volts=hand.volts + STILL) if driven else hand
-    spot, link = place(kind, settings.node), place(kind, settings.node).link
-    if settings.node == "capstan" and kind == "ivu":
-        link = 1
+    spot = place(kind, settings.node)
+    link = shown_by.links.get(settings.node, spot.link)
     run = assembled(term, kind)
     got, none = (measure(run, acts, term, settings, kind, hand, link) for acts in (True, False))
-    way, push = ("m", "N") if spot.factor or settings.node.startswith("tape") else UNITS[kind]
+    way, push = ("m", "N") if spot.factor or settings.node.startswith("tape") else shown_by.units
     shown = next((name for name in CHANGES if np.abs(got[name] - none[name]).max() > 0.0), "force")
     sign = np.where(hand.v < 0.0, -1.0, 1.0)
 
@@ -177,9 +167,10 @@ def curve(term: Term, settings: Any, kind: str) -> Curve:
 def spring(term: Term, settings: Any, kind: str) -> Curve:
     """Pull of a joint that the term makes a spring, by its stretch; without the term it does not stretch."""
     assert term.joint is not None
-    travel, way = SCALES[kind]["travel"], UNITS[kind][0]
+    shown_by = PLANTS[kind].SHOWN
+    travel, (way, force) = shown_by.scales["travel"], shown_by.units
     x = np.linspace(-1e-3, 1e-3, ROWS) * travel
-    y, force = term.joint(settings)["stiffness"] * x, UNITS[kind][1]
+    y = term.joint(settings)["stiffness"] * x
     return Curve(x, y, 0.0 * x, f"stretch, {way}", f"pull, {force}", settings, kind)
 
 
@@ -223,10 +214,10 @@ def measure(run: Any, acts: bool, term: Term, settings: Any, kind: str, hand: Ha
     p, s = stand(kind, hand.h)
     m, spot = s.m, place(kind, settings.node)
     r = getattr(p, spot.factor) if spot.factor else 1.0
-    ratio = ratios(kind, p)
+    ratio = np.array(PLANTS[kind].SHOWN.ratios(p))
     ratio = ratio / (ratio[spot.node] * r)
     q, v = hand.x[:, None] * ratio, hand.v[:, None] * ratio
-    if kind == "ivu" and hand.stretch.any():
+    if PLANTS[kind].SHOWN.stretches and hand.stretch.any():
         end, arm = m.link_i[link], m.link_a[link]
         q[:, end] += hand.stretch / arm
         v[:, end] += np.gradient(hand.stretch, hand.h) / arm
@@ -259,17 +250,9 @@ def stand(kind: str, h: float) -> tuple[Any, Any]:
     """Params and state of a machine at rest whose rows last `h` s."""
     plant = PLANTS[kind]
     name = kind.capitalize()
-    p = plant.build(getattr(plant, f"{name}Settings")(parameters=STAND[kind]), h, *DRIVES[kind])
+    p = plant.build(getattr(plant, f"{name}Settings")(parameters=plant.SHOWN.parameters), h, *plant.SHOWN.drives)
     s = np.zeros(1, GRAPH_STATE).view(np.recarray)[0]
     graph.prepare.interpret(p.graph, s.m)  # without the matrix exponential, which nobody asks for
     graph.assemble.interpret(p.graph, s.m)
     s.m.Gamma_T[:, :] = h * s.m.G.T
     return p, s
-
-
-def ratios(kind: str, p: Any) -> np.ndarray:
-    """How the nodes turn together when nothing is stretched, to the capstan's turn (nq,)."""
-    if kind == "ivu":
-        one, two = p.R_c / p.R1, -p.R_c / p.R2
-        return np.array([one, one, 1.0, two, two])
-    return np.array([p.N, 1.0, 1.0, 1.0]) if kind == "ldu" else np.ones(1)

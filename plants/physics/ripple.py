@@ -19,6 +19,7 @@ from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 TURN = 2.0 * math.pi
+DISC = Turn("A", "phi", "one", 0.002)
 
 
 class CoggingSettings(Settings):
@@ -113,7 +114,7 @@ COGGING = Term(
     settings=CoggingSettings,
     build=build_cogging,
     act={"force": "{m}.f[{i}] += {r} * ripple.cogging({p}, {r} * {m}.qm[{i}])"},
-    stands=(stand("body", "driven"),),
+    stands=(stand("body", "driven"), stand("body", "general")),
     look_alikes={
         "load.imbalance": "turn slowly and count: imbalance comes once a turn, cogging many times",
         "ripple.reel": "the same turns at another tension: cogging stays, an eccentric reel follows the tension",
@@ -156,7 +157,9 @@ ENCODER = Term(
     act={"reading": "{m}.y[{c}] = ripple.encoder({p}, {m}.y[{c}])"},
     stands=(
         stand("sensor", "position turns slides", usual=False),
+        stand("sensor", "general position turns", ways=((DISC,), (DISC, Hint("order", "order")))),
         stand("sensor", "position turns"),
+        stand("sensor", "general position slides", usual=False),
     ),
     look_alikes={
         "ripple.capstan": "on the LDU look at both sensors: a disc off centre does not move the carriage; on the IVU "
@@ -181,7 +184,7 @@ ENCODER = Term(
     ),
     units={"A": "position", "A2": "position", "A3": "position"},
     needs=Needs(turns=0.5),
-    search=(Turn("A", "phi", "one", 0.002),),
+    search=(DISC,),
     sliding=(Turn("A", "phi", "one", 1e-05), Hint("turn", "wavelength", 0.4, lengths=(0.0, 0.045))),
     richer=(Turn("A2", "phi2", "one", 0.0005), Turn("A3", "phi3", "one", 0.0005)),
     other_name=OtherName("turn", "guide.thickness", "wavelength"),

@@ -3,6 +3,7 @@
 The elongation of the joint is longer by  A sin(n q + phi) + harmonics  in the angle q of one of its ends. Spring and
 damper of the joint feel it, and the joint pulls at the body that turns with the lever A n cos(n q + phi): both follow
 from one potential, so that a whole turn takes no work from the spring. The error is zero where the machine starts.
+A joint that is said to be rigid becomes a spring, as stiff as one that is as good as rigid.
 
 Source: Tuttle & Seering, A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics and Automation
 12 (1996); Smith, Gear noise and vibration (2003), ch. 2 for transmission error; ISO 230-2 for the lead of screws.
@@ -17,11 +18,24 @@ from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.physics.ripple import TURN, harmonics
-from rtctl.plants.physics.search import Choice, Turn
+from rtctl.plants.physics.search import Choice, Hint, Part, Turn
 from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
+from rtctl.plants.physics.transmission import FIRM, firm
 
 ENDS = ("from", "to")
+
+ERROR = Turn("A", "phi", "one", 1e-3)
+
+
+def at_end(end: str) -> tuple[tuple[Part, ...], ...]:
+    """How it is looked for in the turns of one end: once and twice a turn, and as often as the record suggests."""
+    here = Choice("end", (end,))
+    return ((ERROR, here, Choice("order", (1.0, 2.0))), (ERROR, here, Hint("order", f"order_{end}")))
+
+
+NEAR, FAR = at_end("from"), at_end("to")
+RIGID = tuple((*way, Choice("c", (FIRM,), "firm")) for way in NEAR)  # in whose two ends it is one law
 
 
 class RatioSettings(Settings):
@@ -38,6 +52,7 @@ class RatioSettings(Settings):
     end: Literal["from", "to"] = Field(default="from", description="end of the joint in whose angle it repeats")
     order: float = quantity(1.0, unit="", gt=0, le=1e4, help="times a turn; 2 for a harmonic drive, or teeth")
     turn: float = quantity(TURN, unit="", gt=0, le=1e3, help="way of one turn: 2 pi, or that in m where the end slides")
+    c: float = quantity(0.0, unit="", ge=0, le=1e12, help="stiffness, of a joint that is said to be rigid")
 
 
 class RatioParams(NamedTuple):
@@ -49,20 +64,18 @@ class RatioParams(NamedTuple):
     A3: float
     phi3: float
     zero: float  # error at position 0
-    end: int
 
 
 def build_ratio(settings: RatioSettings, h: float) -> RatioParams:
     """Error at position 0, which the joint starts without."""
     s = settings
     zero = harmonics.py_func(0.0, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3)
-    return RatioParams(s.order * TURN / s.turn, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3, zero, ENDS.index(s.end))
+    return RatioParams(s.order * TURN / s.turn, s.A, s.phi, s.A2, s.phi2, s.A3, s.phi3, zero)
 
 
-@tick
-def end_of(p, m, j):
-    """Index of the body in whose angle the error of link `j` repeats."""
-    return m.link_i[j] if p.end == 0 else m.link_j[j]
+def joint(settings: RatioSettings) -> dict[str, float]:
+    """Stiffness and damping of a joint that is said to be rigid."""
+    return firm(settings.c)
 
 
 @tick
@@ -80,17 +93,16 @@ def lever(p, q):
 
 
 @tick
-def stretched(p, m, j):
-    """Stretch link `j` by its error."""
-    i = end_of(p, m, j)
-    linear.extend(m, j, error(p, m.qm[i]), lever(p, m.qm[i]) * m.vm[i])
+def stretched(p, m, j, i, r):
+    """Stretch link `j` by its error at node `i` of the end that turns it; `r` takes the node to that end's own unit."""
+    q = r * m.qm[i]
+    linear.extend(m, j, error(p, q), lever(p, q) * r * m.vm[i])
 
 
 @tick
-def levered(p, m, j):
+def levered(p, m, j, i, r):
     """Let link `j` pull at the lever of its error, with all that pulls in it."""
-    i = end_of(p, m, j)
-    m.f[i] -= lever(p, m.qm[i]) * linear.tension(m, j)
+    m.f[i] -= r * lever(p, r * m.qm[i]) * linear.tension(m, j)
 
 
 RATIO = Term(
@@ -101,10 +113,15 @@ RATIO = Term(
     settings=RatioSettings,
     build=build_ratio,
     act={
-        "force": "ripple_ratio.stretched({p}, {m}, {l})",
-        "last": "ripple_ratio.levered({p}, {m}, {l})",
+        "force": "ripple_ratio.stretched({p}, {m}, {l}, {i}, {r})",
+        "last": "ripple_ratio.levered({p}, {m}, {l}, {i}, {r})",
     },
-    stands=(stand("joint", "general spring"),),
+    stands=(
+        stand("joint", "general spring turning turned", ways=(*NEAR, *FAR)),
+        stand("joint", "general spring turned", ways=FAR),
+        stand("joint", "general spring", ways=NEAR),
+        stand("joint", "general rigid", usual=False, ways=RIGID),
+    ),
     look_alikes={
         "ripple.encoder": "sensors on both ends: a ratio moves the far end, a reading error only its own sensor",
         "ripple.cogging": "slow and fast turns: a ratio moves the far end as far at any low speed, a force fades",
@@ -114,6 +131,7 @@ RATIO = Term(
     typical={"A": (1e-4, 1e-2)},
     axis="angle",
     order=45,
+    joint=joint,
     since=2,
     phrase=Phrase(
         noun="an uneven ratio",
@@ -122,9 +140,9 @@ RATIO = Term(
         need=TURNS,
     ),
     check="Turn the near end slowly by hand through one turn and follow the far end with a dial gauge.",
-    units={"A": "position", "A2": "position", "A3": "position"},
+    units={"A": "position", "A2": "position", "A3": "position", "c": "stiffness"},
     needs=Needs(turns=0.5),
-    search=(Turn("A", "phi", "one", 1e-3), Choice("end", ENDS), Choice("order", (1.0, 2.0))),
+    search=(ERROR, Choice("end", ENDS), Choice("order", (1.0, 2.0))),
     richer=(Turn("A2", "phi2", "one", 3e-4), Turn("A3", "phi3", "one", 3e-4)),
     stiff=True,
     defined=True,

@@ -78,6 +78,15 @@ class Where(NamedTuple):
     name: str
 
 
+class Rest(NamedTuple):
+    """Where a spring rests, anywhere: what it pulls with in the middle of the travel is the number that is fitted.
+    Follows the Size of its stiffness; `share` of its measure is a typical pull there."""
+
+    name: str
+    measure: str
+    share: float
+
+
 class Jumps(NamedTuple):
     """The size of the largest of the jumps that the record shows; the others keep their share of it."""
 
@@ -100,4 +109,4 @@ class OtherName(NamedTuple):
     name: str  # of the parameter there
 
 
-Part = Size | Limit | Shape | Turn | At | Hint | Where | Jumps | Choice
+Part = Size | Limit | Shape | Turn | At | Hint | Where | Rest | Jumps | Choice

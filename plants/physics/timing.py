@@ -107,6 +107,14 @@ def late(p, t):
 
 
 @tick
+def jitter(p, m):
+    """Move the readings of all positions of a described machine on to the time at which they are really taken."""
+    delta = late(p, m.t)
+    for c in range(m.ny):
+        m.y[c] += m.y_rate[c] * delta
+
+
+@tick
 def jitter_ivu(p, m):
     """Move the readings of capstan and reels on to the time at which they are really taken."""
     delta = late(p, m.t)
@@ -173,6 +181,7 @@ JITTER = Term(
     settings=JitterSettings,
     build=build_jitter,
     act={
+        "reading": "timing.jitter({p}, {m})",
         "reading:ivu": "timing.jitter_ivu({p}, {m})",
         "reading:ldu": "timing.jitter_ldu({p}, {m}, {r})",
         "reading:axis": "timing.jitter_axis({p}, {m})",

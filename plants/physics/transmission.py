@@ -25,6 +25,9 @@ from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
+FIRM = 25.0  # times the stiffness at which the lighter side rings slowly: as good as rigid
+FIRM_TAU = 1e-3  # s, its damping over its stiffness
+
 
 class BacklashSettings(Settings):
     """gap is the size."""
@@ -34,6 +37,9 @@ class BacklashSettings(Settings):
     gap: float = quantity(unit="", ge=0, le=1.0, help="total play, rad of the link's first end (m at an axis)")
     damping: float = quantity(0.0, unit="", ge=0, le=1, help="share of the link's damping that also acts in the gap")
     edge: float = quantity(0.005, unit="", ge=0, le=1, help="share of half the gap by which its edges are rounded")
+    c: float = quantity(
+        0.0, unit="", ge=0, le=1e12, help="stiffness beyond the gap, of a joint that is said to be rigid"
+    )
 
 
 class BacklashParams(NamedTuple):
@@ -48,6 +54,16 @@ BACKLASH_STATE = state(at=float)  # what the sensor of an axis is at
 def build_backlash(settings: BacklashSettings, h: float) -> BacklashParams:
     """Half the gap; nothing to discretise."""
     return BacklashParams(max(0.5 * settings.gap, 0.0), settings.damping, settings.edge)
+
+
+def joint(settings: BacklashSettings) -> dict[str, float]:
+    """Stiffness and damping of a joint that is said to be rigid."""
+    return firm(settings.c)
+
+
+def firm(c: float) -> dict[str, float]:
+    """Stiffness and damping of a joint that is rigid but for an effect in it; none for a `c` of 0."""
+    return {"stiffness": c, "damping": c * FIRM_TAU} if c > 0.0 else {}
 
 
 @tick
@@ -141,6 +157,12 @@ BACKLASH = Term(
     stands=(
         stand("joint", "shaft"),
         stand("sensor", "lone", usual=False),
+        stand(
+            "joint",
+            "general rigid",
+            usual=False,
+            ways=((Size("gap", "span", (3e-4, 3e-3)), Choice("c", (FIRM,), "firm")),),
+        ),
     ),
     look_alikes={
         "friction.presliding": "reverse with a small force: in a gap nothing pushes back, bristles do at once",
@@ -152,6 +174,7 @@ BACKLASH = Term(
     axis="velocity",
     shown="to and fro",
     order=60,
+    joint=joint,
     state=BACKLASH_STATE,
     phrase=Phrase(
         noun="play",
@@ -165,6 +188,7 @@ BACKLASH = Term(
     richer=(Shape("edge", "one", (0.05,), 20.0),),
     variants=Choice("damping", (0.0, 1.0)),
     told_first=True,
+    units={"c": "stiffness"},
     richer_at="joint",
     stiff=True,
     draws={"gap": Draw(1.0, 5.0, "twist")},

@@ -13,10 +13,11 @@ from rtctl import machines
 from rtctl.campaign.metrics import measure
 from rtctl.campaign.plan import Plan
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.loop import fused, generate, safety
+from rtctl.loop import fused, generate
 from rtctl.loop.fused import Run
 from rtctl.machines import Machine
 from rtctl.own.files import trust
+from rtctl.tick import safety
 
 _made: dict[Any, generate.Generated] = {}
 _plans: dict[str, Plan] = {}

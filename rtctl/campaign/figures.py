@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rtctl.campaign.metrics import METRICS
-from rtctl.loop import safety
 from rtctl.loop.fused import Run
+from rtctl.tick import safety
 
 INK, BLUE, RED, GREY, GREEN = "#222222", "#0b62a8", "#b3262e", "#8a8f98", "#2e8b57"
 POINTS = 1200  # of a line

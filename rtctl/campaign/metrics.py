@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.config.units import ANGLES
-from rtctl.loop import safety
 from rtctl.loop.fused import Run
 from rtctl.machines import Machine
+from rtctl.tick import safety
 from rtctl.trace.metrics import machine_steps
 
 
@@ -25,8 +25,8 @@ METRICS: dict[str, Metric] = {
     "rms_error_mm": Metric("rms of reference - measured while running", "mm", 1),
     "peak_error_mm": Metric("largest of it", "mm", 1),
     "true_final_error_mm": Metric("final error by the emulator's own position", "mm", 1),
-    "final_error": Metric("largest mean error at the end of a step, of an angle or a speed", "unit", 1),
-    "rms_error": Metric("rms of reference - measured while running, of an angle or a speed", "unit", 1),
+    "final_error": Metric("largest mean error at the end of a step, in the machine's unit", "unit", 1),
+    "rms_error": Metric("rms of reference - measured while running, in the machine's unit", "unit", 1),
     "peak_error": Metric("largest of it", "unit", 1),
     "tension_min_N": Metric("lowest tape tension while running", "N", -1),
     "tension_max_N": Metric("highest tape tension while running", "N", 1),
@@ -59,12 +59,12 @@ def _steps(rows: np.ndarray, machine: Machine) -> dict[str, float]:
     if not steps:
         return {}
     settling = [_number(s["settling_s"]) for s in steps]
-    own = {}
     if machine.metres_per_unit is None:
-        unit = "final_error_rad" if machine.unit in ANGLES else "final_error"
-        own = {"final_error": _largest(steps, unit)}
+        own = _largest(steps, "final_error_rad" if machine.unit in ANGLES else "final_error")
+    else:
+        own = _largest(steps, "final_error_mm") / (1000.0 * machine.metres_per_unit)
     found = {
-        **own,
+        "final_error": own,
         "final_error_mm": _largest(steps, "final_error_mm"),
         "overshoot_pct": _largest(steps, "overshoot_pct"),
         "settling_s": max(settling) if all(x == x for x in settling) else NAN,
@@ -85,11 +85,13 @@ def _number(value: float | None) -> float:
 
 
 def _error(rows: np.ndarray, machine: Machine) -> dict[str, float]:
-    if machine.metres_per_unit is None:
-        error = rows[machine.signals.error]
-        return {"rms_error": float(np.sqrt(np.mean(error * error))), "peak_error": float(np.max(np.abs(error)))}
-    error = 1000.0 * machine.metres_per_unit * rows[machine.signals.error]
-    return {"rms_error_mm": float(np.sqrt(np.mean(error * error))), "peak_error_mm": float(np.max(np.abs(error)))}
+    error = rows[machine.signals.error]
+    rms, peak = float(np.sqrt(np.mean(error * error))), float(np.max(np.abs(error)))
+    found = {"rms_error": rms, "peak_error": peak}
+    if machine.metres_per_unit is not None:
+        mm = 1000.0 * machine.metres_per_unit
+        found |= {"rms_error_mm": mm * rms, "peak_error_mm": mm * peak}
+    return found
 
 
 def _tension(rows: np.ndarray) -> dict[str, float]:

@@ -66,8 +66,8 @@ def _compile(machine: Any, link: str) -> None:
     from rtctl.daemon.plant_process import Plant
     from rtctl.loop import generate, zmq_link
     from rtctl.loop.loop import Loop
-    from rtctl.loop.memory import Segment
     from rtctl.loop.records import layout
+    from rtctl.tick.memory import Segment
 
     made = generate.generate(machine, link)
     with tempfile.TemporaryDirectory(prefix="rtctl-build-") as folder:

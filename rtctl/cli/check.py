@@ -87,7 +87,7 @@ def _own(machine: Any) -> list[tuple[str, str]]:
     """What a check of the user's own files has found. Raises UserError where one may not go into the tick."""
     if not machine.config.own:
         return []
-    from rtctl.own.machine import verdicts
+    from rtctl.machines.own_check import verdicts
 
     rows = []
     for v in verdicts(machine):

@@ -103,9 +103,9 @@ def _written() -> Iterator[float]:
 
 def _collect() -> dict[str, Any]:
     from rtctl.config.schema import settings_table
-    from rtctl.loop.faults import KINDS
     from rtctl.machines import EVERY
     from rtctl.plants.physics import TERMS
+    from rtctl.tick.faults import KINDS
 
     rows = [row for model in EVERY.values() for row in settings_table(model) if row.type != "keys"]
     paths = {_plain(row.path) for row in rows if "[]" not in row.path}

@@ -1,5 +1,6 @@
 """`rtctl diagnose`: find the physics that a simulation lacks, in one recording, in many, or on a running machine."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,10 +18,11 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def diagnose(
     what: Annotated[
-        str,
+        list[str],
         typer.Argument(
-            metavar="BUNDLE",
-            help="Folder with recording.parquet and case.json, or a folder of such; with --closed-loop a CONFIG.",
+            metavar="BUNDLE...",
+            help="Folder with recording.parquet and case.json, or a folder of such; several of one described machine; "
+            "with --closed-loop a CONFIG.",
         ),
     ],
     heldout: Annotated[
@@ -48,10 +50,27 @@ def diagnose(
         str, typer.Option("--limit", metavar="T", help="Of a folder: longest time for a bundle, e.g. 600s.")
     ] = "600s",
     again: Annotated[bool, typer.Option("--again", help="Of a folder: also those that are diagnosed already.")] = False,
+    together: Annotated[
+        bool,
+        typer.Option(
+            "--together",
+            help="The bundles, or all in the folder, are of one described machine: one verdict.",
+        ),
+    ] = False,
     terms: Annotated[
         list[str] | None,
         typer.Option(
             "--term", metavar="FILE:NAME", help="A term of your own, ./windage.py:Windage, to be tried as well."
+        ),
+    ] = None,
+    mechanics: Annotated[
+        str | None,
+        typer.Option("--mechanics", metavar="FILE", help="Your file of the machine's M(q) and h(q, v), ./furuta.py."),
+    ] = None,
+    machine: Annotated[
+        Path | None,
+        typer.Option(
+            "--machine", metavar="YAML", help="Your config that names such a file; nothing else is taken of it."
         ),
     ] = None,
     closed_loop: Annotated[
@@ -70,6 +89,9 @@ def diagnose(
     answers are left, experiment.yaml, which tells them apart. Of a folder of bundles, those that are diagnosed already
     are left alone, and NAME-heldout is the second recording of NAME.
 
+    Several bundles are one machine where their cases name one `group`, or with --together: one verdict for all of them,
+    written into the first. Numbers and effects are shared, each recording has its own start and its own noise.
+
     With --closed-loop the machine is recorded first, and where two answers are left the experiment is run and diagnosed
     as well. An emulated machine runs on virtual time.
 
@@ -83,7 +105,11 @@ def diagnose(
 
       rtctl diagnose runs/ivu-20250102-101500 --term ./windage.py:Windage
 
+      rtctl diagnose bench --mechanics ./furuta.py
+
       rtctl diagnose recordings --jobs 2 --no-report
+
+      rtctl diagnose turns-left turns-right --together
 
       rtctl diagnose --closed-loop ivu --for 25s --reference constant_speed
     """
@@ -94,10 +120,13 @@ def diagnose(
         _refuse(f"--engine {engine}", f"is not known; it is {' or '.join(ENGINES)}")
     console = DiagnoseConsole(json)
     _register(terms or [])
+    _couple(mechanics, machine)
     if closed_loop:
         if heldout is not None:
             _refuse("--heldout", "goes with a BUNDLE, not with --closed-loop")
-        _machine(console, what, set_, mode, reference, common.seconds(duration, "--for"), out, report, json)
+        if len(what) > 1 or together:
+            _refuse("--closed-loop", "takes one CONFIG")
+        _machine(console, what[0], set_, mode, reference, common.seconds(duration, "--for"), out, report, json)
         return
     alone = {"--for": duration, "--reference": reference, "--mode": mode, "--set": set_}
     for option, given in alone.items():
@@ -106,11 +135,21 @@ def diagnose(
 
     from rtctl.diagnose.folder import tasks
 
-    bundle = Path(what)
-    found = tasks(bundle, out, heldout, engine)
-    if found:
+    bundle = Path(what[0])
+    found = tasks(bundle, out, heldout, engine) if len(what) == 1 else []
+    if together or len(what) > 1:
+        from rtctl.diagnose.engines import of_one_machine
+
+        if heldout is not None:
+            _refuse("--heldout", "goes with one BUNDLE; of several the last part of each is held out")
+        bundles = [task.bundle for task in found] or [Path(one) for one in what]
+        of_one_machine(bundles, together)
+        _bundle(console, bundles[0], None, out, report, json, engine, bundles[1:])
+    elif found:
         if terms:
             _refuse("--term", "goes with one bundle, not with a folder of them")
+        if mechanics is not None or machine is not None:
+            _refuse("--mechanics and --machine", "go with one bundle, not with a folder of them")
         length = common.seconds(limit, "--limit")
         assert length is not None
         _folder(console, found, jobs, length, report, again, json)
@@ -131,6 +170,17 @@ def _register(terms: list[str]) -> None:
             raise UserError(f"--term {word}: {error}") from error
 
 
+def _couple(mechanics: str | None, machine: Path | None) -> None:
+    """The mechanics of a file that the user names are known from here on; none is taken from a bundle."""
+    if mechanics is not None or machine is not None:
+        from rtctl.own.mechanics import give, give_machine
+
+        if machine is not None:
+            give_machine(machine)
+        if mechanics is not None:
+            give(mechanics)
+
+
 def _refuse(option: str, why: str) -> None:
     from rtctl.config.errors import UserError
 
@@ -138,15 +188,22 @@ def _refuse(option: str, why: str) -> None:
 
 
 def _bundle(
-    console: Any, bundle: Path, other: Path | None, out: Path | None, report: bool, json: bool, engine: str
+    console: Any,
+    bundle: Path,
+    other: Path | None,
+    out: Path | None,
+    report: bool,
+    json: bool,
+    engine: str,
+    more: Sequence[Path] = (),
 ) -> None:
     from rtctl.diagnose.engines import diagnose_into
     from rtctl.diagnose.results import FOLDER
 
     folder = out if out is not None else bundle / FOLDER
     with console.stages() as stage:
-        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage, engine)
-    console.notes([*made.diagnosis.record.case.warnings, *made.faults])
+        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage, engine, more)
+    console.notes([*made.data.get("warnings", made.diagnosis.record.case.warnings), *made.faults])
     if json:
         common.print_json(made.data)
     elif made.described:

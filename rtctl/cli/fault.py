@@ -41,7 +41,7 @@ def add(
       rtctl fault add plant.kill --for 1s --name ldu
     """
     from rtctl.config.errors import UserError, nearest
-    from rtctl.loop.faults import KINDS
+    from rtctl.tick.faults import KINDS
 
     if fault not in KINDS:
         near = nearest(fault, KINDS)
@@ -159,7 +159,7 @@ def _size(text: str, unit: str) -> float:
 
 
 def _catalogue(json: bool) -> None:
-    from rtctl.loop.faults import KINDS
+    from rtctl.tick.faults import KINDS
 
     if json:
         common.print_json({"faults": [{"fault": name, **kind._asdict()} for name, kind in KINDS.items()]})

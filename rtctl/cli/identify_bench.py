@@ -49,7 +49,7 @@ def friction(
     points, refused = experiment.points_of(records, turns)
     result = experiment.friction(points, refused, records[0].kind)
     split = None
-    if records[0].kind == "ivu" and len(records) > 2:
+    if records[0].profile.pairs and len(records) > 2:
         from rtctl.config.errors import NoAnswer
 
         try:
@@ -172,13 +172,14 @@ def scale(
       rtctl identify scale runs/slow runs/fast --travel 300mm --json
     """
     from rtctl.identify import scale_error, wavelength
+    from rtctl.machines.profile import SCALE
 
     length = positive_si(travel, "--travel", "m", "600mm")
     speeds = [positive_si(text, "--speed", "m/s", "20mm/s") for text in speed or ("20mm/s", "50mm/s")]
     records = _records(
         source, set_, out, json, lambda config: [scale_error.scale_config(config, length + MARGIN, v) for v in speeds]
     )
-    R_c = records[0].config.sensors.R_c if records[0].kind == "ldu" else 0.0
+    R_c = records[0].config.sensors.R_c if records[0].profile.has(SCALE) else 0.0
     every = [one for record in records for one in scale_error.passes(record, length)]
     trends = [scale_error.scale_error(one.x, one.e, R_c) for one in every]
     spectra = [wavelength.spectrum(one.x, one.e, x_e=min(length, float(one.x[-1]))) for one in every]
@@ -235,10 +236,11 @@ def steps(
       rtctl identify steps runs/steps --json
     """
     from rtctl.identify import steps as experiment
+    from rtctl.machines.profile import SCALE
 
     records = _records(source, set_, out, json, experiment.usual_configs)
     found = [experiment.steps(record, by) for record in records]
-    labels = [f"{1e3 * experiment.size_mm(one):.1f} um" if records[0].kind == "ldu" else "" for one in found]
+    labels = [f"{1e3 * experiment.size_mm(one):.1f} um" if records[0].profile.has(SCALE) else "" for one in found]
     if plot is not None:
         from rtctl.identify import bench_figures
 

@@ -190,10 +190,11 @@ def _responses(records: list[Any]) -> list["Frf"]:
     from rtctl.config.errors import UserError
     from rtctl.identify import best_linear, sensitivity
     from rtctl.identify.frf import motor_of
+    from rtctl.machines.profile import REELS
 
     groups: dict[Any, list[Any]] = {}
     for record in records:
-        radius = record.config.radius.model_dump_json() if record.kind == "ivu" else ""
+        radius = record.config.radius.model_dump_json() if record.profile.has(REELS) else ""
         groups.setdefault((record.config.excitation.kind, motor_of(record), radius), []).append(record)
     found = []
     for (kind, _, _), group in groups.items():
@@ -223,7 +224,9 @@ def _volts(text: str | None) -> float | None:
 
 
 def _speed(config: Any, text: str | None) -> float | None:
-    unit, example = ("rad/s", "2rad/s") if config.kind == "ivu" else ("m/s", "5mm/s")
+    from rtctl.machines.profiles import profile_of
+
+    unit, example = ("rad/s", "2rad/s") if profile_of(config.kind).unit == "rad" else ("m/s", "5mm/s")
     return None if text is None else positive_si(text, "--speed", unit, example)
 
 
@@ -248,7 +251,9 @@ def _degrees(x: Any) -> float:
 
 
 def _unit(frf: "Frf") -> str:
-    return f"{'rad' if frf.kind == 'ivu' else 'm'}/{'A' if frf.per_ampere else 'V'}"
+    from rtctl.machines.profiles import profile_of
+
+    return f"{profile_of(frf.kind).unit}/{'A' if frf.per_ampere else 'V'}"
 
 
 def _sensitivity_table(result: "Sensitivity") -> list[str]:

@@ -90,9 +90,11 @@ def import_(
     }  # fmt: skip
     plan = with_options(plan, plant, map_ or [], unit or [], rate, parameter or [], case or [], uneven, text)
     if machine is not None:
+        from rtctl.own.mechanics import give_machine
         from rtctl.plants.graph.file import read_machine
         from rtctl.trace.imports.described import make_described
 
+        give_machine(machine)
         believed = read_machine(machine)
         made = make_described(read(file, plan.text), plan, believed, out)
     else:

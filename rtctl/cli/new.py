@@ -20,7 +20,8 @@ def new(
         typer.Option(
             "--like",
             metavar="MACHINE",
-            help="Machine to start from: belt, arm, screw, torsion, pendulum, hoist, spindle, gantry, two-motor, axis.",
+            help="Machine to start from: belt, arm, screw, torsion, pendulum, hoist, spindle, gantry, two-motor, axis, "
+            "furuta, cart-pole.",
         ),
     ] = "belt",
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder; made where it is missing.")] = Path(),

@@ -56,12 +56,17 @@ def tune(
       rtctl tune ldu --set sensors.feedback=scale --gm 11 --pm 60
     """
     from rtctl.design import tune as design
+    from rtctl.machines.profile import REELS
+    from rtctl.machines.profiles import profile_of
 
     settings = common.load_config(config, set_)
     common.machine_of(settings)
     file = out or Path(f"{settings.name}-tuned.yaml")
     picture = plot or file.with_suffix(".png")
-    pictures = [picture, *([picture.with_stem(f"{picture.stem}-radii")] if settings.kind == "ivu" else [])]
+    pictures = [
+        picture,
+        *([picture.with_stem(f"{picture.stem}-radii")] if profile_of(settings.kind).has(REELS) else []),
+    ]
     check_files(file, pictures, force)
     found = design.tune(settings, bandwidth, damping, gm, pm)
     header = f"{settings.name}, tuned by `rtctl tune`.\nbefore: {design.words(found.before)}\n"

@@ -4,12 +4,13 @@ import os
 from typing import Any
 
 from rtctl.daemon import tap
-from rtctl.loop import generate, safety
+from rtctl.loop import generate
 from rtctl.loop.histogram import percentiles
-from rtctl.loop.memory import Segment
 from rtctl.loop.records import STAGES, late_ticks
 from rtctl.loop.ring import Reader
 from rtctl.machines import Machine
+from rtctl.tick import safety
+from rtctl.tick.memory import Segment
 from rtctl.trace.recorder import Recorder
 
 

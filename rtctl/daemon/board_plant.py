@@ -10,10 +10,10 @@ from typing import Any
 from rtctl.daemon.link_end import LinkEnd, now, sleep_until
 from rtctl.drivers.board import Board
 from rtctl.drivers.boards import make
-from rtctl.loop import safety
 from rtctl.loop.realtime import RealTime
 from rtctl.machines import Machine
 from rtctl.machines.wiring import wiring
+from rtctl.tick import safety
 
 
 class BoardPlant:

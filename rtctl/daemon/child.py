@@ -21,10 +21,10 @@ from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.daemon import keys, server
 from rtctl.loop import generate, zmq_link
-from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.machines import Machine
 from rtctl.own.files import trust
+from rtctl.tick.memory import Segment
 
 # Frames a link may hold. ZeroMQ learns what has left its queue only now and then, every 100 frames received at the
 # latest: fewer than twice that, and in lockstep a frame could find a queue full that has long been empty.

@@ -11,8 +11,9 @@ from rtctl.config.load import get_path, set_path
 from rtctl.config.units import convert
 from rtctl.daemon.protocol import Args
 from rtctl.idiom import fill_record
-from rtctl.loop import generate, safety
+from rtctl.loop import generate
 from rtctl.machines import Machine
+from rtctl.tick import safety
 
 if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor

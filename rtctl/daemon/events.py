@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import structlog
 
-from rtctl.loop import safety
 from rtctl.machines.base import COMMON_COLUMNS
+from rtctl.tick import safety
 
 log = structlog.get_logger()
 COMMON = {column.name for column in COMMON_COLUMNS} - {"watchdog", "lateness"}

@@ -20,7 +20,7 @@ from rtctl.config import complaints
 from rtctl.config.errors import UserError
 from rtctl.config.isolated import python
 from rtctl.daemon.children import ChildProcess
-from rtctl.loop import faults
+from rtctl.tick import faults
 from rtctl.trace.recorder import Recorder
 
 if TYPE_CHECKING:

@@ -13,6 +13,8 @@ from rtctl.drivers import daq_stc, linear_scale, ls7084, optical_sensor
 from rtctl.drivers.emulated import EmulatedCard
 from rtctl.drivers.nidaq import EmulatedBoard
 from rtctl.machines import Machine
+from rtctl.machines.profile import REELS, SCALE
+from rtctl.machines.profiles import profile_of
 from rtctl.machines.wiring import TERMINALS, wiring
 from rtctl.plants.fmu import Fmu
 
@@ -37,10 +39,11 @@ class FmuPlant:
 
     def _wired(self, config: Any, dt: float) -> list[Sensor]:
         """What each reading of the FMU does to the board, in the order of the machine's sensors."""
-        if config.kind == "ivu":
+        profile = profile_of(config.kind)
+        if profile.has(REELS):
             reels = ((config.sensors.reel1, config.board.reel1), (config.sensors.reel2, config.board.reel2))
             return [self._rotary(0, config.sensors.capstan, dt), *(self._optical(s, w.channel, dt) for s, w in reels)]
-        if config.kind == "ldu":
+        if profile.has(SCALE):
             return [self._rotary(0, config.sensors.encoder, dt), self._linear(1, config.sensors.scale, dt)]
         return [self._linear(0, config.encoder, dt)]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from rtctl.loop import generate
 
-now = time.monotonic_ns  # CLOCK_MONOTONIC, as rtctl.loop.clock
+now = time.monotonic_ns  # CLOCK_MONOTONIC, as rtctl.tick.clock
 
 
 def sleep_until(wake: int) -> None:

@@ -12,9 +12,10 @@ import zmq
 
 from rtctl.config.errors import UserError
 from rtctl.daemon import child, compiling
-from rtctl.loop import frames, generate, zmq_link
+from rtctl.loop import generate, zmq_link
 from rtctl.loop.loop import Loop
 from rtctl.loop.realtime import RealTime
+from rtctl.tick import frames
 
 FOREVER = 2**62
 

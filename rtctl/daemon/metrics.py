@@ -14,9 +14,9 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 
 from rtctl.config.errors import UserError
-from rtctl.loop import safety
 from rtctl.loop.histogram import octaves, total
 from rtctl.loop.records import STAGES
+from rtctl.tick import safety
 
 if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor

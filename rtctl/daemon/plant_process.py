@@ -15,9 +15,10 @@ from rtctl.config.errors import UserError
 from rtctl.daemon import child, compiling
 from rtctl.daemon.server import release
 from rtctl.drivers.board import BoardError
-from rtctl.loop import frames, generate
+from rtctl.loop import generate
 from rtctl.loop.records import PLANT_STATUS
 from rtctl.machines import Machine, fmu_of
+from rtctl.tick import frames
 
 SECOND = 1_000_000_000
 MOST_BEHIND = 200  # periods that the emulator makes up for before it lets time slip

@@ -18,7 +18,7 @@ import numpy as np
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
 from rtctl.daemon import tap
-from rtctl.loop.memory import Segment
+from rtctl.tick.memory import Segment
 
 SHM = Path("/dev/shm")
 VARIABLE = "RTCTL_SHM_DIR"

@@ -34,12 +34,13 @@ from rtctl.daemon.outside import Outside
 from rtctl.daemon.reload import reload
 from rtctl.daemon.server import runtime_dir
 from rtctl.daemon.starting import Starting, ended
-from rtctl.loop import generate, safety
+from rtctl.loop import generate
 from rtctl.loop.histogram import account
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.records import STAGES, layout
 from rtctl.loop.ring import Reader
 from rtctl.own import files as own_files
+from rtctl.tick import safety
 from rtctl.trace.orders import Journal
 from rtctl.trace.recorder import Recorder
 from rtctl.trace.rotation import Rotation

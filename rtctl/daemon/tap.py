@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.loop.memory import Segment
+from rtctl.tick.memory import Segment
 
 
 def describe(segment: Segment) -> dict[str, Any]:

@@ -17,22 +17,13 @@ from rtctl.config.errors import NoAnswer
 from rtctl.config.load import set_path, set_paths
 from rtctl.design import margins, response
 from rtctl.design.margins import Margins
-from rtctl.loop import fused, safety
+from rtctl.loop import fused
 from rtctl.machines.base import DESCRIBED
+from rtctl.machines.profiles import profile_of
+from rtctl.tick import safety
 
 PERIODS = 3  # averaged, after one in which the loop forgets how it began
 SURE = 0.05  # deviation of the mean loop gain over the periods, above which a line is left out
-NO_FRICTION = {
-    "ivu": {
-        "plant.parameters.tau_F1": 0.0,
-        "plant.parameters.tau_F2": 0.0,
-        "plant.parameters.tau_Fc": 0.0,
-        "law.friction.motor1.tau_C": 0.0,
-        "law.friction.motor2.tau_C": 0.0,
-    },
-    "ldu": {"plant.parameters.F_c": 0.0, "law.friction.F_c": 0.0},
-    "axis": {"plant.parameters.F_c": 0.0},
-}
 
 
 class Measured(NamedTuple):
@@ -52,10 +43,9 @@ def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None
     if config.kind == DESCRIBED:
         still = {f"machine.bodies.{name}.dry": 0.0 for name in config.machine.bodies}
     else:
-        still = NO_FRICTION[config.kind]
+        still = dict(profile_of(config.kind).frictionless)
     values: dict[str, Any] = {**still, "loop.mode": "fused", "loop.write": config.loop.write}
-    if config.kind == "ivu":
-        values["law.allocation.kind"] = "motor1"
+    values |= profile_of(config.kind).alone
     config = set_paths(config, values)
     f_max = f_max or 0.4 * config.loop.rate
     config = set_path(config, "reference", {})

@@ -18,6 +18,8 @@ from rtctl.config.load import set_path, set_paths
 from rtctl.design import mechanics
 from rtctl.drivers import ldu_amplifier
 from rtctl.loop import fused
+from rtctl.machines.profile import REELS
+from rtctl.machines.profiles import PROFILES, profile_of
 from rtctl.plants import ivu, ldu
 
 SHARE = 0.97  # of the friction that is compensated
@@ -42,11 +44,11 @@ class Worth(NamedTuple):
 
 def design(config: Any, share: float = SHARE) -> list[Value]:
     """Feedforward values for the model of a config, `share` of its friction. Raises UserError for another machine."""
-    if config.kind == "ivu":
-        return _ivu(config, share)
-    if config.kind == "ldu":
-        return _ldu(config, share)
-    raise UserError(f"machine: {config.kind} has no feedforward; ivu and ldu have")
+    profile = profile_of(config.kind)
+    if not profile.feedforward:
+        known = " and ".join(kind for kind, other in PROFILES.items() if other.feedforward)
+        raise UserError(f"machine: {config.kind} has no feedforward; {known} have")
+    return _reels(config, share) if profile.has(REELS) else _carriage(config, share)
 
 
 def applied(config: Any, values: list[Value]) -> Any:
@@ -56,11 +58,7 @@ def applied(config: Any, values: list[Value]) -> Any:
 
 def without(config: Any) -> Any:
     """The config with every feedforward switched off."""
-    off = {
-        "ivu": ("law.friction.motor1.tau_C", "law.friction.motor2.tau_C", "law.inertia.share"),
-        "ldu": ("law.friction.F_c", "law.inertia.volts"),
-    }
-    return set_paths(config, dict.fromkeys(off[config.kind], 0.0))
+    return set_paths(config, dict.fromkeys(profile_of(config.kind).feedforward, 0.0))
 
 
 def computed_torque(config: Any) -> float:
@@ -86,12 +84,12 @@ def _played(config: Any, seconds: float) -> tuple[float, float, float]:
     if run.tripped:
         raise NoAnswer(f"the run tripped ({run.tripped}) at {run.trip_time:.3g} s")
     rows = run.between(0.0, seconds)
-    error = rows["capstan_error" if config.kind == "ivu" else "position_error"]
+    error = rows[profile_of(config.kind).error]
     still = _rests(rows["target"], round(0.2 * config.loop.rate))
     if not still.size:
         raise NoAnswer("the reference never rests long enough to tell a final error; take one with steps")
     swing = float("nan")
-    if config.kind == "ivu":
+    if profile_of(config.kind).has(REELS):
         swing = float(np.sqrt(np.mean([np.var(rows[name]) for name in ("truth_tension1", "truth_tension2")])))
     return float(np.sqrt(np.mean(error**2))), float(np.abs(error[still]).max()), swing
 
@@ -105,7 +103,7 @@ def _rests(target: np.ndarray, few: int) -> np.ndarray:
     return ends[1:][np.diff(ends) > few]
 
 
-def _ivu(config: Any, share: float) -> list[Value]:
+def _reels(config: Any, share: float) -> list[Value]:
     p = ivu.parameters(config.plant)
     J = (p.J_m1 + p.J_m2 + float(p.J_1 or 0.0) + float(p.J_2 or 0.0)) / 2
     return [
@@ -124,7 +122,7 @@ def _ivu(config: Any, share: float) -> list[Value]:
     ]
 
 
-def _ldu(config: Any, share: float) -> list[Value]:
+def _carriage(config: Any, share: float) -> list[Value]:
     p = ldu.parameters(config.plant)
     force = p.R_t / p.R_s * p.K_m1 * ldu_amplifier.AMPERE_PER_VOLT / p.R_c
     return [

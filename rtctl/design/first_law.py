@@ -20,6 +20,8 @@ from rtctl.design import margins, response, systems
 from rtctl.design.margins import Margins
 from rtctl.laws import pd, pi_velocity, velocity
 from rtctl.machines.described_parts import Parts, parts_of
+from rtctl.plants.graph.coupled import pulled
+from rtctl.plants.graph.layout import layout
 
 CROSSOVERS = 60  # tried, evenly in the logarithm
 SLOWEST, FASTEST = 1 / 4000, 1 / 12  # of the sample rate
@@ -90,7 +92,9 @@ def kind_for(config: Any) -> tuple[str, str]:
     parts = parts_of(config)
     if parts.is_speed:
         return "pi_velocity", f"PI: {parts.feedback} shows a speed"
-    if any(body.weights for body in parts.machine.bodies.values()):
+    machine = parts.machine
+    swings = pulled(layout(machine), dict(machine.paths()))
+    if any(body.weights for body in machine.bodies.values()) or machine.sensors[parts.feedback].body in swings:
         return "pi_velocity", "PI with velocity feedback: weight pulls, and the integral holds it"
     return "pd", f"PD: {parts.feedback} shows a position, and nothing pulls at rest"
 

@@ -16,23 +16,12 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.config.errors import UserError
-from rtctl.drivers import ldu_amplifier
 from rtctl.laws import allocation, gain_schedule
 from rtctl.machines import described
-from rtctl.machines.base import DESCRIBED
+from rtctl.machines.profile import Model
+from rtctl.machines.profiles import profile_of
 from rtctl.own.files import is_own, refuse_plant
-from rtctl.plants import axis as plant_axis
-from rtctl.plants import ivu as plant_ivu
-from rtctl.plants import ldu as plant_ldu
 from rtctl.plants.graph.linearised import linearised, sensor_row
-
-
-class Model(NamedTuple):
-    """A plant from the command (V) to the measured position, x' = A x + b u, y = c x."""
-
-    A: np.ndarray  # (n, n)
-    b: np.ndarray  # (n,)
-    c: np.ndarray  # (n,) m or rad
 
 
 class Loop(NamedTuple):
@@ -61,12 +50,12 @@ def take(config: Any, motor: int = 1) -> Loop:
     blocks = {block.name: block.params for block in machine.diagram.blocks if block.params is not None}
     plant = next(block.params for block in machine.plant_diagram.blocks if block.name == "plant")
     return Loop(
-        model=MODELS[config.kind](config, plant, blocks, motor),
+        model=(profile_of(config.kind).model or _described)(config, plant, blocks, motor),
         blocks=blocks,
         kind=getattr(config.law.position, "kind", "pd"),
         dt=machine.dt,
         delay=int(config.loop.write == "next_tick"),
-        factor=_factor(config, plant, blocks, motor) if config.kind == "ivu" else 1.0,
+        factor=_factor(config, plant, blocks, motor) if "gain_schedule" in blocks else 1.0,
     )
 
 
@@ -160,39 +149,11 @@ def biquad_response(p: Any, back: np.ndarray) -> np.ndarray:
     return (p.b0 + (p.b1 + p.b2 * back) * back) / (1 + (p.a1 + p.a2 * back) * back)
 
 
-def _ivu(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    A, B = plant_ivu.state_space(p)
-    one, two = B[:, 0], -B[:, 1]  # what a positive command does through either motor
-    pulls = {allocation.DIFFERENTIAL: (one + two) / 2, allocation.MOTOR1: one, allocation.MOTOR2: two}
-    b = pulls.get(blocks["allocation"].kind, one if motor == 1 else two)
-    return Model(A, b, _unit(len(A), plant_ivu.CAPSTAN))
-
-
-def _ldu(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    A, B = plant_ldu.state_space(p)
-    c = config.sensors.R_c * _unit(len(A), plant_ldu.ENCODER)
-    if config.sensors.feedback == "scale":
-        c = p.R_c * _unit(len(A), plant_ldu.CAPSTAN)
-    return Model(A, ldu_amplifier.AMPERE_PER_VOLT * B[:, 0], c)
-
-
-def _axis(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    A, B = plant_axis.state_space(p)
-    return Model(A, B[:, 0], _unit(len(A), 0))
-
-
 def _described(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
     A, B = linearised(p)
     machine = config.machine
     name = described.parts_of(config).feedback
     return Model(A, B @ blocks["machine"].shares[: B.shape[1]], sensor_row(machine, p, name))
-
-
-MODELS = {"ivu": _ivu, "ldu": _ldu, "axis": _axis, DESCRIBED: _described}
-
-
-def _unit(n: int, i: int) -> np.ndarray:
-    return np.eye(n)[i]
 
 
 def _factor(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> float:

@@ -14,6 +14,8 @@ import numpy as np
 from rtctl.config.errors import UserError
 from rtctl.design import margins
 from rtctl.design.margins import Margins
+from rtctl.machines.profile import REELS
+from rtctl.machines.profiles import profile_of
 
 RADII = (0.020, 0.025, 0.030, 0.035, 0.040)  # m
 
@@ -58,7 +60,7 @@ def at(config: Any, R_drive: float, R_other: float, motor: int = 1, printed: boo
 
 def with_radii(config: Any, R1: float, R2: float) -> Any:
     """The config with other reels (m), for its laws and its emulator alike."""
-    if config.kind != "ivu":
+    if not profile_of(config.kind).has(REELS):
         raise UserError(f"machine: {config.kind} has no reels; radii are those of an ivu")
     radii = {"R1": float(R1), "R2": float(R2)}
     parameters = config.plant.parameters.model_copy(update=radii)

@@ -22,10 +22,10 @@ from rtctl.design.margins import Margins
 from rtctl.design.robustness import Map
 from rtctl.design.shaping import Limits
 from rtctl.machines.base import DESCRIBED
+from rtctl.machines.profile import AMPLIFIER, REELS
+from rtctl.machines.profiles import profile_of
 
 PLAIN = (6.0, 45.0)  # dB and deg, of machines that are not listed
-BANDWIDTH = {"ivu": 2.0, "ldu": 50.0, "axis": 5.0}  # Hz: w_n of the PD, or -3 dB of the closed loop
-LEAST = {"ivu": (6.0, 45.0), "ldu": (11.0, 60.0), "axis": (6.0, 45.0)}  # dB and deg
 
 
 class Reason(NamedTuple):
@@ -79,14 +79,15 @@ def tune(
     kind = config.kind
     if kind == DESCRIBED:
         return _described(config, bandwidth, GM, PM)
-    least = (LEAST[kind][0] if GM is None else GM, LEAST[kind][1] if PM is None else PM)
-    hertz = BANDWIDTH[kind] if bandwidth is None else bandwidth
+    profile = profile_of(kind)
+    least = (profile.least[0] if GM is None else GM, profile.least[1] if PM is None else PM)
+    hertz = profile.bandwidth if bandwidth is None else bandwidth
     check(hertz, damping, least, config.loop.rate)
     before = starting(config)
-    if kind == "ivu":
-        made, reasons, maps = _ivu(config, hertz, damping, least)
-    elif kind == "ldu":
-        made, reasons, maps = _ldu(config, hertz, least)
+    if profile.has(REELS):
+        made, reasons, maps = _reels(config, hertz, damping, least)
+    elif profile.has(AMPLIFIER):
+        made, reasons, maps = _shaped(config, hertz, least)
     else:
         made, reasons, maps = *_pd(config, hertz, damping), {}
     after = margins.of_config(made)
@@ -153,7 +154,7 @@ def words(m: Margins | None) -> str:
 
 
 def _pd(config: Any, hertz: float, damping: float) -> tuple[Any, list[Reason]]:
-    at = 1.0 if config.kind == "ivu" else hertz
+    at = 1.0 if profile_of(config.kind).has(REELS) else hertz
     found = pd.design(config, 2 * np.pi * hertz, damping, at)
     found = found._replace(gain=float(f"{found.gain:.4g}"), tau_d=float(f"{found.tau_d:.4g}"))
     made = pd.applied(config, found)
@@ -163,7 +164,7 @@ def _pd(config: Any, hertz: float, damping: float) -> tuple[Any, list[Reason]]:
     ]
 
 
-def _ivu(
+def _reels(
     config: Any, hertz: float, damping: float, least: tuple[float, float]
 ) -> tuple[Any, list[Reason], dict[str, Map]]:
     made, reasons = _pd(schedule.with_mode(config, "off"), hertz, damping)
@@ -183,7 +184,7 @@ def _ivu(
     return made, reasons, {"fixed gain": found.fixed, "scheduled": found.scheduled}
 
 
-def _ldu(config: Any, hertz: float, least: tuple[float, float]) -> tuple[Any, list[Reason], dict[str, Map]]:
+def _shaped(config: Any, hertz: float, least: tuple[float, float]) -> tuple[Any, list[Reason], dict[str, Map]]:
     found = shaping.design(config, Limits(GM=least[0], PM=least[1], bandwidth=hertz))
     values = feedforward.design(config)
     made = feedforward.applied(shaping.applied(config, found.law), values)

@@ -4,7 +4,7 @@ likelihood  a posterior over all hypotheses, for any described machine: those of
 rules       the older one, for the three machines of format 1
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -49,6 +49,31 @@ def load(bundle: Path) -> Any:
     return load_record(bundle)
 
 
+def of_one_machine(bundles: Sequence[Path], together: bool) -> None:
+    """Raise UserError unless the bundles are recordings of one described machine.
+
+    They are where each case names the same `group`, or the user says so (`together`).
+    """
+    groups = {}
+    for bundle in bundles:
+        case = load_case(bundle)
+        if not is_described(case):
+            raise UserError(
+                f"{bundle}: recordings that are taken together are of a described machine (exchange format 2); "
+                "diagnose this one alone, or a folder of bundles each by itself"
+            )
+        groups[bundle] = str(case.get("group") or "")
+    if not together and len(set(groups.values()) | {""}) != 2:
+        told = ", ".join(f"{bundle}: {group or 'none'}" for bundle, group in groups.items())
+        raise UserError(
+            f"several recordings are one machine where their case.json names one group ({told}); give --together if "
+            "they are of one machine, else diagnose each by itself or the folder that holds them"
+        )
+    if not together and "" in groups.values():
+        bundle = next(bundle for bundle, group in groups.items() if not group)
+        raise UserError(f"{bundle}/case.json: group is missing, and the others have one; give --together if it belongs")
+
+
 def diagnose_into(
     bundle: Path,
     other: Path | None,
@@ -57,19 +82,21 @@ def diagnose_into(
     base: Path | None = None,
     progress: Callable[[str], None] = lambda _: None,
     engine: str = RULES,
+    more: Sequence[Path] = (),
 ) -> Diagnosed:
     """Diagnose the bundle and write the results into `out`; `other` is a second recording of the same machine.
 
-    Where `base` is given, no link may lead out of it. `engine` is that of a machine of format 1; a described machine
-    has but one. Raises UserError for a bundle that cannot be read and for a disk that does not take the results,
-    NoAnswer for a bundle that supports no verdict.
+    `more` are recordings of the same described machine that are fitted together with the first. Where `base` is given,
+    no link may lead out of it. `engine` is that of a machine of format 1; a described machine has but one. Raises
+    UserError for a bundle that cannot be read and for a disk that does not take the results, NoAnswer for a bundle that
+    supports no verdict.
     """
     from rtctl.diagnose.results import finite
 
     if engine == LIKELIHOOD or of_described(bundle):
         from rtctl.diagnose.graph import answer, files
 
-        found = answer.diagnose(bundle, progress)
+        found = answer.diagnose(bundle, *more, progress=progress)
         if other is not None:
             from rtctl.diagnose.graph.second import predicted
 

@@ -13,13 +13,13 @@ from rtctl.diagnose.model import Model, dry_with_terms
 from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.scales import node_scales
-from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, Coordinate, Hypothesis
+from rtctl.diagnose.space import COSINE, INVERSE, PLACE, REST, SHAPE, SINE, SIZE, Coordinate, Hypothesis
 from rtctl.diagnose.tacho import counts_up
 from rtctl.diagnose.yardstick import Measures
 from rtctl.idiom import Settings
 from rtctl.own.term import sizes
 from rtctl.plants.physics import TERMS, Element, Term, having, nodes, only, standing
-from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Shape, Size, Turn, Where
+from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Rest, Shape, Size, Turn, Where
 
 FALLING = only("falls_to", "dry")  # to what dry friction there is
 USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
@@ -159,6 +159,8 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
         yield (), {}
         if not _sprung(m):  # whose own spring would take up all but a push
             yield (), {part.name: m.scale(node).at(0.5)}
+    elif isinstance(part, Rest):
+        yield (Coordinate(part.name, REST, part.share * m.of(part.measure, node), offset=m.scale(node).at(0.5)),), {}
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
         if jumps:

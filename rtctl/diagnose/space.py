@@ -2,7 +2,9 @@
 
 x holds, in order, ln(value / owner's value) of each plant parameter, then the coordinates of each hypothesis. A
 coordinate is a size in units of its scale, or the logarithm of a shape (a speed, a time, a frequency) over its scale,
-or one of a pair that makes amplitude and phase: the cosine and sine parts are well-behaved where an angle is not.
+or one of a pair that makes amplitude and phase: the cosine and sine parts are well-behaved where an angle is not. The
+place at which a spring rests is fitted as the push that it makes of it: where the stiffness is small a place is not
+well-behaved, a push is.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,10 +20,13 @@ PRIOR = 0.7  # of the tolerance: standard deviation of the owner's error, betwee
 WIDE = 7.0  # in logarithm, of a parameter of which the owner knows nothing
 INSIDE = 0.9  # of the bounds: places to start from
 SIZE, INVERSE, SHAPE, COSINE, SINE, PLACE = "size", "inverse", "shape", "cosine", "sine", "place"
+REST = "rest"
+SOFTEST = 1e-6  # of its typical size: least stiffness by which a place of rest is told
 
 
 class Coordinate(NamedTuple):
-    """One number of a hypothesis. COSINE is followed by SINE; their name is amplitude and phase, split by a bar."""
+    """One number of a hypothesis. COSINE is followed by SINE; their name is amplitude and phase, split by a bar. REST
+    follows the SIZE of its stiffness; its scale is of the force with which the spring pulls at `offset`."""
 
     name: str
     kind: str
@@ -50,7 +55,7 @@ class Hypothesis(NamedTuple):
     @property
     def sizes(self) -> list[int]:
         """Indices of the coordinates that are zero where the effect is."""
-        return [i for i, c in enumerate(self.coordinates) if c.kind in (SIZE, INVERSE, COSINE, SINE)]
+        return [i for i, c in enumerate(self.coordinates) if c.kind in (SIZE, INVERSE, COSINE, SINE, REST)]
 
     def values(self, x: Sequence[float] | np.ndarray) -> dict[str, float]:
         """SI values of the term's parameters at x."""
@@ -64,6 +69,11 @@ class Hypothesis(NamedTuple):
                 amplitude, phase = c.name.split("|")
                 out[amplitude] = c.scale * float(np.hypot(x[i], x[i + 1]))
                 out[phase] = float(np.arctan2(x[i + 1], x[i]))
+            elif c.kind == REST:
+                k = self.coordinates[i - 1]
+                share = float(np.copysign(max(abs(x[i - 1]), SOFTEST), x[i - 1]))
+                out[k.name] = k.scale * share
+                out[c.name] = c.offset + c.scale * float(x[i]) / (k.scale * share)
             elif c.kind == INVERSE:
                 out[c.name] = c.scale / max(float(x[i]), 1e-9)
             elif c.kind == SIZE:

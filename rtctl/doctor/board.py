@@ -14,7 +14,9 @@ from rtctl.doctor.finding import Finding
 from rtctl.drivers import at_mio_16de as mio
 from rtctl.drivers import daq_stc, optical_sensor
 from rtctl.drivers.board import Board
-from rtctl.loop import frames
+from rtctl.machines.profile import REELS, SCALE
+from rtctl.machines.profiles import profile_of
+from rtctl.tick import frames
 
 REST_READS = 200
 REST_CODES = 4  # peak to peak; the thesis's board has 0.5 LSB of dither
@@ -136,11 +138,12 @@ def steps(config: Any) -> list[Step]:
              "0 V, within 5 mV, and no drift", None),
         Step("rest", "", f"counters stand still, inputs within {REST_CODES} codes", _rest(config)),
     ]  # fmt: skip
-    of = {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.kind]
+    profile = profile_of(config.kind)
+    of = _reels if profile.has(REELS) else _carriage if profile.has(SCALE) else _axis
     return [*common, *of(config)]
 
 
-def _ivu(config: Any) -> list[Step]:
+def _reels(config: Any) -> list[Step]:
     counts = config.sensors.capstan.lines * config.sensors.capstan.multiply
     out = [
         *_way("capstan", 0, "Turn the capstan one full turn, tape towards reel 1.", counts, "one turn", TURN),
@@ -153,7 +156,7 @@ def _ivu(config: Any) -> list[Step]:
     return out
 
 
-def _ldu(config: Any) -> list[Step]:
+def _carriage(config: Any) -> list[Step]:
     counts = config.sensors.encoder.lines * config.sensors.encoder.multiply
     travel = round(STROKE / config.sensors.scale.pitch)
     turns = STROKE / (2 * math.pi * config.sensors.R_c)

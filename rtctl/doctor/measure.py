@@ -11,7 +11,7 @@ import numpy as np
 from rtctl.doctor import cyclictest
 from rtctl.doctor.wakeup import Sleeper
 from rtctl.loop import histogram
-from rtctl.loop.clock import SECOND
+from rtctl.tick.clock import SECOND
 
 ROUNDS = 5
 MOST_LATE = 1e-3  # share of late ticks with which a rate still counts as held

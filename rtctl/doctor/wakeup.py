@@ -15,9 +15,10 @@ import numpy as np
 
 from rtctl.config.isolated import python
 from rtctl.idiom import state, tick
-from rtctl.loop import clock, histogram
-from rtctl.loop.memory import borrowed
+from rtctl.loop import histogram
 from rtctl.loop.realtime import RealTime
+from rtctl.tick import clock
+from rtctl.tick.memory import borrowed
 
 WINDOW = state(late=int, skipped=int, lateness=histogram.HISTOGRAM)
 

@@ -61,8 +61,8 @@ COMMON = (
     Case("supply.sag"),
     Case("loop.stall", size=3e-3),
 )
-STANDS = {
-    "ivu": Stand(
+EVERY = (
+    Stand(
         name="ivu",
         reference={"steps": [{"at": 0.2, "to": 6.0, "ramp": 1.5}]},
         begin=2.0,
@@ -74,7 +74,7 @@ STANDS = {
         error="capstan_error",
         cases=(Case("link.delay", size=0.1), *COMMON),
     ),
-    "ldu": Stand(
+    Stand(
         name="ldu",
         reference={"steps": [{"at": 0.1, "to": 0.06, "ramp": 0.03}]},
         begin=0.5,
@@ -86,4 +86,5 @@ STANDS = {
         error="position_error",
         cases=(Case("link.delay", size=0.02), *COMMON, Case("encoder.freeze", channel=1)),
     ),
-}
+)
+STANDS = {stand.name: stand for stand in EVERY}

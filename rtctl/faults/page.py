@@ -5,7 +5,8 @@ from rtctl.faults.notes import NOTES
 from rtctl.faults.play import Outcome
 from rtctl.faults.processes import Survived
 from rtctl.faults.table import Table
-from rtctl.loop.faults import KINDS
+from rtctl.machines.profiles import profile_of
+from rtctl.tick.faults import KINDS
 
 HEAD = """# Faults
 
@@ -31,7 +32,7 @@ zeros were at the machine's outputs while the fault was still there. In every ru
 for bit those of the undisturbed run, no row is lost, and the machine runs again after `reset`, `arm` and
 `play` once the fault has gone; a run that failed in that would say so in its last column.
 """
-UNITS = {"ivu": ("rad", 1.0), "ldu": ("mm", 1e3)}
+UNITS = {"rad": ("rad", 1.0), "m": ("mm", 1e3)}  # of errors, by the unit of position
 
 
 def text(table: Table) -> str:
@@ -56,7 +57,7 @@ def text(table: Table) -> str:
 
 
 def _outcome(o: Outcome, rate: float) -> str:
-    kind, (unit, factor) = KINDS[o.fault], UNITS[o.machine]
+    kind, (unit, factor) = KINDS[o.fault], UNITS[profile_of(o.machine).unit]
     size = f"{o.size:g} {kind.unit}".strip() if kind.size else ""
     size = f"{kind.size} {size}".strip()
     name = f"{o.fault}, channel {o.channel}" if kind.channels > 1 else o.fault

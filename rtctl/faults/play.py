@@ -7,8 +7,8 @@ import numpy as np
 
 from rtctl.faults.cases import Case, Stand
 from rtctl.faults.drives import Inside, Processes, again
-from rtctl.loop import safety
-from rtctl.loop.faults import KINDS
+from rtctl.tick import safety
+from rtctl.tick.faults import KINDS
 
 
 class Outcome(NamedTuple):

@@ -19,9 +19,10 @@ from rtctl.daemon.supervisor import Supervisor
 from rtctl.faults.cases import Stand
 from rtctl.faults.drives import again
 from rtctl.faults.play import same
-from rtctl.loop import generate, safety
-from rtctl.loop.memory import Segment
+from rtctl.loop import generate
 from rtctl.loop.records import layout
+from rtctl.tick import safety
+from rtctl.tick.memory import Segment
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.repair import repair
 

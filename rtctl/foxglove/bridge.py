@@ -14,8 +14,8 @@ from rtctl.daemon.tap import Tap
 from rtctl.foxglove.channels import ERROR, INFO, WARNING, Channels
 from rtctl.foxglove.envelope import Envelope
 from rtctl.foxglove.parameters import SETPOINT, Parameters
-from rtctl.loop import safety
 from rtctl.machines.base import Column
+from rtctl.tick import safety
 
 TURN = 0.02  # s between two looks at the ring
 STATUS = 0.25  # s between two of the status

@@ -13,6 +13,8 @@ import numpy as np
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path, set_paths
 from rtctl.identify.records import Record, take
+from rtctl.machines.profile import REELS
+from rtctl.machines.profiles import kinds_with, profile_of
 
 ARMING = {"given": 1.0, "measured": 14.0}  # s, by where the radii come from
 REST = 0.5  # s, behind the end of the reference
@@ -26,10 +28,10 @@ def changed(config: Any, changes: Mapping[str, Any]) -> Any:
     return set_paths(config, {"excitation": {"kind": "none"}, **changes})
 
 
-def need(machine: str, name: str, *machines: str) -> None:
-    """Raise UserError where a machine is not one of these."""
-    if machine not in machines:
-        raise UserError(f"{name}: this experiment is for {' and '.join(machines)}, not for {machine}")
+def need(machine: str, name: str, *traits: str) -> None:
+    """Raise UserError where a kind of machine has none of the traits (machines/profile.py)."""
+    if not profile_of(machine).traits.intersection(traits):
+        raise UserError(f"{name}: this experiment is for {' and '.join(kinds_with(*traits))}, not for {machine}")
 
 
 def seconds(config: Any) -> float:
@@ -44,7 +46,7 @@ def seconds(config: Any) -> float:
 
 def arming(config: Any) -> float:
     """s, at most, until the reference plays."""
-    return ARMING[config.radius.source if config.kind == "ivu" else "given"]
+    return ARMING[config.radius.source if profile_of(config.kind).has(REELS) else "given"]
 
 
 def play(config: Any, length: float | None = None) -> Record:
@@ -81,6 +83,7 @@ def ramps(t: np.ndarray, ref: np.ndarray, least: float) -> list[tuple[int, int]]
 
 def counts_per_turn(record: Record) -> int:
     """Of the encoder on the capstan."""
-    sensors = record.config.sensors
-    encoder = sensors.capstan if record.kind == "ivu" else sensors.encoder
+    found = profile_of(record.kind).encoder
+    assert found is not None
+    encoder = found(record.config)
     return int(encoder.lines * encoder.multiply)

@@ -129,7 +129,7 @@ def steps(records: Sequence[Record], columns: Sequence[str], labels: Sequence[st
     figure, axes = _panels("Step responses", len(records))
     for one, record, column, label in zip(axes, records, columns, labels, strict=True):
         t = record.t - record.t[0]
-        unit, factor = ("rad", 1.0) if record.kind == "ivu" else ("mm", 1e3)
+        unit, factor = ("rad", 1.0) if record.profile.unit == "rad" else ("mm", 1e3)
         one.plot(*envelope(t, factor * record["target"]), "--", color=INK, linewidth=1.0, label="reference")
         one.plot(*envelope(t, factor * record[column]), color=BLUE, linewidth=1.1, label=f"{column} {label}".strip())
         _words(one, "time [s]", f"[{unit}]")

@@ -20,6 +20,7 @@ import numpy as np
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.identify.frf import Frf, carried, motor_of, radii
 from rtctl.identify.records import Record, check, steady, take_all
+from rtctl.machines.profile import REELS
 
 SMOOTH = 4  # neighbours on either side over which a variance is averaged: few realisations tell little of it
 
@@ -143,7 +144,7 @@ def _realisation(record: Record, n: int, motor: int) -> _Realisation:
 
 def _input(record: Record, motor: int) -> np.ndarray:
     """What was written to the drive, V, with the sign of the command: so rounding and limits are part of the input."""
-    if record.kind != "ivu":
+    if not record.profile.has(REELS):
         return record["u"]
     return record["u1"] if motor == 1 else -record["u2"]
 

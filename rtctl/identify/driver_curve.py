@@ -17,6 +17,7 @@ import numpy as np
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.identify.bench import changed, need
 from rtctl.identify.records import Record
+from rtctl.machines.profile import AMPLIFIER
 from rtctl.plants import ldu
 
 SAMPLES = 7500  # a voltage
@@ -50,7 +51,7 @@ def driver_config(config: Any, highest: float = 3.0, step: float = 0.1) -> Any:
     The amplifier is written raw, without the inverse of its curve. Raises UserError where `highest` is above 3.0 V,
     where it runs away.
     """
-    need(config.kind, config.name, "ldu")
+    need(config.kind, config.name, AMPLIFIER)
     if not 0 < step <= highest <= 3.0 + 1e-9:
         raise UserError(
             f"{config.name}: 0 to {highest:g} V in steps of {step:g} V; the amplifier runs away above 3.0 V"
@@ -101,7 +102,7 @@ def driver_curve(record: Record, least: int = SAMPLES) -> DriverCurve:
     levels = [known[volts] for volts in sorted(known)]
     if len(levels) < 8:
         raise NoAnswer(f"{record.source}: {len(levels)} voltages held for {least} samples; a curve takes at least 8")
-    K_m = ldu.parameters(record.config.plant).K_m1 if record.kind == "ldu" else None
+    K_m = ldu.parameters(record.config.plant).K_m1 if record.profile.has(AMPLIFIER) else None
     return fit(tuple(levels), K_m)
 
 

@@ -19,6 +19,8 @@ from rtctl.config.load import set_path, set_paths
 from rtctl.identify.bench import arming
 from rtctl.identify.sensitivity import AVERAGES, SETTLE, WINDOW
 from rtctl.laws.excitation import MOST
+from rtctl.machines.profile import REELS, Usual
+from rtctl.machines.profiles import PROFILES, profile_of
 
 PERIOD = 4.096  # s: lines 0.24 Hz apart, every other one excited
 START = 0.2  # s at rest before the first leg
@@ -29,31 +31,6 @@ class Experiment(NamedTuple):
 
     config: Any
     seconds: float
-
-
-class Usual(NamedTuple):
-    """What a machine is excited with where nobody says otherwise."""
-
-    speed: float  # rad/s or m/s
-    rms: float  # V, multisine
-    noise_rms: float  # V
-    band: tuple[float, float]  # Hz, multisine
-    noise_top: float  # Hz
-    settle: float  # s from a turn of the reference to constant speed
-    law: dict[str, Any]  # keys of the config
-
-
-USUAL = {
-    "ivu": Usual(  # at 2 rad/s a period would hold a whole number of counts, and rounding would look like distortion
-        1.97, 1.0, 1.2, (0.4, 60.0), 240.0, 2.2,
-        {"law.position": {"gain": 5.0, "tau_d": 0.1, "derivative_filter": 40.0}, "law.tension.F_t": 0.6,
-         "law.gain_schedule.mode": "off"},
-    ),
-    "ldu": Usual(
-        5e-3, 0.25, 0.25, (0.9, 250.0), 1000.0, 0.5,
-        {"law.position": {"kind": "pd", "gain": 1e3, "tau_d": 0.1, "derivative_filter": 1000.0}},
-    ),
-}  # fmt: skip
 
 
 def multisine(
@@ -118,14 +95,17 @@ def noise(
 
 def usual_of(config: Any) -> Usual:
     """The usual excitation of a machine. Raises UserError where there is none."""
-    if config.kind not in USUAL:
-        raise UserError(f"{config.name}: a frequency response is played on {' and '.join(USUAL)}, not on {config.kind}")
-    return USUAL[config.kind]
+    response = profile_of(config.kind).response
+    if response is None:
+        known = [kind for kind, profile in PROFILES.items() if profile.response is not None]
+        raise UserError(f"{config.name}: a frequency response is played on {' and '.join(known)}, not on {config.kind}")
+    return response.usual
 
 
 def check_size(config: Any, rms: float) -> None:
     """Raise UserError where four times `rms` V leaves the drive's linear range (8.1: 5 V; 12.2: 3 V, runaway)."""
-    most = min(config.law.limit.high, 5.0 if config.kind == "ivu" else config.amplifier.limit)
+    drive = usual_of(config).most
+    most = min(config.law.limit.high, config.amplifier.limit if drive is None else drive)
     if 4 * rms > most:
         raise UserError(
             f"{config.name}: excitation of {rms:g} V rms peaks at some {4 * rms:.2g} V, the drive takes {most:g} V; "
@@ -134,10 +114,11 @@ def check_size(config: Any, rms: float) -> None:
 
 
 def _prepared(config: Any, usual: Usual, motor: int, keep_law: bool) -> Any:
-    if motor not in (1, 2) or (motor == 2 and config.kind != "ivu"):
+    profile = profile_of(config.kind)
+    if not 1 <= motor <= len(profile.columns.written):
         raise UserError(f"{config.name}: motor {motor}: the {config.kind} has no such motor")
     config = set_paths(config, {} if keep_law else usual.law)
-    if config.kind == "ivu":
+    if profile.has(REELS):
         config = set_path(config, "law.allocation.kind", f"motor{motor}")
         if config.safety.following_error:
             config = set_path(config, "safety.following_error", max(config.safety.following_error, 1.0))

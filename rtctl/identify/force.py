@@ -7,6 +7,7 @@ import numpy as np
 
 from rtctl.drivers import ldu_amplifier
 from rtctl.identify.records import Record
+from rtctl.machines.profile import REELS
 from rtctl.plants import ivu, ldu
 
 
@@ -22,7 +23,7 @@ def friction_force(record: Record) -> np.ndarray:
     Of an LDU it is the voltage that would give the current that flows: the measured amplifier gives as much at 0 V as
     at 0.8 V, in the direction of its bit.
     """
-    if record.kind == "ivu":
+    if record.profile.has(REELS):
         return tape_force(record) / (1.0 / record["R1"] + 1.0 / record["R2"])
     u = record["u"]
     if record.config.amplifier.kind != "measured":
@@ -32,12 +33,12 @@ def friction_force(record: Record) -> np.ndarray:
 
 def written_force(record: Record) -> np.ndarray:
     """The same, (n,), but with the voltage that the board writes as it is."""
-    return friction_force(record) if record.kind == "ivu" else record["u"]
+    return friction_force(record) if record.profile.has(REELS) else record["u"]
 
 
 def newtons(record: Record, rows: slice) -> float:
     """Mean of the same in N, along the tape or at the carriage."""
-    force = tape_force(record) if record.kind == "ivu" else carriage_force(record)
+    force = tape_force(record) if record.profile.has(REELS) else carriage_force(record)
     return float(np.mean(force[rows]))
 
 

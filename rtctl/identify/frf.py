@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import UserError
-from rtctl.drivers import l292, ldu_amplifier
 from rtctl.identify.records import Record
+from rtctl.machines.profile import REELS
+from rtctl.machines.profiles import profile_of
 
 CIRCLE_95 = 1.7308  # radius in standard deviations of a complex number that holds 95 % of it: sqrt(-ln 0.05)
 
@@ -71,20 +72,15 @@ def carried(relative: np.ndarray) -> np.ndarray:
 
 def drive(config: Any, f: np.ndarray) -> np.ndarray:
     """Response (n,) of the known drive in A/V at `f` (n,) Hz. Raises UserError where the machine has none."""
-    s = 2j * np.pi * np.asarray(f, float)
-    if config.kind == "ivu":
-        K, w, zeta = l292.second_order(config.plant.driver)
-        zero = config.plant.driver.R_F * config.plant.driver.C_F
-        return K * (1 + s * zero) / (1 + 2 * zeta * s / w + (s / w) ** 2)
-    if config.kind == "ldu":
-        w = 2 * np.pi * config.plant.bandwidth
-        return ldu_amplifier.AMPERE_PER_VOLT / (1 + 2 * config.plant.damping * s / w + (s / w) ** 2)
-    raise UserError(f"{config.kind}: volts are force there, no drive is known to be divided out")
+    response = profile_of(config.kind).response
+    if response is None:
+        raise UserError(f"{config.kind}: volts are force there, no drive is known to be divided out")
+    return response.drive(config, np.asarray(f, float))
 
 
 def motor_of(record: Record) -> int:
     """The motor that carries the command. Raises UserError where both do in turn, which is not one response."""
-    if record.kind != "ivu":
+    if not record.profile.has(REELS):
         return 1
     kind = record.config.law.allocation.kind
     if kind in ("motor1", "motor2"):
@@ -100,6 +96,6 @@ def motor_of(record: Record) -> int:
 
 def radii(record: Record, rows: Any) -> tuple[float, float]:
     """Mean radii in m of the rows, as the laws take them; nan where there are no reels."""
-    if record.kind != "ivu":
+    if not record.profile.has(REELS):
         return float("nan"), float("nan")
     return float(record["R1"][rows].mean()), float(record["R2"][rows].mean())

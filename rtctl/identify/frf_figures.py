@@ -11,9 +11,9 @@ from rtctl.identify.best_linear import BestLinear
 from rtctl.identify.frf import Frf
 from rtctl.identify.model_fit import Fit
 from rtctl.identify.sensitivity import Sensitivity
+from rtctl.machines.profile import REELS
+from rtctl.machines.profiles import profile_of
 from rtctl.trace.plot import BLUE, GREEN, GREY, INK, ORANGE, RED
-
-UNITS = {"ivu": "rad", "ldu": "m", "axis": "m"}
 
 
 def sensitivity(result: Sensitivity, model: np.ndarray | None = None) -> Figure:
@@ -57,7 +57,8 @@ def model_fit(result: Fit) -> Figure:
     figure, (above, turn, off) = _panels(3, "Model fit", heights=(2.2, 1.6, 1))
     for i, (frf, model) in enumerate(zip(result.frfs, result.models, strict=True)):
         color = (BLUE, ORANGE, GREEN, RED)[i % 4]
-        label = f"motor {frf.motor}, {1e3 * frf.R1:.1f}/{1e3 * frf.R2:.1f} mm" if frf.kind == "ivu" else "measured"
+        radii = f"motor {frf.motor}, {1e3 * frf.R1:.1f}/{1e3 * frf.R2:.1f} mm"
+        label = radii if profile_of(frf.kind).has(REELS) else "measured"
         _magnitude(above, frf, label, color)
         above.semilogx(frf.f, _db(model), "--", color=INK, linewidth=1.0, label="model" if i == 0 else None)
         phase = _unwrapped(model)
@@ -104,7 +105,7 @@ def _db(x: np.ndarray) -> np.ndarray:
 
 
 def _words(frf: Frf) -> str:
-    return f"|H| [dB, {UNITS[frf.kind]}/{'A' if frf.per_ampere else 'V'}]"
+    return f"|H| [dB, {profile_of(frf.kind).unit}/{'A' if frf.per_ampere else 'V'}]"
 
 
 def _legends(*axes: Axes) -> None:

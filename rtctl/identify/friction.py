@@ -28,10 +28,12 @@ from rtctl.identify.bench import changed, counts_per_turn, need, ramps, whole
 from rtctl.identify.force import friction_force, newtons, tape_force, written_force
 from rtctl.identify.records import Record
 from rtctl.identify.stribeck import Stribeck, stribeck
+from rtctl.machines.profile import REELS, SCALE
+from rtctl.machines.profile import Friction as Usual
+from rtctl.machines.profiles import profile_of
 from rtctl.plants import ivu
 
 TURN = 2.0 * np.pi
-SPEEDS = {"ivu": (0.15, 0.3, 0.6, 1.2, 2.4, 4.0), "ldu": (1.5, 3.0, 6.0, 12.0, 20.0)}  # rad/s of the capstan
 WINDOW = 0.2  # s, and counts of the encoder in it, beyond which a machine runs off; what only gives way is slower
 COUNTS = 3
 RISE = 1.0  # s, that the force takes at least from half of what breaks away to all of it
@@ -58,27 +60,29 @@ class Friction(NamedTuple):
     refused: tuple[str, ...]  # velocities that gave no answer, and why
 
 
+def _usual(machine: str) -> Usual:
+    found = profile_of(machine).friction
+    assert found is not None
+    return found
+
+
 def velocity_config(config: Any, speeds: Sequence[float] | None = None, turns: float = 12.0) -> Any:
     """The config that runs at every speed (rad/s of the capstan) for `turns` turns, out and home again.
 
     A reel unit first winds to the smaller reel, so that it does not run empty. One turn more is for settling.
     """
-    need(config.kind, config.name, "ivu", "ldu")
+    need(config.kind, config.name, REELS, SCALE)
     way = (turns + 1.0) * TURN
-    per_rad = 1.0
-    changes: dict[str, Any] = {}
-    if config.kind == "ivu":
+    usual = _usual(config.kind)
+    per_rad = usual.per_rad(config)
+    if profile_of(config.kind).has(REELS):
         way *= 1.0 if config.radius.R1 < config.radius.R2 else -1.0
-        changes |= {"safety.current_time": 0}
-    else:
-        per_rad = config.sensors.R_c
-        changes |= {"safety.frozen_time": 0}
     steps, at = [], 0.5
-    for speed in speeds or SPEEDS[config.kind]:
+    for speed in speeds or usual.speeds:
         for to in (way, 0.0):
             steps.append({"at": at, "to": to * per_rad, "ramp": speed * per_rad})
             at += abs(way) / speed + 1.0
-    return changed(config, {**changes, "reference": {"steps": steps}})
+    return changed(config, {**usual.running, "reference": {"steps": steps}})
 
 
 def break_away_config(config: Any, times: int = 2, most: float | None = None, rate: float | None = None) -> Any:
@@ -87,22 +91,10 @@ def break_away_config(config: Any, times: int = 2, most: float | None = None, ra
     The law is proportional and so soft that the machine, once it moves, unloads it. No feedforward helps. While it gets
     under way the force still grows: by 4 mV on an LDU (one code of its board), and 1 % on an IVU.
     """
-    need(config.kind, config.name, "ivu", "ldu")
-    if config.kind == "ivu":
-        gain, most, rate = 0.8, most or 1.0, rate or 0.01  # V/rad
-        changes: dict[str, Any] = {
-            "law.position": {"gain": gain, "tau_d": 0.1, "derivative_filter": 10.0},
-            "law.friction": {"motor1": {"tau_C": 0.0}, "motor2": {"tau_C": 0.0}},
-            "law.inertia": {},
-            "law.gain_schedule": {"mode": "off"},
-        }
-    else:
-        gain, most, rate = 100.0, most or 1.15, rate or 0.05  # V/m
-        changes = {
-            "law.position": {"kind": "pi_velocity", "gain": gain, "velocity_gain": 0.1 * gain},
-            "law.friction": {"F_c": 0.0},
-        }
-    changes |= {"safety.frozen_time": 0, "safety.following_error": 0, "law.shaper": {}}
+    need(config.kind, config.name, REELS, SCALE)
+    usual = _usual(config.kind)
+    gain, most, rate = usual.gain, most or usual.most, rate or usual.rate
+    changes = {**usual.soft, "safety.frozen_time": 0, "safety.following_error": 0, "law.shaper": {}}
     reach, ramp = most / gain, rate / gain
     steps, at, x = [], 0.5, 0.0
     for to in [*(reach, -reach) * times, 0.0]:
@@ -225,7 +217,7 @@ def friction(points: Sequence[Point], refused: Sequence[str], machine: str) -> F
             mean.append((v, 0.5 * (F + float(np.mean(pairs)))))
     both = _fit(mean, True)
     fall = both is None or both.F_S is not None
-    unit = "Nm" if machine == "ivu" else "V"
+    unit = _usual(machine).unit
     return Friction(tuple(points), both, _fit(ahead, fall), _fit(behind, fall), unit, tuple(refused))
 
 
@@ -273,6 +265,6 @@ def _mean(points: Sequence[Point]) -> Point:
 
 def _angles(record: Record) -> tuple[np.ndarray, np.ndarray]:
     """Target and encoder angle in rad of the capstan."""
-    if record.kind == "ivu":
+    if record.profile.has(REELS):
         return record["target"], record["capstan"]
     return record["target"] / record.config.sensors.R_c, record["encoder_counts"] * (TURN / counts_per_turn(record))

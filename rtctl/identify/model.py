@@ -14,18 +14,15 @@ from typing import Any
 import numpy as np
 
 from rtctl.design import response
-from rtctl.drivers import l292
 from rtctl.identify.frf import Frf, drive
-from rtctl.plants import ivu as plant_ivu
-from rtctl.plants import ldu as plant_ldu
+from rtctl.machines.profiles import profile_of
 
-PAIRS = {name: (f"{name}1", f"{name}2") for name in ("J_m", "c_m", "k_m", "c", "k", "K_m")}  # equal on both sides
 F_GAIN = 1.0  # Hz, of the process gain (8.2)
 
 
 def keys(kind: str, name: str) -> tuple[str, ...]:
     """Keys of the plant's parameters for which a name stands."""
-    return PAIRS[name] if kind == "ivu" and name in PAIRS else (name,)
+    return profile_of(kind).pairs.get(name, (name,))
 
 
 class Model:
@@ -34,8 +31,7 @@ class Model:
     def __init__(self, config: Any, names: Sequence[str]):
         self.config, self.kind = config, config.kind
         self.parts = response.take(config)
-        plant = plant_ivu if self.kind == "ivu" else plant_ldu
-        self.base = plant.parameters(config.plant)
+        self.base = profile_of(self.kind).plant.parameters(config.plant)
         self.start = {name: float(getattr(self.base, keys(self.kind, name)[0])) for name in names}
 
     def settings(self, values: Mapping[str, float]) -> Any:
@@ -48,21 +44,12 @@ class Model:
 
     def linear(self, values: Mapping[str, float], frf: Frf) -> response.Model:
         """The plant linearised at the radii of a response, the motor of that response pulling."""
-        settings = self.settings(values)
-        if self.kind == "ldu":
-            w = 2 * np.pi * settings.bandwidth
-            p: Any = plant_ldu.build(settings, 1e-3, (w, settings.damping))
-        else:
-            at = settings.parameters.model_copy(update=_at_radii(settings, frf))
-            zero = settings.driver.R_F * settings.driver.C_F
-            one = (*l292.second_order(settings.driver), zero)
-            p = plant_ivu.build(settings.model_copy(update={"parameters": at}), 1e-3, [one, one])
-        alone = self.config
-        if self.kind == "ivu":
-            blocks = {**self.parts.blocks, "allocation": self.parts.blocks["allocation"]._replace(kind=1 + frf.motor)}
-        else:
-            blocks = self.parts.blocks
-        return response.MODELS[self.kind](alone, p, blocks, frf.motor)
+        profile, blocks = profile_of(self.kind), self.parts.blocks
+        assert profile.response is not None and profile.model is not None
+        p = profile.response.params(self.settings(values), frf.R1, frf.R2)
+        if "allocation" in blocks:  # the motor of the response alone
+            blocks = {**blocks, "allocation": blocks["allocation"]._replace(kind=1 + frf.motor)}
+        return profile.model(self.config, p, blocks, frf.motor)
 
     def response(self, values: Mapping[str, float], frf: Frf, tau: float) -> np.ndarray:
         """H at the lines of a response, hold and the delay `tau` s included, per ampere where the response is."""
@@ -81,12 +68,3 @@ class Model:
 def process_gain(config: Any, frf: Frf) -> float:
     """Process gain at 1 Hz of the model in a config, at the radii of a response; rad/s^2/A or m/s^2/A."""
     return Model(config, ()).process_gain({}, frf)
-
-
-def _at_radii(settings: Any, frf: Frf) -> dict[str, float | None]:
-    """Radii of a response; inertias that were given belong to the starting radii and move with (4.1, 4.2)."""
-    p = plant_ivu.parameters(settings)
-    moved: dict[str, float | None] = {"R1": frf.R1, "R2": frf.R2}
-    for J, R, was in (("J_1", frf.R1, p.R1), ("J_2", frf.R2, p.R2)):
-        moved[J] = getattr(p, J) + 0.5 * np.pi * p.rho_tape * p.h_tape * (R**4 - was**4)
-    return moved

@@ -34,16 +34,14 @@ import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.identify.frf import Frf
-from rtctl.identify.model import PAIRS, Model, keys, process_gain
+from rtctl.identify.model import Model, keys, process_gain
+from rtctl.machines.ivu_profile import EACH
+from rtctl.machines.profile import Response
+from rtctl.machines.profiles import PROFILES, profile_of
 
 __all__ = ["EACH", "FREE", "Estimate", "Fit", "fit", "process_gain"]
 
-FREE = {
-    "ivu": ("J_m", "c", "k", "c_m", "k_m"),
-    "ldu": ("J_m", "M", "k_c", "b_c"),
-}
-EACH = ("J_m1", "J_m2", "c1", "c2", "k1", "k2", "c_m1", "c_m2", "k_m1", "k_m2")  # for both motors at two pairs of radii
-BAND = {"ivu": (0.4, 60.0), "ldu": (0.9, 250.0)}  # Hz; 8.1 leaves out what is above 60 Hz, 12.3 what is above 250 Hz
+FREE = {kind: profile.response.free for kind, profile in PROFILES.items() if profile.response is not None}
 SPAN = 8.0  # factor by which a parameter may leave its start
 VAGUE = 1.0  # logarithm: an interval wider than a factor of e each way is no answer
 MISFIT = 2.0  # chi-square a degree of freedom above which the model is not that of the machine
@@ -90,7 +88,7 @@ def fit(
     given = (frfs,) if isinstance(frfs, Frf) else tuple(frfs)
     names = tuple(FREE.get(config.kind, ()) if free is None else free)
     _check(given, config, names)
-    bottom, top = band or BAND[config.kind]
+    bottom, top = band or _response(config).band
     kept = tuple(frf.select((frf.f >= bottom) & (frf.f <= top) & (frf.relative < 0.5)) for frf in given)
     lines = sum(len(frf.f) for frf in kept)
     if 2 * lines < 3 * (len(names) + 1):
@@ -149,7 +147,7 @@ def _check(frfs: tuple[Frf, ...], config: Any, names: Sequence[str]) -> None:
     known = type(config.plant.parameters).model_fields
     for name in names:
         if not all(key in known for key in keys(config.kind, name)):
-            choices = [*known, *(PAIRS if config.kind == "ivu" else ())]
+            choices = [*known, *profile_of(config.kind).pairs]
             near = nearest(name, choices)
             raise UserError(f"free: the {config.kind} has no parameter '{name}'"
                             + (f"; did you mean '{near}'?" if near else ""))  # fmt: skip
@@ -158,6 +156,12 @@ def _check(frfs: tuple[Frf, ...], config: Any, names: Sequence[str]) -> None:
         raise UserError(f"free: {', '.join(names) or 'nothing'}: name each parameter once, and at least one")
     if not frfs or any(frf.kind != config.kind or frf.dt != frfs[0].dt for frf in frfs):
         raise UserError(f"{config.name}: the responses must be of an {config.kind}, all at one rate")
+
+
+def _response(config: Any) -> Response:
+    found = profile_of(config.kind).response
+    assert found is not None
+    return found
 
 
 def _best(misfit: Callable[[np.ndarray], np.ndarray], start: np.ndarray, span: float) -> Any:
@@ -182,9 +186,9 @@ def _misfit(frfs: tuple[Frf, ...], models: list[np.ndarray], chi2: float, config
     worst = max(range(len(off)), key=lambda i: float(off[i].max()))
     f = frfs[worst].f[off[worst] > 0.5 * off[worst].max()]
     hint = ""
-    if config.kind == "ivu":
+    if each := _response(config).each:
         hint = "; where the two sides are not alike, give responses of both motors at two pairs of radii and free "
-        hint += ", ".join(EACH)
+        hint += ", ".join(each)
     return (
         f"the model does not explain the response: its misfit is {np.sqrt(chi2):.3g} times the noise, worst from "
         f"{f.min():.3g} to {f.max():.3g} Hz{hint}"
@@ -245,6 +249,4 @@ def _process_gain(
         more = {**values, name: values[name] * 1.001}
         slope[i] = np.log(model.process_gain(more, frf) / K) / np.log(1.001)
     half = float(wide[0] / deviation[0]) * float(np.sqrt(slope @ covariance @ slope))
-    return Estimate(
-        K, float(K * np.exp(-half)), float(K * np.exp(half)), f"{'rad' if frf.kind == 'ivu' else 'm'}/s^2/A"
-    )
+    return Estimate(K, float(K * np.exp(-half)), float(K * np.exp(half)), f"{profile_of(frf.kind).unit}/s^2/A")

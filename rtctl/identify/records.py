@@ -9,34 +9,20 @@ Experiments read records and nothing else, so they do not know where the data co
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
-from rtctl.loop import safety
 from rtctl.loop.fused import Run
+from rtctl.machines.profile import Columns, Profile
+from rtctl.machines.profiles import profile_of
+from rtctl.tick import safety
 from rtctl.trace.bundle import Bundle
 
 SWINGING = 0.02  # share of saturated samples above which the excitation alone is not to blame
 TURNING = 1e-3  # share of samples that may run against the reference
 STEADY = 0.02  # share of the top speed by which the reference may change its speed in a second
-
-
-class Signals(NamedTuple):
-    """Columns of a machine that mean the same in all of them."""
-
-    position: str
-    command: str  # V, after excitation and friction compensation, before limits
-    written: tuple[str, ...]  # V, to the drives
-    speed: str  # filtered, rad/s or m/s; "" where it is not recorded
-
-
-SIGNALS = {
-    "ivu": Signals("capstan", "u_c", ("u1", "u2"), "capstan_speed"),
-    "ldu": Signals("position", "u_c", ("u",), "speed"),
-    "axis": Signals("x", "u_c", ("u",), ""),
-}
 
 
 @dataclass(frozen=True)
@@ -58,9 +44,14 @@ class Record:
         return np.asarray(self.columns[column], float)
 
     @property
-    def signals(self) -> Signals:
+    def profile(self) -> Profile:
+        """What the machine is."""
+        return profile_of(self.kind)
+
+    @property
+    def signals(self) -> Columns:
         """Names of the position, the command and what was written."""
-        return SIGNALS[self.kind]
+        return self.profile.columns
 
     @property
     def position(self) -> np.ndarray:

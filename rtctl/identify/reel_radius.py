@@ -20,6 +20,7 @@ import numpy as np
 from rtctl.config.errors import NoAnswer
 from rtctl.identify.bench import changed, counts_per_turn, need
 from rtctl.identify.records import Record
+from rtctl.machines.profile import REELS
 
 TURN = 2.0 * np.pi
 TRAVEL = 1.9  # rad of the capstan: 5 % at the largest reel (5.3)
@@ -56,7 +57,7 @@ def travel_for(share: float, increments: float = 209, R_max: float = 0.04, R_c: 
 
 def radius_config(config: Any, travel: float = 3.8, speed: float = 0.5) -> Any:
     """The config that winds `travel` rad to reel 1 and back, each way at `speed` rad/s of the capstan."""
-    need(config.kind, config.name, "ivu")
+    need(config.kind, config.name, REELS)
     back = 0.5 + travel / speed + 1.0
     steps = [{"at": 0.5, "to": travel, "ramp": speed}, {"at": back, "to": 0.0, "ramp": speed}]
     return changed(config, {"reference": {"steps": steps}})
@@ -67,7 +68,7 @@ def reel_radii(record: Record, travel: float = TRAVEL) -> list[Radii]:
 
     Raises NoAnswer where there is none, or a reel gives fewer than 4 pulses on it.
     """
-    need(record.kind, record.source, "ivu")
+    need(record.kind, record.source, REELS)
     phi, n1, n2, t = (record[name] for name in ("capstan", "reel1_counts", "reel2_counts", "t"))
     found, longest = [], 0.0
     for begin, end in one_way(phi, BACK * TURN / counts_per_turn(record)):

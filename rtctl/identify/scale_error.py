@@ -16,6 +16,7 @@ import numpy as np
 from rtctl.config.errors import NoAnswer
 from rtctl.identify.bench import changed, counts_per_turn, need, ramps
 from rtctl.identify.records import Record
+from rtctl.machines.profile import SCALE
 
 RATE = 500.0  # Hz
 CUTOFF = 50.0  # Hz
@@ -44,7 +45,7 @@ class ScaleError(NamedTuple):
 
 def scale_config(config: Any, travel: float = 0.6, speed: float = 0.02) -> Any:
     """The config that runs `travel` m at `speed` m/s, with a run-up that `passes` leaves out."""
-    need(config.kind, config.name, "ldu")
+    need(config.kind, config.name, SCALE)
     more = RUN_UP * speed  # s of it at either end
     step = {"at": 0.3, "to": travel + 2.0 * more, "ramp": speed}
     return changed(config, {"law.shaper": {}, "reference": {"steps": [step]}})
@@ -60,7 +61,7 @@ def passes(record: Record, travel: float | None = None) -> list[Pass]:
     """
     from scipy.signal import butter, sosfiltfilt
 
-    need(record.kind, record.source, "ldu")
+    need(record.kind, record.source, SCALE)
     t, target, scale = record["t"], record["target"], record["scale"]
     R_c = record.config.sensors.R_c
     encoder = record["encoder_counts"] * (2.0 * np.pi / counts_per_turn(record)) * R_c

@@ -13,6 +13,9 @@ import numpy as np
 from rtctl.config.errors import NoAnswer
 from rtctl.identify.bench import changed, need
 from rtctl.identify.records import Record
+from rtctl.machines import module_of
+from rtctl.machines.profile import REELS, SCALE
+from rtctl.machines.profiles import profile_of
 from rtctl.trace.metrics import scales, step_metrics
 
 TWELFTH, TWENTY_FOURTH = 1e-3 / 12, 1e-3 / 24  # m
@@ -33,7 +36,7 @@ class Steps(NamedTuple):
 
 def printing_config(config: Any, size: float = TWELFTH, count: int = 24, hold: float = 0.4) -> Any:
     """The config that makes `count` steps of `size` m, `hold` s each, and the same home again."""
-    need(config.kind, config.name, "ldu")
+    need(config.kind, config.name, SCALE)
     ends = [*range(1, count + 1), *range(count - 1, -1, -1)]
     steps = [{"at": 0.5 + k * hold, "to": n * size} for k, n in enumerate(ends)]
     last = {"at": 0.5 + len(ends) * hold, "to": 0.0}
@@ -46,7 +49,7 @@ def radian_config(config: Any, tau_C: float = 2.4e-3, R1: float = 0.025, R2: flo
     A step is a jump, as in the thesis, without the shaper and the feedforward of inertia; the friction of both motors
     is compensated in full, at standstill too.
     """
-    need(config.kind, config.name, "ivu")
+    need(config.kind, config.name, REELS)
     changes = {
         "law.shaper": {},
         "law.inertia": {},
@@ -68,9 +71,7 @@ def steps(record: Record, by: str | None = None) -> Steps:
     machine = record.kind
     by = by or record.signals.position
     mm, rad = scales({"plant": machine, "parameters": {"R_c": radius(record.config)}})
-    # three counts of the encoder are at rest: a step need not settle closer
-    floor = {"ivu": 3 * 2 * np.pi / 10_000, "ldu": 4e-6, "axis": 0.0}[machine]
-    each = step_metrics(record["t"], record["target"], record[by], mm, rad, settle_floor=floor)
+    each = step_metrics(record["t"], record["target"], record[by], mm, rad, settle_floor=record.profile.still)
     if not each:
         raise NoAnswer(f"{record.source}: the reference makes no step")
     assert mm is not None  # our own machines move along a line
@@ -95,9 +96,7 @@ def summary(each: Sequence[dict[str, float | None]], by: str, mm: float) -> Step
 
 def radius(config: Any) -> float | None:
     """Radius of the capstan, between radians and metres; None on an axis."""
-    if config.kind == "axis":
-        return None
-    return float(config.R_c if config.kind == "ivu" else config.sensors.R_c)
+    return float(module_of(config.kind).radius(config)) if profile_of(config.kind).encoder else None
 
 
 def usual_configs(config: Any) -> list[Any]:
@@ -105,8 +104,8 @@ def usual_configs(config: Any) -> list[Any]:
 
     Raises UserError for another machine.
     """
-    need(config.kind, config.name, "ivu", "ldu")
-    if config.kind == "ldu":
+    need(config.kind, config.name, REELS, SCALE)
+    if profile_of(config.kind).has(SCALE):
         return [printing_config(config, TWELFTH), printing_config(config, TWENTY_FOURTH)]
     return [radian_config(config, 2.4e-3), radian_config(config, 1.5e-3)]
 

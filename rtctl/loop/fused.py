@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from rtctl import machines
-from rtctl.loop import generate, safety
+from rtctl.loop import generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.records import layout
+from rtctl.tick import safety
 
 
 @dataclass(frozen=True, eq=False)

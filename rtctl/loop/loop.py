@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.loop import faults, generate, mailbox
-from rtctl.loop.memory import Segment
+from rtctl.loop import generate, mailbox
 from rtctl.loop.records import MARKS
 from rtctl.machines import Machine
+from rtctl.tick import faults
+from rtctl.tick.memory import Segment
 
 STRETCH = 20_000  # ticks of virtual time between two looks at the ring's reader
 SECOND = 1_000_000_000

@@ -12,8 +12,8 @@ import numpy as np
 
 from rtctl.idiom import state, tick
 from rtctl.laws.reference import SETPOINT
-from rtctl.loop.faults import FAULT, SLOTS
-from rtctl.loop.memory import Segment, fence
+from rtctl.tick.faults import FAULT, SLOTS
+from rtctl.tick.memory import Segment, fence
 
 COMMAND = state(
     stop=int,  # 1: outputs to zero, then end

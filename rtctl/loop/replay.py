@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.loop import generate, mailbox, safety
+from rtctl.loop import generate, mailbox
 from rtctl.loop.records import MARKS
 from rtctl.machines import Machine
+from rtctl.tick import safety
 
 tick: Any = None  # the generated tick, whose `rx` is a recorded row
 ASSIGNED = re.compile(r"^y\.(\w+) = ", re.MULTILINE)

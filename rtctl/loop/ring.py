@@ -7,7 +7,7 @@ it did not get. Rows are numbered from 0, so rows written = rows read + rows los
 import numpy as np
 
 from rtctl.idiom import state, tick
-from rtctl.loop.memory import Segment, fence
+from rtctl.tick.memory import Segment, release
 
 RING = state(
     head=int,  # rows written; the loop writes it
@@ -19,7 +19,7 @@ RING = state(
 def put(ring, rows, row):
     """Append the record `row[0]`; allocates nothing."""
     rows[ring.head % rows.shape[0]] = row[0]
-    fence()  # the row is whole before the head says that it is there
+    release()  # the row is whole before the head says that it is there
     ring.head += 1
 
 

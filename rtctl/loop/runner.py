@@ -5,8 +5,9 @@ What stands here is the loop as it runs; `tick`, `start`, `advance`, `sample` an
 
 from typing import Any
 
-from rtctl.loop import clock, faults, histogram, mailbox, ring, safety
-from rtctl.loop.memory import borrowed
+from rtctl.loop import histogram, mailbox, ring
+from rtctl.tick import clock, faults, safety
+from rtctl.tick.memory import borrowed
 
 tick: Any = None  # the generated tick: tick(p, s, t, c, rx, tx, y, m, k, fresh, late, passed, gone)
 start: Any = None  # the generated plant: start(p, s), advance(p, s, tx), sample(p, s, rx)

@@ -14,8 +14,8 @@ from numba import types
 
 from rtctl.config.errors import UserError
 from rtctl.idiom import tick
-from rtctl.loop import frames
-from rtctl.loop.memory import fence
+from rtctl.tick import frames
+from rtctl.tick.memory import fence
 
 FUTEX = {"x86_64": 202, "aarch64": 98}  # number of the system call, from the kernel's unistd.h of each architecture
 SYS_FUTEX = FUTEX.get(platform.machine(), 0)

@@ -14,7 +14,7 @@ import zmq
 from numba import types
 
 from rtctl.idiom import tick
-from rtctl.loop import frames
+from rtctl.tick import frames
 
 DONTWAIT = 1
 MOST = 64  # frames drained in one tick: a peer that floods us cannot hold the tick

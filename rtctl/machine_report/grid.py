@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from rtctl.plants.graph.description import FRAME, Description
+from rtctl.plants.graph.mechanics import bodies_of, code_of
 
 
 class Grid(NamedTuple):
@@ -77,4 +78,6 @@ def marks(machine: Description, name: str) -> str:
     if body is None or machine.is_frame(name):
         return ""
     words = (["weight"] if body.weights else []) + (["friction"] if body.dry or body.viscous else [])
+    code = code_of(machine)
+    words += [f"moved by {code.name}"] if code is not None and name in bodies_of(machine) else []
     return ", ".join(words)

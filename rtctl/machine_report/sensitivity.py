@@ -15,9 +15,9 @@ import numpy as np
 
 from rtctl.machines.described_plant import FINE
 from rtctl.machines.described_settings import FULL
+from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import layout as layout_of
-from rtctl.plants.graph.params import build
 from rtctl.plants.graph.played import played
 
 SECONDS, MOST_ROWS = 5.0, 5000
@@ -92,7 +92,7 @@ def sensitivity(config: Any) -> Sensitivity:
     lag = max(1, round(WINDOW / dt))
 
     def shown(path: str, factor: float) -> np.ndarray:
-        p = build(layout, {**values, path: values[path] * factor}, dt / substeps)
+        p = machine_params(layout, {**values, path: values[path] * factor}, dt / substeps)
         y = played(p, u, substeps) * scales
         return np.where(moves, y[lag:] - y[:-lag], y[lag:]).ravel()
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rtctl.plants.graph.description import Body, Description
+from rtctl.plants.graph.mechanics import bodies_of, code_of
 from rtctl.plants.graph.units import FORCE, WAY, joint_units
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
@@ -23,7 +24,13 @@ def si(value: float | None, unit: str) -> str:
 
 def sentences(machine: Description) -> list[Line]:
     """Name of the group, in the first line of each, and a line for each element."""
-    groups = (("bodies", _bodies), ("joints", _joints), ("drives", _drives), ("sensors", _sensors))
+    groups = (
+        ("bodies", _bodies),
+        ("mechanics", _mechanics),
+        ("joints", _joints),
+        ("drives", _drives),
+        ("sensors", _sensors),
+    )
     found: list[Line] = []
     for group, told in groups:
         found += [(group if n == 0 else "", line) for n, line in enumerate(told(machine))]
@@ -37,6 +44,15 @@ def _bodies(machine: Description) -> Iterator[str]:
             continue
         size = f"turns, {si(body.inertia, 'kg m^2')}" if body.turns else f"slides, {si(body.mass, 'kg')}"
         yield ", ".join([f"{name} {size}", *_drag(body), *_weight(body)])
+
+
+def _mechanics(machine: Description) -> Iterator[str]:
+    code = code_of(machine)
+    if code is None or machine.mechanics is None:
+        return
+    yield f"{machine.mechanics.kind} moves {' and '.join(bodies_of(machine))} by each other"
+    numbers = machine.mechanics.parameters.items()
+    yield ", ".join(f"{name} {si(value, code.unit(name).replace('*', ' '))}" for name, value in numbers)
 
 
 def _drag(body: Body) -> Iterator[str]:

@@ -6,18 +6,16 @@ from typing import Any, NamedTuple
 
 from rtctl.config.load import Widen
 from rtctl.laws import excitation, reference
-from rtctl.loop import faults
 from rtctl.machines import axis, described, ivu, ldu, own_plant
 from rtctl.machines.base import DESCRIBED, Column, Diagram, MachineSettings, PlantDiagram, Signals
 from rtctl.own import model
 from rtctl.own.files import OwnError
+from rtctl.tick import faults
 
-MODULES: dict[str, Any] = {"ivu": ivu, "ldu": ldu, "axis": axis}
 CONFIGS: dict[str, type[MachineSettings]] = {
-    "ivu": ivu.IvuConfig,
-    "ldu": ldu.LduConfig,
-    "axis": axis.AxisConfig,
+    kind.model_fields["machine"].default: kind for kind in (ivu.IvuConfig, ldu.LduConfig, axis.AxisConfig)
 }
+MODULES: dict[str, Any] = dict(zip(CONFIGS, (ivu, ldu, axis), strict=True))
 EVERY: dict[str, type[MachineSettings]] = {**CONFIGS, DESCRIBED: described.DescribedConfig}  # of every kind
 
 

@@ -19,7 +19,6 @@ from rtctl.laws.limit import LimitSettings
 from rtctl.laws.reference import MetreReferenceSettings
 from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
-from rtctl.loop import safety
 from rtctl.machines.base import (
     COMMON_COLUMNS,
     STATE_LINES,
@@ -37,6 +36,7 @@ from rtctl.machines.physics import PhysicsTerm, check_nodes
 from rtctl.own import law as own_law
 from rtctl.plants import axis as plant_axis
 from rtctl.plants.fmu import FmuSettings
+from rtctl.tick import safety
 
 __all__ = ["play", "prepare"]  # called by the generated tick as machine.play and machine.prepare
 
@@ -146,7 +146,7 @@ USES = (
     "rtctl.laws.reference",
     "rtctl.laws.shaper",
     "rtctl.laws.velocity",
-    "rtctl.loop.safety",
+    "rtctl.tick.safety",
 )
 LAW_SIGNALS = {
     "e": "y.position_error", "x": "y.x", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",

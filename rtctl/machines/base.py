@@ -9,8 +9,8 @@ from pydantic import Field
 from rtctl.drivers.board import EmulatedSettings
 from rtctl.drivers.boards import DriverSettings
 from rtctl.idiom import Settings, quantity
-from rtctl.loop.faults import FaultSettings
-from rtctl.loop.safety import SafetySettings
+from rtctl.tick.faults import FaultSettings
+from rtctl.tick.safety import SafetySettings
 
 DESCRIBED = "described"  # kind of a machine whose config holds its description
 

@@ -10,7 +10,6 @@ import numpy as np
 from rtctl.drivers import daq_stc
 from rtctl.idiom import state, tick
 from rtctl.laws import bumpless, limit, reference, shaper, velocity
-from rtctl.loop import safety
 from rtctl.machines.base import STATE_LINES, TRACE_LINES, Block, Diagram, PlantDiagram
 from rtctl.machines.described_parts import columns, forwards, metres_per_unit, parts_of, radius, signals, unit
 from rtctl.machines.described_plant import converter, is_counter, readout_of, wires
@@ -18,6 +17,7 @@ from rtctl.machines.described_plant import plant_diagram as described_plant
 from rtctl.machines.described_settings import DescribedConfig, config_class
 from rtctl.own import law as own_law
 from rtctl.plants.linear import MOST_DRIVES
+from rtctl.tick import safety
 
 __all__ = [
     "DescribedConfig", "config_class", "diagram", "metres_per_unit", "parts_of", "plant_diagram", "radius", "signals",
@@ -196,7 +196,7 @@ USES = (
     "rtctl.laws.reference",
     "rtctl.laws.shaper",
     "rtctl.laws.velocity",
-    "rtctl.loop.safety",
+    "rtctl.tick.safety",
 )
 
 

@@ -16,10 +16,14 @@ from rtctl.machines.base import Block, Column, PlantDiagram, physics_lines
 from rtctl.plants.graph import layout as graph_layout
 from rtctl.plants.graph import params as graph_params
 from rtctl.plants.graph import plant
+from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.description import Description, Sensor
 from rtctl.plants.graph.elements import place_of
+from rtctl.plants.graph.joints import sprung
+from rtctl.plants.graph.mechanics import code_of
 from rtctl.plants.graph.units import WAY
 from rtctl.plants.linear import MOST_BODIES
+from rtctl.plants.physics import TERMS
 
 BITS = 16  # of a drive whose converter nobody knows
 FINE = 1e-6  # column units, resolution of a number whose resolution nobody knows
@@ -98,14 +102,23 @@ def graph_of(machine: Description, h: float) -> tuple[graph_layout.Layout, dict[
     """Layout, values and params of a description for substeps of `h` s."""
     layout = graph_layout.layout(machine)
     values = dict(machine.paths())
-    return layout, values, graph_params.build(layout, values, h)
+    return layout, values, machine_params(layout, values, h)
 
 
 def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
     """Blocks and lines of the emulated machine, advanced by substeps of `h` s."""
-    machine: Description = config.machine
+    machine, _ = sprung(config.machine, config.plant.physics)
     layout, values, params = graph_of(machine, h)
-    terms = physics_lines(config.plant.physics, config.kind, h, lambda entry: place_of(layout, values, entry))
+    code = code_of(machine)
+    steps = code.steps.__name__ if code is not None else "linear"
+    start: tuple[str, ...] = ("plant.start(p.plant, s.plant)",)
+    shown: tuple[str, ...] = ()
+    given = ""
+    if code is not None:
+        start, given = (*start, f"{steps}.place(p.plant, s.plant.m)"), "p.plant, "
+        shown = (f"{steps}.zero(p.plant, s.plant.m)",)
+    acting = [entry for entry in config.plant.physics if TERMS[entry.term].act]
+    terms = physics_lines(acting, config.kind, h, lambda entry: place_of(layout, values, entry))
     outputs = [
         Block(f"output{n}", converter(config, n), at_mio_16de.ANALOG_OUTPUT_STATE) for n in range(len(machine.drives))
     ]
@@ -136,12 +149,12 @@ def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
                 "linear.midpoint(s.plant.m)",
                 "plant.weigh(p.plant, s.plant.m)",
                 *terms.force,
-                "linear.advance(s.plant.m)",
+                f"{steps}.advance({given}s.plant.m)",
             ),
         ),
     )
     sample = (
-        ("sensors", ("plant.read(p.plant, s.plant.m)", *terms.reading)),
+        ("sensors", ("plant.read(p.plant, s.plant.m)", *shown, *terms.reading)),
         ("scan", tuple(line for _, _, lines in sensors for line in lines)),
         ("truth", ("described_plant.tell(p.truth, s.plant.m, rx.truth)",)),
     )
@@ -154,11 +167,12 @@ def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
             "rtctl.machines.described_plant",
             "rtctl.plants.graph.plant",
             "rtctl.plants.linear",
+            *((steps,) if code is not None else ()),
             *terms.uses,
         ),
         blocks=blocks,
         truth=truth_columns(machine),
-        start=("plant.start(p.plant, s.plant)",),
+        start=start,
         advance=advance,
         sample=sample,
     )

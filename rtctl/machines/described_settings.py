@@ -22,13 +22,13 @@ from rtctl.laws.limit import LimitSettings
 from rtctl.laws.reference import ReferenceSettings
 from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
-from rtctl.loop.safety import SafetySettings
 from rtctl.machines.base import COMMON_COLUMNS, MachineSettings
 from rtctl.machines.ldu import PdLawSettings, PositionSettings
 from rtctl.machines.physics import PhysicsTerm
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.elements import check_node
 from rtctl.plants.graph.units import measured_unit
+from rtctl.tick.safety import SafetySettings
 
 SIGNALS = ("target", "ref", "w", "feedback", "position_error", "speed", "u_c")  # of the loop, in the trace
 FEEDBACK = ("position", "speed")  # what a loop can close on, in the order in which it is looked for

@@ -28,7 +28,6 @@ from rtctl.laws import (
     velocity,
 )
 from rtctl.laws.velocity import VelocitySettings
-from rtctl.loop import safety
 from rtctl.machines.base import (
     COMMON_COLUMNS,
     STATE_LINES,
@@ -41,6 +40,7 @@ from rtctl.machines.base import (
 from rtctl.machines.ivu_plant import plant_diagram, substeps
 from rtctl.machines.ivu_settings import IvuConfig
 from rtctl.own import law as own_law
+from rtctl.tick import safety
 
 __all__ = ["IvuConfig", "diagram", "plant_diagram", "substeps"]
 
@@ -364,7 +364,7 @@ USES = (
     "rtctl.laws.tension",
     "rtctl.laws.tension_estimate",
     "rtctl.laws.velocity",
-    "rtctl.loop.safety",
+    "rtctl.tick.safety",
 )
 
 

@@ -34,7 +34,6 @@ from rtctl.laws.reference import MetreReferenceSettings
 from rtctl.laws.sections import SectionsSettings
 from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
-from rtctl.loop import safety
 from rtctl.machines.base import (
     COMMON_COLUMNS,
     STATE_LINES,
@@ -50,6 +49,7 @@ from rtctl.machines.physics import PhysicsTerm, check_nodes
 from rtctl.own import law as own_law
 from rtctl.plants import ldu as plant_ldu
 from rtctl.plants.fmu import FmuSettings
+from rtctl.tick import safety
 
 __all__ = ["LduConfig", "diagram", "plant_diagram", "substeps"]
 
@@ -369,5 +369,5 @@ USES = (
     "rtctl.laws.reference",
     "rtctl.laws.shaper",
     "rtctl.laws.velocity",
-    "rtctl.loop.safety",
+    "rtctl.tick.safety",
 )

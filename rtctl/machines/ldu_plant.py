@@ -79,7 +79,7 @@ def plant_diagram(config: "LduConfig", period: float, seed: int) -> PlantDiagram
         (
             "truth",
             (
-                "plant.read(p.plant.graph, s.plant.m)",  # anew, without the errors of the sensors
+                *(("plant.read(p.plant.graph, s.plant.m)",) if terms.reading else ()),  # without errors of the sensors
                 *terms.moves,
                 "rx.truth[0] = s.plant.m.y[1]",
                 "rx.truth[1] = p.plant.R_c * s.plant.m.x[ldu.NQ + ldu.CAPSTAN]",

@@ -7,11 +7,11 @@ from rtctl.config.fields import Shape, child, shape
 from rtctl.config.schema import Row, about, settings_table
 from rtctl.machines import CONFIGS, EVERY
 from rtctl.machines.base import MachineSettings
+from rtctl.machines.profiles import profile_of
 from rtctl.manual.command_pages import cell
 from rtctl.plants.physics import TERMS, by_kind
 
 SHOWN = {"described": "belt"}  # config that stands for a kind, where it has another name
-TITLES = {"ivu": "Image Verification Unit", "ldu": "Linear Drive Unit", "axis": "one axis", "described": "any machine"}
 PHYSICS = "plant.physics[]"
 HEAD = """# Config
 
@@ -71,7 +71,7 @@ def config_pages() -> dict[str, str]:
     for kind, model in EVERY.items():
         own = [part for part in parts(model) if part.paths not in shared]
         own = [p._replace(rows=tuple(r for r in p.rows if r.path not in MachineSettings.model_fields)) for p in own]
-        head = MACHINE.format(title=TITLES[kind], kind=kind, text=_shipped(kind))
+        head = MACHINE.format(title=profile_of(kind).title or "Any machine", kind=kind, text=_shipped(kind))
         found[f"config_{kind}.md"] = page(head, own)
     return found
 

@@ -15,9 +15,9 @@ from numba.core import ir as numba_ir
 
 from rtctl.config.errors import UserError, nearest
 from rtctl.idiom import fill_record, record_dtype
-from rtctl.loop import clock
-from rtctl.own.files import OwnError
+from rtctl.own.files import OwnError, Source
 from rtctl.own.parts import Parts, arguments
+from rtctl.tick import clock
 
 TICKS = 20_000  # measured
 FIRST = 20  # of them, to see whether the rest is worth while
@@ -184,15 +184,20 @@ def _type(found: Any) -> str:
 def _complaint(parts: Parts, name: str, error: Exception) -> OwnError:
     """numba's message in one line, at the line of the file that it is about."""
     assert parts.source is not None
+    return complaint(parts.source, name, error)
+
+
+def complaint(source: Source, name: str, error: Exception) -> OwnError:
+    """As `_complaint`, about the function `name` of a file."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
-    file = re.escape(parts.source.file.rpartition("/")[2])
+    file = re.escape(source.file.rpartition("/")[2])
     found = [int(a or b) for a, b in re.findall(rf'(?:File "[^"]*{file}", line (\d+)|{file} \((\d+)\))', text)]
     lines = [line.strip() for line in text.splitlines()]
     lines = [line for line in lines if line and not line.startswith(("Failed in nopython", "Overload of function"))]
     what = lines[0] if lines else type(error).__name__
     absent = re.search(r"has no attribute '(\w+)'", text)
     if absent and not found:
-        nodes = [n for n in ast.walk(ast.parse(parts.source.text)) if isinstance(n, ast.Attribute)]
+        nodes = [n for n in ast.walk(ast.parse(source.text)) if isinstance(n, ast.Attribute)]
         found = [n.lineno for n in nodes if n.attr == absent[1]][:1]
     if "Untyped global name" in text or "Cannot determine Numba type of" in text:
         match = re.search(r"global name '(\w+)'", text)
@@ -200,7 +205,7 @@ def _complaint(parts: Parts, name: str, error: Exception) -> OwnError:
     elif what.startswith("No implementation of function"):
         call = next((line.removeprefix(">>>").strip() for line in lines if line.startswith(">>>")), "")
         what = f"there is no compiled form of {call or what}"
-    return parts.source.error(found[-1] if found else parts.source.line_of(name), f"does not compile: {what:.300}")
+    return source.error(found[-1] if found else source.line_of(name), f"does not compile: {what:.300}")
 
 
 def _allocates_nothing(parts: Parts) -> None:

@@ -15,12 +15,14 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, create_model
 
-from rtctl.own import law, plant, term
+from rtctl.own import law, mechanics, plant, term
 from rtctl.own.files import OwnError, Source, is_own, is_trusted, read, split
 from rtctl.own.parts import Parts, own
+from rtctl.plants.physics.place import PLANTS
 
 Key = tuple[Any, ...]
 LAW, PLANT, PHYSICS = ("law", "position", "kind"), ("plant", "kind"), ("plant", "physics")
+MECHANICS = ("machine", "mechanics", "kind")
 
 
 class MisplacedError(OwnError):
@@ -61,6 +63,8 @@ def widened(base: Any, data: Any, folder: Path | None = None, law: bool = True) 
         except OwnError as error:
             raise MisplacedError(key, error) from error
     term.register([source for key, source in sources.items() if key[:2] == PHYSICS])
+    if MECHANICS in sources:
+        data = _with_mechanics(data, sources[MECHANICS], folder)
     return model, {**data, "own": {file: texts[file] for file in sorted({s.file for s in sources.values()})}}
 
 
@@ -74,9 +78,27 @@ def long_form(data: Any) -> Any:
     if isinstance(found, dict) and is_own(found.get("position")):
         found = {**found, "position": {"kind": found["position"]}}
     changed = {"law": found} if found is not data.get("law") else {}
+    machine = data.get("machine")
+    if isinstance(machine, dict) and machine.get("mechanics") is not None:
+        given = machine["mechanics"]
+        given = {"kind": given} if isinstance(given, str) else given
+        if isinstance(given, dict) and isinstance(given.get("kind"), str):
+            given = {**given, "kind": mechanics.long_kind(given["kind"])}
+        changed["machine"] = {**machine, "mechanics": given}
     if is_own(data.get("plant")):
         changed["plant"] = {"kind": data["plant"]}
     return {**data, **changed}
+
+
+def _with_mechanics(data: dict[str, Any], source: Source, folder: Path | None) -> dict[str, Any]:
+    """The data with the hash of the mechanics' text, whose code is registered. Raises MisplacedError."""
+    try:
+        path = (folder / source.file).resolve() if folder is not None else None
+        found = mechanics.register(source, path)
+    except OwnError as error:
+        raise MisplacedError(MECHANICS, error) from error
+    machine = data["machine"]
+    return {**data, "machine": {**machine, "mechanics": {**machine["mechanics"], "sha256": found.sha256}}}
 
 
 def without_code(base: Any, data: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
@@ -102,7 +124,7 @@ def without_code(base: Any, data: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
 def _named(data: dict[str, Any]) -> dict[Key, str]:
     """Key -> ./file.py:Name of all own files that the data names."""
     found: dict[Key, str] = {}
-    for key in (LAW, PLANT):
+    for key in (LAW, PLANT, MECHANICS):
         node: Any = data
         for part in key:
             node = node.get(part) if isinstance(node, dict) else None
@@ -165,7 +187,7 @@ def _plant(source: Source, base: Any, machine: str) -> Any:
     """The file's settings with what the config of every plant has: rate, substep, an empty list of terms, no FMU."""
     parts = own(source, plant.FUNCTIONS)
     plant.check_sensors(parts, machine)
-    parts.call("step", "own", plant.INPUTS[machine])
+    parts.call("step", "own", PLANTS[machine].OWN.inputs)
     kept: dict[str, Any] = {n: (base.model_fields[n].annotation, base.model_fields[n]) for n in ("rate", "substep")}
     none: Any = Field(
         default=[], max_length=0, description="an own plant has no nodes for terms: write them into its step"

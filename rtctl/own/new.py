@@ -12,20 +12,13 @@ from typing import NamedTuple
 
 from rtctl.config.errors import UserError, nearest
 from rtctl.own.parts import camel, upper
+from rtctl.plants.physics.place import PLANTS
 
 KINDS = ("law", "plant", "term")  # of files; a machine is a config, see new_machine.py
-MACHINES = ("ivu", "ldu", "axis")
+MACHINES = tuple(PLANTS)
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
-UNIT = {"ivu": "rad", "ldu": "m", "axis": "m"}
 POSITION = re.compile(r"^  position:.*\n(?:    .*\n)+", re.MULTILINE)
 PHYSICS = re.compile(r"^  physics:.*\n?", re.MULTILINE)
-NODE = {"ivu": "reel1", "ldu": "carriage", "axis": "carriage"}  # where the new term stands
-DRAG = {"ivu": 2e-5, "ldu": 50.0, "axis": 50.0}
-GAINS = {  # of the PD that the template is, beside what the config of the machine has
-    "ivu": "gain: 31 V/rad, tau_d: 160 ms, derivative_filter: 40 Hz",
-    "ldu": "gain: 6400 V/m, tau_d: 27 ms, derivative_filter: 200 Hz",
-    "axis": "gain: 39000 V/m, tau_d: 6 ms, derivative_filter: 100 Hz",
-}
 
 
 class Written(NamedTuple):
@@ -92,10 +85,10 @@ def _renamed(text: str, kind: str, stem: str, machine: str) -> str:
     ):
         text = text.replace(old, new)
     if kind == "term":
-        text = text.replace('"reel1"', f'"{NODE[machine]}"', 1) if "import pytest" in text else text
+        text = text.replace('"reel1"', f'"{PLANTS[machine].OWN.node}"', 1) if "import pytest" in text else text
     if kind == "law":
-        text = re.sub(r"\brad\b", UNIT[machine], text)
-        text = text.replace("quantity(40.0", "quantity(200.0") if machine == "ldu" else text
+        text = re.sub(r"\brad\b", PLANTS[machine].OWN.unit, text)
+        text = text.replace("quantity(40.0", f"quantity({PLANTS[machine].OWN.cutoff}")
     return text
 
 
@@ -106,10 +99,10 @@ def _config(kind: str, stem: str, machine: str) -> str:
     text = f"{head}, with the {kind} of {stem}.py\n{rest}".replace(f"name: {machine}\n", f"name: {stem}\n", 1)
     spec = f"./{stem}.py:{camel(stem)}"
     if kind == "law":
-        gains = "".join(f"    {gain}\n" for gain in GAINS[machine].split(", "))
+        gains = "".join(f"    {gain}\n" for gain in PLANTS[machine].OWN.gains)
         return POSITION.sub(f"  position:\n    kind: {spec}\n{gains}", text)
     before, plant, _ = text.partition("\nplant:\n")  # it comes last
     if kind == "plant":
         return f"{before}{plant}  kind: {spec}\n"
-    entry = f"  physics:\n    - {{term: {spec}, node: {NODE[machine]}, c: {DRAG[machine]}}}\n"
+    entry = f"  physics:\n    - {{term: {spec}, node: {PLANTS[machine].OWN.node}, c: {PLANTS[machine].OWN.drag}}}\n"
     return before + plant + PHYSICS.sub("", text.removeprefix(before + plant)) + entry

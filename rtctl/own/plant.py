@@ -3,39 +3,30 @@
     start(p, s)       at rest
     step(p, s, u)     one substep of p.h or whatever `build(settings, h)` makes of its h, s
 
-What it has to leave in its state, by name, the emulated board counts and converts: see SENSORS. The names in TRUTH are
-recorded as truth_ columns where the state has them.
+What it has to leave in its state, by name, the emulated board counts and converts: see `OWN` of the plant
+(plants/shown.py). Its names of the truth are recorded as truth_ columns where the state has them.
 """
 
 from rtctl.own.parts import Parts
+from rtctl.plants.physics.place import PLANTS
 
 FUNCTIONS = {"start": "start(p, s)", "step": "step(p, s, u)"}
-INPUTS = {  # machine -> what `step` may ask for
-    "axis": {"u": "volts"},
-    "ldu": {"u": "volts", "i": "ldu_amplifier.drive(p.amplifier, volts, forward)"},
-    "ivu": {"u1": "u1", "u2": "u2"},
-}
 INPUT_WORDS = {
     "u": "voltage of the board, signed, V",
     "i": "current that the amplifier is asked for, A (ldu)",
     "u1": "voltage to driver 1, V",
     "u2": "voltage to driver 2, V",
 }
-SENSORS = {"axis": ("x",), "ldu": ("encoder", "scale"), "ivu": ("capstan", "reel1", "reel2")}
-TRUTH = {  # machine -> state fields, in the order of its truth columns
-    "axis": ("x", "v"),
-    "ldu": ("scale", "v", "i"),
-    "ivu": ("T1", "T2", "capstan", "motor1", "motor2", "R1", "R2"),
-}
 own_plants: dict[type, Parts] = {}  # settings class -> parts
 
 
 def check_sensors(parts: Parts, machine: str) -> None:
     """Raise OwnError where the state lacks what this machine's sensors look at."""
-    lacking = [name for name in SENSORS[machine] if name not in (parts.state.names or ())]
+    sensors = PLANTS[machine].OWN.sensors
+    lacking = [name for name in sensors if name not in (parts.state.names or ())]
     if lacking:
         raise parts.fault(
             parts.state_name,
             f"{parts.state_name} has no '{lacking[0]}', which a sensor of the {machine} looks at; "
-            f"write {parts.state_name} = state({', '.join(f'{name}=float' for name in SENSORS[machine])}, ...)",
+            f"write {parts.state_name} = state({', '.join(f'{name}=float' for name in sensors)}, ...)",
         )

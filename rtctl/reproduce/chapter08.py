@@ -274,7 +274,7 @@ def unknown(short: bool) -> dict[str, float]:
 @cache
 def velocities(short: bool) -> tuple[Record, ...]:
     """Constant velocities, 12 turns of the capstan each, with three pairs of reels."""
-    speeds, turns = ((0.3, 1.2, 4.0), 3.0) if short else (fr.SPEEDS["ivu"], 12.0)
+    speeds, turns = ((0.3, 1.2, 4.0), 3.0) if short else (None, 12.0)
     return tuple(bench.play(fr.velocity_config(reels(*R), speeds, turns)) for R in REELS)
 
 

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import UserError
-from rtctl.loop import generate, safety
+from rtctl.loop import generate
 from rtctl.machines import Machine
 from rtctl.soak import invariants, ranges
 from rtctl.soak.invariants import NAMES, NEVER
+from rtctl.tick import safety
 
 MOST_KEPT = 20  # violations with a bundle
 BEFORE, AFTER = 2.0, 0.5  # s of rows in it

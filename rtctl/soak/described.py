@@ -1,6 +1,6 @@
 """What a random day may ask of a described machine: moves as large and as fast as those of its own reference."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -8,29 +8,7 @@ from rtctl.config.errors import UserError
 from rtctl.laws import reference
 from rtctl.machines.described_parts import parts_of, signals
 from rtctl.machines.described_plant import converter, is_counter
-
-
-class Range(NamedTuple):
-    """Lengths in the unit of the machine's reference (rad or m), times in s."""
-
-    position: str  # column
-    error: str
-    outputs: tuple[str, ...]
-    counts: str
-    truth: str  # where the counted thing really is; only an emulator knows
-    tensions: tuple[str, ...]  # estimates
-    truth_tensions: tuple[str, ...]
-    travel: float  # to either side of where the day began
-    jump: float  # largest setpoint without a ramp
-    rate: tuple[float, float]  # of a ramp, per s
-    settle: float  # from the end of a move until it has to be there
-    tolerance: float  # how far from its target it may then be
-    stretch: float  # counts that encoder and truth may be apart: an edge that is just passed, springs between the two
-    counters: int  # channels that are wired
-    inputs: int
-    gains: dict[str, tuple[float, float]]  # setting -> share of the config's own value, lowest and highest
-    measure: tuple[str, str] | None = None  # setting with which arming measures what is followed by counts
-
+from rtctl.machines.profile import Range
 
 DESCRIBED_GAINS = {"law.position.gain": (0.8, 1.05), "law.position.velocity_gain": (0.9, 1.1)}
 SETTLE = 3.0  # s, from the end of a move until it has to be there

@@ -9,10 +9,10 @@ from collections import Counter
 import numpy as np
 
 from rtctl.config.load import get_path
-from rtctl.loop import faults, safety
 from rtctl.soak import ranges
 from rtctl.soak.invariants import NEVER
 from rtctl.soak.rig import Rig
+from rtctl.tick import faults, safety
 
 WEIGHTS = {
     "move": 0.28, "ramp": 0.2, "burst": 0.1, "gains": 0.1, "switch": 0.04, "play": 0.06, "capture": 0.02, "wait": 0.05,

@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 
 from rtctl.idiom import state
-from rtctl.loop.memory import borrowed
-from rtctl.loop.safety import ARMED, IDLE, RUNNING, TRIPPED, TRIPS
-from rtctl.loop.safety import NONE as NO_TRIP
+from rtctl.tick.memory import borrowed
+from rtctl.tick.safety import ARMED, IDLE, RUNNING, TRIPPED, TRIPS
+from rtctl.tick.safety import NONE as NO_TRIP
 
 INVARIANTS = {
     "output_limits": "outputs stay within the limits of law and converter",

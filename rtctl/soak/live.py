@@ -15,8 +15,8 @@ from rtctl.config.errors import UserError
 from rtctl.config.load import get_path
 from rtctl.daemon.protocol import OPS
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.loop import faults
 from rtctl.soak.checker import Checker
+from rtctl.tick import faults
 
 HANG = 60.0  # s without a tick
 

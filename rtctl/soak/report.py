@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from rtctl.loop.safety import TRIPS
 from rtctl.soak.events import Day
 from rtctl.soak.invariants import INVARIANTS, NAMES
+from rtctl.tick.safety import TRIPS
 from rtctl.trace.bundle import as_json
 
 SUMMARY = "summary.json"

@@ -7,12 +7,13 @@ from typing import Any, Protocol
 
 from rtctl import machines
 from rtctl.config.load import set_path
-from rtctl.loop import faults, fused, generate
+from rtctl.loop import fused, generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
 from rtctl.loop.ring import Reader
 from rtctl.machines import Machine
 from rtctl.soak.checker import Checker
+from rtctl.tick import faults
 
 STRETCH = 4096  # ticks: their rows fit into the cache
 

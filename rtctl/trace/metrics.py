@@ -8,6 +8,7 @@ import numpy as np
 
 from rtctl.config.units import ANGLES
 from rtctl.machines import MODULES, Machine
+from rtctl.machines.profiles import profile_of
 
 LEAST_HOLD = 10  # samples; a reference that rests for less is still on its way
 
@@ -99,7 +100,7 @@ def scales(case: Mapping[str, Any]) -> tuple[float | None, float | None]:
     if unit not in (None, "m"):  # a speed
         return None, None
     radius = case.get("parameters", {}).get("R_c")
-    if case.get("plant") == "ivu":
+    if profile_of(str(case.get("plant"))).unit in ANGLES:
         if not radius:
             raise ValueError("parameters.R_c is missing: without the capstan's radius (m) rad are not mm")
         return 1000.0 * radius, 1.0

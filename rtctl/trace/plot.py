@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from rtctl.config.errors import UserError
 from rtctl.config.files import replaced
+from rtctl.machines.profiles import profile_of
 from rtctl.trace.bundle import Bundle
 from rtctl.trace.metrics import final_error_key, final_error_unit
 
@@ -80,7 +81,6 @@ PANELS = (
 )
 SPARE = "Counters"  # drawn only where there is no position beside the reference
 METRES = ("position", "x", "truth_x", "encoder_counts")  # a machine with one of these is linear
-NAMES = {"ivu": "Image verification unit", "ldu": "Linear drive unit", "axis": "Axis"}
 
 
 def plot_run(
@@ -212,6 +212,6 @@ def _prefixed(unit: str, largest: float) -> tuple[float, str]:
 def _title(case: Mapping[str, Any]) -> str:
     described = isinstance(case.get("machine"), Mapping)
     named = (case.get("config") or {}).get("name") if described else case.get("machine")
-    machine = named or NAMES.get(str(case.get("plant")), case.get("plant")) or "Run"
+    machine = named or profile_of(str(case.get("plant"))).title or case.get("plant") or "Run"
     date = str(case.get("recorded_at", "")).replace("T", " ").removesuffix("+00:00")
     return f"{machine}, {date} UTC" if date else str(machine)

@@ -24,6 +24,8 @@ def test_a_step_of_the_reel_unit(plan: Make) -> None:
     assert found["final_error_mm"] == pytest.approx(mm * abs(np.mean(tail["target"] - tail["capstan"])))
     assert found["rms_error_mm"] == pytest.approx(mm * np.sqrt(np.mean(rows["capstan_error"] ** 2)))
     assert found["peak_error_mm"] == pytest.approx(mm * np.abs(rows["capstan_error"]).max())
+    for name in ("final_error", "rms_error", "peak_error"):  # rad
+        assert mm * found[name] == pytest.approx(found[f"{name}_mm"])
     assert found["tension_min_N"] == min(rows["truth_tension1"].min(), rows["truth_tension2"].min())
     assert found["peak_output_V"] == max(np.abs(rows["u1"]).max(), np.abs(rows["u2"]).max())
     assert 0.5 < found["settling_s"] < 1.2 and np.isnan(found["trip_s"])

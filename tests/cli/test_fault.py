@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rtctl.loop.faults import KINDS
+from rtctl.tick.faults import KINDS
 
 
 def test_the_catalogue_says_what_each_is(rtctl: Callable[..., Any]) -> None:

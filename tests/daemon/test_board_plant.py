@@ -12,10 +12,10 @@ from rtctl.daemon.board_plant import BoardPlant
 from rtctl.drivers import daq_stc
 from rtctl.drivers.board import BoardError
 from rtctl.drivers.comedi import ComediSettings
-from rtctl.loop import frames, safety
 from rtctl.loop.records import PLANT_STATUS
 from rtctl.loop.shm_link import INPUTS_SLOT, OUTPUTS_SLOT
 from rtctl.machines.wiring import wiring
+from rtctl.tick import frames, safety
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "drivers"))
 import rigs

@@ -19,9 +19,9 @@ from rtctl.daemon.server import default_endpoint
 from rtctl.daemon.session import Session
 from rtctl.daemon.shared_memory import segment_path
 from rtctl.loop import generate
-from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
 from rtctl.loop.ring import Reader
+from rtctl.tick.memory import Segment
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.recorder import Recorder
 from rtctl.trace.repair import repair

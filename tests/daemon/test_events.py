@@ -17,7 +17,7 @@ from rtctl.config.load import to_yaml
 from rtctl.daemon.events import Recording, Trips
 from rtctl.daemon.session import whole
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.loop import safety
+from rtctl.tick import safety
 from rtctl.trace import moved, recorder
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.orders import orders

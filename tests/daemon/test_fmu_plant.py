@@ -7,11 +7,11 @@ from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.daemon import fmu_plant
 from rtctl.drivers import daq_stc
-from rtctl.loop import safety
 from rtctl.loop.records import PLANT_STATUS
 from rtctl.loop.shm_link import INPUTS_SLOT, OUTPUTS_SLOT
 from rtctl.machines import check_plant
 from rtctl.plants.fmu import FmuSettings
+from rtctl.tick import safety
 
 ANY = FmuSettings(file="any.fmu", inputs={}, outputs={})
 STEP = 20 / 4096

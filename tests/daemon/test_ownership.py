@@ -22,8 +22,8 @@ from rtctl.daemon.session import Session
 from rtctl.daemon.shared_memory import segment_path, shared_folder
 from rtctl.daemon.supervisor import Supervisor
 from rtctl.daemon.telemetry import Telemetry
-from rtctl.loop.memory import Segment
 from rtctl.loop.records import STATUS
+from rtctl.tick.memory import Segment
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.repair import repair
 

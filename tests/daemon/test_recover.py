@@ -19,9 +19,9 @@ from rtctl.daemon import leftover, shared_memory
 from rtctl.daemon.lock import MachineLock
 from rtctl.daemon.recover import recover
 from rtctl.loop import fused
-from rtctl.loop.memory import Segment
 from rtctl.loop.ring import RING
 from rtctl.machines.base import Column
+from rtctl.tick.memory import Segment
 from rtctl.trace.bundle import load_bundle
 from rtctl.trace.part import Part
 from rtctl.trace.rotation import Rotation

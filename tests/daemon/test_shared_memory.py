@@ -13,7 +13,7 @@ from rtctl.config.errors import UserError
 from rtctl.daemon import shared_memory
 from rtctl.daemon.session import Session
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.loop.memory import Segment
+from rtctl.tick.memory import Segment
 
 SHAPE = {"status": (np.dtype([("pid", np.int64), ("ended", np.int64)]), 1)}
 

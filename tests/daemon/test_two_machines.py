@@ -18,7 +18,8 @@ import zmq
 from rtctl.config.errors import UserError
 from rtctl.daemon.client import Client
 from rtctl.daemon.keys import new_keys
-from rtctl.loop import frames, generate
+from rtctl.loop import generate
+from rtctl.tick import frames
 from rtctl.trace.bundle import load_bundle
 
 from .netns import PLANT, Host, NotHereError, TwoHosts, number

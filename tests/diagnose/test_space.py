@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rtctl.diagnose.kernel import OPEN
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.space import COSINE, INVERSE, PLACE, SHAPE, SINE, SIZE, WIDE, Coordinate, Hypothesis, Space
+from rtctl.diagnose.space import COSINE, INVERSE, PLACE, REST, SHAPE, SINE, SIZE, WIDE, Coordinate, Hypothesis, Space
 from rtctl.plants.physics import TERMS
 
 OWNER = Model("axis", {"M": 95.0, "K": 35.0, "F_v": 200.0, "F_c": 20.0, "k": 0.0})
@@ -143,3 +143,15 @@ def test_at_its_start_an_effect_does_nothing(plain, hypothesis):
     moved = s.start()
     moved[hypothesis.sizes] += 2.0
     assert np.abs(plain.sim.run(s.model(moved), OPEN) - without).max() > 1e-6
+
+
+@pytest.mark.parametrize("soft", [0.5, -0.2, 1e-9, 0.0])
+def test_a_spring_pulls_as_its_rest_says_however_soft_it_is(soft):
+    """The force at any place is the sum of both sizes, each in its own unit."""
+    spring = Hypothesis(
+        "load.spring", "carriage", (Coordinate("k", SIZE, 40.0), Coordinate("x0", REST, 6.0, offset=0.3))
+    )
+    values = spring.values([soft, 0.5])
+    assert -values["k"] * (0.3 - values["x0"]) == pytest.approx(3.0)
+    assert -values["k"] * (0.8 - values["x0"]) == pytest.approx(3.0 - 40.0 * soft * 0.5, abs=1e-4)
+    assert spring.sizes == [0, 1]

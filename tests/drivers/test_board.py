@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rtctl.drivers import daq_stc
 from rtctl.drivers.at_mio_16de import AnalogOutputSettings
 from rtctl.drivers.board import BoardError, Wiring
-from rtctl.loop import frames
+from rtctl.tick import frames
 
 KINDS = ("emulated", "comedi", "comedi of 16 bits", "nidaqmx")
 OUT_STEP = 20 / 4096

@@ -9,7 +9,7 @@ from rtctl.faults.cases import STANDS
 from rtctl.faults.drives import Inside
 from rtctl.faults.notes import NOTES
 from rtctl.faults.play import Outcome, undisturbed
-from rtctl.loop.faults import KINDS, PROCESSES
+from rtctl.tick.faults import KINDS, PROCESSES
 
 DOCS = Path(__file__).parents[2] / "docs" / "faults.md"
 UNSEEN = {  # why it is no trip

@@ -22,11 +22,12 @@ from rtctl.daemon.protocol import ProtocolError, decode_reply, decode_request, e
 from rtctl.daemon.server import CommandServer
 from rtctl.daemon.supervisor import Supervisor
 from rtctl.daemon.telemetry import Telemetry
-from rtctl.loop import frames, generate
+from rtctl.loop import generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
-from rtctl.loop.memory import Segment
 from rtctl.loop.records import layout
+from rtctl.tick import frames
+from rtctl.tick.memory import Segment
 
 REQUESTS = (
     encode_request(1, "ping", {}),

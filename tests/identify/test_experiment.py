@@ -17,7 +17,7 @@ def test_a_multisine_is_played_at_constant_speed_to_and_fro(name, speed):
     moves = [np.diff(record["ref"][s]).mean() / record.dt for s in whole]
     assert moves == pytest.approx([speed, -speed], rel=1e-3)
     assert abs(record["ref"][whole[0]].mean() - record["ref"][0]) < 0.1 * np.ptp(record["ref"])
-    assert record["w"].std() == pytest.approx(experiment.USUAL[name].rms, rel=0.1)
+    assert record["w"].std() == pytest.approx(experiment.usual_of(record.config).rms, rel=0.1)
     assert not record.trip
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from rtctl.idiom import state, tick
 from rtctl.loop import mailbox
-from rtctl.loop.memory import Segment
+from rtctl.tick.memory import Segment
 
 PARAMS = state(gain=(float, 64))
 BOX = mailbox.mailbox_dtype(PARAMS)

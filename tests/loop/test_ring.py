@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rtctl.idiom import tick
 from rtctl.loop import ring
-from rtctl.loop.memory import Segment
+from rtctl.tick.memory import Segment
 
 ROW = np.dtype([("tick", np.int64), ("x", np.float64, (30,))], align=True)  # long, so that it can be torn
 CAPACITY = 8

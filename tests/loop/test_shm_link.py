@@ -7,7 +7,8 @@ import pytest
 
 from rtctl.config.errors import UserError
 from rtctl.idiom import tick
-from rtctl.loop import frames, generate, shm_link
+from rtctl.loop import generate, shm_link
+from rtctl.tick import frames
 
 
 class Ends:

@@ -7,7 +7,7 @@ import pytest
 
 from rtctl.faults.cases import STANDS
 from rtctl.faults.drives import Inside
-from rtctl.loop import safety
+from rtctl.tick import safety
 
 
 def stalled(mode: str, size: float, **changes: Any) -> tuple[np.ndarray, int]:

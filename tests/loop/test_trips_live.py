@@ -11,7 +11,7 @@ import pytest
 
 from rtctl.daemon.session import Session
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.loop.safety import (
+from rtctl.tick.safety import (
     COMMANDER,
     CURRENT,
     FOLLOWING,

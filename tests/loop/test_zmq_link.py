@@ -9,7 +9,8 @@ import zmq
 
 from rtctl.daemon.child import LINK_WAITING, link_socket
 from rtctl.idiom import tick
-from rtctl.loop import clock, frames, generate, zmq_link
+from rtctl.loop import generate, zmq_link
+from rtctl.tick import clock, frames
 
 
 class Ends:

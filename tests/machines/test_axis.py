@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rtctl.config.errors import UserError
-from rtctl.loop import safety
+from rtctl.tick import safety
 
 SETPOINTS: dict[str, Any] = {
     "reference__steps": [{"at": 0.2, "to": 0.1, "ramp": 0.2}, {"at": 2.0, "to": 0.0, "ramp": 0.2}]

@@ -11,10 +11,11 @@ from rtctl import machines
 from rtctl.cli.common import load_config
 from rtctl.config.errors import UserError
 from rtctl.config.load import get_path, load_settings, set_path, to_yaml
-from rtctl.loop import generate, safety
+from rtctl.loop import generate
 from rtctl.machines import described
 from rtctl.machines.described_plant import graph_of
 from rtctl.plants.graph.played import played
+from rtctl.tick import safety
 
 EXAMPLES = sorted(path.stem for path in (fused.CONFIGS / "machines").glob("*.yaml"))
 

@@ -8,7 +8,7 @@ import fused
 import numpy as np
 import pytest
 
-from rtctl.loop import safety
+from rtctl.tick import safety
 
 F_T = 0.1  # N
 COUNT = 2 * np.pi / 10_000

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rtctl import machines
-from rtctl.loop import safety
 from rtctl.plants import ldu
+from rtctl.tick import safety
 
 STEP = 1e-3 / 12
 STEPS = ((0.5, 1), (1.0, 1), (1.5, 1), (2.0, 1), (2.5, -1), (3.0, -1))  # s, direction, of print_steps.yaml

@@ -14,8 +14,8 @@ from rtctl.config.load import get_path, set_path, to_yaml
 from rtctl.config.schema import json_schema
 from rtctl.daemon.reload import reload
 from rtctl.loop import generate
+from rtctl.machines.own_check import verdicts
 from rtctl.own.files import OwnError
-from rtctl.own.machine import verdicts
 
 TRY = {"kind": "./try.py:Try", "gain": "31 V/rad"}
 TERM = "./my_term.py:MyTerm"

@@ -7,8 +7,9 @@ from rtctl_config import TEMPLATES, loaded
 from rtctl.config.errors import UserError
 from rtctl.config.load import set_path
 from rtctl.daemon.case import describe
-from rtctl.loop import generate, safety
+from rtctl.loop import generate
 from rtctl.loop.replay import Replay
+from rtctl.tick import safety
 
 POSITION = {"kind": "./try.py:Try", "gain": 20, "tau_d": "0.1 s"}
 NOT_A_NUMBER, INFINITE, RAISES, RAISES_IN_RESET = 1, 2, 3, 4

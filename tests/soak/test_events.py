@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.loop import faults, safety
 from rtctl.soak.events import KINDS, SIZES, WEIGHTS, Day
 from rtctl.soak.rig import Fused
+from rtctl.tick import faults, safety
 
 Make = Callable[..., Fused]
 

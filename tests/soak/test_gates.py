@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtctl.loop import safety
 from rtctl.soak.events import Day
 from rtctl.soak.invariants import INVARIANTS
 from rtctl.soak.memory import MOST_MB, Memory
 from rtctl.soak.rig import Fused
+from rtctl.tick import safety
 
 Make = Callable[..., Fused]
 Only = Callable[..., None]

@@ -23,7 +23,7 @@ def settings(request: pytest.FixtureRequest, config: Callable[..., Any]) -> Any:
 
 def test_signals_are_columns_of_the_row(settings: Any) -> None:
     names = generate.generate(machines.build(settings), "shm").row.names or ()
-    r = ranges.RANGES[settings.machine]
+    r = ranges.range_of(machines.build(settings))
     told = (r.position, r.error, *r.outputs, r.counts, r.truth, *r.tensions, *r.truth_tensions)
     assert not set(told) - set(names)
     assert len(r.tensions) == len(r.truth_tensions)

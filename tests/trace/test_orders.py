@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rtctl.config.errors import UserError
-from rtctl.loop import faults
 from rtctl.loop.mailbox import COMMAND
+from rtctl.tick import faults
 from rtctl.trace.orders import ORDERS, Journal, orders, restore
 
 

@@ -13,7 +13,7 @@ from rtctl.cli.main import main
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.daemon.protocol import OPS
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.loop import safety
+from rtctl.tick import safety
 from rtctl.trace.orders import ORDERS
 from rtctl.trace.replay import replay
 

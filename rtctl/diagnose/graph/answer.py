@@ -9,16 +9,15 @@ from threadpoolctl import threadpool_limits
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
-from rtctl.diagnose.graph.case import START
+from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.graph.fits import Fitted, prior, refit
-from rtctl.diagnose.graph.likelihood import Likelihood
-from rtctl.diagnose.graph.model import nominal
+from rtctl.diagnose.graph.joint import together
+from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
 from rtctl.diagnose.graph.record import GraphRecord, load_record
 from rtctl.diagnose.graph.search import Found, Progress, search
-from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
-from rtctl.diagnose.space import COSINE, PLACE, SHAPE, SINE, SIZE, Space
+from rtctl.diagnose.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import load_case
 
@@ -29,7 +28,7 @@ Z90 = 1.645
 class GraphDiagnosis(NamedTuple):
     """What a recording of a described machine says."""
 
-    record: GraphRecord
+    record: GraphRecord  # of several that of the longest way, which the figures show
     found: Found
     decided: Verdict
     effects: tuple[Effect, ...]
@@ -38,6 +37,12 @@ class GraphDiagnosis(NamedTuple):
     heldout: Heldout
     cannot_test: tuple[str, ...]
     seconds: float
+    records: tuple[GraphRecord, ...]
+
+    @property
+    def nominal(self) -> dict[str, float]:
+        """The owner's values by path, those of one recording by path and recording."""
+        return dict(self.found.base.space.owner.base)
 
     @property
     def verdict(self) -> str:
@@ -99,17 +104,18 @@ class GraphDiagnosis(NamedTuple):
             ],
             "cannot_test": list(self.cannot_test),
             "separating_experiment": None,
-            "warnings": list(self.record.case.warnings),
+            "recordings": [r.case.file.parent.name for r in self.records],
+            "warnings": list(dict.fromkeys(line for r in self.records for line in r.case.warnings)),
             "seconds": round(self.seconds, 2),
         }
 
 
-def diagnose(folder: Path | str, progress: Progress = lambda _: None) -> GraphDiagnosis:
-    """Diagnose the bundle of a described machine.
+def diagnose(*folders: Path | str, progress: Progress = lambda _: None) -> GraphDiagnosis:
+    """Diagnose the bundle of a described machine, or several of one machine together.
 
     Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
     """
-    return diagnose_record(load(folder), progress)
+    return diagnose_record(*map(load, folders), progress=progress)
 
 
 def load(folder: Path | str) -> GraphRecord:
@@ -122,31 +128,31 @@ def load(folder: Path | str) -> GraphRecord:
     return graph_record(load_known(folder))
 
 
-def diagnose_record(record: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:
-    """As `diagnose`, for a record in memory."""
+def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:
+    """As `diagnose`, for records in memory."""
     began = time.monotonic()
     with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
-        sim = Simulator(record)
-        space = Space(nominal(record.case), record.case.fitted, record.case.tolerance)
-        if record.edges:  # a model that follows the others tells which way they went
+        like, space = together(records)
+        if any(part.sim.record.edges for part in like.parts):  # a model that follows the others tells their directions
             progress("telling the directions of edges")
-            sim = sim.directed(refit(Likelihood(sim), space).model)
-        found = search(Likelihood(sim), space, progress)
+            like = like.directed(refit(like, space).model)
+        found = search(like, space, progress)
         progress("weighing names against forces without one")
         decided = verdict(found)
         progress("predicting rows that were not fitted")
         heldout = predict(found.base, decided.best)
         effects = _effects(decided)
         return GraphDiagnosis(
-            record=sim.record,
+            record=like.sim.record,
             found=found,
             decided=decided,
             effects=effects,
             located=_located(found, decided),
-            parameters=_parameters(decided.best, record),
+            parameters=_parameters(decided.best, like.sim.record),
             heldout=heldout,
             cannot_test=tuple(sorted(_cannot(found))),
             seconds=time.monotonic() - began,
+            records=tuple(part.sim.record for part in like.parts),
         )
 
 
@@ -189,6 +195,9 @@ def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
             low, high = value * float(np.exp(-half[i])), value * float(np.exp(half[i]))
         elif c.kind in (SIZE, PLACE, COSINE):
             low, high = value - c.scale * half[i], value + c.scale * half[i]
+        elif c.kind == REST:  # of a push, by the stiffness before it
+            reach = abs(c.scale * half[i] / values[h.coordinates[i - 1].name])
+            low, high = value - reach, value + reach
         else:
             low = high = value
         out[name] = Interval(value, float(low), float(high), unit)
@@ -196,16 +205,30 @@ def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
 
 
 def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
-    out, spread, machine = {}, _spread(f), record.case.machine
+    out, spread = {}, _spread(f)
     lowest, highest = f.space.bounds()  # what the owner says that it can be
     for i, path in enumerate(f.space.names):
+        if path.startswith(OWN_START):
+            continue
         value, nominal = f.model.base[path], f.space.owner.base[path]
         ends = np.clip((f.x[i] - spread[i], f.x[i] + spread[i]), lowest[i], highest[i])
         low, high = sorted(nominal * float(np.exp(end)) for end in ends)
-        if path == START:  # kept as its exponential
+        plain, _, name = path.partition(RECORDING)
+        if is_start(plain) and plain not in (FIRST_POSITION, FIRST_SPEED):  # kept as its exponential
             value, low, high = (float(np.log(v)) for v in (value, low, high))
-        out[record.case.called.get(path, path)] = Interval(value, low, high, words.value_unit(machine, path))
+        elif is_start(plain):
+            first = next(p.sim.record for p in f.like.parts if p.sim.record.name == name)
+            value, low, high = first_of(first, plain, (value, low, high))
+        out[record.case.called.get(path, path)] = Interval(value, low, high, words.unit_in(record, path))
     return out
+
+
+def first_of(record: GraphRecord, path: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    """First position or speed of a free response from the exponentials that a fit moves, SI."""
+    place, rate, guess = record.scales
+    x = record.y[record.main][0]
+    scale, offset = (place, x) if path == FIRST_POSITION else (rate, guess)
+    return tuple(float(offset + scale * np.log(v)) for v in values)
 
 
 def _located(found: Found, decided: Verdict) -> Located | None:

@@ -17,10 +17,12 @@ from rtctl.config.load import Dumper
 from rtctl.config.units import to_si
 from rtctl.config.yaml_file import Document
 from rtctl.diagnose.export import entry_of
-from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.case import is_start
+from rtctl.diagnose.graph.model import PHYSICS, GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.words import value_unit
 from rtctl.plants.graph.file import checked
+from rtctl.plants.graph.mechanics import code_of
 
 NO_NAME = "machine"
 
@@ -32,11 +34,19 @@ def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] 
     """
     case = record.case
     machine = case.machine.model_dump(mode="json", exclude_unset=True)
-    for path, value in model.base.items():
+    for path in case.made:
+        _drop(machine, path.split("."))
+    values = own(model.base, record.name)
+    for path, value in values.items():
+        if path in case.made or is_start(path) or path.startswith(PHYSICS):
+            continue
         if value != case.values.get(path):
             value = float(f"{value:.6g}")
         _put(machine, path.split("."), _with_unit(value, value_unit(case.machine, path)))
-    physics = [entry_of(term) for term in model.terms]
+    code = code_of(case.machine)
+    if code is not None:  # the path by which the user gave it, good from any folder
+        machine["mechanics"]["kind"] = f"{code.file}:{code.name}"
+    physics = [entry_of(term) for term in model._replace(base=values).resolved().terms]
     if config is not None:
         plant = {key: value for key, value in dict(config.get("plant") or {}).items() if key != "physics"}
         return {**config, "machine": machine, "plant": {**plant, "physics": physics}}
@@ -79,6 +89,13 @@ def _put(data: Any, path: list[str], value: Any) -> None:
         data[last] = value
 
 
+def _drop(data: Any, path: list[str]) -> None:
+    *outer, last = path
+    for key in outer:
+        data = data[key]
+    data.pop(last, None)
+
+
 def _with_unit(value: float, unit: str) -> float | str:
     """The number with its unit; bare where the unit is not one that a config reads."""
     if not unit:
@@ -98,9 +115,9 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
         f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted, effects that were"
     ]
     lines.append("effects that were found are in plant.physics. Changed, nominal -> fitted:")
-    for path, value in model.base.items():
+    for path, value in own(model.base, record.name).items():
         old = case.values.get(path, value)
-        if abs(value - old) > 5e-4 * abs(old):
+        if not is_start(path) and abs(value - old) > 5e-4 * abs(old):
             unit = value_unit(case.machine, path)
             lines.append(f"  {path}: {old:.4g} -> {value:.4g} {unit}".rstrip())
     return "".join(f"# {line}\n" for line in lines)

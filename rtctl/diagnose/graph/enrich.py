@@ -29,7 +29,7 @@ def enriched(best: Fitted) -> Fitted:
 def restarted(best: Fitted) -> Fitted:
     """The model from other starts, where it leaves more than the noise of counting: where dry friction lets go, and
     where a gap closes, the likelihood has many maxima."""
-    if not best.names or loudness(best) < QUIET:
+    if loudness(best) < QUIET:
         return best
     rng = np.random.default_rng(0)
     nb, space = best.space.nb, best.space

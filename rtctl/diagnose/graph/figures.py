@@ -7,9 +7,10 @@ from scipy.signal import welch
 from rtctl.diagnose.diagnosis import NOTHING
 from rtctl.diagnose.figures import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.graph.answer import GraphDiagnosis
+from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.missing import Missing, subjects
 from rtctl.diagnose.graph.posterior import rivals
-from rtctl.diagnose.graph.words import called, here, value_unit
+from rtctl.diagnose.graph.words import called, channel_unit, here, value_unit
 from rtctl.diagnose.missing import binned
 from rtctl.diagnose.numbers import figures as digits
 from rtctl.diagnose.numbers import percent
@@ -118,7 +119,7 @@ def _spectrum(ax, runs: Missing, term: str, node: str) -> None:
 
 def heldout(d: GraphDiagnosis) -> Figure:
     """Residual of each sensor on rows that no fit saw, in units of its noise, before and after; the motion on top."""
-    late = d.heldout.late
+    late = d.heldout.late.parts[0]
     sim, record = late.sim, late.sim.record
     names = sim.channels
     first = "before" if d.decided.best.names else "the description, fitted"
@@ -147,11 +148,7 @@ def heldout(d: GraphDiagnosis) -> Figure:
 
 
 def _unit(d: GraphDiagnosis, sensor: str) -> str:
-    from rtctl.diagnose.graph.words import body_of
-    from rtctl.plants.graph.units import measured_unit
-
-    machine = d.record.case.machine
-    return measured_unit(machine.sensors[sensor].measures, machine.turns(body_of(machine, sensor)))
+    return channel_unit(d.record.case.machine, sensor)
 
 
 def posterior(d: GraphDiagnosis) -> Figure:
@@ -185,14 +182,14 @@ def _folded(text: str, most: int = 44) -> str:
 
 def parameters(d: GraphDiagnosis) -> Figure | None:
     """Fitted numbers over the nominal ones with 90 % intervals; grey where the interval is the owner's tolerance."""
-    names = list(d.parameters)
+    names = [path for path in d.parameters if not is_start(path)]
     if not names:
         return None
-    case = d.record.case
+    space, owner = d.found.base.space, d.nominal
     figure, (ax,) = new(0.9 + 0.24 * len(names))
     for row, name in enumerate(names):
-        v, nominal = d.parameters[name], case.values[name]
-        tolerance = 100 * case.tolerance(name)
+        v, nominal = d.parameters[name], owner[name]
+        tolerance = 100 * space.tolerance(name)
         if np.isfinite(tolerance):
             ax.barh(row, 2 * tolerance, left=-tolerance, color=SEEN, alpha=0.25, height=0.8)
         value, low, high = (100 * (x / nominal - 1) for x in (v.value, v.low, v.high))

@@ -15,7 +15,7 @@ import numpy as np
 from rtctl.diagnose.fit import fit, jacobian
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.space import COSINE, INVERSE, SINE, SIZE, Space
+from rtctl.diagnose.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
@@ -78,7 +78,7 @@ def prior(space: Space) -> np.ndarray:
     return np.array(out)
 
 
-SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0}  # standard deviation of a size, in typical sizes
+SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0, REST: 3.0}  # standard deviation of a size, in typical sizes
 
 
 def refit(
@@ -88,21 +88,26 @@ def refit(
     rounds: int = 10,
     floor: Likelihood | None = None,
 ) -> Fitted:
-    """The model of `space` from x, first under the noise `floor`, then under the noise that it left the last time."""
+    """The model of `space` from x: by least squares and under the noise `floor`, then under the noise that it left.
+
+    Least squares finds large effects, a noise that knows them finds small ones.
+    """
     x = space.start() if x is None else np.asarray(x, float)
-    if floor is not None:
-        x = fit(floor, space, x, rounds=rounds, enough=1e-2).x
-    e = like.raw(space.model(x))
-    loss, own = like.loss(e), like.told(e)
-    best = (loss, x, e, own)
-    for _ in range(ROUNDS):
-        found = fit(own, space, x, rounds=rounds, enough=1e-3)
-        x = found.x
+
+    def judged(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, Likelihood]:
         e = like.raw(space.model(x))
-        loss, own = like.loss(e), like.told(e)
-        gain = best[0] - loss
+        return like.loss(e), x, e, like.told(e)
+
+    e = like.raw(space.model(x))
+    tried = [judged(fit(like.flat(e), space, x, rounds=rounds, enough=1e-2).x)]
+    if floor is not None:
+        tried.append(judged(fit(floor, space, x, rounds=rounds, enough=1e-2).x))
+    best = min(tried, key=lambda one: one[0])
+    for _ in range(ROUNDS):
+        found = judged(fit(best[3], space, best[1], rounds=rounds, enough=1e-3).x)
+        gain = best[0] - found[0]
         if gain > 0.0:
-            best = (loss, x, e, own)
+            best = found
         if gain < ENOUGH:
             break
     loss, x, e, own = best

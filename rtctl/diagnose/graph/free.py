@@ -7,6 +7,7 @@ what it still explains beside a name says that the law of that name is not the m
 Source: Robinson, Root-N-consistent semiparametric regression, Econometrica 56 (1988).
 """
 
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -14,11 +15,16 @@ import numpy as np
 
 from rtctl.diagnose.fit import bounded_step, parallel
 from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.measures import Measures, speed
 from rtctl.diagnose.scales import spaced
 
-HATS = 10
+HATS = 10  # of a first look at each axis
+FINE = 30  # of the axes that explain most
+SECOND = 2  # axes that are looked at again
+SMOOTH = 0.25  # of the range: distance over which a free force is alike, by its prior
+SIZE = 0.3  # of the force that moves a node: standard deviation of a free force, by its prior
 TURNS = 1.5  # turns from which on an angle is another axis than the position
 
 
@@ -27,30 +33,43 @@ class Free(NamedTuple):
 
     node: str
     axis: str
+    share: float  # standard deviation of its prior, in forces that move the node
     gain: float  # nats, under the noise that it leaves
     e: np.ndarray  # (blocks, sensors) residual that it leaves
-    volume: float  # ln of the posterior's volume over the prior's, nats
+    evidence: float  # nats that it adds to the model
     knots: np.ndarray
     force: np.ndarray  # (hats,) N or Nm
+    rms: float  # of the force over the recording, in forces that move the node
 
 
-def free_forces(base: Fitted) -> list[Free]:
-    """Free forces at every body along every axis, best first."""
+def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
+    """Free forces at every body along every axis, under a prior for each of the `shares` of the force that moves the
+    body; those with most evidence first."""
     sim, about = base.like.sim, Linear(base)
-    measures = Measures(sim, base.model.base, {})
-    out = []
+    every = [Measures(part.sim, base.model.base, {}) for part in base.like.parts]
+    places: dict[tuple[str, str], list[np.ndarray]] = {}
+    taken: set[int] = set()
     for node, ratio in sim.ratios.items():
-        if ratio == 0.0:
+        at = sim.layout.coordinate(node)
+        if ratio == 0.0 or at in taken:  # bodies that move as one feel one force
             continue
-        for axis, values in axes(measures, node, ratio).items():
-            out.append(_fitted(about, measures, node, axis, values))
-    return sorted(out, key=lambda f: -f.gain)
+        taken.add(at)
+        found = [axes(measures, node) for measures in every]
+        for axis in found[0]:
+            if all(axis in own for own in found):
+                places[node, axis] = after(axis, [own[axis] for own in found])
+    places = {place: values for place, values in places.items() if np.ptp(np.concatenate(values)) > 0.0}
+    out = [free for place, values in places.items() for free in _fitted(about, every, *place, values, HATS, shares)]
+    out.sort(key=lambda f: -f.evidence)
+    for place in list(dict.fromkeys((f.node, f.axis) for f in out))[:SECOND]:
+        out += _fitted(about, every, *place, places[place], FINE, shares)
+    return sorted(out, key=lambda f: -f.evidence)
 
 
-def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
+def axes(m: Measures, node: str) -> dict[str, np.ndarray]:
     """Values (n,) of each axis at a body."""
     sim = m.sim
-    x = m.way * ratio
+    x = m.way(node)
     out = {
         "velocity": speed(x, sim.record.dt),
         "position": x,
@@ -63,32 +82,81 @@ def axes(m: Measures, node: str, ratio: float) -> dict[str, np.ndarray]:
     return out
 
 
-def _fitted(about: Linear, m: Measures, node: str, axis: str, values: np.ndarray) -> Free:
-    base, like, sim = about.base, about.like, about.like.sim
-    low, high = np.quantile(values, (1e-3, 1.0 - 1e-3))
-    knots = np.unique(spaced(np.sort(values), low, high, HATS))
-    at, own = sim.layout.coordinate(node), sim.layout.ratio(node, base.model.base)
-    unit = 0.1 * m.of("force", node)
+def after(axis: str, values: list[np.ndarray]) -> list[np.ndarray]:
+    """Values of an axis in each recording; the time of each begins where that of the one before ends."""
+    if axis != "time":
+        return values
+    ends = np.cumsum([0.0, *(v[-1] for v in values)])
+    return [v + end for v, end in zip(values, ends, strict=False)]
+
+
+def _fitted(
+    about: Linear,
+    every: list[Measures],
+    node: str,
+    axis: str,
+    values: list[np.ndarray],
+    hats: int,
+    shares: Sequence[float],
+) -> list[Free]:
+    base, like = about.base, about.base.like
+    along = np.sort(np.concatenate(values))
+    low, high = np.quantile(along, (1e-3, 1.0 - 1e-3))
+    knots = np.unique(spaced(along, low, high, hats))
+    whole = max(m.of("force", node) for m in every)
+    unit = SIZE * whole
+    apart = np.abs(np.subtract.outer(*[np.arange(len(knots)) / (len(knots) - 1)] * 2))
+    root = np.linalg.cholesky(np.exp(-apart / SMOOTH))  # of the prior's covariance (Ornstein and Uhlenbeck, 1930)
+
+    def pushed(part: Likelihood, values: np.ndarray, hat: np.ndarray) -> np.ndarray:
+        sim, model = part.sim, part.sim.own(base.model)
+        forces = np.zeros((len(values), sim.layout.nq))
+        own = sim.layout.ratio(node, model.base)
+        forces[:, sim.layout.coordinate(node)] = own * unit * np.interp(values, knots, hat)
+        return part.of_readings(sim.pushed(forces).run(model, n=part.rows[1], coarse=True))
 
     def column(hat: np.ndarray) -> np.ndarray:
-        forces = np.zeros((len(values), sim.layout.nq))
-        forces[:, at] = own * unit * np.interp(values, knots, hat)
-        out = sim.pushed(forces).run(base.model, n=like.rows[1], coarse=True)
-        return np.asarray(like.of_readings(out) - about.start)
+        found = [pushed(part, own, hat) for part, own in zip(like.parts, values, strict=True)]
+        return np.asarray(np.concatenate(found) - about.start)
 
-    C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2)
-    white, r = like.filtered(C), like.white(base.e)
+    C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2) @ root
+    out = []
+    for share in shares:
+        scale = share / SIZE
+        solved = [_solved(about, C * scale, noise) for noise in (like, like.flat(base.e))]
+        solved.append(_solved(about, C * scale, like.told(max(solved, key=lambda s: s.evidence).e)))
+        best = max(solved, key=lambda s: s.evidence)
+        force = unit * scale * (root @ best.z)
+        rms = float(np.sqrt(np.mean(np.interp(along[:: len(along) // 2000 + 1], knots, force) ** 2))) / whole
+        out.append(Free(node, axis, share, best.gain, best.e, best.evidence, knots, force, rms))
+    return out
+
+
+class _Solved(NamedTuple):
+    gain: float
+    evidence: float
+    e: np.ndarray
+    z: np.ndarray  # (columns,) in standard deviations of the prior
+
+
+def _solved(about: Linear, C: np.ndarray, noise: Likelihood) -> _Solved:
+    """Parameters of the base and the columns C (blocks, sensors, k), each of variance one, that suit the residual under
+    a noise."""
+    base, under = about.base, about.under(noise)
+    r = noise.white(base.e)
     n, k = len(base.x), C.shape[2]
-    M = np.hstack([about.white, white])
-    weight = np.concatenate([about.weight, np.full(k, 1.0 / 9.0)])
+    M = np.hstack([under.white, noise.filtered(C)])
+    weight = np.concatenate([about.weight, np.ones(k)])
     H = M.T @ M + np.diag(weight)
     x = np.concatenate([base.x, np.zeros(k)])
-    low_x, high_x = base.space.bounds()
-    bounds = np.concatenate([low_x, np.full(k, -1e3)]), np.concatenate([high_x, np.full(k, 1e3)])
+    low, high = base.space.bounds()
+    bounds = np.concatenate([low, np.full(k, -1e3)]), np.concatenate([high, np.full(k, 1e3)])
     dx = bounded_step(H, M.T @ r + weight * x, x, *bounds, DAMPING)
     e = about.left(dx, C)
     inner = base.power * (M.T @ M) + np.diag(weight)
-    volume = np.linalg.slogdet(inner)[1] - np.sum(np.log(weight))
+    volume = np.linalg.slogdet(inner)[1]
     if n:
-        volume -= np.linalg.slogdet(inner[:n, :n])[1] - np.sum(np.log(weight[:n]))
-    return Free(node, axis, base.loss - like.loss(e), e, 0.5 * float(volume), knots, unit * dx[n:])
+        volume -= np.linalg.slogdet(inner[:n, :n])[1]
+    prior = 0.5 * float(weight @ (x + dx) ** 2 - weight[:n] @ base.x**2)
+    gain = base.loss - base.like.loss(e)
+    return _Solved(gain, base.power * gain - prior - 0.5 * float(volume), e, dx[n:])

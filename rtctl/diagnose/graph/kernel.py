@@ -14,12 +14,13 @@ import numpy as np
 from rtctl.diagnose.kernel import SLOTS, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
+from rtctl.plants.graph.mechanics import Mechanics
 from rtctl.plants.graph.params import Q, Y
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
-OPEN, TRACK = range(2)
+OPEN, TRACK, HELD = range(3)
 KIND = "described"  # of the lines of a term that a described machine has
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
@@ -52,8 +53,36 @@ def substep(job, p, m, t, forces, row):
     force(t, m)
     last(t, m)
     for i in range(p.nq):
-        m.f[i] += job.correction * job.push[i]
-    linear.advance(m)
+        m.f[i] += job.need[i]
+        for c in range(job.follows):
+            m.f[i] += job.correction[c] * job.push[c, i]
+    {advance}
+
+
+@compiled
+def hold(job, p, m, k, share, path, pace):
+    """Put the held coordinates where they are at `share` of tick k, and into job.need the force that it takes.
+
+    Between rows a cubic runs through positions `path` and speeds `pace` (n, coordinates). The force is the one that
+    would have given the speed at the end of the substep: dry friction answers to it as to any other.
+    """
+    n = path.shape[0]
+    one = min(max(k, 0), n - 1)
+    two = min(one + 1, n - 1) if k >= 0 else one
+    s, T = share, 1.0 / job.rate
+    for i in range(p.nq):
+        if job.held[i] == 0:
+            continue
+        a, b = path[one, i], path[two, i]
+        c, d = T * pace[one, i], T * pace[two, i]
+        if k < 0:
+            c = d = 0.0
+        elif two == one:  # after the last row it goes on
+            b = a + c
+        x = a + s * (c + s * (3.0 * (b - a) - 2.0 * c - d + s * (2.0 * (a - b) + c + d)))
+        v = (c + s * (2.0 * (3.0 * (b - a) - 2.0 * c - d) + s * 3.0 * (2.0 * (a - b) + c + d))) / T
+        job.need[i] += (v - m.x[p.nq + i]) / m.Gamma_T[m.nu + i, p.nq + i]
+        m.x[i], m.x[p.nq + i] = x - job.shift[i], v
 
 
 @compiled
@@ -64,37 +93,50 @@ def look(p, m, t):
 
 
 @entry
-def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
+def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     """Simulate len(seen) ticks after `lead` ticks at the first row; readings go to out (n, sensors), SI.
 
-    jobs.mode 0 applies the recorded `volts` (n, drives) and `forces` (n, coordinates) alone; 1 adds a correction that
-    makes the main sensor follow `seen` (n,) up to row jobs.release, and leaves it in `push` (n,). Returns the row at
-    which the model ran away, n where it did not.
+    jobs.mode 0 applies the recorded `volts` (n, drives) and `forces` (n, coordinates) alone; 1 adds corrections that
+    make the followed sensors follow `seen` (n, followed) up to row jobs.release, and leaves them in `push` (n,
+    followed); 2 holds the first of their coordinates on `path`, and leaves the force that it takes in `push`.
+    Coordinates of jobs.held move as `path` and `pace` (n, coordinates) say. Returns the row at which the model ran
+    away, n where it did not.
     """
     job, p, s, t = jobs[0], ps[0], ss[0], ts[0]
     m = s.m
     graph.start(p, s)
     n, drives = volts.shape
-    main, stride = job.main, job.stride
+    main, stride = job.main[0], job.stride
     first = -(job.lead // stride) * stride
     for k in range(first, n + stride - 1, stride):
         if k == 0:
             m.t = 0.0
+            for i in range(p.nq):
+                m.x[i] += job.first_x[i]
+                m.x[p.nq + i] += job.first_v[i]
         look(p, m, t)
         at = min(max(k, 0), n - 1)
-        job.correction = 0.0
-        if job.mode == 1 and k < job.release:
-            e = seen[at] - m.y[main]
-            if job.speed != 0:  # a rectified speed says how fast, not which way
-                if m.y[main] * m.x[p.nq + p.sensor_i[main]] * p.sensor_a[main] < 0.0:
-                    e = -e
-                job.e, job.d = 0.0, e
-            else:
-                if k == first:
-                    job.e = e
-                job.d += job.a * ((e - job.e) * job.rate - job.d)
-                job.e = e
-            job.correction = job.P * job.e + job.D * job.d
+        if job.mode == 2:  # what the sensor errs by is no motion
+            i, a = p.sensor_i[main], p.sensor_a[main]
+            for _ in range(2):
+                job.shift[i] = (m.y[main] - a * m.x[i]) / a
+                m.x[i] = path[at, i] - job.shift[i]
+                look(p, m, t)
+        for c in range(job.follows):
+            job.correction[c] = 0.0
+            if job.mode == 1 and k < job.release:
+                y = job.main[c]
+                e = seen[at, c] - m.y[y]
+                if job.speed[c] != 0:  # a rectified speed says how fast, not which way
+                    if m.y[y] * m.x[p.nq + p.sensor_i[y]] * p.sensor_a[y] < 0.0:
+                        e = -e
+                    job.e[c], job.d[c] = 0.0, e
+                else:
+                    if k == first:
+                        job.e[c] = e
+                    job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
+                    job.e[c] = e
+                job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
         if k >= 0:
             for c in range(p.ny):
                 for back in range(1, min(stride, k + 1)):  # rows in between lie on a line
@@ -103,7 +145,8 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
                 if k < n:
                     out[k, c] = m.y[c]
                 job.before[c] = m.y[c]
-            push[at] = job.correction
+            for c in range(job.follows if job.mode == 1 else 0):
+                push[at, c] = job.correction[c]
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0
@@ -114,6 +157,12 @@ def run(jobs, ps, ss, ts, volts, forces, seen, out, push):
                     for c in range(drives):
                         m.volts[c] += share * volts[row, c]
             substep(job, p, m, t, forces, at)
+            if job.holds != 0:
+                hold(job, p, m, k, (i + 1.0) / job.substeps, path, pace)
+                for row in ((k if i == 0 else -1), (k + 1 if i == job.substeps - 1 else -1)):
+                    if job.mode == 2 and 0 <= row < n:  # mean of just before a row and just after it
+                        for j in range(p.nq):
+                            push[row] += 0.5 * job.need[j] * job.share[j]
         if not (abs(m.y[main]) < 1e12):
             return max(k, 0)
     return n
@@ -128,16 +177,24 @@ JOB = state(
     delay=int,  # substeps from a write until it acts
     part=float,  # and a part of one
     rate=float,  # Hz
-    main=int,  # number of the sensor that is followed
-    speed=int,  # 1: it shows a speed
-    P=float,  # of the correction, in units of `push` a rad or m
-    D=float,
-    a=float,
-    push=(float, Q),  # what one unit of correction pushes each coordinate with
-    correction=float,
-    e=float,
-    d=float,
-    before=(float, Y),
+    follows=int,
+    main=(int, Q),  # numbers of the sensors that are followed
+    speed=(int, Q),  # 1: it shows a speed
+    P=(float, Q),  # of the correction, in units of `push` a rad or m
+    D=(float, Q),
+    a=(float, Q),
+    push=(float, (Q, Q)),  # what one unit of each correction pushes each coordinate with
+    correction=(float, Q),
+    first_x=(float, Q),  # how far each coordinate is from rest at the first row, and its speed
+    first_v=(float, Q),
+    holds=int,  # 1: some coordinate is held
+    held=(int, Q),  # 1: the coordinate moves as `path` says
+    shift=(float, Q),  # what the reading of a held coordinate is off by
+    need=(float, Q),  # force that holds it, N or Nm
+    share=(float, Q),  # what of it counts at the main sensor's body
+    e=(float, Q),
+    d=(float, Q),
+    before=(float, Y),  # readings of the substep before
 )
 
 
@@ -155,12 +212,16 @@ def terms() -> tuple[Term, ...]:
     return tuple(term for term in TERMS.values() if any(term.act_at(site, KIND) for site in SITES))
 
 
-def source() -> str:
-    """The module's text."""
+def source(code: Mechanics | None = None) -> str:
+    """The module's text; of machines with mechanics from a file it imports their integration by the file's hash."""
     known = terms()
-    modules = sorted({t.build.__module__ for t in known})
-    imports = "\n".join(generate.imported(m) for m in modules)
-    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), RUN]
+    modules = {t.build.__module__ for t in known}
+    run = RUN.replace("{advance}", "linear.advance(m)")
+    if code is not None:
+        modules.add(code.steps.__name__)
+        run = RUN.replace("{advance}", f"{code.steps.__name__}.advance(p, m)")
+    imports = "\n".join(generate.imported(m) for m in sorted(modules))
+    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), run]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
 
 
@@ -193,10 +254,12 @@ def sources_hash() -> str:
 
 
 @cache
-def kernel() -> Kernel:
-    """The kernel, compiled or taken from the cache."""
+def kernel(code: Mechanics | None = None) -> Kernel:
+    """The kernel of all machines, or of those with the mechanics of a file; compiled, or taken from the cache."""
     known = terms()
-    path = generate.write_text("fit_graph", source(), sources_hash())
+    path = generate.write_text(
+        "fit_graph" if code is None else f"fit_{code.name.lower()}", source(code), sources_hash()
+    )
     params = [(field(t.name), record_dtype(sample(t))) for t in known]
     states = [(field(t.name), t.state) for t in known if t.state is not None]
     whole = ("kind", "node", "link", "channel", "other")

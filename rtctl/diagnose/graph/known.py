@@ -70,6 +70,7 @@ def graph_case(record: Record) -> GraphCase:
         warnings=case.warnings,
         file=case.file,
         format=FORMAT,
+        plant=case.plant,
         called=called,
     )
 

@@ -34,7 +34,7 @@ class Likelihood:
         self.sim = sim
         record = sim.record
         self.mean = max(1, round(1.0 / (RATE * record.dt)))
-        self.channels = [sim.layout.sensors[name] for name in sim.channels]
+        self.channels = [sim.column(name) for name in sim.channels]
         begin = min(settled(sim), len(record.t) // 4)
         self.rows = (begin, len(record.t)) if rows is None else rows
         self.target = np.stack([record.y[name] for name in sim.channels], axis=1)
@@ -42,6 +42,9 @@ class Likelihood:
         smooth = np.std(np.diff(self.target, 2, axis=0), axis=0) / 10.0
         self.least = np.where(grain > 0.0, QUANTISED * grain, np.maximum(smooth, 1e-12)) / np.sqrt(self.mean)
         self.least = np.where([name in sim.edges for name in sim.channels], EDGE * grain, self.least)
+        if sim.case.problem == "kinematic":  # the counts of the first position are in what follows it
+            passed = np.array([sim.ratios.get(str(sensor_body(sim, name)), 0.0) for name in sim.channels])
+            self.least = np.hypot(self.least, QUANTISED * record.grain[sim.main] * passed / np.sqrt(self.mean))
         self.noise: list[Noise] = list(noise) if noise is not None else [
             Noise(np.ones(1), float(max(least, 1e-300))) for least in self.least
         ]  # fmt: skip
@@ -68,9 +71,17 @@ class Likelihood:
         if not (np.abs(e) < wild).all():  # ran away: no noise explains it
             e[~(np.abs(e) < wild).all(axis=1)] = wild
             e[::2] *= -1.0
-        beside = np.array([name != self.sim.main for name in self.sim.channels])
-        beside &= np.array([name not in self.sim.edges for name in self.sim.channels])
+        beside = np.array([self._floats(name) for name in self.sim.channels])
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
+
+    def _floats(self, name: str) -> bool:
+        """Whether the constant of a channel says nothing and is still in its residuals."""
+        if name in self.sim.edges:
+            return False
+        if self.sim.case.problem != "static":
+            return name != self.sim.main
+        sensors = self.sim.case.machine.sensors
+        return name in sensors and sensors[name].measures == "position"
 
     def _by_edges(self, name: str, out: np.ndarray, blocks: int) -> np.ndarray:
         """Residual (blocks,) of a sensor that shows edges: their mean in each block, 0 where there is none."""
@@ -93,6 +104,10 @@ class Likelihood:
         name = self.sim.channels[c]
         return np.unique(self.edges_in(name)[1]) if name in self.sim.edges else slice(None)
 
+    def directed(self, model: GraphModel) -> "Likelihood":
+        """The same with the sensors that know no direction, as the model tells the directions of their edges."""
+        return Likelihood(self.sim.directed(model))
+
     def white(self, e: np.ndarray) -> np.ndarray:
         """Innovations of residuals (blocks, sensors), sensor after sensor."""
         return np.concatenate([noise.whiten(e[self.present(c), c]) for c, noise in enumerate(self.noise)])
@@ -107,15 +122,32 @@ class Likelihood:
         other.noise = [noise_of(e[self.present(c), c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
         return other
 
+    def flat(self, e: np.ndarray) -> "Likelihood":
+        """The same with white noise as loud as these residuals (blocks, sensors): least squares.
+
+        An autoregression holds a large effect for noise, so that a fit under it moves by events alone.
+        """
+        other = copy(self)
+        other.noise = [
+            Noise(np.ones(1), max(float(np.std(e[self.present(c), c])), float(self.least[c])))
+            for c in range(e.shape[1])
+        ]
+        return other
+
     def loss(self, e: np.ndarray) -> float:
         """Negative logarithm of the likelihood of residuals under a noise of their own, up to a constant, nats."""
-        total = 0.0
+        return float(self.losses(e, 1)[0])
+
+    def losses(self, e: np.ndarray, count: int) -> np.ndarray:
+        """The same by segment of the rows (count,), nats: their sum is the loss."""
+        out = np.zeros(count)
         for c in range(e.shape[1]):
             shown = e[self.present(c), c]
             own = noise_of(shown, ORDER, float(self.least[c]))
             r = own.whiten(shown)
-            total += len(r) * float(np.log(own.sigma)) + 0.5 * float(r @ r)
-        return total
+            segment = np.arange(len(e))[self.present(c)][own.order :] * count // len(e)
+            out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
+        return out
 
     def filtered(self, columns: np.ndarray) -> np.ndarray:
         """The same filters on many residuals at once (blocks, sensors, columns): (innovations, columns)."""
@@ -128,6 +160,23 @@ class Likelihood:
         shown = [len(np.arange(blocks)[self.present(c)]) for c in range(len(self.noise))]
         return sum(n - noise.order for n, noise in zip(shown, self.noise, strict=True))
 
+    @property
+    def parts(self) -> Sequence["Likelihood"]:
+        """The likelihood of each recording: this one."""
+        return (self,)
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Standard deviation of each channel, SI; 1 where it is constant."""
+        found = np.std(self.target[slice(*self.rows)], axis=0)
+        return np.asarray(np.where(found > 0.0, found, 1.0))
+
+    def split(self, share: float) -> tuple["Likelihood", "Likelihood"]:
+        """The same of the first rows, and of the last `share` of them."""
+        begin, end = self.rows
+        cut = end - round(share * (end - begin))
+        return self.during(begin, cut), self.during(cut, end)
+
     def during(self, begin: int, end: int) -> "Likelihood":
         """The same of rows `begin` to `end`."""
         other = copy(self)
@@ -135,8 +184,19 @@ class Likelihood:
         return other
 
 
+def sensor_body(sim: Simulator, name: str) -> str | None:
+    """Body of a channel; None where it looks at none."""
+    found = sim.case.machine.sensors.get(name)
+    return None if found is None else found.body
+
+
 def settled(sim: Simulator) -> int:
-    """First row that counts: the machine has moved and forgotten how it stood before the recording began."""
+    """First row that counts: the machine has moved and forgotten how it stood before the recording began.
+
+    Of a free response it is the first of all: the state there is fitted.
+    """
+    if sim.case.problem == "free":
+        return 0
     y = sim.seen
     moved = int(np.argmax(np.abs(y - y[0]) > 0.01 * np.ptp(y)))
     return min(moved + round(FORGET / sim.follow / sim.record.dt), len(y) // 5)

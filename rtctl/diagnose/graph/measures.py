@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rtctl.diagnose.graph.model import rigid
+from rtctl.diagnose.graph.model import own
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.element import Element
+from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.elements import contacts
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.physics import TERMS
@@ -42,32 +43,38 @@ class Measures:
     """Measures by name and node, from the main sensor, the ratios of the joints and the recorded commands."""
 
     def __init__(self, sim: Simulator, values: dict[str, float], hints: dict[str, list]):
+        values = own(values, sim.record.name)
         self.sim, self.values, self.hints = sim, values, hints
         self.machine, self.layout = sim.case.machine, sim.layout
-        self.way = way(sim)
         dt = sim.record.dt
-        v = speed(self.way, dt)
-        moving = np.abs(v) > 0.02 * np.abs(v).max(initial=LITTLE)
-        self.v_main = float(np.sqrt(np.mean(v[moving] ** 2))) if moving.any() else LITTLE
-        self.a_main = float(np.std(np.gradient(v, dt)))
-        self.ratios = rigid(self.layout, values, str(sim.body))
+        self.ratios = sim.moves(values)
+        self.leaders = {name: sim.leader(name) for name in self.ratios}
+        self.inertias = machine_params(self.layout, values, dt).inertia
         self.u = sim.volts - np.median(sim.volts, axis=0)
-        self.effort = self._effort()
+        self.ways = [way(sim, number) for number in range(len(sim.followed))]
+        self.speeds, self.efforts = [], []
+        for number, x in enumerate(self.ways):
+            v = speed(x, dt)
+            moving = np.abs(v) > 0.02 * np.abs(v).max(initial=LITTLE)
+            self.speeds.append(float(np.sqrt(np.mean(v[moving] ** 2))) if moving.any() else LITTLE)
+            self.efforts.append(self._effort(number, float(np.std(np.gradient(v, dt)))))
         self.term = ""
         self.record = Seen(sim.elements, dt)
 
-    def _effort(self) -> float:
-        """Rms of what all drives make at the main body, N or Nm."""
-        total = np.zeros(len(self.way))
-        for name, number in self.layout.drives.items():
+    def _effort(self, number: int, a: float) -> float:
+        """Rms of what all drives make at a followed body with the acceleration `a` (rms), N or Nm."""
+        total = np.zeros(len(self.u))
+        for name, channel in self.layout.drives.items():
             drive = self.machine.drives[name]
             path = f"drives.{name}"
             gain = self.values[f"{path}.gain"] * self.values.get(f"{path}.torque_constant", 1.0)
             gain /= self.values.get(f"{path}.resistance", 1.0)
-            bodies = [drive.body] if drive.body else [self.machine.joints[str(drive.joint)].to]
-            total += gain * self.ratios.get(str(bodies[0]), 0.0) * self.u[:, number]
+            body = str(drive.body or self.machine.joints[str(drive.joint)].to)
+            if self.leaders.get(body, 0) == number:
+                total += gain * self.ratios.get(body, 0.0) * self.u[:, channel]
         found = float(np.sqrt(np.mean(total**2)))
-        return max(found, 0.1 * self.inertia(str(self.sim.body)) * self.a_main, LITTLE)
+        share = 0.1 if found > 0.0 or not number else 1.0  # what no drive moves, another body moves
+        return max(found, share * self.inertia(self.sim.followed[number].body) * a, LITTLE)
 
     def body_of(self, node: str) -> str:
         """The body that a node belongs to: its own, that at the far end of a joint, that of a drive or sensor."""
@@ -89,17 +96,27 @@ class Measures:
 
     def scale(self, node: str) -> Scales:
         """Scales of a node."""
-        ratio = self.ratio(node)
-        ends = sorted((float(self.way.min()) * ratio, float(self.way.max()) * ratio))
+        body, arm = self.lever(node)
+        ratio, number = arm * (self.ratios.get(body, 1.0) or 1.0), self.leaders.get(body, 0)
+        x = self.ways[number]
+        ends = sorted((float(x.min()) * ratio, float(x.max()) * ratio))
         return Scales(
-            abs(ratio) * self.v_main, max(ends[1] - ends[0], LITTLE), self.effort / abs(ratio), ends[0], np.sign(ratio)
+            abs(ratio) * self.speeds[number],
+            max(ends[1] - ends[0], LITTLE),
+            self.efforts[number] / abs(ratio),
+            ends[0],
+            np.sign(ratio),
         )
 
-    def ratio(self, node: str) -> float:
-        """What a node moves for one unit of the main sensor's body; tape, and what a contact drives, in their own."""
+    def lever(self, node: str) -> tuple[str, float]:
+        """Body by which a node moves, and what it moves for one unit of it: tape, and what a contact drives, in its
+        own."""
         at = lever(self.layout, self.values, node, bool(self.term) and TERMS[self.term].contact)
-        body, arm = at if at is not None else (self.body_of(node), 1.0)
-        return arm * (self.ratios.get(body, 1.0) or 1.0)
+        return at if at is not None else (self.body_of(node), 1.0)
+
+    def way(self, body: str) -> np.ndarray:
+        """Position (n,) of a body as the followed sensor that joints connect it with saw it."""
+        return np.asarray(self.ways[self.leaders.get(body, 0)] * self.ratios.get(body, 0.0))
 
     def turns(self, node: str) -> bool:
         """Whether what a node belongs to turns."""
@@ -108,17 +125,18 @@ class Measures:
     def of(self, measure: str, node: str) -> float:
         """The measure in SI at a node."""
         s = self.scale(node)
-        volts = max(float(np.sqrt(np.mean(self.sim.volts**2))), LITTLE)
+        volts = max(self.volts(""), LITTLE)
         stiffness = self.stiffness(node)
         peak = float(np.abs(self.sim.volts).max(initial=0.0))
         table = {
-            "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low,
+            "one": 1.0, "force": s.force, "speed": s.speed, "span": s.span, "low": s.low, "per_span2": s.span**-2,
             "drag": s.force / s.speed, "drag2": s.force / s.speed**2, "stiff": s.force / s.span,
-            "twist": s.force / stiffness, "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
+            "twist": self.twist(node, s.force / stiffness),
+            "cubic": stiffness**3 / s.force**2, "square": stiffness**2 / s.force,
             "swell": s.force / (s.speed * s.span**2), "stiffness": stiffness, "firm": self.firm(node),
-            "compliance": 1.0 / s.force, "inertia": self.inertia(node), "seconds": 1.0,
+            "compliance": 1.0 / s.force, "yield": s.speed / s.force, "inertia": self.inertia(node), "seconds": 1.0,
             "ring": min(1.0, 1.0 / (USUAL_RATE * self.sim.record.dt)), "tick": self.sim.record.dt, "driver": 0.0,
-            "duration": len(self.way) * self.sim.record.dt, "volts": max(self.volts(node), 0.05 * volts),
+            "duration": len(self.u) * self.sim.record.dt, "volts": max(self.volts(node), 0.05 * volts),
             "per_volt": 1.0 / volts, "peak": max(peak, LITTLE), "pace": self.pace(node),
             "grain": self.grain(node), "counts": self.grain(node), "grip": s.force, "contact": s.force,
         }  # fmt: skip
@@ -143,7 +161,9 @@ class Measures:
         record = self.sim.record
         if node in record.grain:
             return record.grain[node] or LITTLE
-        return (record.grain[self.sim.main] or LITTLE) * abs(self.ratios.get(self.body_of(node), 1.0) or 1.0)
+        body = self.body_of(node)
+        sensor = self.sim.followed[self.leaders.get(body, 0)].sensor
+        return (record.grain[sensor] or LITTLE) * abs(self.ratios.get(body, 1.0) or 1.0)
 
     def dry(self, node: str) -> float:
         """Dry friction of the model at a body, with that of all bodies that move with it."""
@@ -166,18 +186,33 @@ class Measures:
         return float(total / own**power)
 
     def inertia(self, node: str) -> float:
-        """Inertia or mass of all that moves, as the node feels it."""
-        total = 0.0
-        for name, body in self.machine.bodies.items():
-            if name in self.ratios:
-                key = "inertia" if body.turns else "mass"
-                total += self.ratios[name] ** 2 * self.values[f"bodies.{name}.{key}"]
-        return float(total / (self.ratios.get(self.body_of(node), 1.0) or 1.0) ** 2)
+        """Inertia or mass of all that joints make move with a node, as the node feels it."""
+        body = self.body_of(node)
+        number, total, counted = self.leaders.get(body, 0), 0.0, set()
+        for name, ratio in self.ratios.items():
+            at = self.layout.coordinate(name)
+            if ratio != 0.0 and self.leaders[name] == number and at not in counted:
+                counted.add(at)
+                total += (ratio / self.layout.ratio(name, self.values)) ** 2 * float(self.inertias[at])
+        return float(total / (self.ratios.get(body, 1.0) or 1.0) ** 2)
 
     def stiffness(self, node: str) -> float:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""
         s = self.scale(node)
         return self.values.get(f"joints.{node}.stiffness", 0.0) or s.force / s.span
+
+    def twist(self, node: str, usual: float) -> float:
+        """Deflection of a joint: `usual` by its force, in a kinematic problem as the positions differ."""
+        sim, sensors = self.sim, self.machine.sensors
+        if sim.case.problem != "kinematic":
+            return usual
+        apart = []
+        for name in sim.channels:
+            ratio = self.ratios.get(str(sensors[name].body), 0.0)
+            if sensors[name].measures == "position" and ratio != 0.0:
+                off = float(np.std(sim.record.y[name] - ratio * self.way(str(sim.body)))) / abs(ratio)
+                apart.append(off * abs(self.ratios.get(self.body_of(node), 1.0)))
+        return max([usual, *apart])
 
     def firm(self, node: str) -> float:
         """Stiffness of a joint with which the lighter of its two sides rings at a tenth of the sample rate."""
@@ -218,8 +253,8 @@ def speed(x: np.ndarray, dt: float) -> np.ndarray:
     return np.asarray(np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH / dt)) + 1), dt))
 
 
-def way(sim: Simulator) -> np.ndarray:
-    """Position of the main body as its sensor saw it, (n,) rad or m; of a speed the way since row 0."""
-    if sim.shows_speed:
-        return np.asarray(np.cumsum(sim.seen) * sim.record.dt)
-    return sim.seen
+def way(sim: Simulator, number: int = 0) -> np.ndarray:
+    """Position of a followed body as its sensor saw it, (n,) rad or m; of a speed the way since row 0."""
+    if sim.followed[number].shows_speed:
+        return np.asarray(np.cumsum(sim.watched[:, number]) * sim.record.dt)
+    return np.asarray(sim.watched[:, number])

@@ -13,12 +13,11 @@ from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.hypotheses import faster
 from rtctl.diagnose.graph.likelihood import settled
 from rtctl.diagnose.graph.measures import speed, way
-from rtctl.diagnose.graph.model import GraphModel, rigid
+from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.graph.words import body_of, here
+from rtctl.diagnose.graph.words import body_of, channel_unit, here
 from rtctl.diagnose.quantities import DIMENSIONS
 from rtctl.plants.graph.description import Description
-from rtctl.plants.graph.units import measured_unit
 from rtctl.plants.physics import TERMS
 
 CLEARER = 3.0  # times more than the followed sensor, from which on another sensor's reading shows an effect
@@ -70,15 +69,15 @@ class Missing:
         at = here(self.machine, node)
         title = f"{at[4:] if at.startswith('the ') else at}"
         if channel is not None:
-            index = self.sim.layout.sensors[channel]
+            index = self.sim.column(channel)
             y = self.d.record.y[channel] - out0[:, index]
             law = out1[:, index] - out0[:, index]
             y, law = (v - np.median(v[self.rows]) for v in (y, law))
-            sensor = self.machine.sensors[channel]
-            unit = measured_unit(sensor.measures, self.machine.turns(body_of(self.machine, channel)))
+            unit = channel_unit(self.machine, channel)
             return Curve(x, x_words, x_unit, y, law, f"missing reading of {here(self.machine, channel)}", unit, title)
         body = self.node_body(node)
-        factor = 1.0 / (rigid(self.sim.layout, full.base, str(self.sim.body)).get(body, 0.0) or 1.0)
+        factor, number = 1.0 / (self.sim.moves(self.sim.own(full).base).get(body, 0.0) or 1.0), self.sim.leader(body)
+        push0, push1 = push0[:, number], push1[:, number]
         turns = self.machine.turns(body)
         what = "torque" if turns else "force"
         unit = DIMENSIONS["force"][not turns]
@@ -94,7 +93,7 @@ class Missing:
     def abscissa(self, axis: str, node: str) -> tuple[np.ndarray, str, str]:
         """Values (n,) of an axis, its words and unit."""
         record, body = self.d.record, self.node_body(node)
-        x = way(self.sim) * self.sim.ratios[body]
+        x = way(self.sim, self.sim.leader(body)) * self.sim.ratios[body]
         turns, at = self.machine.turns(body), here(self.machine, body)
         if axis == "velocity":
             return speed(x, record.dt), f"speed of {at}", DIMENSIONS["speed"][not turns]
@@ -124,7 +123,8 @@ class Missing:
         if not term:
             model = self.unnamed()
             return model, model
-        terms = [t for t in self.best.terms if (t.term, t.node) != (term, node)]
+        known = self.best.known()  # those stay: their numbers go by their place
+        terms = [t for i, t in enumerate(self.best.terms) if i < known or (t.term, t.node) != (term, node)]
         return self.best._replace(terms=tuple(terms)), self.best
 
     def _channel(self, known, node: str, out0: np.ndarray, out1: np.ndarray) -> str | None:
@@ -136,9 +136,11 @@ class Missing:
             return node
         if node not in self.machine.joints and node not in self.machine.sensors:
             return None
-        change = {n: float(np.std((out1 - out0)[self.rows, self.sim.layout.sensors[n]])) for n in self.sim.channels}
+        change = {n: float(np.std((out1 - out0)[self.rows, self.sim.column(n)])) for n in self.sim.channels}
         least = dict(zip(self.sim.channels, self.d.found.like.least, strict=True))
         best = max(others, key=lambda n: change[n] / least[n])
+        if self.sim.main not in change:  # its motion is given; of a static problem the correction is the missing force
+            return best if self.sim.case.problem == "kinematic" else None
         return best if change[best] / least[best] > CLEARER * change[self.sim.main] / least[self.sim.main] else None
 
 

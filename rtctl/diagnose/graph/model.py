@@ -4,9 +4,14 @@ from typing import Any, NamedTuple
 
 from rtctl.diagnose.graph.case import GraphCase
 from rtctl.idiom import Settings
+from rtctl.plants.graph.coupled import machine_params
+from rtctl.plants.graph.joints import sprung
 from rtctl.plants.graph.layout import Layout, layout
-from rtctl.plants.graph.params import GraphParams, build
+from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.physics import TERMS
+
+PHYSICS = "physics."  # head of the paths of the owner's terms
+RECORDING = "@"  # between the path of a number and the recording that it belongs to
 
 
 class GraphModel(NamedTuple):
@@ -15,6 +20,20 @@ class GraphModel(NamedTuple):
     layout: Layout
     base: dict[str, float]
     terms: tuple[Settings, ...] = ()
+
+    def known(self) -> int:
+        """Number of the terms that the owner knows, which come first."""
+        return len({path.split(".")[1] for path in self.base if path.startswith(PHYSICS)})
+
+    def resolved(self) -> "GraphModel":
+        """The same with the numbers of the owner's terms as `base` has them."""
+        found: dict[int, dict[str, float]] = {}
+        for path, value in self.base.items():
+            if path.startswith(PHYSICS) and RECORDING not in path:
+                _, number, key = path.split(".")
+                found.setdefault(int(number), {})[key] = value
+        terms = [t.model_copy(update=found[i]) if i in found else t for i, t in enumerate(self.terms)]
+        return self._replace(terms=tuple(terms))
 
     def add(self, *terms: Settings) -> "GraphModel":
         """The same with more terms."""
@@ -29,28 +48,31 @@ class GraphModel(NamedTuple):
 
     def built(self) -> "GraphModel":
         """The same with the joints that its terms make springs as springs of the description."""
-        base, machine = dict(self.base), self.layout.machine
-        found: dict[str, Any] = {}
-        for settings in self.terms:
-            s: Any = settings
-            made = TERMS[s.term].joint
-            if made is not None and s.node in machine.joints:
-                numbers = made(s)
-                base |= {f"joints.{s.node}.{key}": value for key, value in numbers.items()}
-                found[s.node] = machine.joints[s.node].model_copy(update=dict.fromkeys(numbers, 1.0))
-        if not found:
+        machine, numbers = sprung(self.layout.machine, self.terms)
+        if not numbers:
             return self
-        elastic = machine.model_copy(update={"joints": {**machine.joints, **found}})
-        return self._replace(layout=layout(elastic), base=base)
+        same = {name: joint.model_copy(update={"stiffness": 1.0, "damping": 1.0})
+                for name, joint in machine.joints.items() if f"joints.{name}.stiffness" in numbers}  # fmt: skip
+        known = machine.model_copy(update={"joints": {**machine.joints, **same}})  # one layout for all their numbers
+        return self._replace(layout=layout(known), base={**self.base, **numbers})
 
     def params(self, h: float) -> GraphParams:
         """Params of the plant for substeps of `h` s."""
-        return build(self.layout, self.base, h)
+        return machine_params(self.layout, self.base, h)
 
 
 def nominal(case: GraphCase) -> GraphModel:
     """The owner's model: the description and the terms that the owner knows."""
     return GraphModel(case.layout, dict(case.values), tuple(settings_of(entry) for entry in case.physics))
+
+
+def own(values: dict[str, float], name: str) -> dict[str, float]:
+    """Numbers as one recording has them: those of its own in the place of the shared ones."""
+    if not any(RECORDING in path for path in values):
+        return values
+    out = {path: value for path, value in values.items() if RECORDING not in path}
+    out |= {path.partition(RECORDING)[0]: value for path, value in values.items() if path.endswith(RECORDING + name)}
+    return out
 
 
 def settings_of(entry: dict[str, Any]) -> Settings:

@@ -25,22 +25,19 @@ class Heldout(NamedTuple):
 def predict(base: Fitted, best: Fitted) -> Heldout:
     """Held-out error of the base and of the best model, each fitted to the rows before."""
     like = base.like
-    begin, end = like.rows
-    cut = end - round(HELD * (end - begin))
-    first, late = like.during(begin, cut), like.during(cut, end)
+    first, late = like.split(HELD)
     models = [
         f.space.model(refit(first, f.space, f.x, rounds=6).x) if f.space.names or f.space.hypotheses else f.model
         for f in (base, best)
     ]
-    return judged(like, late, (models[0], models[1]), (begin, cut))
+    return judged(like, late, (models[0], models[1]), first.rows)
 
 
 def judged(
     whole: Likelihood, late: Likelihood, models: tuple[GraphModel, GraphModel], rows: tuple[int, int]
 ) -> Heldout:
     """Errors of the base and the best model on the rows of `late`, by the spread of each sensor on those of `whole`."""
-    spread = np.std(whole.target[slice(*whole.rows)], axis=0)
-    spread = np.where(spread > 0.0, spread, 1.0)
+    spread = whole.spread
     before, after = (float(np.sqrt(np.mean(np.mean(late.raw(m) ** 2, axis=0) / spread**2))) for m in models)
     floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
     return Heldout(before, after, min(floor, after), rows, models, late)

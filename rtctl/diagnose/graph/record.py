@@ -1,17 +1,20 @@
 """Record of a described machine: commands, sensors and measured inputs on an even clock, in SI units."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.columns import unwrap
-from rtctl.diagnose.graph.case import GraphCase, read_case
+from rtctl.diagnose.graph.case import HELD_PROBLEMS, GraphCase, read_case
+from rtctl.diagnose.graph.kinematic import followed
+from rtctl.diagnose.graph.model import rigid
 from rtctl.trace.bundle import PARQUET, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
-LEAST_ROWS = 50
+BEYOND = 10  # rows that a recording has to have beside one for each unknown: its noise is estimated as well
+EARLY = 10  # rows, from which the speed at the first is guessed
 
 
 class GraphRecord(NamedTuple):
@@ -27,6 +30,9 @@ class GraphRecord(NamedTuple):
     grain: dict[str, float]  # sensor -> step of its numbers, SI; 0 where nobody knows it
     forces: np.ndarray | None  # (n, bodies in order) measured inputs, N or Nm
     edges: dict[str, np.ndarray] = {}  # noqa: RUF012  # sensor without direction -> (n,) its counts
+    positions: dict[str, np.ndarray] = {}  # body -> (n,) measured inputs, rad or m  # noqa: RUF012
+    name: str = ""  # of the recording, where there are several of one machine
+    scales: tuple[float, float, float] = (1.0, 1.0, 0.0)  # of a first position, a first speed, and a guess of the speed
 
     @property
     def main(self) -> str:
@@ -53,8 +59,11 @@ def load_record(folder: Path | str) -> GraphRecord:
 def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> GraphRecord:
     """The record of these columns; `path` is told in messages."""
     t = _column(path, columns, "t", "s, clock at the tick")
-    if len(t) < LEAST_ROWS:
-        raise NoAnswer(f"{path} holds {len(t)} rows; a verdict needs {LEAST_ROWS}")
+    unknowns = len(case.fitted)
+    if len(t) < unknowns + BEYOND:
+        raise NoAnswer(
+            f"{path} holds {len(t)} rows; {unknowns} unknown numbers and the noise need {unknowns + BEYOND} at least"
+        )
     rows = len(t)
     t, dt, even = _clock(path, t, case)
     n = len(t)
@@ -65,7 +74,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     driven = [] if case.problem == "free" else list(machine.drives.values())
     u = np.zeros((n, len(machine.drives)))
     for d, drive in enumerate(driven):
-        u[:, d] = even(_column(path, columns, drive.column, f"{drive.unit}, command"))
+        u[:, d] = even(_column(path, columns, drive.column, f"{drive.unit}, command") * _on(path, columns, drive))
     y: dict[str, np.ndarray] = {}
     grain: dict[str, float] = {}
     edges: dict[str, np.ndarray] = {}
@@ -93,18 +102,98 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     first = next(iter(y))
     if np.ptp(y[first]) == 0.0:
         raise NoAnswer(f"{path}: column '{machine.sensors[first].column}' never changes; nothing moved")
-    forces = _forces(path, columns, case)
-    return GraphRecord(case, t, dt, even(np.asarray(ref, float)), even(w), u, y, grain, forces, edges)
+    forces, positions = _forces(path, columns, case)
+    record = GraphRecord(
+        case, t, dt, even(np.asarray(ref, float)), even(w), u, y, grain,
+        None if forces is None else np.stack([even(f) for f in forces.T], axis=1),
+        edges, {body: even(x) for body, x in positions.items()},
+    )  # fmt: skip
+    if case.problem == "static" and record.main in case.machine.sensors:
+        made = _made(case, u, str(case.machine.sensors[record.main].body))
+        record = record._replace(y=y | made, grain=grain | dict.fromkeys(made, 0.0))
+    _check_problem(path, record)
+    record = record._replace(scales=_scales(record))
+    if case.problem != "kinematic":
+        return record
+    fine = {name: grain[name] or float(np.std(np.diff(y[name], 2))) / 10.0 for name in y}
+    return record._replace(case=followed(case, record.main, fine, y[record.main], dt))
 
 
-def _forces(path: Path, columns: dict[str, np.ndarray], case: GraphCase) -> np.ndarray | None:
-    if not case.inputs:
-        return None
+def _on(path: Path, columns: dict[str, np.ndarray], drive: Any) -> np.ndarray | float:
+    """1 in the rows (n,) in which a drive is on, 0 in the others."""
+    if drive.enabled is None:
+        return 1.0
+    on = _column(path, columns, drive.enabled, "0 or 1, whether the drive is on")
+    bad = np.flatnonzero((on != 0.0) & (on != 1.0))
+    if len(bad):
+        raise UserError(
+            f"{path}: column '{drive.enabled}', row {bad[0]}: {on[bad[0]]:g}; it should be 0 (off) or 1 (on)"
+        )
+    return on
+
+
+def _made(case: GraphCase, u: np.ndarray, main: str) -> dict[str, np.ndarray]:
+    """Force (n,) that the drives were measured to make, N or Nm at the main body's, under the first drive's name."""
+    drives = list(case.machine.drives.items())
+    if not drives:
+        return {}
+    total, moved = np.zeros(len(u)), rigid(case.layout, case.values, main)
+    for number, (name, drive) in enumerate(drives):
+        path = f"drives.{name}"
+        gain = case.values[f"{path}.gain"] * case.values.get(f"{path}.torque_constant", 1.0)
+        body = drive.body if drive.body is not None else case.machine.joints[str(drive.joint)].to
+        total += gain / case.values.get(f"{path}.resistance", 1.0) * moved.get(body, 0.0) * u[:, number]
+    return {drives[0][0]: total}
+
+
+def _check_problem(path: Path, record: GraphRecord) -> None:
+    """Raise NoAnswer where the recording lacks what its problem is about, UserError where an input is what it tells."""
+    problem, machine, bodies = record.case.problem, record.case.machine, record.case.layout.bodies
+    for name, entry in record.case.inputs.items():
+        own = machine.sensors[record.main].body if entry.measures == "position" else None
+        if own is not None and bodies[entry.body].coordinate == bodies[own].coordinate:
+            raise UserError(
+                f"{record.case.file}: inputs.{name}.body: '{entry.body}' moves with the body of sensor {record.main}; "
+                "a position that is an input is that of another body, beyond a spring"
+            )
+    if problem not in HELD_PROBLEMS:
+        return
+    shown = {name: machine.sensors[name] for name in record.y if name in machine.sensors}
+    if record.main not in shown or shown[record.main].measures not in ("position", "speed"):
+        raise NoAnswer(f"{path}: a {problem} problem needs the position or speed of a body, which no column shows")
+    if problem == "kinematic" and sum(s.measures == "position" for s in shown.values()) < 2:
+        raise NoAnswer(f"{path}: a kinematic problem compares two positions at least; the recording shows one")
+    if problem == "static" and len(record.y) < 2:
+        raise NoAnswer(
+            f"{path}: a static problem needs a measured force: a drive's column or a sensor of force or current"
+        )
+
+
+def _scales(record: GraphRecord) -> tuple[float, float, float]:
+    """Scales of the first position and the first speed of the main sensor, and a guess of that speed."""
+    x = record.y[record.main]
+    if record.case.machine.sensors[record.main].measures == "speed":
+        return float(np.std(x)) or 1.0, 1.0, 0.0
+    few = min(EARLY, len(x))
+    guess = float(np.polyfit(record.dt * np.arange(few), x[:few], min(2, few - 1))[-2])
+    rate = float(np.sqrt(np.mean(np.gradient(x, record.dt) ** 2)))
+    return 0.1 * float(np.ptp(x)) or 1.0, rate or 1.0, guess
+
+
+def _forces(
+    path: Path, columns: dict[str, np.ndarray], case: GraphCase
+) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
+    """Measured forces (n, bodies), None where there are none, and measured positions (n,) by body."""
     names = list(case.machine.bodies)
-    out = np.zeros((len(columns["t"]), len(names)))
+    forces, positions = None, {}
     for name, entry in case.inputs.items():
-        out[:, names.index(entry.body)] += _column(path, columns, entry.column, f"input {name}") / entry.per_unit
-    return out
+        values = _column(path, columns, entry.column, f"input {name}") / entry.per_unit
+        if entry.measures == "position":
+            positions[entry.body] = values
+            continue
+        forces = np.zeros((len(values), len(names))) if forces is None else forces
+        forces[:, names.index(entry.body)] += values
+    return forces, positions
 
 
 def _clock(path: Path, t: np.ndarray, case: GraphCase):

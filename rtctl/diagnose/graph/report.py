@@ -13,6 +13,7 @@ from rtctl.diagnose import numbers
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Interval
 from rtctl.diagnose.graph import figures, words
 from rtctl.diagnose.graph.answer import GraphDiagnosis
+from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.missing import machine_words
 from rtctl.diagnose.report import COLOR, Picture, interval, svg
 from rtctl.diagnose.words import need, noun, phrase_of
@@ -82,9 +83,22 @@ def html(d: GraphDiagnosis) -> str:
         instead=instead(d),
         parameters=parameter_rows(d),
         cannot=cannot_rows(d),
-        warnings=r.case.warnings,
+        warnings=d.as_json()["warnings"],
         figures=pictures(d),
-        footer=f"rtctl diagnose, {d.seconds:.1f} s; {len(r.t)} rows, prediction fitted to rows {begin} to {end}.",
+        together=together(d),
+        footer=f"rtctl diagnose, {d.seconds:.1f} s; {sum(len(one.t) for one in d.records)} rows, prediction fitted to "
+        f"rows {begin} to {end}{'' if len(d.records) == 1 else f' of {r.name}'}.",
+    )
+
+
+def together(d: GraphDiagnosis) -> str:
+    """What several recordings have been taken for, in a sentence; "" for one recording."""
+    if len(d.records) == 1:
+        return ""
+    names = [r.name for r in d.records]
+    return (
+        f"{len(names)} recordings of one machine: {', '.join(names[:-1])} and {names[-1]}. Numbers and effects are "
+        f"shared; the figures show {names[0]}."
     )
 
 
@@ -186,9 +200,11 @@ def parameter_rows(d: GraphDiagnosis) -> list[Row]:
     """The fitted numbers with their nominal values."""
     rows = []
     for path, v in d.parameters.items():
-        scale, unit = _scaled(d.record.case.values[path], v.unit)
+        start = is_start(path)
+        scale, unit = _scaled(v.value if start else d.nominal[path], v.unit)
         low, high = sorted((v.low, v.high))
-        nominal, fitted = (numbers.figures(scale * x, 4) for x in (d.record.case.values[path], v.value))
+        nominal, fitted = (numbers.figures(scale * x, 4) for x in (d.nominal[path], v.value))
+        nominal = "" if start else nominal
         ends = " to ".join(numbers.figures(scale * x, 3) for x in (low, high))
         rows.append(Row(path, nominal, fitted, ends, unit, figures.untold(d, path)))
     return rows
@@ -213,6 +229,8 @@ def terminal(d: GraphDiagnosis) -> RenderableType:
     parts: list[RenderableType] = [
         Text.assemble((f" {d.verdict} ", f"bold reverse {COLOR.get(d.verdict, 'white')}"), " ", d.headline)
     ]
+    if together(d):
+        parts.append(Text(together(d), style="dim"))
     if d.effects:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for name in ("effect", "at", "size", "90 % interval", "confidence"):

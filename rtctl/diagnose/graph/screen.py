@@ -20,7 +20,7 @@ from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis
 TRIES = 3
 TOO_FAR = 3.0  # times the residual: a step that changes more says little about what is missing
 RIDGE = 1e-6
-FACTORS = (0.2, 5.0, 25.0)  # of the size that a secant promises
+FACTORS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of the size that a secant promises
 
 
 class Score(NamedTuple):
@@ -28,39 +28,45 @@ class Score(NamedTuple):
 
     hypothesis: Hypothesis
     gain: float  # nats, under the noise that it leaves
-    power: float  # nats, under the noise of what no hypothesis explains
-    x: np.ndarray  # of the hypothesis
+    power: float  # half the sum of squares that least squares takes off, in variances of the residual
+    x: tuple[np.ndarray, ...]  # of the hypothesis, by the noise under which it was solved for
     norm: float  # of a typical size beside the base, in standard deviations: below 3 or so nothing is seen
 
 
 class Screened(NamedTuple):
-    """Scores, best first, and the model about which they hold, under the noise of what no hypothesis explains."""
+    """Scores, best first, and the linear models about which they hold: under the noise of what no hypothesis explains,
+    and by least squares."""
 
     scores: list[Score]
-    about: Linear
+    about: tuple[Linear, ...]
+
+    @property
+    def floor(self) -> Likelihood:
+        """Noise of what no hypothesis explains."""
+        return self.about[0].like
 
     def starts(self, score: Score, most: int) -> list[np.ndarray]:
         """Places (unknowns of the base and the hypothesis) to fit from: sizes far from what a secant says as well, the
         base moved along with each; the best first."""
-        about, h = self.about, score.hypothesis
-        base, like = about.base, about.base.like
+        h, base = score.hypothesis, self.about[0].base
         space = base.space.add(h)
         sizes = np.array([c.kind in (SIZE, INVERSE) for c in h.coordinates], bool)
-        xs = [score.x, *(np.where(sizes, k * score.x, score.x) for k in (FACTORS if sizes.any() else ()))]
+        xs = [np.where(sizes, k * x, x) for x in score.x for k in (FACTORS if sizes.any() else (1.0,))]
         low, high = space.bounds()
         n = len(base.x)
 
-        def placed(x: np.ndarray) -> tuple[float, np.ndarray]:
+        def placed(x: np.ndarray) -> list[tuple[float, np.ndarray]]:
             at = np.clip(np.concatenate([base.x, x]), low, high)
-            e = base.e + like.raw(space.model(at), True) - about.start
-            dx = about.step(e)
-            return like.loss(e + np.tensordot(about.raw, dx, axes=1)), np.concatenate([base.x + dx, at[n:]])
+            e = base.e + base.like.raw(space.model(at), True) - self.about[0].start
+            steps = [about.step(e) for about in self.about]
+            losses = [base.like.loss(e + np.tensordot(self.about[0].raw, dx, axes=1)) for dx in steps]
+            return [(loss, np.concatenate([base.x + dx, at[n:]])) for loss, dx in zip(losses, steps, strict=True)]
 
-        found = sorted(parallel([partial(placed, x) for x in xs]), key=lambda pair: pair[0])
-        return [x for _, x in found[:most]]
+        found = [pair for pairs in parallel([partial(placed, x) for x in xs]) for pair in pairs]
+        return [x for _, x in sorted(found, key=lambda pair: pair[0])[:most]]
 
     def promising(self, most: int) -> list[Score]:
-        """Scores in the order in which they deserve a fit: by what they gain, and by the power that they explain, in
+        """Scores in the order in which they deserve a fit: by what they gain, and by what least squares takes off, in
         turns."""
         by_power = sorted(self.scores, key=lambda s: -s.power)
         out: list[Score] = []
@@ -74,12 +80,20 @@ def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     own = Linear(base)
     changes = parallel([partial(_change, base, own.start, h) for h in candidates])
     about = own.under(floor_noise(own, [change for found in changes for change, _ in found]))
-    r = about.like.white(base.e)
-    slope = about.slope(r)
-    scores = parallel(
-        [partial(_score, about, h, change, r, slope) for h, change in zip(candidates, changes, strict=True)]
-    )
-    return Screened(sorted(scores, key=lambda s: -s.gain), about)
+    flat = own.under(base.like.flat(base.e))
+
+    def scores(about: Linear) -> list[Score]:
+        r = about.like.white(base.e)
+        slope = about.slope(r)
+        return parallel(
+            [partial(_score, about, h, change, r, slope) for h, change in zip(candidates, changes, strict=True)]
+        )
+
+    both = [
+        one._replace(gain=max(one.gain, other.gain), power=other.power, x=(*one.x, *other.x))
+        for one, other in zip(scores(about), scores(flat), strict=True)
+    ]
+    return Screened(sorted(both, key=lambda s: -s.gain), (about, flat))
 
 
 def floor_noise(about: Linear, changes: list[np.ndarray]) -> Likelihood:
@@ -152,4 +166,4 @@ def _score(
     A = about.H
     alone = np.linalg.solve(A + 1e-9 * np.diag(np.diag(A)) + 1e-300 * np.eye(n), cross) if n else cross[:0]
     norm = float(np.sqrt(max(own[0, 0] - (cross[:, 0] @ alone[:, 0] if n else 0.0), 0.0)))
-    return Score(h, base.loss - like.loss(about.left(dx, C)), float(power), at, norm)
+    return Score(h, base.loss - like.loss(about.left(dx, C)), float(power), (at,), norm)

@@ -11,15 +11,16 @@ import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.fits import Fitted, explained, refit, without
-from rtctl.diagnose.graph.hypotheses import hints, hypotheses
+from rtctl.diagnose.graph.hypotheses import combined, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened, screen
 from rtctl.diagnose.space import Space
 
 MOST = 3  # effects
-NAMES = (8, 5, 4)  # hypotheses that are refitted in each step, and in the exchange 4
+NAMES = (8, 5, 4)  # terms that are refitted in each step, and in the exchange 4
 STARTS = 2  # of the first few of them
 FIRST = 3
+OTHERS = 3  # nodes of the best terms beside the first
 LEAST = 6.0  # nats that screening must promise for a refit
 BEAM = 2
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
@@ -53,7 +54,7 @@ class Found(NamedTuple):
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
     """Fit the base, then what is missing beside it."""
     progress("fitting the nominal parameters")
-    base = refit(like, space)
+    base = restarted(refit(like, space))
     progress("screening every hypothesis")
     looked, odds = screened(base)
     known: dict[tuple[str, ...], Fitted] = {(): base}
@@ -112,9 +113,7 @@ def screened(parent: Fitted) -> tuple[Screened, float]:
     sim = parent.like.sim
     model = parent.model
     candidates = [
-        h
-        for h in hypotheses(sim, model, hints(sim, model, parent.like.rows[0]), model.terms)
-        if h.name not in parent.names
+        h for h in hypotheses(sim, model, combined(parent.like, model), model.terms) if h.name not in parent.names
     ]
     names = {h.name for h in candidates}
     return screen(parent, candidates), float(np.log(max(len(names), 1)))
@@ -123,26 +122,33 @@ def screened(parent: Fitted) -> tuple[Screened, float]:
 def step(
     like: Likelihood, parent: Fitted, looked: Screened, known: dict[tuple[str, ...], Fitted], most: int
 ) -> list[Fitted]:
-    """Refits of a model with each of the most promising hypotheses beside it."""
-    top: dict[str, list[Score]] = {}
+    """Refits of a model with each of the most promising hypotheses beside it.
+
+    Each term is tried at its most promising node, then the best terms at their other nodes.
+    """
+    top: dict[str, dict[str, list[Score]]] = {}
     for score in looked.promising(most):
-        if max(score.gain, score.power) > LEAST and (len(top) < most or score.hypothesis.name in top):
-            top.setdefault(score.hypothesis.name, []).append(score)
-    out = []
-    for rank, chosen in enumerate(top.values()):
-        names = key((*parent.names, chosen[0].hypothesis.name))
-        if names in known:
-            out.append(known[names])
-            continue
-        scores = chosen[: STARTS if rank < FIRST else 1]
-        fits = [
-            refit(like, parent.space.add(s.hypothesis), x, floor=looked.about.like)
-            for s in scores
-            for x in looked.starts(s, STARTS if rank < FIRST else 1)
-        ]
-        best = max(fits, key=lambda f: f.log_evidence)
-        known[names] = best
-        out.append(best)
+        if max(score.gain, score.power) > LEAST and (len(top) < most or score.hypothesis.term in top):
+            top.setdefault(score.hypothesis.term, {}).setdefault(score.hypothesis.name, []).append(score)
+
+    def refitted(scores: list[Score], starts: int) -> Fitted:
+        names = key((*parent.names, scores[0].hypothesis.name))
+        if names not in known:
+            fits = [
+                refit(like, parent.space.add(s.hypothesis), x, floor=looked.floor)
+                for s in scores[:starts]
+                for x in looked.starts(s, starts)
+            ]
+            known[names] = max(fits, key=lambda f: f.log_evidence)
+        return known[names]
+
+    firsts = {
+        term: refitted(next(iter(nodes.values())), STARTS if rank < FIRST else 1)
+        for rank, (term, nodes) in enumerate(top.items())
+    }
+    out = list(firsts.values())
+    for term in sorted(firsts, key=lambda term: -firsts[term].log_evidence)[:BEAM]:
+        out += [refitted(scores, STARTS) for scores in list(top[term].values())[1 : 1 + OTHERS]]
     return out
 
 

@@ -6,9 +6,9 @@ from threadpoolctl import threadpool_limits
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph.answer import GraphDiagnosis, load
+from rtctl.diagnose.graph.joint import check_same
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.prediction import judged
-from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.simulate import Simulator
 
 
@@ -18,25 +18,11 @@ def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
     Raises UserError where the folder cannot be read or is of another machine, NoAnswer where it supports no verdict.
     """
     sim = Simulator(load(other))
+    if len(d.found.like.parts) > 1:
+        raise UserError("--heldout goes with one recording; of several together the last part is held out")
     if sim.record.edges:
         sim = sim.directed(d.decided.best.model)
     check_same(d.record, sim.record)
     like = Likelihood(sim)
     with threadpool_limits(1):
         return d._replace(heldout=judged(like, like, (d.found.base.model, d.decided.best.model), like.rows))
-
-
-def check_same(first: GraphRecord, second: GraphRecord) -> None:
-    """Raise UserError where two records are of machines with other elements."""
-    for group in ("bodies", "joints", "drives", "sensors"):
-        one, two = (set(getattr(r.case.machine, group)) for r in (first, second))
-        if one != two:
-            raise UserError(
-                f"{second.case.file}: machine.{group} has {', '.join(sorted(two)) or 'none'}, and the first recording "
-                f"has {', '.join(sorted(one)) or 'none'}; a second recording is of the same machine"
-            )
-    if list(first.y) != list(second.y):
-        raise UserError(
-            f"{second.case.file}: the recording shows {', '.join(second.y)}, and the first {', '.join(first.y)}; "
-            "a second recording has the same sensors"
-        )

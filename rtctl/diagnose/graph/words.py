@@ -4,12 +4,15 @@ import math
 from typing import Any
 
 from rtctl.diagnose.diagnosis import Effect
-from rtctl.diagnose.graph.case import START
-from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
+from rtctl.diagnose.graph.model import PHYSICS, RECORDING, GraphModel
+from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.numbers import both, nice
 from rtctl.diagnose.quantities import DIMENSIONS
 from rtctl.diagnose.words import BY_NODE, Slots, harmonics, noun, phrase_of
 from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.mechanics import code_of
+from rtctl.plants.graph.units import measured_unit
 from rtctl.plants.physics import TERMS
 
 
@@ -47,13 +50,41 @@ def unit_at(machine: Description, term: str, node: str, parameter: str) -> str:
     return unit
 
 
+def unit_in(record: GraphRecord, path: str) -> str:
+    """Unit of any unknown number: of the description, of an owner's term, or of a first position and speed."""
+    machine, plain = record.case.machine, path.partition(RECORDING)[0]
+    if plain.startswith(PHYSICS):
+        _, number, key = plain.split(".")
+        entry = record.case.physics[int(number)]
+        return unit_at(machine, str(entry["term"]), str(entry["node"]), key)
+    if plain in (FIRST_POSITION, FIRST_SPEED):
+        turns = machine.turns(body_of(machine, record.main))
+        return DIMENSIONS["position" if plain == FIRST_POSITION else "speed"][not turns]
+    return value_unit(machine, plain)
+
+
+def channel_unit(machine: Description, channel: str) -> str:
+    """Unit of a sensor's reading, or of the force that drives were measured to make."""
+    if channel in machine.sensors:
+        return measured_unit(machine.sensors[channel].measures, machine.turns(body_of(machine, channel)))
+    return DIMENSIONS["force"][not machine.turns(body_of(machine, channel))]
+
+
 def value_unit(machine: Description, path: str) -> str:
     """Unit of a number of the description by its dotted path."""
     from rtctl.plants.graph.units import BODY, GRAVITY, drive_units, joint_units
 
+    path = path.partition(RECORDING)[0]
     if path == START:
         return "rad"
     group, name, *rest = path.split(".")
+    if group == BEGINS and name in machine.bodies and not rest:
+        return "rad" if machine.turns(name) else "m"
+    if is_start(path) or path.startswith(PHYSICS):
+        return ""
+    if group == "mechanics":
+        code = code_of(machine)
+        return code.unit(rest[-1]) if code is not None else ""
     key = rest[-1]
     if group == "bodies" and "gravity" in rest:
         return GRAVITY.get(key, "")

@@ -7,6 +7,8 @@ from rtctl.config.errors import UserError
 from rtctl.config.units import to_si
 from rtctl.diagnose.case import OTHER_NAMES, PARAMETERS, read_case
 from rtctl.diagnose.quantities import Quantities, quantities
+from rtctl.machines.profile import FREE_UNITS
+from rtctl.machines.profiles import profile_of
 from rtctl.trace.bundle import CASE, FORMAT, as_json
 from rtctl.trace.imports.plan import Plan
 from rtctl.trace.imports.table import Table
@@ -23,9 +25,10 @@ def case_of(table: Table, plan: Plan, units: dict[str, str], rate: float | None,
     if len(set(position.values())) > 1:
         told = ", ".join(f"{name} in {unit}" for name, unit in position.items())
         raise UserError(f"{table.path}: {told}: position and reference should be of one kind")
-    if plan.plant == "axis" and position.get("x", "m") != "m":
+    free = profile_of(plan.plant or "").has(FREE_UNITS)
+    if free and position.get("x", "m") != "m":
         sensors.setdefault("unit", position["x"])
-    if plan.plant == "axis" and units.get("u", "V") != "V":
+    if free and units.get("u", "V") != "V":
         drive.setdefault("unit", units["u"])
     axis = quantities(sensors.get("unit"), drive.get("unit"))
     controller = given.pop("controller", None)
@@ -64,7 +67,7 @@ def _parameter(plant: str, name: str, value: float | str, axis: Quantities) -> f
     field = PARAMETERS[plant].model_fields.get(name)
     extra = field.json_schema_extra if field else None
     unit = extra.get("unit") if isinstance(extra, dict) else ""
-    if plant == "axis":
+    if profile_of(plant).has(FREE_UNITS):
         unit = axis.of(OTHER_NAMES[plant].get(name, name))
     try:
         return float(to_si(value, str(unit or "")))

@@ -86,6 +86,8 @@ def wanted_columns(believed: Believed) -> dict[str, Wanted]:
     for name, drive in machine.drives.items():
         unit = {"%": "percent"}.get(drive.unit, drive.unit)
         out[drive.column] = Wanted(drive.column, f"drive {name}", unit, 1.0, False, f"command of {name}")
+        if drive.enabled is not None:
+            out[drive.enabled] = Wanted(drive.enabled, f"switch {name}", "", 1.0, False, f"1 where {name} is on")
     for name, sensor in machine.sensors.items():
         unit = measured_unit(sensor.measures, _turns(machine, sensor))
         counts = sensor.counts_per_unit is not None
@@ -94,7 +96,8 @@ def wanted_columns(believed: Believed) -> dict[str, Wanted]:
     inputs = believed.case.get("inputs")
     for name, entry in inputs.items() if isinstance(inputs, Mapping) else ():
         if isinstance(entry, Mapping) and isinstance(entry.get("column"), str):
-            unit = "Nm" if machine.turns(str(entry.get("body"))) else "N"
+            turns = machine.turns(str(entry.get("body")))
+            unit = measured_unit("position", turns) if entry.get("measures") == "position" else ("N", "Nm")[turns]
             scale = entry.get("per_unit", 1.0)
             out[entry["column"]] = Wanted(entry["column"], f"input {name}", unit, float(scale), False, f"input {name}")
     return out
@@ -138,7 +141,7 @@ def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believ
         named["t"] = ColumnPlan(column=table.clock)
     problem = plan.case.get("problem", believed.case.get("problem", "driven"))
     if problem in ("driven", "static"):
-        _need(table, named, {c: w for c, w in known.items() if w.what.startswith("drive ")}, all)
+        _need(table, named, {c: w for c, w in known.items() if w.what.startswith(("drive ", "switch "))}, all)
     _need(table, named, {c: w for c, w in known.items() if w.what.startswith("input ")}, all)
     _need(table, named, {c: w for c, w in known.items() if w.what.startswith("sensor ")}, any)
     return named

@@ -10,8 +10,9 @@ import pyarrow as pa
 from rtctl import machines
 from rtctl.config.errors import UserError, nearest
 from rtctl.config.units import convert
-from rtctl.machines import axis, ivu_plant, ldu_plant
 from rtctl.machines.base import Column
+from rtctl.machines.profile import FREE_UNITS
+from rtctl.machines.profiles import profile_of
 from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
 from rtctl.trace.clock import even_rows, increasing
 from rtctl.trace.imports.case import case_of, checked
@@ -26,7 +27,6 @@ OTHER_UNITS = {  # of an axis: what else the model's m, m/s and V may be, all of
     "m/s": ("m/s", "rad/s", "V/s"),
     "V": ("V", "A", "N", "Nm"),
 }
-TRUTH = {"axis": axis.TRUTH, "ivu": ivu_plant.TRUTH, "ldu": ldu_plant.TRUTH}
 COUNTS = "_counts"
 SLOWEST, FASTEST = 100.0, 1e-7  # s from row to row: beyond them a time without unit is asked about
 LATEST = 1e11  # s since 1970, which is the year 5138: what is later counts milliseconds or less
@@ -78,7 +78,7 @@ def make_bundle(table: Table, plan: Plan, folder: Path | str) -> Imported:
 
 def known_columns(plant: str) -> dict[str, Column]:
     """What a recording of this machine may hold."""
-    return {column.name: column for column in (*machines.MODULES[plant].COLUMNS, *TRUTH[plant])}
+    return {column.name: column for column in (*machines.MODULES[plant].COLUMNS, *profile_of(plant).truth)}
 
 
 def _wanted(table: Table, plan: Plan, known: dict[str, Column]) -> dict[str, ColumnPlan]:
@@ -123,7 +123,7 @@ def _signals(
             continue
         values = table.numbers(given.column, name)
         ours = known[name].unit if name in known else theirs or ""
-        choices = OTHER_UNITS.get(ours, (ours,)) if plan.plant == "axis" else (ours,)
+        choices = OTHER_UNITS.get(ours, (ours,)) if profile_of(plan.plant or "").has(FREE_UNITS) else (ours,)
         if theirs is None:
             ask_suffix(table, name, given.column, ours, choices)
             assumed += [f"{name} in {ours}"] if ours not in ("", "counts", "ticks") else []

@@ -5,6 +5,7 @@ from graph_cases import BELT, PENDULUM, case_of
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph.case import read_case
+from rtctl.diagnose.graph.model import nominal
 
 
 def test_paths_and_tolerances_of_a_description():
@@ -80,3 +81,22 @@ def test_refused_description_names_the_path():
     machine = {**BELT, "joints": {"belt": {**BELT["joints"]["belt"], "to": "carrige"}}}
     with pytest.raises(UserError, match=r"case\.json: machine.*no body 'carrige'; did you mean 'carriage'\?"):
         read_case(case_of(machine), "bench")
+
+
+def test_numbers_of_known_terms_are_fitted_by_path():
+    known = [{"term": "friction.stribeck", "node": "rod", "F_s": 0.006, "v_s": 0.3}]
+    tolerance = {"default": 0.1, "physics.0.F_s": 0.5, "physics.0.v_s": 0.0}
+    case = read_case(case_of(PENDULUM, physics=known) | {"tolerance": tolerance}, "bench")
+    assert "physics.0.F_s" in case.fitted
+    assert "physics.0.v_s" not in case.fitted
+    assert case.tolerance("physics.0.F_s") == 0.5
+    model = nominal(case)
+    moved = model._replace(base={**model.base, "physics.0.F_s": 0.008}).resolved()
+    assert (moved.terms[0].F_s, moved.terms[0].v_s) == (0.008, 0.3)
+
+
+def test_per_recording_names_values_of_the_machine():
+    case = read_case(case_of(PENDULUM, per_recording=["bodies.rod.gravity"]), "bench")
+    assert "bodies.rod.gravity.mass" in case.per_recording
+    with pytest.raises(UserError, match=r"per_recording: there is no value bodies.rod.mas"):
+        read_case(case_of(PENDULUM, per_recording=["bodies.rod.mas"]), "bench")

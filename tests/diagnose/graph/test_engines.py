@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from rtctl.cli.main import app
 from rtctl.config.errors import UserError
-from rtctl.diagnose.engines import diagnose_into, is_described
+from rtctl.diagnose.engines import diagnose_into, is_described, of_one_machine
 from rtctl.diagnose.folder import Task, one
 from rtctl.diagnose.graph.second import predicted
 
@@ -68,3 +68,27 @@ def test_command_line(bench, tmp_path):
     done = CliRunner().invoke(app, ["diagnose", str(bench), "--out", str(out), "--no-report"])
     assert "Nothing is missing" in done.stdout
     assert "model" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("groups", "together", "sentence"),
+    [
+        (("leg", "leg"), False, ""),
+        (("", ""), True, ""),
+        (("", ""), False, "give --together"),
+        (("leg", "arm"), False, "give --together"),
+        (("leg", ""), False, "group is missing"),
+    ],
+)
+def test_several_recordings_are_one_machine_by_group_or_flag(tmp_path, groups, together, sentence):
+    bundles = []
+    for i, group in enumerate(groups):
+        folder = tmp_path / str(i)
+        folder.mkdir()
+        (folder / "case.json").write_text(json.dumps(case_of(PENDULUM, group=group)))
+        bundles.append(folder)
+    if not sentence:
+        of_one_machine(bundles, together)
+        return
+    with pytest.raises(UserError, match=sentence):
+        of_one_machine(bundles, together)

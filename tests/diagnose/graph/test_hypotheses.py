@@ -1,10 +1,10 @@
 from functools import cache
 
 import numpy as np
-from graph_cases import BELT, PENDULUM, case_of, command, record
+from graph_cases import BELT, PENDULUM, blank, case_of, command, record
 
 from rtctl.diagnose.graph.hypotheses import hints, hypotheses
-from rtctl.diagnose.graph.kernel import kernel
+from rtctl.diagnose.graph.kernel import OPEN, kernel
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.physics import TERMS
@@ -54,3 +54,54 @@ def test_friction_along_the_way_asks_for_dry_friction_that_it_alters():
         return [h for h in hypotheses(sim, nominal(sim.case)) if h.term == "friction.position"]
 
     assert positions(0.01) and not positions(0.0)
+
+
+SCREW = {
+    "bodies": {"motor": {"inertia": 2e-4, "dry": 0.01}, "screw": {"inertia": 1e-4}, "table": {"mass": 20.0}},
+    "joints": {"coupling": {"from": "motor", "to": "screw", "ratio": 1.0, "stiffness": 40.0, "damping": 0.02},
+               "nut": {"from": "screw", "to": "table", "ratio": 1.6e-3}},
+    "drives": {name: {"body": "motor", "column": name, "kind": "force", "gain": 0.05} for name in ("one", "two")},
+    "sensors": {"encoder": {"body": "motor", "measures": "position", "column": "counts", "counts_per_unit": 1000.0},
+                "scale": {"body": "table", "measures": "position", "column": "scale", "counts_per_unit": 1e6}},
+}  # fmt: skip
+
+
+@cache
+def of_screw():
+    u = command(4.0)
+    still = blank(case_of(SCREW), u)._replace(u=np.stack([u, u], axis=1))
+    model = nominal(still.case)
+    moved = Simulator(still).run(model, mode=OPEN)
+    sim = Simulator(still._replace(y={name: moved[:, k] for k, name in enumerate(still.y)}))
+    waves = {"order:motor": [4.0], "order:screw": [4.0], "wavelength:table": [1e-3], "wavelength:scale": [1e-3]}
+    return sim, hypotheses(sim, model, hints(sim, model, 100) | waves)
+
+
+def test_terms_stand_where_the_table_of_nodes_says():
+    names = {h.name for h in of_screw()[1]}
+    assert {f"ripple.cogging:{body}" for body in ("motor", "screw", "table")} <= names
+    assert {f"friction.load:{body}" for body in ("motor", "screw")} <= names
+    assert {f"transmission.{name}:coupling" for name in ("creep", "slip", "backlash")} <= names
+    assert {"ripple.ratio:coupling", "ripple.ratio:nut", "transmission.backlash:nut"} <= names
+    assert {"ripple.encoder:encoder", "ripple.encoder:scale", "drive.thermal:two"} <= names
+
+
+def test_each_of_several_drives_may_have_a_supply_of_its_own():
+    feeds = {(h.node, h.fixed.get("feeds", "all")) for h in of_screw()[1] if h.term == "drive.supply_sag"}
+    assert feeds == {("one", "all"), ("one", "own"), ("two", "own")}
+    assert not any("feeds" in h.fixed for h in hypotheses(of("belt")[0], nominal(of("belt")[0].case)))
+
+
+def test_a_joint_slips_at_what_it_carries():
+    all_of_them = of_screw()[1]
+    limits = sorted(h.coordinates[0].scale for h in all_of_them if h.name == "transmission.slip:coupling")
+    assert len(limits) == 3 and 0.0 < limits[0] < limits[2] < 1.0  # Nm, of a motor of up to half a newton metre
+
+
+def test_an_error_of_another_sensor_shows_its_own_order():
+    ripple = {"term": "ripple.encoder", "node": "second", "A": 0.02, "order": 5}
+    second = {"body": "rod", "measures": "position", "column": "second", "counts_per_unit": 5000.0}
+    pendulum = {**PENDULUM, "sensors": {**PENDULUM["sensors"], "second": second}}
+    sim = Simulator(record(case_of(pendulum), command(4.0), [ripple]))
+    found = hints(sim, nominal(sim.case), 100)["order:second"]
+    assert np.isclose(found[0], 5.0, atol=0.3)

@@ -6,7 +6,7 @@ from graph_cases import BELT, PENDULUM, RATE, case_of, write_bundle
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.graph.case import read_case
-from rtctl.diagnose.graph.record import LEAST_ROWS, load_record, record_of
+from rtctl.diagnose.graph.record import load_record, record_of
 
 N = 200
 COUNTS = np.round(3000 * np.sin(np.arange(N) / 20))
@@ -70,5 +70,19 @@ def test_refusals(change, kind, sentence):
 
 
 def test_too_few_rows():
-    with pytest.raises(NoAnswer, match=f"holds 20 rows; a verdict needs {LEAST_ROWS}"):
-        of({name: values[:20] for name, values in COLUMNS.items()})
+    case = case_of(PENDULUM)
+    least = len(read_case(case, "bench").fitted) + 10
+    with pytest.raises(
+        NoAnswer, match=f"holds {least - 1} rows; {least - 10} unknown numbers and the noise need {least}"
+    ):
+        of({name: values[: least - 1] for name, values in COLUMNS.items()}, case)
+
+
+def test_a_drive_acts_where_it_is_on():
+    case = case_of(PENDULUM)
+    motor = {**PENDULUM["drives"]["motor"], "enabled": "torque_on"}
+    case["machine"] = {**PENDULUM, "drives": {"motor": motor}}
+    on = np.where(np.arange(N) < 120, 1.0, 0.0)
+    np.testing.assert_array_equal(of({**COLUMNS, "torque_on": on}, case).u[:, 0], COLUMNS["u"] * on)
+    with pytest.raises(UserError, match=r"column 'torque_on', row 120: 0\.5; it should be 0"):
+        of({**COLUMNS, "torque_on": np.where(on > 0, 1.0, 0.5)}, case)

@@ -52,7 +52,7 @@ def test_places_are_those_of_the_layout():
     assert place_of(lay, values, coulomb) == (0, 0, 0, 0.1)
     there = elements(lay)
     assert nodes(TERMS["friction.stribeck"], there) == ("motor", "rod")
-    assert nodes(TERMS["transmission.backlash"], there) == ()  # the gear is rigid
+    assert nodes(TERMS["transmission.hysteresis"], there) == ()  # the gear is rigid
     assert nodes(TERMS["structure.compliance"], there) == ("gear",)
     assert nodes(TERMS["drive.deadband"], there) == ("bridge",) and nodes(TERMS["timing.delay"], there) == ("loop",)
     with pytest.raises(

@@ -1,6 +1,7 @@
 """Sliding contacts: no force beyond the limit, creep in proportion, what slid stays, and the strip falls behind."""
 
 import bench
+import machine
 import numpy as np
 import pytest
 import stand
@@ -122,3 +123,38 @@ def test_every_law_of_the_tape_sees_what_has_slid(act, left):
     wheel = ripple_tape.build_capstan(ripple_tape.CapstanSettings(node="capstan", a=1e-4), 5e-4)
     ripple_tape.capstan_arm(wheel, m, ivu.CAPSTAN)
     assert (m.f - before)[ivu.CAPSTAN] == pytest.approx(-1e-4 * (T[1] - T[0]))
+
+
+HELD = {  # a motor that turns a hub by a spring, at whose far end nothing turns
+    "bodies": {"motor": {"inertia": 1e-3}, "hub": {"inertia": 1e3}},
+    "joints": {"clutch": {"from": "motor", "to": "hub", "ratio": 0.5, "stiffness": 100.0, "damping": 2.0}},
+    "drives": {"amplifier": {"body": "motor", "column": "u", "kind": "force", "gain": 1.0}},
+    "sensors": {"encoder": {"body": "motor", "measures": "position", "column": "counts", "counts_per_unit": 1e6},
+                "cell": {"joint": "clutch", "measures": "force", "column": "force", "resolution": 1e-6}},
+}  # fmt: skip
+
+
+def test_a_joint_creeps_in_proportion_to_its_force():
+    """Held at 2 Nm of the motor the joint carries 4 Nm and lets go by rate T."""
+    r = machine.run(HELD, [machine.settings("transmission.creep", "clutch", rate=0.05)], np.full(600, 2.0))
+    assert r.y[-1, 1] == pytest.approx(-4.0, rel=1e-2)
+    slid = 0.5 * (r.y[-1, 0] - r.y[-201, 0])  # by the hub's unit, which hardly moves
+    assert slid == pytest.approx(0.05 * 4.0 * 0.2, rel=1e-2)
+
+
+def test_a_joint_creeps_with_the_way_of_its_far_end():
+    free = {**HELD, "bodies": {"motor": {"inertia": 1e-3}, "hub": {"inertia": 0.1, "viscous": 2.0}}}
+    term = machine.settings("transmission.creep", "clutch", kappa=0.01)
+    r, tight = (machine.run(free, terms, np.full(600, 2.0)) for terms in ([term], []))
+    way = r.x[-1, 1] - r.x[-201, 1]
+    assert way == pytest.approx(tight.x[-1, 1] - tight.x[-201, 1], rel=1e-2)
+    lost = 0.5 * (r.x[-1, 0] - r.x[-201, 0]) - way
+    assert lost == pytest.approx(0.01 * 4.0 * way, rel=2e-2)
+
+
+@pytest.mark.parametrize(("push", "slips"), [(1.4, False), (1.7, True)])
+def test_a_joint_slips_past_its_limit(push, slips):
+    term = machine.settings("transmission.slip", "clutch", F_max=3.0)
+    r = machine.run(HELD, [term], push * np.minimum(np.arange(600) / 300, 1.0))
+    assert np.abs(r.y[:, 1]).max() == pytest.approx(3.0 if slips else 2.8, rel=5e-2)
+    assert (r.x[-1, 0] - r.x[-101, 0] > 0.1) == slips

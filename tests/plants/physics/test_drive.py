@@ -113,7 +113,7 @@ def test_what_flows_has_sagged_already():
         )
         for _ in range(steps):
             u = np.array([2.0, -3.0])
-            drive.supply_sag(p, s, u)
+            drive.supply_sag(p, s, u, 0)
         assert u == pytest.approx(np.array([2.0, -3.0]) / 1.5)
 
 
@@ -121,7 +121,7 @@ def test_a_capacitor_holds_the_supply_for_a_while():
     p, s, got = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1, tau=0.02), H), sagging(), []
     for _ in range(100):
         u = np.array([2.0, 0.0])
-        drive.supply_sag(p, s, u)
+        drive.supply_sag(p, s, u, 0)
         got.append(u[0])
     t = H * np.arange(1, 101)
     np.testing.assert_allclose(got, 2.0 * (1 - 0.2 * (1 - np.exp(-t / 0.02))), rtol=1e-12)
@@ -130,14 +130,14 @@ def test_a_capacitor_holds_the_supply_for_a_while():
 def test_sag_lowers_all_by_what_all_draw():
     p = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1), H)
     u = np.array([1.0, -2.0])
-    drive.supply_sag(p, sagging(), u)
+    drive.supply_sag(p, sagging(), u, 0)
     assert u == pytest.approx([0.7, -1.4])
     p = drive.build_supply_sag(drive.SupplySagSettings(node="drive1", k=0.1, form="power"), H)
     u = np.array([1.0, -2.0])
-    drive.supply_sag(p, sagging(), u)
+    drive.supply_sag(p, sagging(), u, 0)
     assert u == pytest.approx([0.5, -1.0])
     u = np.array([9.0, 9.0])
-    drive.supply_sag(p, sagging(), u)
+    drive.supply_sag(p, sagging(), u, 0)
     assert list(u) == [0.0, 0.0]  # nothing is left, and it does not turn
 
 
@@ -171,3 +171,10 @@ def test_a_term_stands_at_its_own_drive(node, channel):
 def test_settings_out_of_bounds_are_refused(model, values):
     with pytest.raises(ValidationError):
         model(node="drive", **values)
+
+
+def test_a_supply_of_its_own_asks_for_no_other_drive():
+    p = drive.build_supply_sag(drive.SupplySagSettings(node="second", k=0.1, feeds="own"), H)
+    u = np.array([4.0, -2.0, 1.0])
+    drive.supply_sag(p, sagging(), u, 1)
+    assert u == pytest.approx([4.0, -1.6, 1.0])

@@ -73,13 +73,13 @@ def test_gain_falls_as_it_warms_and_comes_back():
     for k in range(2000):
         u = np.array([2.0 if k < 1000 else 0.1])
         was = u[0]
-        drive_dynamics.thermal_gain(p, s, u)
+        drive_dynamics.thermal_gain(p, s, u, p.channel, p.gain)
         gains.append(u[0] / was)
     assert gains[0] == 1.0
     assert gains[200] == pytest.approx(math.exp(-0.5 * (1 - math.exp(-1.0))), rel=1e-9)  # after tau
     assert gains[999] == pytest.approx(math.exp(-0.5), rel=1e-2)
     assert gains[-1] > 0.98
-    assert drive_dynamics.thermal_friction(p, s, 3.0) == 3.0  # that of a drive leaves friction alone
+    assert drive_dynamics.thermal_friction(p, s, 3.0, p.friction) == 3.0  # that of a drive leaves friction alone
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_what_is_left_of_a_warm_drive_by_the_form_of_the_loss(form, left):
         s = zeros(drive_dynamics.THERMAL_STATE)
         for _ in range(4000):
             u = np.array([volts])
-            drive_dynamics.thermal_gain(p, s, u)
+            drive_dynamics.thermal_gain(p, s, u, p.channel, p.gain)
         return u[0] / volts
 
     assert gain(0.5) == pytest.approx(left, rel=1e-6)
@@ -103,9 +103,11 @@ def test_friction_falls_at_a_motor_and_its_gain_stays():
     p, s = warm("motor2")
     for _ in range(200):
         u = np.array([9.0, 2.0])
-        drive_dynamics.thermal_gain(p, s, u)
+        drive_dynamics.thermal_gain(p, s, u, p.channel, p.gain)
         assert list(u) == [9.0, 2.0]
-    assert drive_dynamics.thermal_friction(p, s, 3.0) == pytest.approx(3.0 * math.exp(-0.5 * (1 - math.exp(-1.0))))
+    assert drive_dynamics.thermal_friction(p, s, 3.0, p.friction) == pytest.approx(
+        3.0 * math.exp(-0.5 * (1 - math.exp(-1.0)))
+    )
 
 
 def test_a_warm_drive_runs_easier_where_its_own_motor_rubs():
@@ -113,9 +115,9 @@ def test_a_warm_drive_runs_easier_where_its_own_motor_rubs():
     s = zeros(drive_dynamics.THERMAL_STATE)
     for _ in range(4000):
         u = np.array([0.0, 2.0])
-        drive_dynamics.thermal_gain(p, s, u)
+        drive_dynamics.thermal_gain(p, s, u, p.channel, p.gain)
     assert list(u) == [0.0, 2.0]
-    assert drive_dynamics.thermal_friction(p, s, 3.0) == pytest.approx(3.0 * math.exp(-0.4), rel=1e-6)
+    assert drive_dynamics.thermal_friction(p, s, 3.0, p.friction) == pytest.approx(3.0 * math.exp(-0.4), rel=1e-6)
     assert [place(*at).node for at in (("ivu", "drive1"), ("ivu", "drive2"), ("ldu", "drive"), ("axis", "drive"))] == [
         ivu.MOTOR1, ivu.MOTOR2, ldu.CAPSTAN, axis.CARRIAGE,
     ]  # fmt: skip
@@ -130,3 +132,11 @@ def test_each_drive_is_warmed_by_its_own_motor():
         volts = u[0, (i - 10) // 2]
         assert x[i] / base[i] == pytest.approx(math.exp(-0.3 * volts**2), rel=1e-3)
         assert x[other] == pytest.approx(base[other], rel=1e-9)
+
+
+def test_a_drive_of_any_name_loses_its_gain():
+    import machine
+
+    r = machine.run(machine.SCREW, [machine.settings("drive.thermal", "amplifier", a=0.4, tau=0.05)], np.ones(400))
+    assert r.u[0, 0] == 1.0
+    assert r.u[-1, 0] == pytest.approx(math.exp(-0.4), rel=1e-3)

@@ -1,6 +1,7 @@
 """Friction under load: a share of what presses, at its lever."""
 
 import bench
+import machine
 import numpy as np
 import pytest
 
@@ -35,3 +36,29 @@ def test_the_wheel_takes_what_the_shaft_transmits():
     torque = 4.2 * (r.q[-1, 0] - 20 * r.q[-1, 1])
     assert torque == pytest.approx(0.03 * 21e-3, rel=0.05)
     assert r.s.m.dry[1] == pytest.approx(0.1 * 20 * torque, rel=0.1)
+
+
+def test_a_body_drags_by_every_joint_that_ends_at_it():
+    three = {
+        "bodies": {"a": {"inertia": 1e-3}, "b": {"inertia": 1.0}, "c": {"inertia": 1e3}},
+        "joints": {"one": {"from": "a", "to": "b", "ratio": 0.5, "stiffness": 200.0, "damping": 2.0},
+                   "two": {"from": "b", "to": "c", "ratio": 2.0, "stiffness": 100.0, "damping": 5.0}},
+        "drives": {"amplifier": {"body": "a", "column": "u", "kind": "force", "gain": 1.0}},
+        "sensors": {name: {"joint": name, "measures": "force", "column": name, "resolution": 1e-6}
+                    for name in ("one", "two")},
+    }  # fmt: skip
+    r = machine.run(three, [machine.settings("friction.load", "b", mu=0.1)], np.full(200, 2.0))
+    one, two = np.abs(r.y[-1])
+    assert one > 3.5 and two > 0.1
+    assert r.dry[-1, 1] == pytest.approx(0.1 * (one + 2.0 * two), rel=2e-2)
+
+
+def test_a_body_drags_by_the_weight_that_it_carries():
+    arm = {
+        "bodies": {"arm": {"inertia": 0.1, "gravity": {"mass": 1.0, "arm": 0.2, "angle": 0.3}}},
+        "drives": {"amplifier": {"body": "arm", "column": "u", "kind": "force", "gain": 1.0}},
+        "sensors": {"encoder": {"body": "arm", "measures": "position", "column": "counts", "counts_per_unit": 1e6}},
+    }  # fmt: skip
+    r = machine.run(arm, [machine.settings("friction.load", "arm", mu=0.2, by="weight")], np.full(200, 3.0))
+    assert np.ptp(r.x[:, 0]) > 0.3
+    assert r.dry[1:, 0] == pytest.approx(0.2 * 9.80665 * 0.2 * np.abs(np.sin(r.x[:-1, 0] + 0.3)), abs=5e-3)

@@ -94,3 +94,11 @@ def test_a_push_goes_one_way_wherever_one_comes_from():
     r = bench.run("axis", [bump("push", F=30.0)], np.zeros(1000), speeds={"carriage": 0.05}, F_c=0.0, F_v=0.0)
     gained = 30.0 * 2e-3 * math.sqrt(2 * math.pi)
     assert r.v[-1, 0] == pytest.approx(math.sqrt(0.05**2 + 2 * gained / M), rel=1e-4)
+
+
+@pytest.mark.parametrize(("bend", "far"), [(0.0, 2.0), (3.0, 2.0 * 13**0.5), (-3.0, 2.0 / 13**0.5)])
+def test_a_spring_stiffens_or_yields_far_from_its_rest(bend, far):
+    p = load.build_spring(load.SpringSettings(node="carriage", k=1.0, x0=0.5, bend=bend), 1e-3)
+    assert load.spring.py_func(p, 2.5) == pytest.approx(-far)
+    assert load.spring.py_func(p, -1.5) == pytest.approx(far)
+    assert load.spring.py_func(p, 0.5 + 1e-4) == pytest.approx(-1e-4, rel=1e-6)

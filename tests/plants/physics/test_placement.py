@@ -69,7 +69,7 @@ def test_the_first_stand_that_fits_counts():
 
 
 def test_what_described_machines_are_asked_about_no_plant_is():
-    drag, fan = TERMS["friction.quadratic"], (element("fan", "body", "turns general"),)
+    drag, fan = TERMS["friction.quadratic"], (element("fan", "body", "turns general single"),)
     assert standing(drag, fan, "fan")[0].offered
     assert not any(standing(drag, kind, node)[0].offered for kind, there in by_kind(drag).items() for node in there)
     assert {name for name, term in TERMS.items() if not by_kind(term) and nodes(term, fan)} == {
@@ -83,3 +83,15 @@ def test_elements_by_trait():
     assert only("slips") == "transmission.slip"
     with pytest.raises(StopIteration):
         only("slips", "never")
+
+
+def test_a_supply_is_looked_for_at_one_drive_or_at_each():
+    sag = TERMS["drive.supply_sag"]
+    there = (element("one", "drive", "general force supply several"), element("two", "drive", "general force several"))
+    assert [len(standing(sag, there, name)[0].ways) for name in ("one", "two")] == [2, 1]
+    assert standing(sag, "axis", "drive")[0].ways == ()
+
+
+def test_friction_by_load_stands_at_springs_and_weights():
+    there = tuple(element(name, "body", f"general turns {name}") for name in ("sprung", "heavy", "rotor"))
+    assert nodes(TERMS["friction.load"], there) == ("sprung", "heavy")

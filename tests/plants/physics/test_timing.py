@@ -100,3 +100,17 @@ def test_jitter_reads_what_stands_there_a_moment_later(kind):
     for c in range(one.y.shape[1]):
         error = (two.y - one.y)[5:-5, c] - (speed[:, c] * late)[5:-5]
         assert np.abs(error).max() < 0.2 * np.abs(two.y - one.y)[:, c].max()
+
+
+def test_positions_of_a_described_machine_are_read_off_their_times():
+    import machine
+
+    from rtctl.plants.physics import timing
+
+    term = machine.settings("timing.jitter", "loop", sigma=1e-4, rate=1000.0)
+    r, even = (machine.run(machine.SCREW, terms, np.full(300, 0.5)) for terms in ([term], []))
+    speed = np.gradient(even.y, machine.H, axis=0)[200:-1]
+    p = timing.build_jitter(term, machine.H)
+    off = np.array([timing.late.py_func(p, t) for t in (np.arange(300) + 1) * machine.H])[200:-1]
+    assert r.y[200:-1] - even.y[200:-1] == pytest.approx(speed * off[:, None], rel=5e-2, abs=1e-8)
+    assert np.std(off) > 5e-5

@@ -60,3 +60,14 @@ def test_the_sensor_of_an_axis_lags_by_the_gap_after_a_reversal():
     assert np.median(behind[backwards]) == pytest.approx(gap / 2)
     steady = r.v[1:, 0] * r.v[:-1, 0] > 0
     assert (np.diff(r.y[:, 0]) * np.sign(r.v[1:, 0]) >= 0.0)[steady].all()
+
+
+def test_a_nut_that_is_said_to_be_rigid_has_play():
+    import machine
+
+    term = machine.settings("transmission.backlash", "nut", gap=2e-4, c=4e6)
+    push = np.repeat([0.6, -0.6, 0.6], 300)
+    r = machine.run(machine.SCREW, [term], push)
+    behind = r.y[:, 1] - 1.6e-3 * r.x[:, 1]
+    assert np.abs(behind).max() == pytest.approx(1e-4, rel=0.25)
+    assert behind[290] == pytest.approx(-1e-4, rel=0.1) and behind[590] == pytest.approx(1e-4, rel=0.1)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from pydantic import Field
 
 from rtctl.idiom import Settings, guard, quantity, state, tick
-from rtctl.loop import frames
+from rtctl.tick import frames
 
 IDLE, ARMED, RUNNING, TRIPPED = range(4)
 STATES = ("idle", "armed", "running", "tripped")

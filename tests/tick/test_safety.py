@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.loop import frames, safety
 from rtctl.loop.mailbox import COMMAND
-from rtctl.loop.safety import (
+from rtctl.tick import frames, safety
+from rtctl.tick.safety import (
     ARMED,
     COMMANDER,
     CURRENT,

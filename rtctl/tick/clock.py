@@ -4,7 +4,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from rtctl.loop.memory import intrinsic
+from rtctl.tick.memory import intrinsic
 
 CLOCK_MONOTONIC = 1
 CLOCK_BOOTTIME = 7  # CLOCK_MONOTONIC and the time that the computer was suspended

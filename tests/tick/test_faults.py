@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from rtctl.drivers import daq_stc
 from rtctl.faults.cases import COMMON, STANDS
 from rtctl.faults.drives import Inside
-from rtctl.loop import faults, frames, generate, mailbox
+from rtctl.loop import generate, mailbox
+from rtctl.tick import faults, frames
 
 TICKS = 60
 

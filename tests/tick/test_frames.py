@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from rtctl.loop import frames, generate
+from rtctl.loop import generate
+from rtctl.tick import frames
 
 
 @pytest.mark.parametrize("dtype", [frames.OUTPUTS, frames.INPUTS])

@@ -7,7 +7,7 @@ import numpy as np
 
 from rtctl.config.errors import UserError
 from rtctl.idiom import record_dtype
-from rtctl.own import check, law, plant
+from rtctl.own import check, law, mechanics, plant
 from rtctl.own.check import Verdict
 from rtctl.own.files import OwnError, load, split
 from rtctl.own.files import Source as File
@@ -28,6 +28,13 @@ def verdicts(machine: Any) -> list[Verdict]:
         h = machine.plant_period / machine.substeps
         signals = check.healthy(plant.INPUT_WORDS, h, SIZE[machine.unit])
         found.append(check.check(parts, _params(machine.plant_diagram, "own"), signals, h))
+    coupling = getattr(machine.config.machine, "mechanics", None)
+    if coupling is not None:
+        file, name = split(coupling.kind)
+        try:
+            mechanics.checked(machine.config.machine, File(file, name, machine.config.own[file]))
+        except OwnError as error:
+            raise UserError(str(error)) from error
     for settings in machine.config.plant.physics:
         file = settings.term.partition(":")[0]
         if file in machine.config.own:

@@ -3,7 +3,7 @@ import time
 import pytest
 
 from rtctl.idiom import tick
-from rtctl.loop import clock
+from rtctl.tick import clock
 
 
 @tick

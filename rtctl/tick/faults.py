@@ -19,7 +19,7 @@ from pydantic import Field, model_validator
 from rtctl import counted
 from rtctl.drivers import daq_stc
 from rtctl.idiom import Settings, quantity, state, tick
-from rtctl.loop import frames
+from rtctl.tick import frames
 
 SLOTS = 16  # faults at a time
 DEPTH = 1024  # ticks that a link may be late

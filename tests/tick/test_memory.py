@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtctl.loop.memory import ALIGN, Segment
+from rtctl.tick.memory import ALIGN, Segment
 
 RECORD = np.dtype([("n", np.int64), ("x", np.float64, (3,))])
 LAYOUT = {"first": (np.dtype(np.int8), 3), "records": (RECORD, 5)}

@@ -1,0 +1,49 @@
+"""A machine with mechanics from a file closes its loop in one process and between processes, and replays."""
+
+import os
+
+import fused
+import numpy as np
+import pytest
+
+from rtctl.cli.common import with_loop
+from rtctl.config.load import set_path
+from rtctl.daemon.session import Session
+from rtctl.trace.bundle import load_bundle
+from rtctl.trace.replay import replay
+
+LENGTH = 1.5  # s
+
+
+@pytest.fixture(scope="module")
+def run(runtime, tmp_path_factory):
+    def make(mode):
+        config = fused.config("machines/furuta", safety__link_timeout=5.0, safety__missed_ticks=0)
+        config = set_path(config, "name", f"furuta{os.getpid()}")
+        folder = tmp_path_factory.mktemp("run") / "bundle"
+        assert Session(with_loop(config, mode, "shm"), folder, LENGTH).run()["tripped"] is None
+        return folder
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def bundle(run):
+    return run("fused")
+
+
+def test_the_arm_follows_and_the_pendulum_swings(bundle):
+    rows = load_bundle(bundle).columns
+    assert rows["truth_arm"][-1] == pytest.approx(np.radians(60.0), abs=0.3)
+    assert np.abs(rows["truth_pendulum"]).max() > 0.05
+    moved = np.abs(rows["pendulum_counts"] - np.floor(rows["truth_pendulum"] * 2048 / (2 * np.pi)))
+    assert moved.max() <= 1.0
+
+
+def test_turns_between_processes_are_to_the_bit_what_one_process_does(run, bundle):
+    one, other = (load_bundle(folder).columns for folder in (bundle, run("lockstep")))
+    assert [name for name in one if not np.array_equal(one[name], other[name])] == []
+
+
+def test_it_replays_to_the_bit(bundle):
+    assert replay(bundle).identical
