@@ -214,6 +214,12 @@ def link(m, j, i1, a, i2, b, c, k):
 
 
 @tick
+def side(m, j, i):
+    """Whether link `j` gets longer (1) or shorter (-1) as coordinate `i`, at one of its ends, goes on."""
+    return 1.0 if (m.link_a[j] if m.link_i[j] == i else m.link_b[j]) > 0.0 else -1.0
+
+
+@tick
 def stretch(m, j):
     """Elongation of link `j` at the middle of the substep, m or rad."""
     return m.link_a[j] * m.qm[m.link_i[j]] + m.link_b[j] * m.qm[m.link_j[j]] + m.link_e[j]

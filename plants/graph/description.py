@@ -101,6 +101,9 @@ class _Joint(Settings):
         description="tape, belt or rope between the radii of the two bodies, which turn the same way (open) or against "
         "each other (crossed); stiffness in N/m, no ratio",
     )
+    contact: bool = Field(
+        False, description="passes on its force by friction, as a friction wheel or a capstan on a strip; it may slip"
+    )
 
     @model_validator(mode="after")
     def _rigid(self) -> "_Joint":
@@ -176,6 +179,7 @@ class Sensor(Settings):
     resolution: float | None = Field(None, ge=0, description="step of the column's numbers")
     per_unit: float = Field(1.0, description="column units for one SI unit")
     noise: float | None = Field(None, ge=0, description="standard deviation, column units")
+    direction: bool = Field(True, description="false: a counter of edges that counts up whichever way it turns")
 
     @property
     def scale(self) -> float:

@@ -185,6 +185,71 @@ def creep_wheel(p, s, m, i, j):
     s.fallen += p.h * p.kappa * strip_force(p, m) * abs(p.R_c * m.vm[i])
 
 
+@tick
+def share_spans(m, i, j, k, d, v, change):
+    """As `share`, over the spans `j` and `k` that lie around coordinate `i`."""
+    both = m.link_c[j] + m.link_c[k]
+    for n in (j, k):
+        way = linear.side(m, n, i)
+        linear.slid(m, n, way * d, way * v, way * change * m.link_c[n] / both)
+
+
+@tick
+def carried(m, i, r):
+    """Force on what coordinate `i` moves by `r` for one unit, of the links that end at it, N."""
+    torque = 0.0
+    for j in range(m.nl):
+        if m.link_i[j] == i:
+            torque -= m.link_a[j] * linear.tension(m, j)
+        if m.link_j[j] == i:
+            torque -= m.link_b[j] * linear.tension(m, j)
+    return torque / r
+
+
+@tick
+def slip(p, s, m, i, r, j, k):
+    """Slip of a contact: of coordinate `i` in the spans `j` and `k` around it, in link `j`, or, without a link, on what
+    it moves by `r` for one unit."""
+    if k >= 0:
+        T = linear.side(m, j, i) * linear.tension(m, j) + linear.side(m, k, i) * linear.tension(m, k)
+        before = s.d
+        change = slide(s, p.F_max, T, m.link_c[j] + m.link_c[k], m.link_k[j] + m.link_k[k], p.h)
+        share_spans(m, i, j, k, s.d, (s.d - before) / p.h, change)
+    elif j >= 0:
+        slip_joint(p, s, m, j)
+    else:
+        gain = p.h * m.G[m.nq + i, m.nu + i] * r * r  # speed that a newton gives what is moved
+        free = s.rate + gain * carried(m, i, r)
+        rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
+        if abs(rate) < 1e-12 * abs(free):  # rounding of a stop
+            rate = 0.0
+        s.fallen += 0.5 * p.h * (s.rate + rate)
+        s.rate = rate
+
+
+@tick
+def creep(p, s, m, i, r, j, k):
+    """Creep of a contact, which stands as for `slip`."""
+    if k >= 0:
+        arm = m.link_a[k] if m.link_i[k] == i else m.link_b[k]
+        T = linear.side(m, j, i) * linear.tension(m, j) + linear.side(m, k, i) * linear.tension(m, k)
+        before = s.d
+        grip = p.kappa * abs(arm * m.vm[i])
+        change = micro(s, grip, T, m.link_c[j] + m.link_c[k], m.link_k[j] + m.link_k[k], p.h)
+        share_spans(m, i, j, k, s.d, (s.d - before) / p.h, change)
+    elif j >= 0:
+        creep_joint(p, s, m, j)
+    else:
+        s.fallen += p.h * p.kappa * carried(m, i, r) * abs(r * m.vm[i])
+
+
+@tick
+def behind(s, m, c):
+    """Let the reading `c` of what is moved fall behind by what has slid; there is none where `c` is below 0."""
+    if c >= 0:
+        m.y[c] -= s.fallen
+
+
 SLIP = Term(
     name="transmission.slip",
     words="slip: pushed too hard, the contact slides and what was gained is lost for good",
@@ -194,6 +259,8 @@ SLIP = Term(
     build=build_slip,
     act={
         "force": "contact.slip_joint({p}, {s}, {m}, {l})",
+        "force:described": "contact.slip({p}, {s}, {m}, {i}, {r}, {l}, {k})",
+        "reading:described": "contact.behind({s}, {m}, {c})",
         "force:ivu": "contact.slip_tape({p}, {s}, {m})",
         "force:ldu": "contact.slip_wheel({p}, {s}, {m}, {i}, {l})",
         "reading:ldu": "{m}.y[1] -= {s}.fallen",
@@ -237,6 +304,8 @@ CREEP = Term(
     build=build_creep,
     act={
         "force": "contact.creep_joint({p}, {s}, {m}, {l})",
+        "force:described": "contact.creep({p}, {s}, {m}, {i}, {r}, {l}, {k})",
+        "reading:described": "contact.behind({s}, {m}, {c})",
         "force:ivu": "contact.creep_tape({p}, {s}, {m}, {i})",
         "force:ldu": "contact.creep_wheel({p}, {s}, {m}, {i}, {l})",
         "reading:ldu": "{m}.y[1] -= {s}.fallen",

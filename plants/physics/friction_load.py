@@ -87,6 +87,21 @@ def load_drive(p, m, i):
     return p.mu * abs(F) / m.G[nq + i, nu + i]
 
 
+@tick
+def pressed(p, m, i, j, k):
+    """As `load`, of the links `j` and `k` where both end at node `i`, else of `j`.
+
+    Where no link is named it is as `load_all`, and of the drives at a node at which no link ends.
+    """
+    if j >= 0:
+        return load(p, m, i, j, k if k >= 0 and (m.link_i[k] == i or m.link_j[k] == i) else j)
+    ends = p.weight
+    for n in range(m.nl):
+        if m.link_i[n] == i or m.link_j[n] == i:
+            ends = 1
+    return load_all(p, m, i) if ends > 0 else load_drive(p, m, i)
+
+
 LOAD = Term(
     name="friction.load",
     words="dry friction that grows with load: the tighter the tape or the harder the push, the more it drags",
@@ -96,6 +111,7 @@ LOAD = Term(
     build=build_load,
     act={
         "force": "{m}.dry[{i}] += friction_load.load_all({p}, {m}, {i})",
+        "force:described": "{m}.dry[{i}] += friction_load.pressed({p}, {m}, {i}, {l}, {k})",
         "force:ldu": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {l}, {l})",
         "force:ivu": "{m}.dry[{i}] += friction_load.load({p}, {m}, {i}, {p}.one, {p}.two)",
         "force:axis": "{m}.dry[{i}] += friction_load.load_drive({p}, {m}, {i})",

@@ -13,7 +13,7 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
-from rtctl.plants import ivu, linear
+from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.graph import reel
 from rtctl.plants.physics.ripple_tape import tape_of
@@ -50,27 +50,26 @@ def build_radius_change(settings: RadiusChangeSettings, h: float) -> RadiusChang
 
 
 @tick
-def radius(p, m, i, grow):
-    """Of reel `i` at its angle, m."""
-    R_0 = m.link_a[tape_of(m, i)]
-    return max(R_0 + grow * m.qm[i], min(p.R_min, R_0))
+def radius(p, m, j, grow):
+    """Of the reel of tape `j` at its angle, m."""
+    R_0 = m.link_a[j]
+    return max(R_0 + grow * m.qm[m.link_i[j]], min(p.R_min, R_0))
 
 
 @tick
-def wound(p, m, i, grow):
-    """Stretch the tape of reel `i` by what the reel has wound at another radius."""
-    j = tape_of(m, i)
+def wound(p, m, j, grow):
+    """Stretch the tape `j` by what its reel has wound at another radius."""
+    i = m.link_i[j]
     R_0, q = m.link_a[j], m.qm[i]
     way = reel.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
-    linear.extend(m, j, way, (radius(p, m, i, grow) - R_0) * m.vm[i])
+    linear.extend(m, j, way, (radius(p, m, j, grow) - R_0) * m.vm[i])
 
 
 @tick
-def turned(p, m, i, grow):
-    """Let all that pulls at the tape of reel `i` do so at the reel's radius, and all that turns the reel turn its
-    inertia."""
-    j = tape_of(m, i)
-    R_0, R = m.link_a[j], radius(p, m, i, grow)
+def turned(p, m, j, grow):
+    """Let all that pulls at the tape `j` do so at its reel's radius, and all that turns the reel turn its inertia."""
+    i = m.link_i[j]
+    R_0, R = m.link_a[j], radius(p, m, j, grow)
     m.f[i] -= (R - R_0) * linear.tension(m, j)
     # All that turns the reel turns another inertia: what the matrices divide by the old one is put right as a force.
     torque, c, k = m.f[i], 0.0, 0.0
@@ -93,19 +92,33 @@ def turned(p, m, i, grow):
 
 
 @tick
-def wind(p, m, i):
-    """The radius of reel `i`, and of the other where it is the same tape, follows its angle."""
-    wound(p, m, i, p.grow)
-    if p.other != 0.0:
-        wound(p, m, ivu.REEL1 + ivu.REEL2 - i, p.other)
+def wind(p, m, j, k):
+    """The radius of the reel of tape `j`, and of that of `k` where it is the same tape, follows its angle."""
+    wound(p, m, j, p.grow)
+    if p.other != 0.0 and k >= 0:
+        wound(p, m, k, p.other)
 
 
 @tick
-def turn(p, m, i):
+def turn(p, m, j, k):
     """So do its arm and its inertia, for all that pulls and turns: after every other force."""
-    turned(p, m, i, p.grow)
-    if p.other != 0.0:
-        turned(p, m, ivu.REEL1 + ivu.REEL2 - i, p.other)
+    turned(p, m, j, p.grow)
+    if p.other != 0.0 and k >= 0:
+        turned(p, m, k, p.other)
+
+
+@tick
+def wind_at(p, m, i):
+    """`wind` of reel `i` of the IVU, whose tapes are the first two links."""
+    j = tape_of(m, i)
+    wind(p, m, j, 1 - j)
+
+
+@tick
+def turn_at(p, m, i):
+    """`turn` of the same."""
+    j = tape_of(m, i)
+    turn(p, m, j, 1 - j)
 
 
 RADIUS_CHANGE = Term(
@@ -115,7 +128,12 @@ RADIUS_CHANGE = Term(
     source="thesis (4.1)-(4.8)",
     settings=RadiusChangeSettings,
     build=build_radius_change,
-    act={"force": "geometry.wind({p}, {m}, {i})", "last": "geometry.turn({p}, {m}, {i})"},
+    act={
+        "force": "geometry.wind_at({p}, {m}, {i})",
+        "force:described": "geometry.wind({p}, {m}, {l}, {k})",
+        "last": "geometry.turn_at({p}, {m}, {i})",
+        "last:described": "geometry.turn({p}, {m}, {l}, {k})",
+    },
     stands=(stand("body", "reel"),),
     look_alikes={
         "sensor.scale": "two turns and two more: a growing reel goes with the square of the way, a factor does not",

@@ -97,15 +97,40 @@ def tape_of(m, i):
 
 
 @tick
-def reel(p, m, i):
-    """Stretch the tape of reel `i` by what the reel has wound too much."""
-    linear.extend(m, tape_of(m, i), way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i])
+def reel(p, m, i, j):
+    """Stretch the tape `j` of reel `i` by what the reel has wound too much."""
+    linear.extend(m, j, way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i])
 
 
 @tick
-def reel_arm(p, m, i):
+def reel_arm(p, m, i, j):
     """Let it pull at the arm that it has, with what slip and slack have left of its tension."""
-    m.f[i] -= arm(p, m.qm[i]) * linear.tension(m, tape_of(m, i))
+    m.f[i] -= arm(p, m.qm[i]) * linear.tension(m, j)
+
+
+@tick
+def spans(p, m, i, j, k):
+    """Move the spans `j` and `k` around capstan `i` by what it has passed too much; there are none where `k` is below
+    0."""
+    if k >= 0:
+        moved, speed = way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i]
+        for n in (j, k):
+            linear.extend(m, n, linear.side(m, n, i) * moved, linear.side(m, n, i) * speed)
+
+
+@tick
+def spans_arm(p, m, i, j, k):
+    """As `reel_arm`."""
+    if k >= 0:
+        for n in (j, k):
+            m.f[i] -= arm(p, m.qm[i]) * linear.side(m, n, i) * linear.tension(m, n)
+
+
+@tick
+def rolled(p, m, i, c):
+    """Move the reading `c` of what rolls on capstan `i`; there is none where `c` is below 0."""
+    if c >= 0:
+        m.y[c] += way(p, m.x[i])
 
 
 @tick
@@ -129,7 +154,12 @@ REEL = Term(
     source="Shelton 1986",
     settings=ReelSettings,
     build=build_reel,
-    act={"force": "ripple_tape.reel({p}, {m}, {i})", "last": "ripple_tape.reel_arm({p}, {m}, {i})"},
+    act={
+        "force": "ripple_tape.reel({p}, {m}, {i}, ripple_tape.tape_of({m}, {i}))",
+        "force:described": "ripple_tape.reel({p}, {m}, {i}, {l})",
+        "last": "ripple_tape.reel_arm({p}, {m}, {i}, ripple_tape.tape_of({m}, {i}))",
+        "last:described": "ripple_tape.reel_arm({p}, {m}, {i}, {l})",
+    },
     stands=(stand("body", "reel"),),
     look_alikes={
         "load.imbalance": "the same turns at another tension: an eccentric reel follows the tension, a weight does not",
@@ -161,6 +191,9 @@ CAPSTAN = Term(
     settings=CapstanSettings,
     build=build_capstan,
     act={
+        "force:described": "ripple_tape.spans({p}, {m}, {i}, {l}, {k})",
+        "last:described": "ripple_tape.spans_arm({p}, {m}, {i}, {l}, {k})",
+        "reading:described": "ripple_tape.rolled({p}, {m}, {i}, {c})",
         "force:ivu": "ripple_tape.capstan({p}, {m}, {i})",
         "last:ivu": "ripple_tape.capstan_arm({p}, {m}, {i})",
         "reading:ldu": "{m}.y[1] += ripple_tape.way({p}, {m}.x[{i}])",

@@ -15,6 +15,7 @@ import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Phrase
@@ -99,6 +100,14 @@ def slack(share, T):
     return share * max(-T, 0.0)
 
 
+@tick
+def let_go(p, m, j, k):
+    """Take away the push of tape `j`, and of what is on the other side, `k`, where there is one."""
+    linear.pull(m, j, slack(p.share, linear.tension(m, j)))
+    if k >= 0:
+        linear.pull(m, k, slack(p.other, linear.tension(m, k)))
+
+
 VISCOELASTIC = Term(
     name="tape.viscoelastic",
     words="the tape gives way slowly: held taut it relaxes, let go it comes back late",
@@ -141,8 +150,8 @@ SLACK = Term(
     settings=SlackSettings,
     build=build_slack,
     act={
-        "force": "linear.pull({m}, {l}, tape.slack({p}.share, linear.tension({m}, {l})))\n"
-        "linear.pull({m}, 1 - {l}, tape.slack({p}.other, linear.tension({m}, 1 - {l})))"
+        "force": "tape.let_go({p}, {m}, {l}, 1 - {l})",
+        "force:described": "tape.let_go({p}, {m}, {l}, {k})",
     },
     stands=(stand("joint", "spring span"),),
     look_alikes={

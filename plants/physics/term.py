@@ -9,6 +9,8 @@ these names are filled in:
               node that slides ({r} * {m}.vm[{i}] is the node's speed in the term's unit)
     {l}       the link (spring) that the node names: tape1, or the shaft that ends at a motor or a wheel
     {c}       the channel: of the drive for a drive, of the sensor for a sensor
+    {k}       of a described machine: the link on the other side of the body that the tape of {l} lies around; of {l},
+              {k} and {c} each is -1 where there is none
 
 The sites of a substep in their order:
 

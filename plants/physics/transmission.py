@@ -125,6 +125,21 @@ def follow(s, p, x):
     return s.at
 
 
+@tick
+def play(p, s, m, i, r, j):
+    """Play in link `j`, or of the sensor of coordinate `i`, which moves `r` for a unit, where there is no link."""
+    if j >= 0:
+        linear.pull(m, j, backlash(p, m, j))
+    else:
+        follow(s, p, r * m.x[i])
+
+
+@tick
+def shown(p, s, y, j):
+    """Reading of a sensor behind a gap for `y`; the same where the play is in link `j`."""
+    return y if j >= 0 else min(max(s.at, y - p.half), y + p.half)
+
+
 BACKLASH = Term(
     name="transmission.backlash",
     words="play: on reversal the motor turns a little before anything follows",
@@ -134,6 +149,8 @@ BACKLASH = Term(
     build=build_backlash,
     act={
         "force": "linear.pull({m}, {l}, transmission.backlash({p}, {m}, {l}))",
+        "force:described": "transmission.play({p}, {s}, {m}, {i}, {r}, {l})",
+        "reading:described": "{m}.y[{c}] = transmission.shown({p}, {s}, {m}.y[{c}], {l})",
         "force:axis": "transmission.follow({s}, {p}, {m}.x[{i}])",
         "reading:axis": "{m}.y[{c}] = min(max({s}.at, {m}.y[{c}] - {p}.half), {m}.y[{c}] + {p}.half)",
     },

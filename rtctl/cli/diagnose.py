@@ -33,6 +33,14 @@ def diagnose(
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Where the results go; BUNDLE/diagnosis if absent."),
     ] = None,
+    engine: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="rules, or likelihood: which of the two judges a reel unit, linear drive or axis. A described machine "
+            "is always judged by its likelihood.",
+        ),
+    ] = "rules",
     json: JsonOption = False,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     jobs: Annotated[
@@ -106,7 +114,10 @@ def diagnose(
       rtctl diagnose --closed-loop ivu --for 25s --reference constant_speed
     """
     from rtctl.cli.diagnose_console import DiagnoseConsole
+    from rtctl.diagnose.engines import ENGINES
 
+    if engine not in ENGINES:
+        _refuse(f"--engine {engine}", f"is not known; it is {' or '.join(ENGINES)}")
     console = DiagnoseConsole(json)
     _register(terms or [])
     _couple(mechanics, machine)
@@ -125,7 +136,7 @@ def diagnose(
     from rtctl.diagnose.folder import tasks
 
     bundle = Path(what[0])
-    found = tasks(bundle, out, heldout) if len(what) == 1 else []
+    found = tasks(bundle, out, heldout, engine) if len(what) == 1 else []
     if together or len(what) > 1:
         from rtctl.diagnose.engines import of_one_machine
 
@@ -133,7 +144,7 @@ def diagnose(
             _refuse("--heldout", "goes with one BUNDLE; of several the last part of each is held out")
         bundles = [task.bundle for task in found] or [Path(one) for one in what]
         of_one_machine(bundles, together)
-        _bundle(console, bundles[0], None, out, report, json, bundles[1:])
+        _bundle(console, bundles[0], None, out, report, json, engine, bundles[1:])
     elif found:
         if terms:
             _refuse("--term", "goes with one bundle, not with a folder of them")
@@ -143,7 +154,7 @@ def diagnose(
         assert length is not None
         _folder(console, found, jobs, length, report, again, json)
     else:
-        _bundle(console, bundle, heldout, out, report, json)
+        _bundle(console, bundle, heldout, out, report, json, engine)
 
 
 def _register(terms: list[str]) -> None:
@@ -183,6 +194,7 @@ def _bundle(
     out: Path | None,
     report: bool,
     json: bool,
+    engine: str,
     more: Sequence[Path] = (),
 ) -> None:
     from rtctl.diagnose.engines import diagnose_into
@@ -190,7 +202,7 @@ def _bundle(
 
     folder = out if out is not None else bundle / FOLDER
     with console.stages() as stage:
-        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage, more)
+        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage, engine, more)
     console.notes([*made.data.get("warnings", made.diagnosis.record.case.warnings), *made.faults])
     if json:
         common.print_json(made.data)

@@ -1,4 +1,8 @@
-"""Choice of the engine for a bundle: machines known by name (format 1), or described by their parts (format 2)."""
+"""Choice of the engine for a bundle.
+
+likelihood  a posterior over all hypotheses, for any described machine: those of format 2, and the three of format 1
+rules       the older one, for the three machines of format 1
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -8,6 +12,8 @@ from rtctl.config.errors import UserError
 from rtctl.trace.bundle import load_case
 
 DESCRIBED_FORMAT = 2
+RULES, LIKELIHOOD = "rules", "likelihood"  # engines; the first judges the machines of format 1 alone
+ENGINES = (RULES, LIKELIHOOD)
 
 
 class Diagnosed(NamedTuple):
@@ -75,18 +81,19 @@ def diagnose_into(
     report: bool = True,
     base: Path | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    engine: str = RULES,
     more: Sequence[Path] = (),
 ) -> Diagnosed:
     """Diagnose the bundle and write the results into `out`; `other` is a second recording of the same machine.
 
-    `more` are recordings of the same described machine that are fitted together with the first.
-
-    Where `base` is given, no link may lead out of it. Raises UserError for a bundle that cannot be read and for a disk
-    that does not take the results, NoAnswer for a bundle that supports no verdict.
+    `more` are recordings of the same described machine that are fitted together with the first. Where `base` is given,
+    no link may lead out of it. `engine` is that of a machine of format 1; a described machine has but one. Raises
+    UserError for a bundle that cannot be read and for a disk that does not take the results, NoAnswer for a bundle that
+    supports no verdict.
     """
     from rtctl.diagnose.results import finite
 
-    if of_described(bundle):
+    if engine == LIKELIHOOD or of_described(bundle):
         from rtctl.diagnose.graph import answer, files
 
         found = answer.diagnose(bundle, *more, progress=progress)

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.failures import told
 from rtctl.config.files import write_text
+from rtctl.diagnose.engines import RULES
 from rtctl.diagnose.results import EXPERIMENT, FOLDER, MODEL, RESULT, TURN, finite, fresh, put
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
 
@@ -38,6 +39,7 @@ class Task(NamedTuple):
     bundle: Path
     out: Path
     other: Path | None = None
+    engine: str = RULES
 
 
 class Outcome(NamedTuple):
@@ -113,7 +115,7 @@ def is_bundle(folder: Path) -> bool:
     return any((folder / name).is_file() for name in (CASE, PARQUET, ARROWS))
 
 
-def tasks(folder: Path, out: Path | None = None, other: Path | None = None) -> list[Task]:
+def tasks(folder: Path, out: Path | None = None, other: Path | None = None, engine: str = RULES) -> list[Task]:
     """A task for each bundle in `folder`, by name; none where it is no folder of bundles.
 
     Results go to `out`/NAME, or into each bundle. A second recording is `other`/NAME, or NAME-heldout beside NAME.
@@ -126,7 +128,7 @@ def tasks(folder: Path, out: Path | None = None, other: Path | None = None) -> l
         if name.endswith(SECOND) and name.removesuffix(SECOND) in found:
             continue
         second = other / name if other is not None else found.get(name + SECOND)
-        made.append(Task(name, bundle, out / name if out is not None else bundle / FOLDER, second))
+        made.append(Task(name, bundle, out / name if out is not None else bundle / FOLDER, second, engine))
     return made
 
 
@@ -151,7 +153,7 @@ def one(task: Task, report: bool) -> Outcome:
 
     began = time.monotonic()
     try:
-        made = diagnose_into(task.bundle, task.other, task.out, report, task.out.parent)
+        made = diagnose_into(task.bundle, task.other, task.out, report, task.out.parent, engine=task.engine)
         return Outcome(task.name, 0, time.monotonic() - began, made.data, "; ".join(made.faults))
     except (UserError, NoAnswer) as error:
         return Outcome(task.name, error.exit_code, time.monotonic() - began, message=_line(error))

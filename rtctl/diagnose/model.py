@@ -48,6 +48,10 @@ class Model(NamedTuple):
         """The same with other parameters."""
         return self._replace(base={**self.base, **base})
 
+    def tied(self, name: str) -> tuple[str, ...]:
+        """Parameters that move with one: itself."""
+        return (name,)
+
     def add(self, *terms: Settings) -> "Model":
         """The same with more terms."""
         return self._replace(terms=(*self.terms, *terms))

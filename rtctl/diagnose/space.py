@@ -119,7 +119,8 @@ class Space(NamedTuple):
         """The model at x."""
         base = dict(self.owner.base)
         for name, value in zip(self.names, x[: self.nb], strict=True):
-            base[name] = self.owner.base[name] * float(np.exp(value))
+            for each in self.owner.tied(name):
+                base[each] = self.owner.base[each] * float(np.exp(value))
         terms = list(self.owner.terms)
         for hypothesis, part in zip(self.hypotheses, self.parts(x), strict=True):
             terms.append(hypothesis.settings(part))

@@ -228,7 +228,7 @@ def physics_lines(terms: list[Any], kind: str, dt: float, place_of: Callable[[st
             if act is not None:
                 line = act.format(
                     p=f"p.{name}", s=f"s.{name}", m="s.plant.m", i=spot.node, l=spot.link, c=spot.channel,
-                    r=ratio,
+                    k=getattr(spot, "other", -1), r=ratio,
                 )  # fmt: skip
                 lines[site] += line.split("\n")
                 if site == "reading" and term.moves:

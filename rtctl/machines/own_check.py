@@ -69,7 +69,7 @@ def _check_term(machine: Any, settings: Any, file: File) -> None:
         if act is not None:
             lines += act.format(
                 p="p", s="s", m="m", i=spot.node, l=spot.link, c=spot.channel,
-                r=ratio,
+                k=getattr(spot, "other", -1), r=ratio,
             ).split("\n")  # fmt: skip
     params = record_dtype(term.build(settings, machine.plant_period / machine.substeps))
     belief = record_dtype(_params(machine.plant_diagram, "plant"))

@@ -62,7 +62,7 @@ def own_term(source: Source) -> Term:
     line = source.line_of(name)
     for site in found.act:
         base, _, kind = site.partition(":")
-        if base not in SITES or (kind and kind not in PLANTS):
+        if base not in SITES or (kind and kind not in (*PLANTS, "described")):
             known = ", ".join(SITES)
             raise source.error(line, f"{name}.act: there is no site '{site}'; it is {known}, or e.g. force:ivu")
     if not by_kind(found):

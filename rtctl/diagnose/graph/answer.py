@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
-from rtctl.diagnose.graph.fits import Fitted, prior
+from rtctl.diagnose.graph.fits import Fitted, prior, refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
@@ -19,6 +19,7 @@ from rtctl.diagnose.graph.search import Found, Progress, search
 from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
 from rtctl.diagnose.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.plants.physics import TERMS
+from rtctl.trace.bundle import load_case
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
 Z90 = 1.645
@@ -114,7 +115,17 @@ def diagnose(*folders: Path | str, progress: Progress = lambda _: None) -> Graph
 
     Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
     """
-    return diagnose_record(*map(load_record, folders), progress=progress)
+    return diagnose_record(*map(load, folders), progress=progress)
+
+
+def load(folder: Path | str) -> GraphRecord:
+    """The record of a bundle of either exchange format. Raises as `diagnose`."""
+    if load_case(Path(folder)).get("plant") is None:
+        return load_record(folder)
+    from rtctl.diagnose.graph.known import graph_record
+    from rtctl.diagnose.record import load_record as load_known
+
+    return graph_record(load_known(folder))
 
 
 def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:
@@ -122,6 +133,9 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
     began = time.monotonic()
     with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
         like, space = together(records)
+        if any(part.sim.record.edges for part in like.parts):  # a model that follows the others tells their directions
+            progress("telling the directions of edges")
+            like = like.directed(refit(like, space).model)
         found = search(like, space, progress)
         progress("weighing names against forces without one")
         decided = verdict(found)
@@ -205,7 +219,7 @@ def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
         elif is_start(plain):
             first = next(p.sim.record for p in f.like.parts if p.sim.record.name == name)
             value, low, high = first_of(first, plain, (value, low, high))
-        out[path] = Interval(value, low, high, words.unit_in(record, path))
+        out[record.case.called.get(path, path)] = Interval(value, low, high, words.unit_in(record, path))
     return out
 
 

@@ -50,6 +50,9 @@ class GraphCase(NamedTuple):
     warnings: tuple[str, ...]
     file: Path
     made: tuple[str, ...] = ()  # paths of values that the program took, where nobody gave any
+    format: int = FORMAT  # whose names of effects may be given
+    plant: str = ""  # kind of plant by which the owner calls the machine: effects stand at its nodes alone
+    called: dict[str, str] = {}  # noqa: RUF012  # path -> symbol by which the owner calls it
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
@@ -68,10 +71,13 @@ class GraphCase(NamedTuple):
     def fitted(self) -> tuple[str, ...]:
         """Paths of the values that a fit may move, in the order of the description."""
         out = []
+        behind = {path for paths in self.machine.symbols.values() for path in paths[1:]}  # they move with the first
         for path, value in self.values.items():
             key = path.rsplit(".", 1)[-1]
+            if path in behind or path in self.made:
+                continue
             moves = key not in NEVER or path.startswith("physics.")
-            if path not in self.made and value != 0.0 and moves and self.tolerance(path) > 1e-3 and self._acts(path):
+            if value != 0.0 and moves and self.tolerance(path) > 1e-3 and self._acts(path):
                 out.append(path)
         return tuple(out)
 
@@ -82,6 +88,8 @@ class GraphCase(NamedTuple):
         group, name, *rest = path.split(".")
         if group == "drives" and rest == ["damping"]:
             return self.machine.drives[name].bandwidth_hz is not None
+        if group == "bodies" and rest[0] == "reel":  # paper that does not land changes nothing
+            return bool(self.values.get(f"bodies.{name}.reel.thickness"))
         if group == "drives" and rest == ["inductance"]:
             return self.machine.drives[name].kind == "voltage"
         return True

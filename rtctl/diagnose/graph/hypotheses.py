@@ -7,14 +7,15 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.graph.likelihood import Likelihood
-from rtctl.diagnose.graph.measures import Measures, way
+from rtctl.diagnose.graph.measures import Measures, lever, way
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.hints import MOST, ORDERS, jumps, peaks, seen, spectrum, spots
-from rtctl.diagnose.hypotheses import parts_of, searched, starts_of
+from rtctl.diagnose.hypotheses import parts_of, searched, shows_alone, starts_of
 from rtctl.diagnose.space import Hypothesis
 from rtctl.idiom import Settings
 from rtctl.plants.graph.description import Sensor
+from rtctl.plants.graph.elements import contacts, undriven
 from rtctl.plants.graph.layout import layout
 from rtctl.plants.linear import MOST_SENSORS
 from rtctl.plants.physics import TERMS, nodes, standing
@@ -23,6 +24,8 @@ QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 ROWS = 8000  # of a spectrum
+CALM = 5e-3  # s, over which an acceleration is taken
+SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 ABOUT = {  # kinds of element that a problem tells of: positions of no force, a measured force of no command
     "kinematic": ("joint", "sensor"),
     "static": ("body", "joint", "sensor"),
@@ -54,8 +57,11 @@ def hypotheses(
             if (
                 stand.again
                 or not stand.offered
+                or not term.in_format(sim.case.format)
+                or (sim.case.plant and node not in nodes(term, sim.case.plant))
+                or ("contact" in element.traits and "contact" not in stand.needs)
                 or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
-                or (term.needs.compared and len(sim.channels) < 2)
+                or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, False))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
             ):
                 continue
@@ -135,6 +141,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         at = gauges.layout.sensors.get(GAUGE + name)
         pull = np.abs(read[begin:, at]) if at is not None else np.full(1, np.nan)
         found[f"grip:{name}"] = [float(np.quantile(pull, q)) for q in HOLDING] if np.isfinite(pull).all() else []
+    found |= grips(sim, model)
     found["spot"] = spots(ways[0], push[:, 0], MOST)
     for name in sim.channels:
         grain = record.grain[name]
@@ -143,6 +150,34 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
             found[f"jump:{name}"] = [
                 (float(record.t[k] - record.t[0]), size * grain) for k, size in jumps(error, 1.0)
             ]  # fmt: skip
+    return found
+
+
+def grips(sim: Simulator, model: GraphModel, shares: tuple[float, ...] = SLIPPING) -> dict[str, list]:
+    """Limits that would hold each contact for these `shares` of the time, by what lies behind it on the rigid machine.
+
+    The bodies behind a contact are those that no drive moves but through it.
+    """
+    record, machine, values = sim.record, sim.case.machine, model.base
+    w = max(1, round(CALM / record.dt))
+    if len(record.t) <= 4 * w:
+        return {}
+    found: dict[str, list] = {}
+    for node, contact in contacts(machine).items():
+        at = lever(sim.layout, values, node, True)
+        assert at is not None
+        moved = at[1] * sim.ratios[at[0]]
+        if moved == 0.0:
+            continue
+        x = way(sim, sim.leader(at[0]))
+        v = (x[2 * w :] - x[: -2 * w]) / (2 * w * record.dt)
+        a = (x[2 * w :] - 2 * x[w:-w] + x[: -2 * w]) / (w * record.dt) ** 2
+        force = np.zeros(len(v))
+        for name in {node} if not contact.joint else undriven(machine, contact.joint):
+            own, key = sim.ratios[name], "inertia" if machine.turns(name) else "mass"
+            force += own**2 * (values[f"bodies.{name}.{key}"] * a + values.get(f"bodies.{name}.viscous", 0.0) * v)
+            force += abs(own) * values.get(f"bodies.{name}.dry", 0.0) * np.sign(v)
+        found[f"grip:{node}"] = [float(f) for f in np.quantile(np.abs(force / moved), shares)]
     return found
 
 

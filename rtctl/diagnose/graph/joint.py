@@ -60,6 +60,13 @@ class Joint(Likelihood):
         """The same with white noise as loud as these residuals (blocks, sensors) in each recording."""
         return self._of([part.flat(own) for part, own in self._cut(e)])
 
+    def directed(self, model: GraphModel) -> "Joint":
+        """The same with the sensors that know no direction, as far as the model tells it in every recording."""
+        sims = [part.sim.directed(model) for part in self._parts]
+        for sim in sims:
+            sim.channels = [name for name in sim.channels if all(name in other.channels for other in sims)]
+        return Joint([Likelihood(sim) for sim in sims])
+
     def losses(self, e: np.ndarray, count: int) -> np.ndarray:
         """Losses by segment (count,), nats: each recording has a share of the segments."""
         cuts = self._cut(e)

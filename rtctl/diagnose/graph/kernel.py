@@ -15,13 +15,13 @@ from rtctl.diagnose.kernel import SLOTS, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.loop import generate
 from rtctl.plants.graph.mechanics import Mechanics
-from rtctl.plants.graph.params import Q
+from rtctl.plants.graph.params import Q, Y
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
 OPEN, TRACK, HELD = range(3)
-SPECIAL = frozenset({"reel", "capstan", "wheel", "span", "contact", "guided", "wrapped", "edges", "loaded"})
+KIND = "described"  # of the lines of a term that a described machine has
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
 
@@ -106,15 +106,16 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     m = s.m
     graph.start(p, s)
     n, drives = volts.shape
-    main = job.main[0]
-    for k in range(-job.lead, n):
+    main, stride = job.main[0], job.stride
+    first = -(job.lead // stride) * stride
+    for k in range(first, n + stride - 1, stride):
         if k == 0:
             m.t = 0.0
             for i in range(p.nq):
                 m.x[i] += job.first_x[i]
                 m.x[p.nq + i] += job.first_v[i]
         look(p, m, t)
-        at = max(k, 0)
+        at = min(max(k, 0), n - 1)
         if job.mode == 2:  # what the sensor errs by is no motion
             i, a = p.sensor_i[main], p.sensor_a[main]
             for _ in range(2):
@@ -131,24 +132,30 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
                         e = -e
                     job.e[c], job.d[c] = 0.0, e
                 else:
-                    if k == -job.lead:
+                    if k == first:
                         job.e[c] = e
                     job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
                     job.e[c] = e
                 job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
         if k >= 0:
             for c in range(p.ny):
-                out[k, c] = m.y[c]
+                for back in range(1, min(stride, k + 1)):  # rows in between lie on a line
+                    if k - back < n:
+                        out[k - back, c] = m.y[c] + (job.before[c] - m.y[c]) * back / stride
+                if k < n:
+                    out[k, c] = m.y[c]
+                job.before[c] = m.y[c]
             for c in range(job.follows if job.mode == 1 else 0):
-                push[k, c] = job.correction[c]
+                push[at, c] = job.correction[c]
         for i in range(job.substeps):
             for c in range(drives):
                 m.volts[c] = 0.0
             for late in range(2 if job.part > 0.0 else 1):  # mean of two, as in physics/timing.py
-                row = min(max(k + (i - job.delay - late) // job.substeps, 0), n - 1)
-                share = job.part if late == 1 else 1.0 - job.part
-                for c in range(drives):
-                    m.volts[c] += share * volts[row, c]
+                share = (job.part if late == 1 else 1.0 - job.part) / stride
+                for tick in range(stride):
+                    row = min(max(k + tick + (i - job.delay - late) // job.substeps, 0), n - 1)
+                    for c in range(drives):
+                        m.volts[c] += share * volts[row, c]
             substep(job, p, m, t, forces, at)
             if job.holds != 0:
                 hold(job, p, m, k, (i + 1.0) / job.substeps, path, pace)
@@ -164,6 +171,7 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
 JOB = state(
     mode=int,
     substeps=int,
+    stride=int,  # ticks a substep, where it is longer than one
     lead=int,  # ticks
     release=int,  # row at which the correction ends
     delay=int,  # substeps from a write until it acts
@@ -186,6 +194,7 @@ JOB = state(
     share=(float, Q),  # what of it counts at the main sensor's body
     e=(float, Q),
     d=(float, Q),
+    before=(float, Y),  # readings of the substep before
 )
 
 
@@ -200,12 +209,7 @@ class Kernel(NamedTuple):
 
 def terms() -> tuple[Term, ...]:
     """The library's terms that can stand in a described machine."""
-    return tuple(term for term in TERMS.values() if any(site in term.act for site in SITES) and not special(term))
-
-
-def special(term: Term) -> bool:
-    """Whether a term stands only at elements that no described machine has: reels, tapes, strips, contacts."""
-    return all(stand.needs & SPECIAL for stand in term.stands)
+    return tuple(term for term in TERMS.values() if any(term.act_at(site, KIND) for site in SITES))
 
 
 def source(code: Mechanics | None = None) -> str:
@@ -230,11 +234,11 @@ def _site(site: str, known: tuple[Term, ...]) -> str:
         "            break",
     ]
     for number, term in enumerate(known, 1):
-        act = term.act.get(site)
+        act = term.act_at(site, KIND)
         if act is not None:
             name = field(term.name)
             line = act.format(p=f"t.q[k].{name}", s=f"t.z[k].{name}", m="m", i="t.q[k].node", r="t.q[k].factor",
-                              l="t.q[k].link", c="t.q[k].channel")  # fmt: skip
+                              l="t.q[k].link", k="t.q[k].other", c="t.q[k].channel")  # fmt: skip
             lines += [f"        if kind == {number}:", *(f"            {part}" for part in line.split("\n"))]
     return "\n".join(lines)
 
@@ -258,7 +262,8 @@ def kernel(code: Mechanics | None = None) -> Kernel:
     )
     params = [(field(t.name), record_dtype(sample(t))) for t in known]
     states = [(field(t.name), t.state) for t in known if t.state is not None]
-    head = [("kind", np.int64), ("node", np.int64), ("link", np.int64), ("channel", np.int64), ("factor", np.float64)]
+    whole = ("kind", "node", "link", "channel", "other")
+    head = [*((name, np.int64) for name in whole), ("factor", np.float64)]
     slot = np.dtype(head + params, align=True)
     slots = state(q=(slot, SLOTS), z=(np.dtype([*states, ("spare", np.float64)], align=True), SLOTS))
     return Kernel(generate.load(path), tuple(t.name for t in known), slot, slots)
@@ -268,5 +273,6 @@ def fill_slot(kern: Kernel, slot: Any, settings: Any, place: Any, h: float) -> N
     """Put one term of a `physics:` list into a slot, at a place of the machine."""
     term = TERMS[settings.term]
     slot["kind"] = kern.names.index(term.name) + 1
-    slot["node"], slot["link"], slot["channel"], slot["factor"] = place
+    for name in place._fields:
+        slot[name] = getattr(place, name)
     fill_record(slot[field(term.name)], term.build(settings, h))

@@ -12,6 +12,7 @@ from copy import copy
 
 import numpy as np
 
+from rtctl.diagnose.edges import Edges
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.noise import Noise, noise_of
 from rtctl.diagnose.graph.simulate import Simulator
@@ -20,6 +21,7 @@ RATE = 500.0  # 1/s, of the averaged residuals
 ORDER = 20  # of the autoregression
 FORGET = 8.0  # over the bandwidth of the observer: until the start is forgotten
 QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
+EDGE = 0.03  # of a step: the least that an edge leaves, whose tick is known
 WILD = 1e6  # residual of a model that runs away, in steps of noise
 
 
@@ -39,6 +41,7 @@ class Likelihood:
         grain = np.array([record.grain[name] for name in sim.channels])
         smooth = np.std(np.diff(self.target, 2, axis=0), axis=0) / 10.0
         self.least = np.where(grain > 0.0, QUANTISED * grain, np.maximum(smooth, 1e-12)) / np.sqrt(self.mean)
+        self.least = np.where([name in sim.edges for name in sim.channels], EDGE * grain, self.least)
         if sim.case.problem == "kinematic":  # the counts of the first position are in what follows it
             passed = np.array([sim.ratios.get(str(sensor_body(sim, name)), 0.0) for name in sim.channels])
             self.least = np.hypot(self.least, QUANTISED * record.grain[sim.main] * passed / np.sqrt(self.mean))
@@ -61,6 +64,9 @@ class Likelihood:
         e = self.target[begin:end] - out[begin:end, self.channels]
         keep = len(e) // self.mean * self.mean
         e = e[:keep].reshape(-1, self.mean, e.shape[1]).mean(axis=1)
+        for c, name in enumerate(self.sim.channels):
+            if name in self.sim.edges:
+                e[:, c] = self._by_edges(name, out, len(e))
         wild = WILD * self.least
         if not (np.abs(e) < wild).all():  # ran away: no noise explains it
             e[~(np.abs(e) < wild).all(axis=1)] = wild
@@ -69,15 +75,42 @@ class Likelihood:
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
 
     def _floats(self, name: str) -> bool:
-        """Whether the constant of a channel says nothing."""
+        """Whether the constant of a channel says nothing and is still in its residuals."""
+        if name in self.sim.edges:
+            return False
         if self.sim.case.problem != "static":
             return name != self.sim.main
         sensors = self.sim.case.machine.sensors
         return name in sensors and sensors[name].measures == "position"
 
+    def _by_edges(self, name: str, out: np.ndarray, blocks: int) -> np.ndarray:
+        """Residual (blocks,) of a sensor that shows edges: their mean in each block, 0 where there is none."""
+        sensor = self.sim.case.machine.sensors[name]
+        told, block = self.edges_in(name)
+        way = sensor.scale * out
+        e = told.at - told.way(way)
+        mean = np.bincount(told.group, e) / np.maximum(np.bincount(told.group), 1)
+        total = np.bincount(block, e - mean[told.group], blocks)[:blocks]
+        return np.asarray(total / np.maximum(np.bincount(block, minlength=blocks)[:blocks], 1) / sensor.scale)
+
+    def edges_in(self, name: str) -> tuple[Edges, np.ndarray]:
+        """Edges of a sensor in the rows that count, and the block of each."""
+        begin, end = self.rows
+        told = self.sim.edges[name].between(begin + 1, begin + (end - begin) // self.mean * self.mean)
+        return told, (told.rows - begin) // self.mean
+
+    def present(self, c: int) -> np.ndarray | slice:
+        """Blocks in which sensor `c` shows something: all, or those with an edge."""
+        name = self.sim.channels[c]
+        return np.unique(self.edges_in(name)[1]) if name in self.sim.edges else slice(None)
+
+    def directed(self, model: GraphModel) -> "Likelihood":
+        """The same with the sensors that know no direction, as the model tells the directions of their edges."""
+        return Likelihood(self.sim.directed(model))
+
     def white(self, e: np.ndarray) -> np.ndarray:
         """Innovations of residuals (blocks, sensors), sensor after sensor."""
-        return np.concatenate([noise.whiten(e[:, c]) for c, noise in enumerate(self.noise)])
+        return np.concatenate([noise.whiten(e[self.present(c), c]) for c, noise in enumerate(self.noise)])
 
     def residual(self, model: GraphModel, coarse: bool = False, at: str = "") -> np.ndarray:
         """Innovations of a model, as a fit minimises them."""
@@ -86,7 +119,7 @@ class Likelihood:
     def told(self, e: np.ndarray) -> "Likelihood":
         """The same with the noise of these residuals (blocks, sensors)."""
         other = copy(self)
-        other.noise = [noise_of(e[:, c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
+        other.noise = [noise_of(e[self.present(c), c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
         return other
 
     def flat(self, e: np.ndarray) -> "Likelihood":
@@ -95,7 +128,10 @@ class Likelihood:
         An autoregression holds a large effect for noise, so that a fit under it moves by events alone.
         """
         other = copy(self)
-        other.noise = [Noise(np.ones(1), max(float(np.std(e[:, c])), float(self.least[c]))) for c in range(e.shape[1])]
+        other.noise = [
+            Noise(np.ones(1), max(float(np.std(e[self.present(c), c])), float(self.least[c])))
+            for c in range(e.shape[1])
+        ]
         return other
 
     def loss(self, e: np.ndarray) -> float:
@@ -106,20 +142,23 @@ class Likelihood:
         """The same by segment of the rows (count,), nats: their sum is the loss."""
         out = np.zeros(count)
         for c in range(e.shape[1]):
-            own = noise_of(e[:, c], ORDER, float(self.least[c]))
-            r = own.whiten(e[:, c])
-            segment = np.arange(own.order, len(e)) * count // len(e)
+            shown = e[self.present(c), c]
+            own = noise_of(shown, ORDER, float(self.least[c]))
+            r = own.whiten(shown)
+            segment = np.arange(len(e))[self.present(c)][own.order :] * count // len(e)
             out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
         return out
 
     def filtered(self, columns: np.ndarray) -> np.ndarray:
         """The same filters on many residuals at once (blocks, sensors, columns): (innovations, columns)."""
-        return np.concatenate([noise.whiten(columns[:, c]) for c, noise in enumerate(self.noise)])
+        return np.concatenate([noise.whiten(columns[self.present(c), c]) for c, noise in enumerate(self.noise)])
 
     @property
     def size(self) -> int:
         """Number of innovations."""
-        return sum((self.rows[1] - self.rows[0]) // self.mean - noise.order for noise in self.noise)
+        blocks = (self.rows[1] - self.rows[0]) // self.mean
+        shown = [len(np.arange(blocks)[self.present(c)]) for c in range(len(self.noise))]
+        return sum(n - noise.order for n, noise in zip(shown, self.noise, strict=True))
 
     @property
     def parts(self) -> Sequence["Likelihood"]:

@@ -9,7 +9,8 @@ from rtctl.diagnose.graph.model import own
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.element import Element
 from rtctl.plants.graph.coupled import machine_params
-from rtctl.plants.graph.layout import NOWHERE
+from rtctl.plants.graph.elements import contacts
+from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.physics import TERMS
 
 SMOOTH = 5e-3  # s, over which a speed is taken
@@ -95,8 +96,8 @@ class Measures:
 
     def scale(self, node: str) -> Scales:
         """Scales of a node."""
-        body = self.body_of(node)
-        ratio, number = self.ratios.get(body, 1.0) or 1.0, self.leaders.get(body, 0)
+        body, arm = self.lever(node)
+        ratio, number = arm * (self.ratios.get(body, 1.0) or 1.0), self.leaders.get(body, 0)
         x = self.ways[number]
         ends = sorted((float(x.min()) * ratio, float(x.max()) * ratio))
         return Scales(
@@ -106,6 +107,12 @@ class Measures:
             ends[0],
             np.sign(ratio),
         )
+
+    def lever(self, node: str) -> tuple[str, float]:
+        """Body by which a node moves, and what it moves for one unit of it: tape, and what a contact drives, in its
+        own."""
+        at = lever(self.layout, self.values, node, bool(self.term) and TERMS[self.term].contact)
+        return at if at is not None else (self.body_of(node), 1.0)
 
     def way(self, body: str) -> np.ndarray:
         """Position (n,) of a body as the followed sensor that joints connect it with saw it."""
@@ -192,7 +199,7 @@ class Measures:
     def stiffness(self, node: str) -> float:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""
         s = self.scale(node)
-        return self.values.get(f"joints.{node}.stiffness", s.force / s.span)
+        return self.values.get(f"joints.{node}.stiffness", 0.0) or s.force / s.span
 
     def twist(self, node: str, usual: float) -> float:
         """Deflection of a joint: `usual` by its force, in a kinematic problem as the positions differ."""
@@ -225,6 +232,20 @@ class Measures:
         """The highest value that the term's settings allow."""
         bounds = TERMS[self.term].settings.model_fields[parameter].metadata
         return float(min((b.le for b in bounds if hasattr(b, "le")), default=np.inf))
+
+
+def lever(layout: Layout, values: dict[str, float], node: str, contact: bool) -> tuple[str, float] | None:
+    """Body and arm of what a span of tape, or where `contact` says so a contact, passes on; None of any other node."""
+    machine = layout.machine
+    touching = contacts(machine).get(node) if contact else None
+    if touching is not None and touching.joint:
+        return str(machine.joints[touching.joint].to), 1.0
+    if touching is not None:
+        return node, values[f"bodies.{node}.radius"]
+    if node in machine.joints and machine.joints[node].span is not None:
+        body = str(machine.joints[node].to)
+        return body, values[f"bodies.{body}.radius"]
+    return None
 
 
 def speed(x: np.ndarray, dt: float) -> np.ndarray:

@@ -39,6 +39,13 @@ class GraphModel(NamedTuple):
         """The same with more terms."""
         return self._replace(terms=(*self.terms, *terms))
 
+    def tied(self, path: str) -> tuple[str, ...]:
+        """Paths of the numbers that move with that of a path: those of the same symbol."""
+        for paths in self.layout.machine.symbols.values():
+            if path in paths:
+                return tuple(paths)
+        return (path,)
+
     def built(self) -> "GraphModel":
         """The same with the joints that its terms make springs as springs of the description."""
         machine, numbers = sprung(self.layout.machine, self.terms)
@@ -81,9 +88,17 @@ def rigid(layout: Layout, values: dict[str, float], main: str) -> dict[str, floa
     while todo:
         here = todo.pop()
         for name, joint in machine.joints.items():
-            a, b, n = getattr(joint, "from"), joint.to, values[f"joints.{name}.ratio"]
+            a, b, n = getattr(joint, "from"), joint.to, ratio_of(joint, name, values)
             for one, other, ratio in ((a, b, n), (b, a, 1.0 / n)):
                 if one == here and other not in out and not machine.is_frame(other):
                     out[other] = out[here] * ratio
                     todo.append(other)
     return {name: out.get(name, 0.0) for name in machine.bodies if not machine.is_frame(name)}
+
+
+def ratio_of(joint: Any, name: str, values: dict[str, float]) -> float:
+    """What the far end of a joint moves for one unit of its near end when it is not stretched; a span by the radii."""
+    if joint.span is None:
+        return values[f"joints.{name}.ratio"]
+    near, far = (values[f"bodies.{body}.radius"] for body in (getattr(joint, "from"), joint.to))
+    return near / far if joint.span == "open" else -near / far

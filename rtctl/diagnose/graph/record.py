@@ -29,6 +29,7 @@ class GraphRecord(NamedTuple):
     y: dict[str, np.ndarray]  # sensor -> (n,) SI; a counter's value is the middle of its count
     grain: dict[str, float]  # sensor -> step of its numbers, SI; 0 where nobody knows it
     forces: np.ndarray | None  # (n, bodies in order) measured inputs, N or Nm
+    edges: dict[str, np.ndarray] = {}  # noqa: RUF012  # sensor without direction -> (n,) its counts
     positions: dict[str, np.ndarray] = {}  # body -> (n,) measured inputs, rad or m  # noqa: RUF012
     name: str = ""  # of the recording, where there are several of one machine
     scales: tuple[float, float, float] = (1.0, 1.0, 0.0)  # of a first position, a first speed, and a guess of the speed
@@ -76,6 +77,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
         u[:, d] = even(_column(path, columns, drive.column, f"{drive.unit}, command") * _on(path, columns, drive))
     y: dict[str, np.ndarray] = {}
     grain: dict[str, float] = {}
+    edges: dict[str, np.ndarray] = {}
     for name, sensor in machine.sensors.items():
         if sensor.column not in columns and len(machine.sensors) > 1 and y:
             continue
@@ -89,6 +91,9 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
                     "a counter counts"
                 )
             raw = unwrap(raw)[0] + 0.5
+        if not sensor.direction:
+            edges[name] = even(raw)
+            continue
         y[name] = even(raw) / sensor.scale
         grain[name] = abs(sensor.grain / sensor.scale)
     if u.size and not np.ptp(u, axis=0).any() and case.problem == "driven":
@@ -101,7 +106,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     record = GraphRecord(
         case, t, dt, even(np.asarray(ref, float)), even(w), u, y, grain,
         None if forces is None else np.stack([even(f) for f in forces.T], axis=1),
-        {body: even(x) for body, x in positions.items()},
+        edges, {body: even(x) for body, x in positions.items()},
     )  # fmt: skip
     if case.problem == "static" and record.main in case.machine.sensors:
         made = _made(case, u, str(case.machine.sensors[record.main].body))

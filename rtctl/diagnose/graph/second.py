@@ -5,11 +5,10 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph.answer import GraphDiagnosis
+from rtctl.diagnose.graph.answer import GraphDiagnosis, load
 from rtctl.diagnose.graph.joint import check_same
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.prediction import judged
-from rtctl.diagnose.graph.record import load_record
 from rtctl.diagnose.graph.simulate import Simulator
 
 
@@ -18,10 +17,12 @@ def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
 
     Raises UserError where the folder cannot be read or is of another machine, NoAnswer where it supports no verdict.
     """
-    record = load_record(other)
-    check_same(d.record, record)
+    sim = Simulator(load(other))
     if len(d.found.like.parts) > 1:
         raise UserError("--heldout goes with one recording; of several together the last part is held out")
-    like = Likelihood(Simulator(record))
+    if sim.record.edges:
+        sim = sim.directed(d.decided.best.model)
+    check_same(d.record, sim.record)
+    like = Likelihood(sim)
     with threadpool_limits(1):
         return d._replace(heldout=judged(like, like, (d.found.base.model, d.decided.best.model), like.rows))

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rtctl.config.errors import UserError
+from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
@@ -24,15 +25,18 @@ from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.graph.elements import elements, spot
 from rtctl.plants.graph.layout import NOWHERE
 from rtctl.plants.graph.mechanics import code_of
-from rtctl.plants.graph.plant import GRAPH_STATE
+from rtctl.plants.graph.params import build
+from rtctl.plants.graph.plant import GRAPH_STATE, state_space
 from rtctl.plants.physics import TERMS, ordered
 
 FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
 FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
+COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
+LEAD = 1.0  # s at the first row, at most, in which springs come to rest
+FORGOTTEN = 5.0  # time constants of what swings longest, after which it does so no more
 STEADY = 0.4  # rad a substep, of the quickest ring in which lost motion is crossed
-LEAD = 0.5  # s at the first row, in which springs come to rest
 NEVER = np.iinfo(np.int64).max  # row
 ABSENT = np.zeros((1, 1))
 
@@ -77,12 +81,45 @@ class Simulator:
         self.channels = [n for n in (*self.layout.sensors, *self.case.machine.drives) if n in record.y]
         if self.mode == HELD:
             self.channels.remove(self.main)
-        machine = record.case.machine
-        flexible = bool(self.layout.links) or any(b.weights for b in machine.bodies.values())
-        flexible = flexible and machine.mechanics is None  # which swings on while its sensors are held
-        self.lead = round(LEAD / record.dt) if flexible and self.case.problem != "free" else 0
+        self.lead = round(self._rest() / record.dt)
         self.release = NEVER
         self.ratios = self.moves(record.case.values)
+        self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
+
+    def _rest(self) -> float:
+        """Time in s at the first row in which what swings comes to rest."""
+        machine = self.case.machine
+        if machine.mechanics is not None or self.case.problem == "free":  # it swings on while its sensors are held
+            return 0.0
+        weighs = any(body.weights for body in machine.bodies.values())
+        if weighs or not self.layout.links:
+            return LEAD if weighs else 0.0
+        poles = np.linalg.eigvals(state_space(build(self.layout, self.case.values, self.record.dt))[0])
+        swings = poles[np.abs(poles.imag) > 1e-3 * np.abs(poles)]
+        return min(LEAD, FORGOTTEN / max(float(-swings.real.max()), 1e-9)) if len(swings) else LEAD
+
+    def directed(self, model: GraphModel) -> "Simulator":
+        """The same with the sensors that know no direction as the model tells the directions of their edges, where it
+        does: between two edges they are on a line."""
+        found: dict[str, Edges] = {}
+        y, grain = dict(self.record.y), dict(self.record.grain)
+        out = self.run(model) if self.record.edges else np.empty((0, 0))
+        for name, counts in self.record.edges.items():
+            y.pop(name, None)
+            scale = self.case.machine.sensors[name].scale
+            c, main = self.layout.sensors[name], self.layout.sensors[self.main]
+            gear = float(np.polyfit(out[:, main], out[:, c], 1)[0]) if np.isfinite(out).all() else np.nan
+            told = edges(counts, scale * (out[:, c] + gear * (self.seen - out[:, main])), c)
+            if told is not None:
+                found[name] = told
+                ticks = told.rows - 1 + told.share
+                y[name] = np.interp(np.arange(len(counts)), ticks, told.at / scale)
+                grain[name] = 1.0 / abs(scale)
+        other = copy(self)
+        other.record, other.edges = self.record._replace(y=y, grain=grain), found
+        shown = {*self.channels, *found}
+        other.channels = [name for name in (*self.layout.sensors, *self.case.machine.drives) if name in shown]
+        return other
 
     @property
     def seen(self) -> np.ndarray:
@@ -189,8 +226,11 @@ class Simulator:
         n = len(self.seen) if n is None else n
         stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
         substeps = self.substeps * (2 if stiff else 1)
-        substeps = (substeps + 1) // 2 if coarse else substeps
-        h = record.dt / substeps
+        coarse = coarse and not any(TERMS[str(getattr(t, "term", ""))].slips for t in model.terms)  # a matter of ticks
+        whole = self.mode == HELD or bool(self.inputs) or self.case.machine.mechanics is not None  # needs every tick
+        stride = max(1, int(COARSEST / record.dt)) if coarse and self.substeps == 1 and not whole else 1
+        substeps = 1 if stride > 1 else (substeps + 1) // 2 if coarse else substeps
+        h = record.dt * stride / substeps
         params = model.params(h)
         p = np.zeros(1, _dtype(params))
         fill_record(p[0], params)
@@ -202,7 +242,7 @@ class Simulator:
         for slot, settings in zip(slots[0]["q"], acting, strict=False):
             s: Any = settings
             kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s, model.layout, there, model.base), h)
-        job = self._job(model, params, mode, substeps)
+        job = self._job(model, params, mode, substeps, stride)
         states = np.zeros(1, GRAPH_STATE)
         offsets = np.array([start_of(self, one, model.base) for one in self.followed])
         seen = np.ascontiguousarray(self.watched[:n] + offsets)
@@ -288,10 +328,11 @@ class Simulator:
                     speed = ratio * rate / model.layout.ratio(name, model.base)
                     x[model.layout.nq + at] = states["m"]["v_before"][0, at] = speed
 
-    def _job(self, model: GraphModel, params: Any, mode: int, substeps: int) -> np.ndarray:
+    def _job(self, model: GraphModel, params: Any, mode: int, substeps: int, stride: int) -> np.ndarray:
         job = np.zeros(1, kernel.JOB)
         j = job[0]
-        dt = self.record.dt
+        dt = self.record.dt * stride
+        j["stride"] = stride
         j["mode"], j["substeps"], j["rate"], j["release"] = mode, substeps, 1.0 / dt, self.release
         j["lead"] = self.lead if mode == TRACK else 0
         j["part"], j["delay"] = np.modf(self.case.delay_samples * substeps)

@@ -73,7 +73,7 @@ def run(name: str | None, volts: np.ndarray, h: float, v: float = 0.0, dry: floa
     lines, scope, params, memory = dict.fromkeys(SITES, "pass"), {"linear": linear, "graph": graph}, None, None
     if name is not None:
         term = TERMS[name]
-        fill = {"p": "P", "s": "S", "m": "m", "i": "i", "r": "r", "l": "l", "c": "c"}
+        fill = {"p": "P", "s": "S", "m": "m", "i": "i", "r": "r", "l": "l", "k": "-1", "c": "c"}
         lines = {site: (term.act_at(site, "axis") or "pass").format(**fill) for site in SITES}
         module = importlib.import_module(term.build.__module__)
         scope[module.__name__.rpartition(".")[2]] = module

@@ -22,8 +22,8 @@ def wind(p, s, volts, substeps, x, ripple):
             m.u[0], m.u[1] = volts[k, 0], volts[k, 1]
             linear.midpoint(m)
             graph.weigh(p.graph, m)
-            ripple_tape.reel(ripple, m, ivu.REEL2)
-            ripple_tape.reel_arm(ripple, m, ivu.REEL2)
+            ripple_tape.reel(ripple, m, ivu.REEL2, 1)
+            ripple_tape.reel_arm(ripple, m, ivu.REEL2, 1)
             linear.advance(m)
         for i in range(m.nx):
             x[k, i] = m.x[i]
@@ -91,7 +91,7 @@ def test_an_empty_reel_gets_no_smaller():
     _, s = stand.plant("ivu", 2.5e-4, d_tape=0.0)
     p = geometry.build_radius_change(geometry.RadiusChangeSettings(node="reel1", d=1e-3), 2.5e-4)
     s.m.qm[ivu.REEL1], s.m.qm[ivu.CAPSTAN] = -500.0, -500.0 * 0.02 / 0.0125
-    geometry.wind(p, s.m, ivu.REEL1)
+    geometry.wind(p, s.m, ivu.LINKS["tape1"], ivu.LINKS["tape2"])
     wound = (linear.tension(s.m, 0) / 450.0) + 0.0125 * s.m.qm[ivu.CAPSTAN]
     turns = (0.038 - 0.02) / (1e-3 / (2 * np.pi))
     assert wound == pytest.approx(-(0.029 * turns + 0.02 * (500.0 - turns)))

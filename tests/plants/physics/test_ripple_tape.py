@@ -66,13 +66,21 @@ def together(p: ripple_tape.WheelParams, way, arm):
     return both
 
 
-REEL = ripple_tape.reel, ripple_tape.reel_arm
+REEL = (
+    lambda p, m, i: ripple_tape.reel(p, m, i, ripple_tape.tape_of(m, i)),
+    lambda p, m, i: ripple_tape.reel_arm(p, m, i, ripple_tape.tape_of(m, i)),
+)
+SPANS = (
+    lambda p, m, i: ripple_tape.spans(p, m, i, 0, 1),
+    lambda p, m, i: ripple_tape.spans_arm(p, m, i, 0, 1),
+)
 CASES = {
     "reel1": (ivu.REEL1, reel(e=2e-3, phi=0.4, e2=1e-3, phi2=2.0), *REEL),
     "reel2": (ivu.REEL2, reel(e=2e-3, phi=0.4, e3=1e-3, phi3=2.0), *REEL),
     "capstan": (
         ivu.CAPSTAN, capstan(a=5e-4, phi=0.4, a2=3e-4, phi2=1.0), ripple_tape.capstan, ripple_tape.capstan_arm,
     ),
+    "described capstan": (ivu.CAPSTAN, capstan(a=5e-4, phi=0.4, a2=3e-4, phi2=1.0), *SPANS),
 }  # fmt: skip
 
 
@@ -86,7 +94,7 @@ def test_forces_come_from_one_potential(node):
         one = 0.038 * q[ivu.REEL1] - 0.0125 * q[ivu.CAPSTAN]
         two = 0.022 * q[ivu.REEL2] + 0.0125 * q[ivu.CAPSTAN]
         extra = ripple_tape.way(p, q[at])
-        if node == "capstan":
+        if node.endswith("capstan"):
             return one - extra, two + extra
         return (one + extra, two) if node == "reel1" else (one, two + extra)
 
