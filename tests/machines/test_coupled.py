@@ -34,7 +34,8 @@ def bundle(run):
 
 def test_the_arm_follows_and_the_pendulum_swings(bundle):
     rows = load_bundle(bundle).columns
-    assert rows["truth_arm"][-1] == pytest.approx(np.radians(60.0), abs=0.3)
+    assert rows["truth_arm"][-1] == pytest.approx(np.radians(60.0), abs=0.05)
+    assert rows["truth_arm"].max() < 1.05 * np.radians(60.0)
     assert np.abs(rows["truth_pendulum"]).max() > 0.05
     moved = np.abs(rows["pendulum_counts"] - np.floor(rows["truth_pendulum"] * 2048 / (2 * np.pi)))
     assert moved.max() <= 1.0
