@@ -18,7 +18,7 @@ from graph_cases import RUB, case_of, columns_of, command
 from rtctl.config.yaml_file import Document
 from rtctl.plants.graph.file import checked
 
-TEXT = (ROOT / "docs" / "bring_your_own_machine_diagnose.md").read_text()
+TEXT = (ROOT / "docs" / "bring_your_own_machine.md").read_text().partition("## From a log to a report")[2]
 DESCRIPTIONS = re.findall(r"```yaml\n(.*?)```", TEXT, re.S)
 COMMANDS = [line for block in re.findall(r"```console\n(.*?)```", TEXT, re.S) for line in block.strip().splitlines()]
 LOGS = {  # log -> description, its columns in the log, amplitude of the command, effects of the machine
