@@ -5,7 +5,7 @@ import pytest
 
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.elements import check_node, elements, place_of
-from rtctl.plants.graph.layout import layout
+from rtctl.plants.graph.layout import NOWHERE, layout
 from rtctl.plants.graph.linearised import linearised, sensor_row
 from rtctl.plants.graph.params import build
 from rtctl.plants.graph.played import played
@@ -49,7 +49,7 @@ def test_a_sensor_sees_its_body_through_the_gear():
 def test_places_are_those_of_the_layout():
     made, lay, values, _ = machine()
     coulomb = TERMS["friction.coulomb"].settings.model_validate({"term": "friction.coulomb", "node": "rod", "F_C": 1.0})
-    assert place_of(lay, values, coulomb) == (0, 0, 0, 0.1)
+    assert place_of(lay, values, coulomb) == (0, NOWHERE, NOWHERE, 0.1, NOWHERE)
     there = elements(lay)
     assert nodes(TERMS["friction.stribeck"], there) == ("motor", "rod")
     assert nodes(TERMS["transmission.hysteresis"], there) == ()  # the gear is rigid
