@@ -111,9 +111,7 @@ def _head(model: GraphModel, record: GraphRecord) -> str:
     """Comment lines on top of the file."""
     case = record.case
     seconds = len(record.t) * record.dt
-    lines = [
-        f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted,"
-    ]
+    lines = [f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted,"]
     lines.append("effects that were found are in plant.physics. Changed, nominal -> fitted:")
     for path, value in own(model.base, record.name).items():
         old = case.values.get(path, value)
