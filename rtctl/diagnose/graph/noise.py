@@ -24,6 +24,8 @@ class Noise(NamedTuple):
 
     def whiten(self, e: np.ndarray) -> np.ndarray:
         """Innovations (n - p, ...) of residuals (n, ...), by their standard deviation."""
+        if e.size == 0:  # of no fitted parameter
+            return np.zeros((max(len(e) - self.order, 0), *e.shape[1:]))
         return np.asarray(lfilter(self.a, [1.0], e, axis=0)[self.order :] / self.sigma)
 
 

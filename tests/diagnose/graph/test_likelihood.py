@@ -59,3 +59,22 @@ def test_a_model_that_ran_away_is_no_likely_one():
     out = like().sim.run(model(2.0)).copy()
     out[1200:] = np.nan
     assert like().loss(like().of_readings(out)) > like().loss(like().raw(model(0.0)))
+
+
+def test_losses_of_segments_sum_to_the_loss():
+    e = like().raw(model(0.0))
+    assert like().losses(e, 7).sum() == pytest.approx(like().loss(e))
+    e = np.random.default_rng(0).standard_normal(e.shape)
+    quiet = like().losses(e, 4)
+    e[: len(e) // 4] *= 3.0
+    assert np.argmax(like().losses(e, 4)) == 0
+    assert np.ptp(quiet) < 0.2 * np.ptp(like().losses(e, 4))
+
+
+def test_flat_noise_is_as_loud_as_the_residual():
+    e = like().raw(model(0.0))
+    white = like().flat(e).white(e)
+    assert len(white) == e.size  # no autoregression: least squares
+    np.testing.assert_allclose(white.reshape(e.shape[1], -1).std(axis=1), 1.0)
+    least = like().flat(np.zeros_like(e))
+    np.testing.assert_allclose([noise.sigma for noise in least.noise], like().least)

@@ -36,3 +36,9 @@ def test_many_residuals_at_once():
     noise = Noise(A, 0.5)
     e = np.random.default_rng(4).standard_normal((50, 3))
     np.testing.assert_allclose(noise.whiten(e)[:, 1], noise.whiten(e[:, 1]))
+
+
+def test_no_columns_have_no_innovations():
+    noise = Noise(A, 0.5)
+    assert noise.whiten(np.zeros((100, 0))).shape == (98, 0)
+    assert noise.whiten(np.zeros((100, 3))).shape == (98, 3)
