@@ -190,6 +190,7 @@ def fill(command: Any, wanted: Sequence[Fault]) -> None:
         raise ValueError(f"{len(wanted)} faults; {SLOTS} is the most at a time")
     slots = max(len(wanted), min(int(command["faulty"]), 1))
     command["faults"] = 0
+    command["faults"]["lowest"], command["faults"]["highest"] = -CODES, CODES - 1  # of an order without: older ones
     for j, fault in enumerate(wanted):
         command["faults"][j] = fault
     command["faulty"] = slots
