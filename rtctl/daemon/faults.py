@@ -76,7 +76,7 @@ class Faults:
         try:
             kept = [
                 *(f for f in self._in_force() if f.end > tick),
-                faults.build(settings, self._of.machine.dt, tick),
+                faults.build(settings, self._of.machine.dt, tick, self._of.machine.diagram.blocks),
             ]
         except ValueError as error:
             raise UserError(str(error)) from error

@@ -94,6 +94,7 @@ def _build(config: Any) -> Machine:
     else:
         period = dt
     substeps = module.substeps(config, period)
+    diagram = module.diagram(config, dt)
     if own_plant.is_own(config):
         plant = own_plant.plant_diagram(config, period, config.loop.seed, substeps)
     else:
@@ -105,11 +106,11 @@ def _build(config: Any) -> Machine:
         dt=dt,
         plant_period=period,
         substeps=substeps,
-        diagram=module.diagram(config, dt),
+        diagram=diagram,
         plant_diagram=plant,
         reference=reference.build(config.reference, dt),
         excitation=excitation.build(config.excitation, dt),
-        faults=tuple(faults.build(settings, dt) for settings in config.faults),
+        faults=tuple(faults.build(settings, dt, 0, diagram.blocks) for settings in config.faults),
         truth=plant.truth if config.record.truth else (),
         unit=module.unit(config),
         metres_per_unit=module.metres_per_unit(config),

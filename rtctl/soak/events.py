@@ -203,7 +203,9 @@ class Day:
         if kind == "loop.stall":
             size = float(size or 0.0) * dt
         if kind == "dac.stuck":
-            size, lasts = float(rng.integers(12)), min(lasts, 0.2)  # it drives the machine whatever the law says
+            at = faults.FaultSettings(fault=kind, channel=channel)
+            bits = faults.bits_of(faults.build(at, dt, 0, self.rig.machine.diagram.blocks))
+            size, lasts = float(rng.integers(bits)), min(lasts, 0.2)  # it drives the machine whatever the law says
         return kind, faults.FaultSettings(
             fault=kind, at=float(rng.uniform(0.0, 0.05)), lasts=max(lasts, dt), channel=channel, size=size
         )

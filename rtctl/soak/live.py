@@ -97,7 +97,7 @@ class Live:
     def fault(self, settings: faults.FaultSettings) -> faults.Fault:
         """Add a fault, its time counted from now."""
         answer = self._handle("fault", action="add", fault=settings.model_dump(exclude_none=True))
-        return faults.build(settings, self.machine.dt, int(answer["tick"]))
+        return faults.build(settings, self.machine.dt, int(answer["tick"]), self.machine.diagram.blocks)
 
     def run(self, ticks: int) -> None:
         """Turns of the supervisor until so many more rows have been checked. Raises RuntimeError where none come."""

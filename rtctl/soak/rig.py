@@ -105,7 +105,7 @@ class Fused:
 
     def fault(self, settings: faults.FaultSettings) -> faults.Fault:
         """Add a fault, its time counted from now; those that are over leave their slots."""
-        made = faults.build(settings, self.machine.dt, self.tick)
+        made = faults.build(settings, self.machine.dt, self.tick, self.machine.diagram.blocks)
         kept = [f for f in faults.in_force(self.segment["mailbox"][0]["command"]) if f.end > self.tick]
         self._post(lambda _, c: faults.fill(c, [*kept, made]))
         return made

@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 
 from rtctl import counted
 from rtctl.drivers import daq_stc
+from rtctl.drivers.at_mio_16de import AnalogOutputParams
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.tick import frames
 
@@ -25,6 +26,7 @@ SLOTS = 16  # faults at a time
 DEPTH = 1024  # ticks that a link may be late
 FOR_EVER = 2**62
 CODES = 2048  # of a bipolar 12-bit converter, to either side
+BITS = 32  # of the widest converter that a frame has room for
 
 (
     NONE, LINK_DELAY, LINK_LOSS, LINK_REORDER, LINK_SILENT, ENCODER_FREEZE, ENCODER_MISSED, ENCODER_NOISE, ADC_OPEN,
@@ -63,7 +65,8 @@ KINDS: dict[str, Kind] = {
     ),
     "adc.open": Kind(ADC_OPEN, "an analog input hangs open and drifts to its rail", channels=frames.AI_CHANNELS),
     "dac.stuck": Kind(
-        DAC_STUCK, "a bit of an analog output is stuck at one", "which bit", "", 9.0, 0.0, 11.0, frames.AO_CHANNELS
+        DAC_STUCK, "a bit of an analog output is stuck at one", "which bit", "", 9.0, 0.0, BITS - 2.0,
+        frames.AO_CHANNELS,
     ),
     "driver.hot": Kind(
         DRIVER_HOT, "an amplifier is too hot and has switched itself off", channels=frames.AO_CHANNELS
@@ -115,9 +118,17 @@ class Fault(NamedTuple):
     begin: int  # ticks
     end: int
     size: float  # in ticks where it is a time
+    lowest: tuple[int, ...] = (-CODES,) * frames.AO_CHANNELS  # code of each analog output
+    highest: tuple[int, ...] = (CODES - 1,) * frames.AO_CHANNELS
 
 
-FAULT = np.dtype([("kind", "i8"), ("channel", "i8"), ("begin", "i8"), ("end", "i8"), ("size", "f8")], align=True)
+FAULT = np.dtype(
+    [
+        ("kind", "i8"), ("channel", "i8"), ("begin", "i8"), ("end", "i8"), ("size", "f8"),
+        ("lowest", "i8", (frames.AO_CHANNELS,)), ("highest", "i8", (frames.AO_CHANNELS,)),
+    ],
+    align=True,
+)  # fmt: skip
 FAULTS_STATE = state(
     seed=int,
     raw=frames.INPUTS,  # the newest that the board has sent
@@ -133,8 +144,11 @@ FAULTS_STATE = state(
 )
 
 
-def build(settings: FaultSettings, dt: float, now: int = 0) -> Fault:
-    """In ticks of `dt` s from tick `now` on. Raises ValueError for a delay that is longer than the line."""
+def build(settings: FaultSettings, dt: float, now: int = 0, blocks: Sequence[Any] = ()) -> Fault:
+    """In ticks of `dt` s from tick `now` on, at the analog outputs that stand in the diagram's `blocks`.
+
+    Raises ValueError for a delay that is longer than the line, and for a bit that an output does not have.
+    """
     kind = KINDS[settings.fault]
     size = kind.usual if settings.size is None else settings.size
     if settings.fault == "link.delay":
@@ -143,7 +157,27 @@ def build(settings: FaultSettings, dt: float, now: int = 0) -> Fault:
             raise ValueError(f"link.delay: {size * dt:g} s is {size:.0f} ticks; {DEPTH - 1} is the most")
     begin = now + round(settings.at / dt)
     end = FOR_EVER if settings.lasts is None else begin + max(round(settings.lasts / dt), 1)
-    return Fault(kind.number, settings.channel, begin, end, size)
+    made = Fault(kind.number, settings.channel, begin, end, size, *_codes(blocks))
+    if settings.fault == "dac.stuck":
+        bits = bits_of(made)
+        if settings.size is None:
+            made = made._replace(size=min(size, bits - 1.0))
+        elif not size < bits:
+            raise ValueError(f"dac.stuck: output {made.channel} has no bit {size:g}; it has 0 to {bits - 1}")
+    return made
+
+
+def bits_of(fault: Fault) -> int:
+    """Bits of the analog output that a fault is at."""
+    return (fault.highest[fault.channel] - fault.lowest[fault.channel]).bit_length()
+
+
+def _codes(blocks: Sequence[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Lowest and highest code of each analog output, in the order of the frame, which is that of the diagram."""
+    outputs = [b.params for b in blocks if isinstance(b.params, AnalogOutputParams)]
+    usual = [(-CODES, CODES - 1)] * (frames.AO_CHANNELS - len(outputs))
+    lowest, highest = zip(*((p.code_min, p.code_max) for p in outputs), *usual, strict=True)
+    return lowest, highest
 
 
 def fill(command: Any, wanted: Sequence[Fault]) -> None:
@@ -156,6 +190,7 @@ def fill(command: Any, wanted: Sequence[Fault]) -> None:
         raise ValueError(f"{len(wanted)} faults; {SLOTS} is the most at a time")
     slots = max(len(wanted), min(int(command["faulty"]), 1))
     command["faults"] = 0
+    command["faults"]["lowest"], command["faults"]["highest"] = -CODES, CODES - 1  # of an order without: older ones
     for j, fault in enumerate(wanted):
         command["faults"][j] = fault
     command["faulty"] = slots
@@ -163,8 +198,13 @@ def fill(command: Any, wanted: Sequence[Fault]) -> None:
 
 def in_force(command: Any) -> list[Fault]:
     """The faults that a command record holds, those that are over included."""
-    rows = [Fault(*(value.item() for value in row)) for row in command["faults"][: int(command["faulty"])]]
-    return [fault for fault in rows if fault.kind != NONE]
+    rows = command["faults"][: int(command["faulty"])]
+    faults = [
+        Fault(int(r["kind"]), int(r["channel"]), int(r["begin"]), int(r["end"]), float(r["size"]),
+              tuple(r["lowest"].tolist()), tuple(r["highest"].tolist()))
+        for r in rows
+    ]  # fmt: skip
+    return [fault for fault in faults if fault.kind != NONE]
 
 
 @tick
@@ -304,10 +344,11 @@ def distort(c, wire, k):
         if not active(fault, k):
             continue
         if fault.kind == DAC_STUCK:
-            wire.ao_codes[n] = ((wire.ao_codes[n] + CODES) | (1 << int(fault.size))) - CODES
+            lowest = fault.lowest[n]
+            wire.ao_codes[n] = ((wire.ao_codes[n] - lowest) | (1 << int(fault.size))) + lowest
         elif fault.kind == SUPPLY_SAG:
-            most = int(fault.size * CODES)
             for i in range(frames.AO_CHANNELS):
+                most = int(fault.size * max(-fault.lowest[i], fault.highest[i] + 1))
                 wire.ao_codes[i] = min(max(wire.ao_codes[i], -most), most)
         elif fault.kind == DRIVER_HOT:
             wire.ao_codes[n] = 0

@@ -2,6 +2,7 @@ import ast
 import re
 from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -149,3 +150,28 @@ def test_machine_code_is_found_where_numba_puts_it(
     assert generate.is_warm(path, "entry")
     assert not generate.is_warm(path, "other")
     assert (tmp_path / "numba").exists() == elsewhere
+
+
+def test_one_process_at_a_time_compiles_an_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    path = tmp_path / "small.py"
+    order: list[str] = []
+
+    def other() -> None:
+        with generate.turn(path, "entry"):
+            order.append("other")
+
+    with generate.turn(path, "entry"), generate.turn(path, "another"):
+        with (tmp_path / "small.entry.lock").open("w") as file:
+            assert not generate._locked(file)
+        thread = Thread(target=other)
+        thread.start()
+        order.append("first")
+    thread.join()
+    assert order == ["first", "other"]
+    with generate.turn(path, "entry"):
+        monkeypatch.setattr(generate, "PATIENCE", 0.0)  # as long as it waits for one that was stopped
+        other()
+    monkeypatch.setattr(generate, "is_warm", lambda *_: True)
+    with generate.turn(path, "third"):
+        assert not (tmp_path / "small.third.lock").exists()

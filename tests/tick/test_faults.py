@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from rtctl.drivers import daq_stc
+from rtctl.drivers.at_mio_16de import AnalogOutputParams
 from rtctl.faults.cases import COMMON, STANDS
 from rtctl.faults.drives import Inside
 from rtctl.loop import generate, mailbox
+from rtctl.machines.base import Block
 from rtctl.tick import faults, frames
 
 TICKS = 60
@@ -180,6 +182,28 @@ def test_a_hot_driver_gives_nothing_and_a_supply_that_sags_a_share() -> None:
     assert Line(fault("driver.hot", 0, 5, channel=1)).tick(codes=700)[2] == [700, 0, 700, 700]
     sag = Line(fault("supply.sag", 0, 5, 0.1))
     assert [sag.tick(codes=c)[2][0] for c in (-2000, -100, 2000)] == [-204, -100, 204]
+
+
+def board(*codes: tuple[int, int]) -> list[Block]:
+    return [Block(f"output{n}", AnalogOutputParams(1.0, *both, n, 0.0, 0.0), None) for n, both in enumerate(codes)]
+
+
+def test_a_fault_of_an_output_knows_the_codes_of_each() -> None:
+    blocks = board((-32768, 32767), (0, 4095))
+    made = faults.build(faults.FaultSettings(fault="supply.sag", size=0.5), 0.001, 0, blocks)
+    assert Line(made).tick(codes=30000)[2] == [16384, 2048, 1024, 1024]
+    for channel, bit, right in ((0, 14, 16384), (1, 11, 2048)):
+        wanted = faults.FaultSettings(fault="dac.stuck", channel=channel, size=bit)
+        line = Line(made := faults.build(wanted, 0.001, 0, blocks))
+        assert line.tick(codes=0)[2][channel] == right
+        assert faults.in_force(line.c[0]) == [made]
+
+
+def test_a_bit_that_the_output_lacks_is_refused_and_the_usual_one_is_one_that_it_has() -> None:
+    blocks = board((-128, 127))
+    assert faults.build(faults.FaultSettings(fault="dac.stuck"), 0.001, 0, blocks).size == 7.0
+    with pytest.raises(ValueError, match="output 0 has no bit 8; it has 0 to 7"):
+        faults.build(faults.FaultSettings(fault="dac.stuck", size=8), 0.001, 0, blocks)
 
 
 def test_lateness_is_the_largest_of_the_stalls_in_force() -> None:
