@@ -14,11 +14,13 @@ Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I (199
 
 import math
 import traceback
+import warnings
 from collections import namedtuple
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core.errors import NumbaExperimentalFeatureWarning
 
 from rtctl.idiom import interpreted, tick
 from rtctl.plants import linear
@@ -27,6 +29,9 @@ from rtctl.plants.graph import plant
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.mechanics import Mechanics, bodies_of, code_of
 from rtctl.plants.graph.params import POSITION, GraphParams, Q
+
+# params with the mechanics' own fields take the place of the general ones: meant
+warnings.filterwarnings("ignore", message=".*considered a subtype.*", category=NumbaExperimentalFeatureWarning)
 
 REACH = 0.35  # of an eigenvalue times a step: Runge-Kutta's error of phase is then 1e-4 of a radian for each
 MOST_INNER = 400  # steps a substep

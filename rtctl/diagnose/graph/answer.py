@@ -67,6 +67,9 @@ class GraphDiagnosis(NamedTuple):
         open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
         first = "; ".join(sure)
         text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
+        if len(open_) == 1:
+            p = min(e.confidence for e in self.effects)
+            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name."
         return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
 
     def as_json(self) -> dict[str, Any]:
