@@ -31,7 +31,8 @@ DEFINED = re.compile(
     r"^define (?![^\n]*@(?:_ZN7cpython|cfunc\.)).*?^}", re.MULTILINE | re.DOTALL
 )  # not what Python calls it by
 MAKES = ("call", "arrayexpr", "binop", "inplace_binop", "unary", "build_list", "build_set", "build_map", "build_string")
-HEAP_TYPES = (types.Buffer, types.List, types.Set, types.ListType, types.DictType, types.UnicodeType, types.SetType)
+HEAP_NAMES = ("Buffer", "List", "Set", "ListType", "DictType", "UnicodeType", "SetType")
+HEAP_TYPES = tuple(getattr(types, name) for name in HEAP_NAMES if hasattr(types, name))  # numba 0.60 lacks some
 DRIVER = """
 def drive(p, s, inputs, out, ns):
     for k in range(inputs.shape[0]):
