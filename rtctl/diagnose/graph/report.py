@@ -35,7 +35,7 @@ PICTURES = {
             "band holds 95 % of that noise.",
     }),
     "posterior": (figures.posterior, {
-        "": "Posterior probability of each answer. A force without a name is a free function with ten values; 1e-9 is "
+        "": "Mean posterior over resampled segments. A force without a name is a free function of one axis; 1e-9 is "
             "how probable an answer is beside the first.",
     }),
     "parameters": (figures.parameters, {
