@@ -161,18 +161,24 @@ def strip_force(p, m):
 
 
 @tick
+def fall_behind(p, s, gain, force):
+    """Slip behind a rigid contact that carries F_max at most; a newton gives what is moved the speed `gain`."""
+    free = s.rate + gain * force
+    rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
+    if abs(rate) < 1e-12 * abs(free):  # rounding of a stop
+        rate = 0.0
+    s.fallen += 0.5 * p.h * (s.rate + rate)
+    s.rate = rate
+
+
+@tick
 def slip_wheel(p, s, m, i, j):
     """Slip in link `j` of the LDU, or of node `i`, its capstan, on the strip."""
     if p.strip == 0:
         linear.pull(m, j, slide(s, p.F_max, undone(m, j), m.link_c[j], m.link_k[j], p.h))
         return
     gain = p.h * m.G[m.nq + i, m.nu + i] * p.R_c * p.R_c  # speed that a newton gives the carriage
-    free = s.rate + gain * strip_force(p, m)
-    rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
-    if abs(rate) < 1e-12 * abs(free):  # rounding of a stop
-        rate = 0.0
-    s.fallen += 0.5 * p.h * (s.rate + rate)
-    s.rate = rate
+    fall_behind(p, s, gain, strip_force(p, m))
 
 
 @tick
@@ -219,12 +225,7 @@ def slip(p, s, m, i, r, j, k):
         slip_joint(p, s, m, j)
     else:
         gain = p.h * m.G[m.nq + i, m.nu + i] * r * r  # speed that a newton gives what is moved
-        free = s.rate + gain * carried(m, i, r)
-        rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
-        if abs(rate) < 1e-12 * abs(free):  # rounding of a stop
-            rate = 0.0
-        s.fallen += 0.5 * p.h * (s.rate + rate)
-        s.rate = rate
+        fall_behind(p, s, gain, carried(m, i, r))
 
 
 @tick

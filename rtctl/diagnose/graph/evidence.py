@@ -47,16 +47,20 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
     entries: list[tuple[Fitted, Free | None, float]] = [(f, None, found.merit(f)) for f in fits]
     entries += _beside(found, base, free_forces(base))
+    sim = base.like.parts[0].sim
+    unit, before = Measures(sim, base.model.base, {}).of("force", str(sim.body)), correction(base)
     for fit in found.fits[:BESIDE]:
         if fit.names:
-            whole = DISCREPANCY * missing_force(base, fit)
+            # the correction has less of what the effects are, also of those in a sensor or a drive
+            change = float(np.sqrt(np.mean((before - correction(fit)) ** 2)))
+            whole = DISCREPANCY * change / unit if np.isfinite(change) else 0.0
             shares = (SIZE, *((whole,) if whole > LEAST else ()))
             free = free_forces(fit, shares)
             for share in shares:
                 entries += _beside(
                     found, fit, [f for f in free if f.share == share and (share < SIZE or large(base, fit, f))]
                 )
-    losses = [base.power * _losses(found, fit.e if free is None else free.e) for fit, free, _ in entries]
+    losses = [base.power * found.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
     return tuple(sorted(out, key=lambda r: -r.probability))
@@ -67,15 +71,10 @@ def large(base: Fitted, fit: Fitted, free: Free) -> bool:
     return amplitude(base.e, fit.e, free.e) > DISCREPANCY
 
 
-def missing_force(base: Fitted, fit: Fitted) -> float:
-    """Rms of the force that the effects of a fit take the place of, in forces that move the followed body.
-
-    It is what the observer's correction has less of, so that it stands for an effect in a sensor or a drive as well.
-    """
-    sim = base.like.parts[0].sim
-    before, after = (sim.everything(sim.own(f.model))[1][base.like.rows[0] :, 0] for f in (base, fit))
-    change = float(np.sqrt(np.mean((before - after) ** 2)))
-    return change / Measures(sim, base.model.base, {}).of("force", str(sim.body)) if np.isfinite(change) else 0.0
+def correction(fit: Fitted) -> np.ndarray:
+    """Correction (rows,) of the observer at the followed body of the first recording, N or Nm."""
+    sim = fit.like.parts[0].sim
+    return np.asarray(sim.everything(sim.own(fit.model))[1][fit.like.rows[0] :, 0])
 
 
 def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
@@ -86,10 +85,6 @@ def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
     drawn = (merits + losses.sum(axis=1)) - weights @ losses.T
     odds = np.exp(drawn - drawn.max(axis=1, keepdims=True))
     return np.asarray((odds / odds.sum(axis=1, keepdims=True)).mean(axis=0))
-
-
-def _losses(found: Found, e: np.ndarray) -> np.ndarray:
-    return found.like.losses(e, SEGMENTS)
 
 
 def _beside(found: Found, fit: Fitted, free: list[Free]) -> list[tuple[Fitted, Free | None, float]]:

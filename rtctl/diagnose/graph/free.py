@@ -45,7 +45,8 @@ class Free(NamedTuple):
 def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
     """Free forces at every body along every axis, under a prior for each of the `shares` of the force that moves the
     body; those with most evidence first."""
-    sim, about = base.like.sim, Linear(base)
+    sim, own = base.like.sim, Linear(base)
+    about = own, own.under(base.like.flat(base.e))  # the parameters are filtered once for all places
     every = [Measures(part.sim, base.model.base, {}) for part in base.like.parts]
     places: dict[tuple[str, str], list[np.ndarray]] = {}
     taken: set[int] = set()
@@ -56,8 +57,8 @@ def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
         taken.add(at)
         found = [axes(measures, node) for measures in every]
         for axis in found[0]:
-            if all(axis in own for own in found):
-                places[node, axis] = after(axis, [own[axis] for own in found])
+            if all(axis in values for values in found):
+                places[node, axis] = after(axis, [values[axis] for values in found])
     places = {place: values for place, values in places.items() if np.ptp(np.concatenate(values)) > 0.0}
     out = [free for place, values in places.items() for free in _fitted(about, every, *place, values, HATS, shares)]
     out.sort(key=lambda f: -f.evidence)
@@ -91,7 +92,7 @@ def after(axis: str, values: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _fitted(
-    about: Linear,
+    abouts: tuple[Linear, Linear],
     every: list[Measures],
     node: str,
     axis: str,
@@ -99,7 +100,7 @@ def _fitted(
     hats: int,
     shares: Sequence[float],
 ) -> list[Free]:
-    base, like = about.base, about.base.like
+    base, like, start = abouts[0].base, abouts[0].base.like, abouts[0].start
     along = np.sort(np.concatenate(values))
     low, high = np.quantile(along, (1e-3, 1.0 - 1e-3))
     knots = np.unique(spaced(along, low, high, hats))
@@ -117,14 +118,15 @@ def _fitted(
 
     def column(hat: np.ndarray) -> np.ndarray:
         found = [pushed(part, own, hat) for part, own in zip(like.parts, values, strict=True)]
-        return np.asarray(np.concatenate(found) - about.start)
+        return np.asarray(np.concatenate(found) - start)
 
     C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2) @ root
     out = []
     for share in shares:
         scale = share / SIZE
-        solved = [_solved(about, C * scale, noise) for noise in (like, like.flat(base.e))]
-        solved.append(_solved(about, C * scale, like.told(max(solved, key=lambda s: s.evidence).e)))
+        solved = [_solved(about, C * scale) for about in abouts]
+        left = max(solved, key=lambda s: s.evidence).e
+        solved.append(_solved(abouts[0].under(like.told(left)), C * scale))
         best = max(solved, key=lambda s: s.evidence)
         force = unit * scale * (root @ best.z)
         rms = float(np.sqrt(np.mean(np.interp(along[:: len(along) // 2000 + 1], knots, force) ** 2))) / whole
@@ -139,13 +141,13 @@ class _Solved(NamedTuple):
     z: np.ndarray  # (columns,) in standard deviations of the prior
 
 
-def _solved(about: Linear, C: np.ndarray, noise: Likelihood) -> _Solved:
+def _solved(about: Linear, C: np.ndarray) -> _Solved:
     """Parameters of the base and the columns C (blocks, sensors, k), each of variance one, that suit the residual under
-    a noise."""
-    base, under = about.base, about.under(noise)
+    the noise of `about`."""
+    base, noise = about.base, about.like
     r = noise.white(base.e)
     n, k = len(base.x), C.shape[2]
-    M = np.hstack([under.white, noise.filtered(C)])
+    M = np.hstack([about.white, noise.filtered(C)])
     weight = np.concatenate([about.weight, np.ones(k)])
     H = M.T @ M + np.diag(weight)
     x = np.concatenate([base.x, np.zeros(k)])

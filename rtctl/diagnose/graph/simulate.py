@@ -8,6 +8,7 @@ held    the main sensor's coordinate moves as it was recorded, and the force tha
 """
 
 from copy import copy
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -149,25 +150,23 @@ class Simulator:
         """Highest frequency, rad/s, at which a body beside the held one rings with a joint."""
         p = GraphModel(self.layout, self.case.values).params(SUBSTEP)
         held, out = self.layout.coordinate(str(self.body)), 0.0
-        for k in range(p.nl):
-            for at, lever in ((p.link_i[k], p.link_a[k]), (p.link_j[k], p.link_b[k])):
-                if at != held:
-                    out = max(out, float(np.sqrt(p.link_c[k] * lever**2 / p.inertia[at])))
+        for at, stiffness in stiff_ends(p):
+            if at != held:
+                out = max(out, float(np.sqrt(stiffness / p.inertia[at])))
         return out
+
+    @cached_property
+    def pace(self) -> float:
+        """Rms speed of the followed body, rad/s or m/s; of a speed its spread."""
+        x = self.seen
+        return float(np.std(x) if self.shows_speed else np.sqrt(np.mean(np.gradient(x, self.record.dt) ** 2)))
 
     def _own_scales(self, params: Any, at: int) -> tuple[float, float]:
         """Scales of the first position and speed of a coordinate: those of a ring as quick as the machine moves."""
-        x = self.seen
-        rate = np.std(x) if self.shows_speed else np.sqrt(np.mean(np.gradient(x, self.record.dt) ** 2))
         ratio = next((r / self.layout.ratio(name, self.case.values) for name, r in self.ratios.items()
                       if r and self.layout.coordinate(name) == at), 1.0)  # fmt: skip
-        stiffness = sum(
-            params.link_c[k] * lever**2
-            for k in range(params.nl)
-            for end, lever in ((params.link_i[k], params.link_a[k]), (params.link_j[k], params.link_b[k]))
-            if end == at
-        )
-        speed = float(rate) * abs(ratio)
+        stiffness = sum(c for end, c in stiff_ends(params) if end == at)
+        speed = self.pace * abs(ratio)
         return speed * float(np.sqrt(params.inertia[at] / stiffness)) if stiffness else 0.0, speed
 
     def column(self, channel: str) -> int:
@@ -383,6 +382,15 @@ def start_of(sim: Simulator, one: Followed, base: dict[str, float]) -> float:
     if machine.mechanics is not None and not one.shows_speed:
         offset += machine.mechanics.at.get(one.body, 0.0)
     return offset
+
+
+def stiff_ends(params: Any) -> list[tuple[int, float]]:
+    """Coordinate and stiffness at it, N/m or Nm/rad, of each end of each spring."""
+    return [
+        (int(at), float(params.link_c[k] * lever**2))
+        for k in range(params.nl)
+        for at, lever in ((params.link_i[k], params.link_a[k]), (params.link_j[k], params.link_b[k]))
+    ]
 
 
 _dtypes: dict[type, np.dtype] = {}
