@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
-from rtctl.diagnose.graph.fits import Fitted, prior, refit
+from rtctl.diagnose.graph.fits import Fitted, refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
@@ -180,8 +180,7 @@ def _effects(decided: Verdict) -> tuple[Effect, ...]:
 
 def _spread(f: Fitted) -> np.ndarray:
     """Half width of the 90 % interval of each unknown."""
-    H = f.power * f.J.T @ f.J + np.diag(prior(f.space))
-    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(H)), 0.0)))
+    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(f.information)), 0.0)))
 
 
 def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:

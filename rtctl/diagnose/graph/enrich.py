@@ -20,7 +20,7 @@ def enriched(best: Fitted) -> Fitted:
     for index in range(len(best.space.hypotheses)):
         for other in others(best, index):
             space, x = exchanged(best, index, other)
-            trial = refit(best.like, space, x)
+            trial = refit(best.like, space, x, best.J[..., : space.nb])
             if trial.log_evidence > best.log_evidence + WORTH:
                 best = trial
     return best
@@ -45,7 +45,7 @@ def restarted(best: Fitted) -> Fitted:
         x = best.x.copy()
         x[:nb] = np.clip(0.15 * width * rng.standard_normal(nb), low[:nb], high[:nb])
         starts.append(x)
-    trials = [refit(best.like, space, np.clip(x, low, high)) for x in starts]
+    trials = [refit(best.like, space, x, best.J) for x in starts]
     return max([best, *trials], key=lambda f: f.log_evidence)
 
 

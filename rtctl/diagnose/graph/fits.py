@@ -12,13 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.fit import fit, jacobian
+from rtctl.diagnose.graph.descent import ALL, EFFECTS, Point, derivatives, descend
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
+POLISH = 5  # steps of a polished fit
 ENOUGH = 2.0  # nats, that a further round must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
@@ -31,7 +32,8 @@ class Fitted(NamedTuple):
     space: Space
     x: np.ndarray
     e: np.ndarray  # (blocks, sensors) residual, SI
-    J: np.ndarray  # (innovations, unknowns), under its own noise
+    J: np.ndarray  # (blocks, sensors, unknowns) of the residual, in single precision
+    A: np.ndarray  # (unknowns, unknowns) their inner products, as innovations
     like: Likelihood  # with its own noise
     loss: float  # negative logarithm of the likelihood, nats
 
@@ -57,10 +59,14 @@ class Fitted(NamedTuple):
         return COARSE / (COARSE + self.like.size)
 
     @property
+    def information(self) -> np.ndarray:
+        """Second derivative (unknowns, unknowns) of the negative logarithm of the posterior."""
+        return np.asarray(self.power * self.A + np.diag(prior(self.space)))
+
+    @property
     def log_evidence(self) -> float:
         """Logarithm of the evidence, nats, up to a constant that all models of the record share."""
-        weight = prior(self.space)
-        H = self.power * self.J.T @ self.J + np.diag(weight)
+        weight, H = prior(self.space), self.information
         keep = weight > 0.0
         _, volume = np.linalg.slogdet(H[np.ix_(keep, keep)])
         volume -= float(np.sum(np.log(weight[keep])))
@@ -85,38 +91,60 @@ def refit(
     like: Likelihood,
     space: Space,
     x: np.ndarray | None = None,
-    rounds: int = 10,
+    known: np.ndarray | None = None,
     floor: Likelihood | None = None,
+    rounds: int = 10,
+    freshest: int = ALL,
 ) -> Fitted:
     """The model of `space` from x: by least squares and under the noise `floor`, then under the noise that it left.
 
-    Least squares finds large effects, a noise that knows them finds small ones.
+    Least squares finds large effects, a noise that knows them finds small ones. `known` (blocks, sensors, unknowns) are
+    the derivatives in the first columns, as a model with fewer effects has them.
     """
-    x = space.start() if x is None else np.asarray(x, float)
-
-    def judged(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, Likelihood]:
-        e = like.raw(space.model(x))
-        return like.loss(e), x, e, like.told(e)
-
+    low, high = space.bounds()
+    x = np.clip(space.start() if x is None else np.asarray(x, float), low, high)
     e = like.raw(space.model(x))
-    tried = [judged(fit(like.flat(e), space, x, rounds=rounds, enough=1e-2).x)]
+    J = np.zeros((*e.shape, len(x)), np.float32)
+    count = 0 if known is None else known.shape[2]
+    if known is not None:
+        J[..., :count] = known
+    start = Point(x, e, derivatives(like, space, x, range(count, len(x)), J), EFFECTS if count else ALL)
+
+    def judged(at: Point) -> tuple[float, Point, Likelihood]:
+        return like.loss(at.e), at, like.told(at.e)
+
+    tried = [judged(descend(like.flat(e), space, start, rounds, 1e-2, min(freshest, EFFECTS)))]
     if floor is not None:
-        tried.append(judged(fit(floor, space, x, rounds=rounds, enough=1e-2).x))
+        tried.append(judged(descend(floor, space, start, rounds, 1e-2, min(freshest, EFFECTS))))
     best = min(tried, key=lambda one: one[0])
     for _ in range(ROUNDS):
-        found = judged(fit(best[3], space, best[1], rounds=rounds, enough=1e-3).x)
+        found = judged(descend(best[2], space, best[1], rounds, 1e-3, freshest))
         gain = best[0] - found[0]
         if gain > 0.0:
             best = found
         if gain < ENOUGH:
             break
-    loss, x, e, own = best
-    return Fitted(space, x, e, jacobian(own, space, x), own, loss)
+    loss, at, own = best
+    return _fitted(own, space, at, loss)
 
 
-def without(base: Fitted, index: int) -> tuple[Space, np.ndarray]:
-    """Space and start of a model without one of its hypotheses."""
-    return base.space.without(index), np.delete(base.x, base.space.columns(index))
+def polished(f: Fitted) -> Fitted:
+    """The model with derivatives taken where it is."""
+    J = derivatives(f.like, f.space, f.x, range(len(f.x)))
+    at = descend(f.like, f.space, Point(f.x, f.e, J, ALL), POLISH, 1e-3)
+    loss = f.like.loss(at.e)
+    return _fitted(f.like.told(at.e), f.space, *((at, loss) if loss < f.loss else (Point(f.x, f.e, J), f.loss)))
+
+
+def _fitted(own: Likelihood, space: Space, at: Point, loss: float) -> Fitted:
+    white = own.filtered(at.J)
+    return Fitted(space, at.x, at.e, at.J, white.T @ white, own, loss)
+
+
+def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
+    """Space, start and derivatives of a model without one of its hypotheses."""
+    gone = base.space.columns(index)
+    return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
 
 
 def explained(base: Fitted, best: Fitted) -> float:

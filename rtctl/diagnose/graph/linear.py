@@ -4,11 +4,11 @@ Screening, starts of fits and free forces all solve for the parameters beside so
 """
 
 from copy import copy
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
-from rtctl.diagnose.fit import bounded_step, parallel
+from rtctl.diagnose.fit import bounded_step
 from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.likelihood import Likelihood
 
@@ -21,20 +21,8 @@ class Linear:
     def __init__(self, base: Fitted):
         self.base, self.like = base, base.like
         self.start: np.ndarray = base.like.raw(base.model, True)  # residuals of coarse simulations
-        self.raw: np.ndarray = self._raw()
+        self.raw = np.asarray(base.J, float)
         self.weight = prior(base.space)
-
-    def _raw(self) -> np.ndarray:
-        base, space = self.base, self.base.space
-        steps, high = space.steps(), space.bounds()[1]
-
-        def column(i: int) -> np.ndarray:
-            x, step = base.x.copy(), steps[i] if base.x[i] + steps[i] <= high[i] else -steps[i]
-            x[i] += step
-            return np.asarray((base.like.raw(space.model(x), True) - self.start) / step)
-
-        columns = parallel([partial(column, i) for i in range(len(base.x))])
-        return np.stack(columns, axis=2) if columns else np.zeros((*base.e.shape, 0))
 
     def under(self, like: Likelihood) -> "Linear":
         """The same under another noise."""

@@ -37,8 +37,7 @@ def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
     n = len(e)
     e = e - e.mean()
     order = min(order, n // 20)
-    f = np.fft.rfft(e, 2 * n)
-    r = np.fft.irfft(np.abs(f) ** 2)[: order + 1] / n
+    r = np.array([e[lag:] @ e[: n - lag] for lag in range(order + 1)]) / n
     r[0] = r[0] * (1.0 + 1e-9) + 1e-300
     a = np.concatenate([[1.0], -solve_toeplitz(r[:-1], r[1:])]) if order else np.ones(1)
     innovation = lfilter(a, [1.0], e)[order:]

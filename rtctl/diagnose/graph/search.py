@@ -143,7 +143,7 @@ def step(
         names = key((*parent.names, scores[0].hypothesis.name))
         if names not in known:
             fits = [
-                refit(like, parent.space.add(s.hypothesis), x, floor=looked.floor)
+                refit(like, parent.space.add(s.hypothesis), x, parent.J, looked.floor)
                 for s in scores[:starts]
                 for x in looked.starts(s, starts)
             ]
