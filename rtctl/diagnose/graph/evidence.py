@@ -18,6 +18,7 @@ from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.free import SIZE, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.search import Found, amplitude
+from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
 
 SEGMENTS = 32
 DRAWS = 300
@@ -45,28 +46,37 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     """All explanations that were fitted, with free forces beside the likeliest; the most probable first."""
     base = found.base
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
-    entries: list[tuple[Fitted, Free | None, float]] = [(f, None, found.merit(f)) for f in fits]
-    entries += _beside(found, base, free_forces(base))
     sim = base.like.parts[0].sim
     unit, before = Measures(sim, base.model.base, {}).of("force", str(sim.body)), correction(base)
-    for fit in found.fits[:BESIDE]:
-        if fit.names:
-            # the correction has less of what the effects are, also of those in a sensor or a drive
-            change = float(np.sqrt(np.mean((before - correction(fit)) ** 2)))
-            whole = DISCREPANCY * change / unit if np.isfinite(change) else 0.0
-            shares = (SIZE, *((whole,) if whole > LEAST else ()))
+
+    def wrong(fit: Fitted) -> float:
+        """What the laws of a fit may be wrong by, in forces that move the machine: the correction has less of what the
+        effects are, also of those in a sensor or a drive."""
+        change = float(np.sqrt(np.mean((before - correction(fit)) ** 2))) if fit.names else 0.0
+        return DISCREPANCY * change / unit if np.isfinite(change) else 0.0
+
+    entries: list[tuple[Fitted, Free | None, float]] = []
+    for rank, fit in enumerate(fits):
+        off = wrong(fit)
+        share, wander = wandering(fit)
+        listed = found.merit(fit) + log_density(share, float(np.hypot(LITTLE, off)))
+        entries.append((fit, None, listed))
+        if wander is not None:
+            entries.append((fit, wander, found.merit(fit) + log_density(share, SIZE) - UNLISTED))
+        if rank < BESIDE or fit is base:
+            shares = (SIZE, *((off,) if fit.names and off > LEAST else ()))
             free = free_forces(fit, shares)
-            for share in shares:
-                entries += _beside(
-                    found, fit, [f for f in free if f.share == share and (share < SIZE or large(base, fit, f))]
-                )
+            large = [f for f in free if f.share == SIZE and (not fit.names or exceeds(base, fit, f))]
+            entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
+            small = [f for f in free if f.share < SIZE]
+            entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
     losses = [base.power * found.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
     return tuple(sorted(out, key=lambda r: -r.probability))
 
 
-def large(base: Fitted, fit: Fitted, free: Free) -> bool:
+def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:
     """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
     return amplitude(base.e, fit.e, free.e) > DISCREPANCY
 
@@ -87,7 +97,11 @@ def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
     return np.asarray((odds / odds.sum(axis=1, keepdims=True)).mean(axis=0))
 
 
-def _beside(found: Found, fit: Fitted, free: list[Free]) -> list[tuple[Fitted, Free | None, float]]:
-    """Free forces of one size beside a fit; the prior is shared among them."""
-    toll = float(np.log(max(len(free), 1))) + (UNLISTED if free and free[0].share == SIZE else 0.0)
-    return [(fit, f, found.merit(fit) + f.evidence - toll) for f in free]
+def _shared(free: list[Free]) -> list[tuple[Free, float]]:
+    """Free forces of one size, each with the logarithm of its prior: they share it. A large one leaves a force that
+    comes and goes as small as its law may be wrong by."""
+    each = -float(np.log(max(len(free), 1)))
+    return [
+        (f, each + (log_density(0.0, float(np.hypot(LITTLE, DISCREPANCY * f.rms))) if f.share == SIZE else 0.0))
+        for f in free
+    ]
