@@ -23,7 +23,7 @@ POLISH = 5  # steps of a polished fit
 ENOUGH = 2.0  # nats, that a further round must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
-COARSE = 2000.0  # innovations that a recording counts for at most: no model is exact
+COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 
 
 class Fitted(NamedTuple):

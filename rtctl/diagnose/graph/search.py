@@ -3,7 +3,7 @@
 Source: beam search over forward steps, with removal and exchange of each effect at the end.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -17,6 +17,8 @@ from rtctl.diagnose.graph.screen import Score, Screened, screen
 from rtctl.diagnose.space import Space
 
 MOST = 3  # effects
+REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
+MORE = 1.0  # nats that this must bring
 NAMES = (8, 5, 4)  # terms that are refitted in each step, and in the exchange 4
 STARTS = 2  # of the first few of them
 FIRST = 3
@@ -55,17 +57,24 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     """Fit the base, then what is missing beside it."""
     progress("fitting the nominal parameters")
     base = restarted(refit(like, space))
-    progress("screening every hypothesis")
-    looked, odds = screened(base)
-    known: dict[tuple[str, ...], Fitted] = {(): base}
+    for _ in range(REBASED):
+        progress("screening every hypothesis")
+        looked, odds = screened(base)
+        known: dict[tuple[str, ...], Fitted] = {(): base}
+        progress("fitting effect 1")
+        grown = step(like, base, looked, known, NAMES[0])
+        again = rebased(base, grown)
+        if again is base:
+            break
+        base = again
     merit = partial(merit_of, odds=odds)
-    beam, first = [base], looked
+    beam = [base]
     for level in range(MOST):
-        grown: list[Fitted] = []
-        for parent in beam:
-            progress(f"fitting effect {level + 1}" + (f" beside {', '.join(parent.names)}" if parent.names else ""))
-            promising = first if level == 0 else screened(parent)[0]
-            grown += step(like, parent, promising, known, NAMES[level])
+        if level > 0:
+            grown = []
+            for parent in beam:
+                progress(f"fitting effect {level + 1} beside {', '.join(parent.names)}")
+                grown += step(like, parent, screened(parent)[0], known, NAMES[level])
         better = [f for f in grown if adds(base, _parent(f, beam), f, merit)]
         if not better:
             break
@@ -84,6 +93,19 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         known[key(best.names)] = enriched(best)
     standing = [f for f in known.values() if stands(base, f, known, merit)]
     return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
+
+
+def rebased(base: Fitted, grown: Sequence[Fitted]) -> Fitted:
+    """The base from where the best models with one effect have its parameters, if that is better by what counts.
+
+    Where the likelihood has many maxima, an effect may only have shown the way to a better one of the base.
+    """
+    for f in sorted(grown, key=lambda f: f.loss)[:REBASED]:
+        if f.loss < base.loss - ENOUGH:
+            again = refit(base.like, *without(f, 0))
+            if again.log_evidence > base.log_evidence + MORE:
+                base = again
+    return base
 
 
 def merit_of(f: Fitted, odds: float) -> float:
