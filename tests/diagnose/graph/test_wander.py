@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+from graph_cases import PENDULUM, RATE, case_of, command, nothing, record
+
+from rtctl.diagnose.graph.answer import diagnose_record
+from rtctl.diagnose.graph.fits import refit
+from rtctl.diagnose.graph.joint import together
+from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
+
+FORCE = 0.4  # Nm, rms of the drive
+
+
+def random_force(n, rms, seed=3):
+    """A force (n,) without a pattern that changes within 0.2 s."""
+    white = np.random.default_rng(seed).standard_normal(n + 400)
+    slow = np.convolve(white, np.exp(-np.arange(400) / (0.2 * RATE)), "valid")[:n]
+    return rms * slow / slow.std()
+
+
+def test_a_machine_as_described_leaves_little():
+    share, _ = wandering(nothing().found.base)
+    assert share < 3 * LITTLE
+
+
+def test_a_random_force_is_measured():
+    u = command(4.0)
+    push = random_force(len(u), 0.1 * FORCE)
+    like, space = together([record(case_of(PENDULUM), u, push=push)])
+    share, free = wandering(refit(like, space))
+    assert free is not None
+    assert (free.node, free.axis) == ("rod", "time")
+    there = np.interp(free.knots, np.arange(len(u)) / RATE, push)
+    assert np.corrcoef(free.force, there)[0, 1] > 0.7
+    assert free.force.std() == pytest.approx(there.std(), rel=0.4)
+
+
+def test_a_random_force_has_no_name():
+    u = command(4.0)
+    d = diagnose_record(record(case_of(PENDULUM), u, push=random_force(len(u), 0.15 * FORCE)))
+    assert d.verdict == "unnamed"
+
+
+def test_density_of_a_share():
+    values = np.linspace(0.0, 0.1, 2001)
+    density = np.exp([log_density(v, LITTLE) for v in values])
+    mean = np.sqrt(np.sum(density * values**2) / np.sum(density))
+    assert mean == pytest.approx(LITTLE, rel=0.01)
