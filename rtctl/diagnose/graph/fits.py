@@ -19,7 +19,6 @@ from rtctl.diagnose.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
-POLISH = 5  # steps of a polished fit
 ENOUGH = 2.0  # nats, that a further round must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
@@ -126,14 +125,6 @@ def refit(
             break
     loss, at, own = best
     return _fitted(own, space, at, loss)
-
-
-def polished(f: Fitted) -> Fitted:
-    """The model with derivatives taken where it is."""
-    J = derivatives(f.like, f.space, f.x, range(len(f.x)))
-    at = descend(f.like, f.space, Point(f.x, f.e, J, ALL), POLISH, 1e-3)
-    loss = f.like.loss(at.e)
-    return _fitted(f.like.told(at.e), f.space, *((at, loss) if loss < f.loss else (Point(f.x, f.e, J), f.loss)))
 
 
 def _fitted(own: Likelihood, space: Space, at: Point, loss: float) -> Fitted:

@@ -5,7 +5,7 @@ import pytest
 from graph_cases import BELT, RUB, case_of, command, record
 
 from rtctl.diagnose.graph.descent import ALL, Point, derivatives, descend
-from rtctl.diagnose.graph.fits import polished, refit
+from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
 
@@ -72,7 +72,7 @@ def linear(high=10.0):
 
 
 def test_least_squares_of_a_linear_problem():
-    like, space, truth = linear()
+    like, space, _ = linear()
     x = np.zeros(4)
     J = derivatives(like, space, x, range(4))
     np.testing.assert_allclose(J[:, 0], like.A, rtol=1e-4, atol=1e-6)
@@ -120,9 +120,9 @@ def test_a_fit_goes_on_from_the_derivatives_of_the_base():
     assert further.x[-1] == pytest.approx(RUB["F_C"], rel=0.1)
 
 
-def test_polished_derivatives_are_those_of_where_it_is():
+def test_derivatives_of_a_fit_are_those_of_where_it_is():
     like, space, base = problem()
-    f = polished(refit(like, space.add(DRY), np.append(base.x, 0.5), base.J))
+    f = refit(like, space.add(DRY), np.append(base.x, 0.5), base.J)
     there = derivatives(f.like, f.space, f.x, range(len(f.x)))
     size = np.linalg.norm(there, axis=(0, 1))
     apart = np.linalg.norm(f.J - there, axis=(0, 1))

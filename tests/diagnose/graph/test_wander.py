@@ -26,7 +26,7 @@ def test_a_random_force_is_measured():
     u = command(4.0)
     push = random_force(len(u), 0.1 * FORCE)
     like, space = together([record(case_of(PENDULUM), u, push=push)])
-    share, free = wandering(refit(like, space))
+    _, free = wandering(refit(like, space))
     assert free is not None
     assert (free.node, free.axis) == ("rod", "time")
     there = np.interp(free.knots, np.arange(len(u)) / RATE, push)
