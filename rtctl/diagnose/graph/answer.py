@@ -144,6 +144,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         decided = verdict(found)
         progress("predicting rows that were not fitted")
         heldout = predict(found.base, decided.best)
+        decided = borne_out(decided, heldout)
         effects = _effects(decided)
         return GraphDiagnosis(
             record=like.sim.record,
@@ -157,6 +158,16 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             seconds=time.monotonic() - began,
             records=tuple(part.sim.record for part in like.parts),
         )
+
+
+def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
+    """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
+    if decided.verdict not in (NAMED, AMBIGUOUS) or heldout.after < heldout.before:
+        return decided
+    names = ", ".join(decided.best.names)
+    errors = f"{heldout.after:.2g} instead of {heldout.before:.2g} of the spread"
+    why = f"with {names} the last rows are predicted worse than without: {errors}"
+    return decided._replace(verdict=UNNAMED, confidence=(), rivals=(), why=why)
 
 
 def _effects(decided: Verdict) -> tuple[Effect, ...]:
