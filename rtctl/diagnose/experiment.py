@@ -19,73 +19,16 @@ from rtctl.diagnose.law import LawParams
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.motions import MENU, Limits, Motion
 from rtctl.diagnose.numbers import nice
+from rtctl.diagnose.plan import EASE, FULL, NEARLY, OVER, SPEED_OVER, Experiment
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.quantities import Quantities, of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SHARE, Simulator, resolution
 from rtctl.diagnose.words import at
 
-FILE = "experiment.yaml"
-EASE = (1.0, 0.6, 0.35, 0.2)  # of speed and size, until the command stays within its limit
-FULL = 0.95  # of the drive's limit
-OVER = 0.1  # share of the travel by which a simulated machine may overshoot it
-SPEED_OVER = 0.02  # s, a speed is taken over this
 STILL = 0.05  # s in which a sensor at rest does not change by a count
 LEAST = 0.05  # distance over the noise below which nothing is told apart
-NEARLY = 0.9  # of the largest distance: of all that come this near, the shortest motion is taken
 STEP = 0.02  # of a value, in difference quotients
-
-
-class Experiment(NamedTuple):
-    """A motion, and what it is expected to show."""
-
-    motion: Motion
-    limits: Limits
-    rivals: tuple[str, ...]
-    distance: dict[str, float]  # of each motion: how far the least distinct rivals are apart, over the noise
-    pairs: dict[str, dict[str, float]]  # of each motion: of each pair
-    refused: dict[str, str]  # motion -> why not
-
-    @property
-    def name(self) -> str:
-        return self.motion.name
-
-    @property
-    def words(self) -> str:
-        """What to do, in a sentence or two."""
-        return self.motion.words
-
-    @property
-    def why(self) -> str:
-        """What it is for, in a sentence."""
-        names = called(self.rivals, self.limits.units)
-        told = " from ".join(names) if len(names) == 2 else f"{', '.join(names[:-1])} and {names[-1]} from each other"
-        return f"It tells {told}: what they predict is {nice(self.distance[self.name])} times the noise apart."
-
-    def as_dict(self) -> dict[str, Any]:
-        """As in diagnosis.json."""
-        limits = self.limits
-        return {
-            "name": self.name,
-            "words": self.words,
-            "why": {
-                "words": self.why,
-                "rivals": list(self.rivals),
-                "distance": {k: round(v, 4) for k, v in self.distance.items()},
-                "pairs": {k: round(v, 4) for k, v in self.pairs[self.name].items()},
-                "refused": dict(self.refused),
-            },
-            "reference": {
-                "unit": limits.unit,
-                "knots": [[round(float(t), 6), float(f"{r:.7g}")] for t, r in self.motion.knots],
-                "repeat": self.motion.repeat,
-                "relative": True,
-            },
-            "excitation": None,  # every motion of the menu is a reference
-            "seconds": round(self.motion.seconds, 3),
-            "limits": {"travel": [limits.low, limits.high], "speed": limits.speed, "command": limits.command},
-            "file": FILE,
-        }
 
 
 class Outcome(NamedTuple):
@@ -130,7 +73,8 @@ def design(record: Record, rivals: Sequence[Model], sim: Simulator | None = None
     worst = {name: min(found[p] for p in counted) for name, found in pairs.items()}
     most = max(worst.values())
     best = min((name for name in worst if worst[name] >= NEARLY * most), key=lambda name: motions[name].seconds)
-    return Experiment(motions[best], limits, labels, worst, pairs, refused)
+    said = called(labels, of_case(sim.case))
+    return Experiment(motions[best], limits, labels, tuple(said), worst, pairs, refused)
 
 
 def names_of(rivals: Sequence[Model]) -> tuple[str, ...]:
@@ -158,9 +102,8 @@ def limits_of(sim: Simulator) -> Limits:
     low, high = float(x.min()), float(x.max())
     speed = float(np.quantile(np.abs(v), 0.99)) or float(np.abs(v).max())
     return Limits(
-        plant=record.plant,
         unit="rad" if record.plant == "ivu" else (sim.case.sensors.unit or "m"),
-        units=of_case(sim.case),
+        command_unit=of_case(sim.case).command,
         dt=record.dt,
         low=low,
         high=high,
@@ -240,7 +183,7 @@ def respond(sim: Simulator, limits: Limits, model: Model) -> tuple[np.ndarray, s
         volts = sim.volts + volts_of(sim, push)
     most = float(np.abs(volts).max())
     if most > limits.command:
-        unit = limits.units.command
+        unit = limits.command_unit
         return out, f"it takes {nice(most, unit)}, and {nice(limits.command, unit)} are the most"
     x = out[:, 0] * to_position(sim)
     room = OVER * (limits.high - limits.low)
