@@ -9,17 +9,16 @@ Source: Atkinson & Fedorov, The design of experiments for discriminating between
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.config.errors import NoAnswer
 from rtctl.diagnose.kernel import CLOSED, TRACK
 from rtctl.diagnose.law import LawParams
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.motions import MENU, Limits, Motion
+from rtctl.diagnose.motions import Limits, Motion
 from rtctl.diagnose.numbers import nice
-from rtctl.diagnose.plan import EASE, FULL, NEARLY, OVER, SPEED_OVER, Experiment
+from rtctl.diagnose.plan import FULL, OVER, SPEED_OVER, Experiment, chosen, eased, limits_in
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.quantities import Quantities, of_case
 from rtctl.diagnose.record import Record
@@ -55,8 +54,7 @@ def design(record: Record, rivals: Sequence[Model], sim: Simulator | None = None
     motions: dict[str, Motion] = {}
     pairs: dict[str, dict[str, float]] = {}
     refused: dict[str, str] = {}
-    for make in MENU:
-        motion, outcome = eased(problem, limits, rivals, make)
+    for motion, outcome in eased(limits, lambda motion: simulate(problem, limits, rivals, motion)):
         if outcome.trouble:
             refused[motion.name] = outcome.trouble
             continue
@@ -65,14 +63,7 @@ def design(record: Record, rivals: Sequence[Model], sim: Simulator | None = None
             f"{labels[i]} / {labels[j]}": distance(outcome, i, j) / problem.floor
             for i, j in combinations(range(len(rivals)), 2)
         }
-    if not pairs:
-        name, reason = next(iter(refused.items()))
-        raise NoAnswer(f"no motion stays within the limits of this recording ({name}: {reason})")
-    told = [p for p in next(iter(pairs.values())) if max(found[p] for found in pairs.values()) > LEAST]
-    counted = told or list(next(iter(pairs.values())))
-    worst = {name: min(found[p] for p in counted) for name, found in pairs.items()}
-    most = max(worst.values())
-    best = min((name for name in worst if worst[name] >= NEARLY * most), key=lambda name: motions[name].seconds)
+    best, worst = chosen(motions, pairs, refused, LEAST)
     said = called(labels, of_case(sim.case))
     return Experiment(motions[best], limits, labels, tuple(said), worst, pairs, refused)
 
@@ -94,24 +85,12 @@ def called(rivals: Sequence[str], units: Quantities) -> list[str]:
 def limits_of(sim: Simulator) -> Limits:
     """Travel, speed and command of the recording, from the main sensor."""
     record, drive = sim.record, sim.case.drive
-    x = to_position(sim) * (sim.seen - sim.half)
-    x = x - x[0]
-    step = min(max(1, round(SPEED_OVER / record.dt)), len(x) // 8)
-    v = (x[step:] - x[:-step]) / (step * record.dt)
-    a = (v[step:] - v[:-step]) / (step * record.dt)
-    low, high = float(x.min()), float(x.max())
-    speed = float(np.quantile(np.abs(v), 0.99)) or float(np.abs(v).max())
-    return Limits(
-        unit="rad" if record.plant == "ivu" else (sim.case.sensors.unit or "m"),
-        command_unit=of_case(sim.case).command,
-        dt=record.dt,
-        low=low,
-        high=high,
-        speed=speed,
-        acceleration=max(float(np.quantile(np.abs(a), 0.98)), 0.5 * speed),
-        resolution=to_position(sim) * smallest_step(sim),
-        command=FULL * drive.limit_volt if drive.limit_volt else float(np.abs(record.u).max()),
-    )
+    return limits_in(
+        to_position(sim) * (sim.seen - sim.half), record.dt,
+        "rad" if record.plant == "ivu" else (sim.case.sensors.unit or "m"), of_case(sim.case).command,
+        to_position(sim) * smallest_step(sim),
+        FULL * drive.limit_volt if drive.limit_volt else float(np.abs(record.u).max()), SPEED_OVER,
+    )  # fmt: skip
 
 
 def smallest_step(sim: Simulator) -> float:
@@ -123,16 +102,6 @@ def to_position(sim: Simulator) -> float:
     """Reference's unit for one unit of the main sensor."""
     law: LawParams = sim.law
     return float(law.to_unit)
-
-
-def eased(problem: Problem, limits: Limits, rivals: Sequence[Model], make: Any) -> tuple[Motion, Outcome]:
-    """A motion of the menu, made smaller until every rival stays within the limits, and what the rivals do."""
-    for ease in EASE:
-        motion = make(limits._replace(acceleration=ease * limits.acceleration), ease)
-        outcome = simulate(problem, limits, rivals, motion)
-        if not outcome.trouble:
-            break
-    return motion, outcome
 
 
 def simulate(problem: Problem, limits: Limits, rivals: Sequence[Model], motion: Motion) -> Outcome:

@@ -42,7 +42,9 @@ def graph_record(record: Record) -> GraphRecord:
         counter = sensor.counts_per_unit is not None
         y[name] = (np.asarray(values, float) + (MIDDLE if counter else 0.0)) / sensor.scale
         grain[name] = abs(sensor.grain / sensor.scale)
-    return GraphRecord(case, record.t, record.dt, record.ref, record.w, record.u, y, grain, None, edges)
+    return GraphRecord(
+        case, record.t, record.dt, record.ref, record.w, record.u, y, grain, None, edges, source=record
+    )
 
 
 def graph_case(record: Record) -> GraphCase:
