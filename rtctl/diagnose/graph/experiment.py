@@ -2,9 +2,9 @@
 
 Each rival in turn is the machine: with every motion of a menu its closed loop is simulated, and what its sensors would
 record is judged as a recording is, by the likelihood of each other rival under the tracking observer, with the noise
-that the recording showed. A rival may refit its own parameters and the nominal ones to it. What then remains is the gain
-in log probability that the experiment is expected to bring, in nats. The motion of the largest gain between the
-least distinct pair is the experiment: T-optimality.
+that the recording showed. A rival may refit its own parameters and the nominal ones to it. The loss that remains is the
+expected gain in log probability of the right rival, in nats. The motion with the largest gain between the least
+distinct pair is the experiment: T-optimality.
 
 Source: Atkinson & Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62 (1975).
 """

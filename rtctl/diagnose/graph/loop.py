@@ -163,6 +163,24 @@ def stand_in(record: GraphRecord) -> Loop:
     )  # fmt: skip
 
 
+def stand_in_law(record: GraphRecord) -> dict[str, Any]:
+    """The stand-in as the `law` of a config, plain data in SI units."""
+    shares, gain, rate = _pd(record, nominal(record.case))
+    machine = record.case.machine
+    drive = int(np.argmax(shares != 0.0))
+    position: dict[str, Any] = {"kind": "pd", "gain": gain, "derivative_filter": FILTER * rate / (2 * np.pi)}
+    if machine.sensors[record.main].measures != "speed":
+        position["tau_d"] = DAMPED / rate
+    names = list(machine.drives)
+    forwards = shares[drive]
+    return {
+        "feedback": record.main,
+        "drive": names[drive],
+        "shares": {name: float(share / np.sign(forwards)) for name, share in zip(names, shares, strict=True) if share},
+        "position": position,
+    }
+
+
 def _pd(record: GraphRecord, model: GraphModel) -> tuple[np.ndarray, float, float]:
     """Shares (drives,) of a stand-in's output, its gain in command by rad or m (or by their rate), and its bandwidth in
     rad/s."""
