@@ -27,8 +27,8 @@ def recorded(ref, name, *terms):
     """The record of a rotor with `terms` beyond its description that follows `ref` (n,), rad."""
     n, case = len(ref), read_case(CASE, name)
     still = np.zeros(n)
-    blank = GraphRecord(case, still, 1.0 / RATE, ref, still, still[:, None], {"encoder": still}, {"encoder": 1 / 1592.0},
-                        None)  # fmt: skip
+    y, grain = {"encoder": still}, {"encoder": 1 / 1592.0}
+    blank = GraphRecord(case, still, 1.0 / RATE, ref, still, still[:, None], y, grain, None)
     model = nominal(case).add(*map(settings_of, terms))
     out, u = loop.run(Simulator(blank), loop.loop_of(blank), model, ref, still)
     columns = {"t": np.arange(n) / RATE, "tau": u[:, 0], "counts": np.floor(1592.0 * out[:, 0])}
