@@ -21,6 +21,7 @@ from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.model import PHYSICS, GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.words import value_unit
+from rtctl.own.term import texts
 from rtctl.plants.graph.file import checked
 from rtctl.plants.graph.mechanics import code_of
 
@@ -71,6 +72,8 @@ def write_model(
     Raises UserError where the machine would not be read again or the file cannot be written.
     """
     data = to_config(model, record, config)
+    code = data.get("own", {}) | texts(entry["term"] for entry in data["plant"]["physics"])
+    data = {**data, "own": code} if code else data
     checked(data, Document(data, path=str(path)))
     text = _head(model, record) + yaml.dump(data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=120)
     try:

@@ -2,6 +2,7 @@
 
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,10 @@ from rtctl.diagnose.diagnosis import NAMED
 from rtctl.diagnose.graph import experiment, files, loop
 from rtctl.diagnose.graph.answer import diagnose_record
 from rtctl.diagnose.graph.case import read_case
+from rtctl.diagnose.graph.evidence import Rival
+from rtctl.diagnose.graph.fits import refit
+from rtctl.diagnose.graph.hypotheses import hypotheses
+from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.model import nominal, settings_of
 from rtctl.diagnose.graph.record import GraphRecord, record_of
 from rtctl.diagnose.graph.report import instead
@@ -42,45 +47,65 @@ def one_speed(seconds=4.0):
 
 
 @cache
-def first():
-    """Record and diagnosis of a turn at one speed, at which friction of any law is one torque."""
+def rivals():
+    """Record of a turn at one speed, at which friction of any law is one torque, and two laws fitted to it."""
     record = recorded(one_speed(), "first", DRY)
-    return record, diagnose_record(record)
+    like, space = together([record])
+    found = hypotheses(like.sim, nominal(record.case))
+    laws = [next(h for h in found if h.term == term) for term in ("friction.coulomb", "friction.viscous")]
+    return record, [refit(like, space.add(law)) for law in laws]
 
 
-def test_laws_that_look_alike_at_one_speed_leave_an_experiment():
-    _, d = first()
-    assert d.verdict != NAMED
-    found = d.planned.experiment
-    assert found is not None
-    assert len(found.rivals) >= 2
-    assert found.nats[found.name] > experiment.CLEAR
-    data = d.as_json()["separating_experiment"]
-    assert data["why"]["nats"][found.name] == max(data["why"]["nats"].values()) or found.motion.seconds
-    assert any("rtctl run experiment.yaml" in line for line in instead(d))
+@cache
+def plan():
+    """What is planned where the two laws are as probable."""
+    record, fits = rivals()
+    table = tuple(Rival(f, None, 0.0, 0.5) for f in fits)
+    decided = SimpleNamespace(best=fits[0], table=table, probabilities=tuple((f.names, 0.5) for f in fits))
+    return experiment.planned(record, decided)
 
 
-def test_the_experiment_names_the_law():
-    record, d = first()
-    motion = d.planned.experiment.motion
+@cache
+def both():
+    """Diagnosis of the first recording and that of the experiment together."""
+    motion = plan().experiment.motion
     t = np.arange(round(motion.seconds * RATE)) / RATE
-    again = diagnose_record(record, recorded(motion.reference(t), "second", DRY))
-    assert again.verdict == NAMED
-    assert [e.name for e in again.effects] == [DRY["term"]]
+    second = recorded(motion.reference(t), "second", DRY)
+    return diagnose_record(rivals()[0], second)
 
 
-def test_the_file_of_a_recording_by_others_has_a_law_that_stands_in():
-    _, d = first()
+def test_the_laws_look_alike_at_one_speed_and_a_motion_tells_them_apart():
+    _, fits = rivals()
+    assert abs(fits[0].power * (fits[0].loss - fits[1].loss)) < experiment.CLEAR
+    found = plan().experiment
+    assert found.rivals == ("friction.coulomb:rotor", "friction.viscous:rotor")
+    assert found.nats[found.name] > experiment.CLEAR
+    assert found.nats[found.name] >= 0.9 * max(found.nats.values())
+    assert plan().untold == ""
+
+
+def test_the_diagnosis_of_both_recordings_names_the_law():
+    d = both()
+    assert d.verdict == NAMED
+    assert [e.name for e in d.effects] == [DRY["term"]]
+
+
+def test_it_is_told_in_the_json_the_report_and_a_file_that_runs():
+    d = both()._replace(planned=plan())
+    told = d.as_json()["separating_experiment"]
+    assert told["why"]["rivals"] == list(plan().experiment.rivals)
+    assert told["why"]["nats"][told["name"]] > experiment.CLEAR
+    assert any("rtctl run experiment.yaml" in line for line in instead(d))
     settings = machines.settings(yaml.safe_load(files.experiment_yaml(d)))
     assert settings.loop.mode == "fused"
-    assert len(settings.reference.knots) == len(d.planned.experiment.motion.knots)
+    assert len(settings.reference.knots) == len(plan().experiment.motion.knots)
     assert settings.law.position.gain == pytest.approx(30.0**2 * 1e-3)
 
 
 def test_equal_rivals_are_told_by_no_motion():
-    record, d = first()
-    best = d.decided.best
-    twice = d.decided._replace(probabilities=((("a:b",), 0.5), (("c:d",), 0.5)), table=())
-    assert experiment.left(twice._replace(probabilities=())) == ()
-    found = experiment.design(record, [best, best], best)
+    record, fits = rivals()
+    found = experiment.design(record, [fits[0], fits[0]], fits[0])
     assert max(found.nats.values()) == pytest.approx(0.0, abs=1e-9)
+    table = tuple(Rival(f, None, 0.0, 0.5) for f in fits[:1])
+    alone = SimpleNamespace(best=fits[0], table=table, probabilities=((fits[0].names, 1.0),))
+    assert experiment.planned(record, alone) == experiment.Planned()
