@@ -49,8 +49,9 @@ class GraphDiagnosis(NamedTuple):
 
     @property
     def nominal(self) -> dict[str, float]:
-        """The owner's values by path, those of one recording by path and recording."""
-        return dict(self.found.base.space.owner.base)
+        """The owner's values by path and by symbol, those of one recording by path and recording."""
+        values, called = dict(self.found.base.space.owner.base), self.record.case.called
+        return values | {called[path]: value for path, value in values.items() if path in called}
 
     @property
     def verdict(self) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from rtctl.diagnose.kernel import SLOTS, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
+from rtctl.laws import shaper
 from rtctl.loop import generate
 from rtctl.plants.graph.mechanics import Mechanics
 from rtctl.plants.graph.params import Q, Y
@@ -22,7 +23,7 @@ from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
 OPEN, TRACK, HELD = range(3)
-LAW = "rtctl.diagnose.law"  # module of the laws that close a loop
+LAWS = {"rtctl.diagnose.law", "rtctl.laws.shaper"}  # modules of what closes a loop
 KIND = "described"  # of the lines of a term that a described machine has
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
@@ -206,7 +207,10 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
         if k >= 0:
             for c in range(p.ny):
                 out[k, c] = m.y[c]
-            law.step(laws[0], law_states[0], ref[k], w[k], loop.scale * m.y[loop.sensor])
+            if k == 0:
+                shaper.reset(laws[0].shaper, loop.shaper, ref[0])
+            shaped = shaper.step(laws[0].shaper, loop.shaper, ref[k])
+            law.step(laws[0], law_states[0], shaped, w[k], loop.scale * m.y[loop.sensor])
             for c in range(drives):
                 own = loop.give[c, 0] * law_states[0].u1 + loop.give[c, 1] * law_states[0].u2
                 volts[k + 1, c] = loop.beside[c] + own
@@ -227,6 +231,7 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
 '''
 
 CLOSED = state(  # of a closed loop
+    shaper=shaper.SHAPER_STATE,
     sensor=int,  # whose reading the law gets
     scale=float,  # that reading for one SI unit
     give=(float, (MOST_DRIVES, 2)),  # command of each drive for one unit of either output of the law
@@ -287,7 +292,7 @@ def source(code: Mechanics | None = None, closed: bool = False) -> str:
     if code is not None:
         modules.add(code.steps.__name__)
         steps = STEPS.replace("{advance}", f"{code.steps.__name__}.advance(p, m)")
-    imports = "\n".join(generate.imported(m) for m in sorted(modules | ({LAW} if closed else set())))
+    imports = "\n".join(generate.imported(m) for m in sorted(modules | (LAWS if closed else set())))
     run = LOOP if closed else RUN
     parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), steps, run]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)

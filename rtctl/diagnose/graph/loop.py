@@ -64,7 +64,8 @@ def loop_of(record: GraphRecord) -> Loop:
 def run(sim: Simulator, loop: Loop, model: GraphModel, ref: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Readings (n, sensors), SI, and commands (n, drives) of a model in closed loop, from the first row of `sim` on.
 
-    `ref` and `w` (n,) are reference and excitation. Readings are nan from the tick on at which the model ran away.
+    `ref` and `w` (n,) are the reference before shaping and the excitation. Readings are nan from the tick on at which
+    the model ran away.
     """
     ready = sim.ready(model, TRACK)
     n, drives = len(ref), sim.volts.shape[1]
