@@ -126,7 +126,7 @@ def diagnose(
             _refuse("--heldout", "goes with a BUNDLE, not with --closed-loop")
         if len(what) > 1 or together:
             _refuse("--closed-loop", "takes one CONFIG")
-        _machine(console, what[0], set_, mode, reference, common.seconds(duration, "--for"), out, report, json)
+        _machine(console, what[0], set_, mode, reference, common.seconds(duration, "--for"), out, report, json, engine)
         return
     alone = {"--for": duration, "--reference": reference, "--mode": mode, "--set": set_}
     for option, given in alone.items():
@@ -143,7 +143,7 @@ def diagnose(
         if heldout is not None:
             _refuse("--heldout", "goes with one BUNDLE; of several the last part of each is held out")
         bundles = [task.bundle for task in found] or [Path(one) for one in what]
-        of_one_machine(bundles, together)
+        of_one_machine(bundles, together, engine)
         _bundle(console, bundles[0], None, out, report, json, engine, bundles[1:])
     elif found:
         if terms:
@@ -252,37 +252,34 @@ def _machine(
     out: Path | None,
     report: bool,
     json: bool,
+    engine: str,
 ) -> None:
-    from rtctl.diagnose import repair
-    from rtctl.diagnose.folder import own_config, write
+    from rtctl.diagnose import engines, repair
     from rtctl.diagnose.results import finite
     from rtctl.own import files
 
     config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)
     files.refuse_plant(config, f"{what}: ")
-    if not isinstance(config.machine, str):
-        _refuse("--closed-loop", f"takes ivu, ldu and axis; of a described machine: rtctl run {what}, then diagnose")
+    judge = engines.judge(engine, not isinstance(config.machine, str))
     config = repair.ready(config, mode)
     folder = out if out is not None else common.default_folder(config.name)
     with console.stages() as stage:
-        made = repair.repair(config, folder, length, stage)
+        made = repair.repair(config, folder, length, stage, **judge.repairs)
         stage("writing the results")
-        faults = write(made.last, folder, own_config(made.bundle), report)
+        faults = judge.write(made, folder, report)
+    rows = judge.changes(made.last)
     console.notes([*made.last.record.case.warnings, *faults])
     if json:
-        common.print_json(finite(_repaired(made)))
+        common.print_json(finite(_repaired(made, judge.as_json(made.last), rows)))
     else:
-        console.repaired(made, folder)
+        console.repaired(made, folder, rows, judge.described)
 
 
-def _repaired(made: "Repair") -> dict[str, Any]:
-    from rtctl.diagnose.diagnosis import as_json
-    from rtctl.diagnose.repair import changes
-
+def _repaired(made: "Repair", data: dict[str, Any], rows: list[tuple[str, str, str]]) -> dict[str, Any]:
     return {
-        **as_json(made.last),
+        **data,
         "bundles": [str(bundle) for bundle in made.bundles],
         "verdicts": [d.verdict for d in made.diagnoses],
         "trips": list(made.trips),
-        "changes": [dict(zip(("key", "was", "is"), row, strict=True)) for row in changes(made.last)],
+        "changes": [dict(zip(("key", "was", "is"), row, strict=True)) for row in rows],
     }

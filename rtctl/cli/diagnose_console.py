@@ -99,14 +99,11 @@ class DiagnoseConsole:
             if (folder / name).is_file():
                 self.out.print(f"{word:11}{folder / name}", highlight=False, markup=False, soft_wrap=True)
 
-    def repaired(self, made: Any, folder: Path) -> None:
-        """The last verdict and what the model has that the owner's had not."""
-        from rtctl.diagnose.repair import changes
-
+    def repaired(self, made: Any, folder: Path, rows: list[tuple[str, str, str]], described: bool = False) -> None:
+        """The last verdict and what the model has that the owner's had not: `rows` of key, was and is."""
         for bundle, trip in zip(made.bundles, made.trips, strict=True):
             self.out.print(f"{'recorded':11}{bundle}" + (f", tripped: {trip}" if trip else ""), highlight=False)
-        self.result(made.last, folder)
-        rows = changes(made.last)
+        (self.described if described else self.result)(made.last, folder)
         if not rows:
             self.out.print("The model is as it was.")
             return

@@ -49,18 +49,18 @@ def load(bundle: Path) -> Any:
     return load_record(bundle)
 
 
-def of_one_machine(bundles: Sequence[Path], together: bool) -> None:
-    """Raise UserError unless the bundles are recordings of one described machine.
+def of_one_machine(bundles: Sequence[Path], together: bool, engine: str = RULES) -> None:
+    """Raise UserError unless the bundles are recordings of one machine that `engine` takes together.
 
     They are where each case names the same `group`, or the user says so (`together`).
     """
     groups = {}
     for bundle in bundles:
         case = load_case(bundle)
-        if not is_described(case):
+        if engine != LIKELIHOOD and not is_described(case):
             raise UserError(
-                f"{bundle}: recordings that are taken together are of a described machine (exchange format 2); "
-                "diagnose this one alone, or a folder of bundles each by itself"
+                f"{bundle}: recordings are taken together by --engine likelihood; diagnose this one alone, or a folder "
+                "of bundles each by itself"
             )
         groups[bundle] = str(case.get("group") or "")
     if not together and len(set(groups.values()) | {""}) != 2:
@@ -112,3 +112,39 @@ def diagnose_into(
     d = diagnose(bundle, other, progress)
     progress("writing the results")
     return Diagnosed(d, finite(as_json(d)), tuple(write(d, out, own_config(bundle), report, base)), False)
+
+
+class Judge(NamedTuple):
+    """What an engine does with the recordings that a repair makes."""
+
+    repairs: dict[str, Any]  # arguments of `repair`
+    write: Callable[[Any, Path, bool], list[str]]  # repair, folder, whether with a report -> faults
+    changes: Callable[[Any], list[tuple[str, str, str]]]  # diagnosis -> (key, was, is)
+    as_json: Callable[[Any], dict[str, Any]]
+    described: bool
+
+
+def judge(engine: str, described: bool) -> Judge:
+    """The judge of an engine; that of a described machine is always the likelihood."""
+    if described or engine == LIKELIHOOD:
+        return _by_likelihood()
+    from rtctl.diagnose import folder, repair
+    from rtctl.diagnose.diagnosis import as_json
+
+    def write(made: Any, out: Path, report: bool) -> list[str]:
+        return folder.write(made.last, out, folder.own_config(made.bundle), report)
+
+    return Judge({}, write, repair.changes, as_json, False)
+
+
+def _by_likelihood() -> Judge:
+    from rtctl.diagnose.graph import answer, files
+
+    def diagnose(bundle: Path, other: Path | None, progress: Callable[[str], None]) -> Any:
+        return answer.diagnose(*([other] if other is not None else []), bundle, progress=progress)
+
+    def write(made: Any, out: Path, report: bool) -> list[str]:
+        return files.write(made.last, out, report)
+
+    repairs = {"diagnose": diagnose, "both": True}
+    return Judge(repairs, write, files.changes, lambda d: dict(d.as_json()), True)

@@ -9,83 +9,25 @@ Source: Atkinson & Fedorov, The design of experiments for discriminating between
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.config.errors import NoAnswer
 from rtctl.diagnose.kernel import CLOSED, TRACK
 from rtctl.diagnose.law import LawParams
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.motions import MENU, Limits, Motion
+from rtctl.diagnose.motions import Limits, Motion
 from rtctl.diagnose.numbers import nice
+from rtctl.diagnose.plan import FULL, OVER, SPEED_OVER, Experiment, chosen, eased, limits_in
 from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.quantities import Quantities, of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import SHARE, Simulator, resolution
 from rtctl.diagnose.words import at
 
-FILE = "experiment.yaml"
-EASE = (1.0, 0.6, 0.35, 0.2)  # of speed and size, until the command stays within its limit
-FULL = 0.95  # of the drive's limit
-OVER = 0.1  # share of the travel by which a simulated machine may overshoot it
-SPEED_OVER = 0.02  # s, a speed is taken over this
 STILL = 0.05  # s in which a sensor at rest does not change by a count
 LEAST = 0.05  # distance over the noise below which nothing is told apart
-NEARLY = 0.9  # of the largest distance: of all that come this near, the shortest motion is taken
 STEP = 0.02  # of a value, in difference quotients
-
-
-class Experiment(NamedTuple):
-    """A motion, and what it is expected to show."""
-
-    motion: Motion
-    limits: Limits
-    rivals: tuple[str, ...]
-    distance: dict[str, float]  # of each motion: how far the least distinct rivals are apart, over the noise
-    pairs: dict[str, dict[str, float]]  # of each motion: of each pair
-    refused: dict[str, str]  # motion -> why not
-
-    @property
-    def name(self) -> str:
-        return self.motion.name
-
-    @property
-    def words(self) -> str:
-        """What to do, in a sentence or two."""
-        return self.motion.words
-
-    @property
-    def why(self) -> str:
-        """What it is for, in a sentence."""
-        names = called(self.rivals, self.limits.units)
-        told = " from ".join(names) if len(names) == 2 else f"{', '.join(names[:-1])} and {names[-1]} from each other"
-        return f"It tells {told}: what they predict is {nice(self.distance[self.name])} times the noise apart."
-
-    def as_dict(self) -> dict[str, Any]:
-        """As in diagnosis.json."""
-        limits = self.limits
-        return {
-            "name": self.name,
-            "words": self.words,
-            "why": {
-                "words": self.why,
-                "rivals": list(self.rivals),
-                "distance": {k: round(v, 4) for k, v in self.distance.items()},
-                "pairs": {k: round(v, 4) for k, v in self.pairs[self.name].items()},
-                "refused": dict(self.refused),
-            },
-            "reference": {
-                "unit": limits.unit,
-                "knots": [[round(float(t), 6), float(f"{r:.7g}")] for t, r in self.motion.knots],
-                "repeat": self.motion.repeat,
-                "relative": True,
-            },
-            "excitation": None,  # every motion of the menu is a reference
-            "seconds": round(self.motion.seconds, 3),
-            "limits": {"travel": [limits.low, limits.high], "speed": limits.speed, "command": limits.command},
-            "file": FILE,
-        }
 
 
 class Outcome(NamedTuple):
@@ -112,8 +54,7 @@ def design(record: Record, rivals: Sequence[Model], sim: Simulator | None = None
     motions: dict[str, Motion] = {}
     pairs: dict[str, dict[str, float]] = {}
     refused: dict[str, str] = {}
-    for make in MENU:
-        motion, outcome = eased(problem, limits, rivals, make)
+    for motion, outcome in eased(limits, lambda motion: simulate(problem, limits, rivals, motion)):
         if outcome.trouble:
             refused[motion.name] = outcome.trouble
             continue
@@ -122,15 +63,9 @@ def design(record: Record, rivals: Sequence[Model], sim: Simulator | None = None
             f"{labels[i]} / {labels[j]}": distance(outcome, i, j) / problem.floor
             for i, j in combinations(range(len(rivals)), 2)
         }
-    if not pairs:
-        name, reason = next(iter(refused.items()))
-        raise NoAnswer(f"no motion stays within the limits of this recording ({name}: {reason})")
-    told = [p for p in next(iter(pairs.values())) if max(found[p] for found in pairs.values()) > LEAST]
-    counted = told or list(next(iter(pairs.values())))
-    worst = {name: min(found[p] for p in counted) for name, found in pairs.items()}
-    most = max(worst.values())
-    best = min((name for name in worst if worst[name] >= NEARLY * most), key=lambda name: motions[name].seconds)
-    return Experiment(motions[best], limits, labels, worst, pairs, refused)
+    best, worst = chosen(motions, pairs, refused, LEAST)
+    said = called(labels, of_case(sim.case))
+    return Experiment(motions[best], limits, labels, tuple(said), worst, pairs, refused)
 
 
 def names_of(rivals: Sequence[Model]) -> tuple[str, ...]:
@@ -150,25 +85,12 @@ def called(rivals: Sequence[str], units: Quantities) -> list[str]:
 def limits_of(sim: Simulator) -> Limits:
     """Travel, speed and command of the recording, from the main sensor."""
     record, drive = sim.record, sim.case.drive
-    x = to_position(sim) * (sim.seen - sim.half)
-    x = x - x[0]
-    step = min(max(1, round(SPEED_OVER / record.dt)), len(x) // 8)
-    v = (x[step:] - x[:-step]) / (step * record.dt)
-    a = (v[step:] - v[:-step]) / (step * record.dt)
-    low, high = float(x.min()), float(x.max())
-    speed = float(np.quantile(np.abs(v), 0.99)) or float(np.abs(v).max())
-    return Limits(
-        plant=record.plant,
-        unit="rad" if record.plant == "ivu" else (sim.case.sensors.unit or "m"),
-        units=of_case(sim.case),
-        dt=record.dt,
-        low=low,
-        high=high,
-        speed=speed,
-        acceleration=max(float(np.quantile(np.abs(a), 0.98)), 0.5 * speed),
-        resolution=to_position(sim) * smallest_step(sim),
-        command=FULL * drive.limit_volt if drive.limit_volt else float(np.abs(record.u).max()),
-    )
+    return limits_in(
+        to_position(sim) * (sim.seen - sim.half), record.dt,
+        "rad" if record.plant == "ivu" else (sim.case.sensors.unit or "m"), of_case(sim.case).command,
+        to_position(sim) * smallest_step(sim),
+        FULL * drive.limit_volt if drive.limit_volt else float(np.abs(record.u).max()), SPEED_OVER,
+    )  # fmt: skip
 
 
 def smallest_step(sim: Simulator) -> float:
@@ -180,16 +102,6 @@ def to_position(sim: Simulator) -> float:
     """Reference's unit for one unit of the main sensor."""
     law: LawParams = sim.law
     return float(law.to_unit)
-
-
-def eased(problem: Problem, limits: Limits, rivals: Sequence[Model], make: Any) -> tuple[Motion, Outcome]:
-    """A motion of the menu, made smaller until every rival stays within the limits, and what the rivals do."""
-    for ease in EASE:
-        motion = make(limits._replace(acceleration=ease * limits.acceleration), ease)
-        outcome = simulate(problem, limits, rivals, motion)
-        if not outcome.trouble:
-            break
-    return motion, outcome
 
 
 def simulate(problem: Problem, limits: Limits, rivals: Sequence[Model], motion: Motion) -> Outcome:
@@ -240,7 +152,7 @@ def respond(sim: Simulator, limits: Limits, model: Model) -> tuple[np.ndarray, s
         volts = sim.volts + volts_of(sim, push)
     most = float(np.abs(volts).max())
     if most > limits.command:
-        unit = limits.units.command
+        unit = limits.command_unit
         return out, f"it takes {nice(most, unit)}, and {nice(limits.command, unit)} are the most"
     x = out[:, 0] * to_position(sim)
     room = OVER * (limits.high - limits.low)

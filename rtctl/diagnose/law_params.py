@@ -97,11 +97,16 @@ def written(
 
 
 def plain(case: Case, dt: float) -> LawParams:
-    """A law that writes nothing: every part in its neutral place."""
+    """A law that writes nothing, with the units of a case."""
+    return neutral(1 / per_unit(case)[0], dt)
+
+
+def neutral(to_unit: float, dt: float) -> LawParams:
+    """A law that writes nothing, each part in its neutral place; `to_unit` is the reference for one unit of reading."""
     return LawParams(
         kind=law.NONE,
         tape=law.NO_TAPE,
-        to_unit=1 / per_unit(case)[0],
+        to_unit=to_unit,
         resolution=0.0,
         shift=0.0,
         origin=0.0,
@@ -171,14 +176,17 @@ def _with_sections(p: LawParams, coefficients: Any) -> LawParams:
 def _of_config(config: Any, record: "Record") -> LawParams:
     """The law of one of our own machines."""
     case, dt = record.case, record.dt
-    p = _position(plain(case, dt), config.law, dt)
-    p = p._replace(
-        velocity=velocity.build(config.law.velocity, dt),
-        limit=limit.build(config.law.limit, dt),
-        shaper=shaper.build(config.law.shaper, dt),
-        rounds=law.BOARD,
-    )
+    p = of_settings(plain(case, dt), config.law, dt)._replace(rounds=law.BOARD)
     return {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.machine](p, config, record)
+
+
+def of_settings(p: LawParams, settings: Any, dt: float) -> LawParams:
+    """The same with position law, speed filter, limit and shaper of a config's `law`."""
+    return _position(p, settings, dt)._replace(
+        velocity=velocity.build(settings.velocity, dt),
+        limit=limit.build(settings.limit, dt),
+        shaper=shaper.build(settings.shaper, dt),
+    )
 
 
 def _position(p: LawParams, settings: Any, dt: float) -> LawParams:

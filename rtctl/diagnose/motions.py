@@ -13,14 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.numbers import nice
-from rtctl.diagnose.quantities import Quantities
 
 MARGIN = 0.02  # share of the travel that is kept free at each end
 CORNER = 4  # knots in a change of speed
 KNOTS = 900  # of one level of the multisine
-PERIOD = {"ivu": 4.0, "ldu": 1.0, "axis": 2.0}  # s, of the multisine
-HIGHEST = {"ivu": 20.0, "ldu": 150.0, "axis": 50.0}  # Hz, of the multisine
-DITHER = {"ivu": 12.0, "ldu": 40.0, "axis": 30.0}  # Hz
+PERIOD = (1.0, 4.0)  # s, of the multisine, shortest and longest
+TICKS = 2000  # in a period between these
+LINES = 100  # periods of the highest frequency in that of the multisine
+DITHER = 40  # the same of the dither
+FASTEST = 0.05  # of the sample rate, highest frequency of either
 LEVELS = (0.3, 1.0)  # of the multisine
 SPEEDS = (0.08, 0.3, 0.9)  # of the highest
 WORK = 30.0  # s, of the warm-up
@@ -29,16 +30,20 @@ WORK = 30.0  # s, of the warm-up
 class Limits(NamedTuple):
     """What the recording shows that the machine can do. Positions count from where the recording began."""
 
-    plant: str
-    unit: str  # rad or m
-    units: Quantities
+    unit: str  # of the reference
+    command_unit: str
     dt: float  # s
     low: float
     high: float
     speed: float
     acceleration: float
     resolution: float  # smallest step that the sensor shows, in `unit`
-    command: float  # in units.command
+    command: float  # largest, in `command_unit`
+
+    @property
+    def period(self) -> float:
+        """Period of the multisine, s."""
+        return float(np.clip(TICKS * self.dt, *PERIOD))
 
     @property
     def span(self) -> float:
@@ -179,11 +184,11 @@ def steps_with_rests(limits: Limits, ease: float) -> Motion:
 
 def multisine(limits: Limits, ease: float) -> Motion:
     """Odd random-phase lines, the amplitude falling with frequency, at two levels in turn."""
-    T, ticks = PERIOD[limits.plant], round(PERIOD[limits.plant] / limits.dt)
+    T, ticks = limits.period, round(limits.period / limits.dt)
     spacing = max(1, int(np.ceil(ticks / KNOTS)))
     n = max(ticks // spacing, 32)
     T = n * spacing * limits.dt
-    highest = min(HIGHEST[limits.plant], 0.2 / (spacing * limits.dt))
+    highest = min(LINES / limits.period, FASTEST / limits.dt, 0.2 / (spacing * limits.dt))
     lines = np.arange(n // 2 + 1)
     used = (lines % 2 == 1) & (lines / T <= max(highest, 3.5 / T))
     phases = np.random.default_rng(1).random(len(lines))
@@ -261,7 +266,7 @@ def dither(limits: Limits, ease: float) -> Motion:
     v, half = 0.06 * ease * limits.speed, 4.0
     a, b = stretch(limits, v * half)
     half = abs(b - a) / v if abs(b - a) < v * half else half
-    f = min(DITHER[limits.plant], 0.05 / limits.dt)
+    f = min(DITHER / limits.period, FASTEST / limits.dt)
     swing = min(0.15 * ease * limits.speed / (2 * np.pi * f), 0.5 * abs(b - a))
     path = Path(limits).rest(0.5).move(a, 0.3 * limits.speed).rest(0.5)
     path.move(b, v).rest(0.3).move(a, v).rest(0.3)

@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rtctl.config.files import write_text
-from rtctl.diagnose import figures, numbers, repair, words
+from rtctl.diagnose import figures, numbers, played, words
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Diagnosis, Effect, Interval
 from rtctl.diagnose.model import FITTED
 from rtctl.diagnose.simulate import Simulator
@@ -227,8 +227,8 @@ def experiment(d: Diagnosis) -> dict[str, Any] | None:
         "words": f"{told[:1].upper()}{told[1:]}.",
         "why": why.get("words") or "",
         "tell": f"How they differ: {tell}." if tell else "",
-        "where": f"Put the machine where the recording began{repair.room(given)}, and run the file beside this report:",
-        "run": repair.command(float(given["seconds"])) if "seconds" in given else "",
+        "where": f"Put the machine where the recording began{played.room(given)}, and run the file beside this report:",
+        "run": played.command(float(given["seconds"])) if "seconds" in given else "",
         "picture": svg(drawn, "motion", MOTION_ALT) if drawn else "",
         "tried": [
             *((name.replace("_", " "), f"{value:.2g}") for name, value in tried),

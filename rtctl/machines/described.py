@@ -11,7 +11,7 @@ from rtctl.drivers import daq_stc
 from rtctl.idiom import state, tick
 from rtctl.laws import bumpless, limit, reference, shaper, velocity
 from rtctl.machines.base import STATE_LINES, TRACE_LINES, Block, Diagram, PlantDiagram
-from rtctl.machines.described_parts import columns, forwards, metres_per_unit, parts_of, radius, signals, unit
+from rtctl.machines.described_parts import columns, metres_per_unit, parts_of, radius, shares_of, signals, unit
 from rtctl.machines.described_plant import converter, is_counter, readout_of, wires
 from rtctl.machines.described_plant import plant_diagram as described_plant
 from rtctl.machines.described_settings import DescribedConfig, config_class
@@ -20,8 +20,8 @@ from rtctl.plants.linear import MOST_DRIVES
 from rtctl.tick import safety
 
 __all__ = [
-    "DescribedConfig", "config_class", "diagram", "metres_per_unit", "parts_of", "plant_diagram", "radius", "signals",
-    "unit",
+    "DescribedConfig", "config_class", "diagram", "metres_per_unit", "parts_of", "plant_diagram", "radius", "shares_of",
+    "signals", "unit",
 ]  # fmt: skip
 
 SETTLE_FLOOR = 0.0  # two percent of the step say it all
@@ -58,14 +58,11 @@ def play(t, s, guard, c, made, k):
 
 def _params(config: Any, dt: float) -> DescribedParams:
     parts = parts_of(config)
-    drive = parts.machine.drives[parts.drive]
-    shares = np.zeros(MOST_DRIVES)
-    for n, name in enumerate(parts.machine.drives):
-        shares[n] = config.law.shares.get(name, 0.0)
-    shares[parts.number] = config.law.shares.get(parts.drive, 1.0)
+    drive, shares = parts.machine.drives[parts.drive], np.zeros(MOST_DRIVES)
+    shares[: len(parts.machine.drives)] = shares_of(config)
     ampere = {"current": abs(drive.gain), "voltage": abs(drive.gain) / (drive.resistance or 1.0)}.get(drive.kind, 0.0)
     scale = parts.machine.sensors[parts.feedback].scale
-    return DescribedParams(round(0.05 / dt), 1.0 / scale, ampere, forwards(config) * shares)
+    return DescribedParams(round(0.05 / dt), 1.0 / scale, ampere, shares)
 
 
 def diagram(config: Any, dt: float) -> Diagram:

@@ -119,3 +119,11 @@ def forwards(config: Any) -> float:
         if abs(reached) > 1e-12 * float(np.abs(moment) @ np.abs(b) or 1.0):
             return 1.0 if reached > 0 else -1.0
     return 1.0
+
+
+def shares_of(config: Any) -> np.ndarray:
+    """Command of each drive (drives,) for one of the law, with the sign that moves the feedback forwards."""
+    parts, law = parts_of(config), config.law
+    shares = np.array([law.shares.get(name, 0.0) for name in parts.machine.drives])
+    shares[parts.number] = law.shares.get(parts.drive, 1.0)
+    return np.asarray(forwards(config) * shares)

@@ -145,7 +145,7 @@ def test_a_machine_that_is_recorded_and_diagnosed(rtctl, tmp_path, monkeypatch):
 
     seen = {}
 
-    def recorded(config, out, length, progress):
+    def recorded(config, out, length, progress, **more):
         seen.update(mode=config.loop.mode, steps=len(config.reference.steps), out=out, length=length)
         progress("recording 3 s")
         d = SimpleNamespace(record=SimpleNamespace(case=SimpleNamespace(warnings=("mind this",))), verdict="nothing")

@@ -163,7 +163,7 @@ def test_limits_are_those_of_the_recording(recorded):
 def test_every_motion_stays_within_travel_and_speed(plant, low, span, speed, stiff, ease):
     low = max(low, -span)
     dt = {"ivu": 2e-3, "ldu": 1e-4, "axis": 1e-3}[plant]
-    limits = Limits(plant, "m", quantities(None), dt, low, low + span, speed, stiff * speed, 1e-4 * span, 10.0)
+    limits = Limits("m", "V", dt, low, low + span, speed, stiff * speed, 1e-4 * span, 10.0)
     for make in MENU:
         motion = make(limits, ease)
         t, r = motion.knots.T

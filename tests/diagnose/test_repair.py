@@ -19,7 +19,6 @@ from rtctl.diagnose.case import read_case
 from rtctl.diagnose.folder import own_config, write
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.motions import MENU, Limits
-from rtctl.diagnose.quantities import quantities
 from rtctl.diagnose.record import Record, load_record
 from rtctl.laws import reference
 from rtctl.machines import CONFIGS
@@ -173,7 +172,7 @@ def test_the_head_says_how_much_room_it_needs_and_what_else_was_tried():
 
 @pytest.mark.parametrize("make", MENU)
 def test_every_motion_is_played_from_the_file_as_it_is(tmp_path, make):
-    limits = Limits("axis", "m", quantities(None), 1e-3, -0.02, 0.05, 0.1, 1.0, 1e-6, 8.0)
+    limits = Limits("m", "V", 1e-3, -0.02, 0.05, 0.1, 1.0, 1e-6, 8.0)
     motion = make(limits, 1.0)
     plan = {"reference": {"unit": "m", "knots": motion.knots, "repeat": motion.repeat, "relative": True}}
     path = tmp_path / "experiment.yaml"

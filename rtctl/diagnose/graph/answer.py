@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
+from rtctl.diagnose.graph.experiment import Planned, left, planned
 from rtctl.diagnose.graph.fits import Fitted, refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.model import RECORDING
@@ -38,11 +39,19 @@ class GraphDiagnosis(NamedTuple):
     cannot_test: tuple[str, ...]
     seconds: float
     records: tuple[GraphRecord, ...]
+    planned: Planned = Planned()
+
+    @property
+    def experiment(self) -> dict[str, Any] | None:
+        """The separating experiment as in diagnosis.json; None where there is none."""
+        found = self.planned.experiment
+        return None if found is None else found.as_dict()
 
     @property
     def nominal(self) -> dict[str, float]:
-        """The owner's values by path, those of one recording by path and recording."""
-        return dict(self.found.base.space.owner.base)
+        """The owner's values by path and by symbol, those of one recording by path and recording."""
+        values, called = dict(self.found.base.space.owner.base), self.record.case.called
+        return values | {called[path]: value for path, value in values.items() if path in called}
 
     @property
     def verdict(self) -> str:
@@ -106,7 +115,8 @@ class GraphDiagnosis(NamedTuple):
                 if p > 1e-4
             ],
             "cannot_test": list(self.cannot_test),
-            "separating_experiment": None,
+            "separating_experiment": self.experiment,
+            "no_experiment": self.planned.untold,
             "recordings": [r.case.file.parent.name for r in self.records],
             "warnings": list(dict.fromkeys(line for r in self.records for line in r.case.warnings)),
             "seconds": round(self.seconds, 2),
@@ -146,6 +156,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         heldout = predict(found.base, decided.best)
         decided = borne_out(decided, heldout)
         effects = _effects(decided)
+        if len(left(decided)) > 1:
+            progress("planning an experiment")
         return GraphDiagnosis(
             record=like.sim.record,
             found=found,
@@ -154,6 +166,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             located=_located(found, decided),
             parameters=_parameters(decided.best, like.sim.record),
             heldout=heldout,
+            planned=planned(like.sim.record, decided),
             cannot_test=tuple(sorted(_cannot(found))),
             seconds=time.monotonic() - began,
             records=tuple(part.sim.record for part in like.parts),

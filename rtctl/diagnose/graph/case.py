@@ -53,6 +53,7 @@ class GraphCase(NamedTuple):
     format: int = FORMAT  # whose names of effects may be given
     plant: str = ""  # kind of plant by which the owner calls the machine: effects stand at its nodes alone
     called: dict[str, str] = {}  # noqa: RUF012  # path -> symbol by which the owner calls it
+    config: dict[str, Any] | None = None  # of a recording by our own daemon: plain data of the machine's config
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
@@ -151,7 +152,13 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         notes=str(case.get("notes") or ""),
         warnings=tuple(warnings),
         file=where,
+        config=_own_config(case),
     )
+
+
+def _own_config(case: dict[str, Any]) -> dict[str, Any] | None:
+    config = case.get("config")
+    return config if isinstance(config, dict) and isinstance(config.get("machine"), dict) else None
 
 
 def _foreign() -> tuple[str, ...]:

@@ -21,10 +21,12 @@ from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.model import PHYSICS, GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.words import value_unit
+from rtctl.own.term import texts
 from rtctl.plants.graph.file import checked
 from rtctl.plants.graph.mechanics import code_of
 
 NO_NAME = "machine"
+CHANGED = 5e-4  # share of a value below which it has not changed
 
 
 def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -70,6 +72,8 @@ def write_model(
     Raises UserError where the machine would not be read again or the file cannot be written.
     """
     data = to_config(model, record, config)
+    code = data.get("own", {}) | texts(entry["term"] for entry in data["plant"]["physics"])
+    data = {**data, "own": code} if code else data
     checked(data, Document(data, path=str(path)))
     text = _head(model, record) + yaml.dump(data, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=120)
     try:
@@ -109,13 +113,21 @@ def _with_unit(value: float, unit: str) -> float | str:
 
 def _head(model: GraphModel, record: GraphRecord) -> str:
     """Comment lines on top of the file."""
-    case = record.case
     seconds = len(record.t) * record.dt
     lines = [f"The machine as a recording of {seconds:.3g} s shows it: numbers of `machine` are fitted,"]
     lines.append("effects that were found are in plant.physics. Changed, nominal -> fitted:")
+    lines += [
+        f"  {path}: {old:.4g} -> {value:.4g} {unit}".rstrip() for path, old, value, unit in changed(model, record)
+    ]
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def changed(model: GraphModel, record: GraphRecord) -> list[tuple[str, float, float, str]]:
+    """(path, nominal value, fitted value, unit) of each number of the description that a fit moved, SI."""
+    case = record.case
+    rows = []
     for path, value in own(model.base, record.name).items():
         old = case.values.get(path, value)
-        if not is_start(path) and abs(value - old) > 5e-4 * abs(old):
-            unit = value_unit(case.machine, path)
-            lines.append(f"  {path}: {old:.4g} -> {value:.4g} {unit}".rstrip())
-    return "".join(f"# {line}\n" for line in lines)
+        if not is_start(path) and abs(value - old) > CHANGED * abs(old):
+            rows.append((path, old, value, value_unit(case.machine, path)))
+    return rows

@@ -55,6 +55,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
         change = float(np.sqrt(np.mean((before - correction(fit)) ** 2))) if fit.names else 0.0
         return DISCREPANCY * change / unit if np.isfinite(change) else 0.0
 
+    best = set(found.best.names)  # and whether a small error of fewer laws does as well
     entries: list[tuple[Fitted, Free | None, float]] = []
     for rank, fit in enumerate(fits):
         off = wrong(fit)
@@ -63,7 +64,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
         entries.append((fit, None, listed))
         if wander is not None:
             entries.append((fit, wander, found.merit(fit) + log_density(share, SIZE) - UNLISTED))
-        if rank < BESIDE or fit is base:
+        if rank < BESIDE or set(fit.names) < best:
             shares = (SIZE, *((off,) if fit.names and off > LEAST else ()))
             free = free_forces(fit, shares)
             large = [f for f in free if f.share == SIZE and (not fit.names or exceeds(base, fit, f))]

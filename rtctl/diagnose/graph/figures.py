@@ -189,7 +189,7 @@ def parameters(d: GraphDiagnosis) -> Figure | None:
     figure, (ax,) = new(0.9 + 0.24 * len(names))
     for row, name in enumerate(names):
         v, nominal = d.parameters[name], owner[name]
-        tolerance = 100 * space.tolerance(name)
+        tolerance = 100 * space.tolerance(path_of(d, name))
         if np.isfinite(tolerance):
             ax.barh(row, 2 * tolerance, left=-tolerance, color=SEEN, alpha=0.25, height=0.8)
         value, low, high = (100 * (x / nominal - 1) for x in (v.value, v.low, v.high))
@@ -203,11 +203,17 @@ def parameters(d: GraphDiagnosis) -> Figure | None:
     return figure
 
 
-def untold(d: GraphDiagnosis, path: str) -> bool:
+def path_of(d: GraphDiagnosis, name: str) -> str:
+    """Path of a fitted number by the symbol or path under which it is told."""
+    called = d.record.case.called
+    return next(path for path in d.found.base.space.names if called.get(path, path) == name)
+
+
+def untold(d: GraphDiagnosis, name: str) -> bool:
     """Whether the interval of a fitted number is that of the owner's tolerance: the recording says nothing of it."""
     space = d.decided.best.space
-    weight = float(space.prior()[space.names.index(path)])
-    v = d.parameters[path]
+    weight = float(space.prior()[space.names.index(path_of(d, name))])
+    v = d.parameters[name]
     if weight <= 0.0 or v.value == 0.0:
         return False
     half = 0.5 * abs(float(np.log(max(v.high / v.low, 1.0)))) if v.low * v.high > 0 else np.inf

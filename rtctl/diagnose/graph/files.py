@@ -1,4 +1,4 @@
-"""Files of a diagnosis of a described machine: diagnosis.json, model.yaml, report.html."""
+"""Files of a diagnosis by likelihood: verdict, model, separating experiment, torque over the turn, report."""
 
 import json
 from pathlib import Path
@@ -7,10 +7,14 @@ from typing import Any
 from rtctl.config.errors import UserError
 from rtctl.config.failures import told
 from rtctl.config.files import write_text
+from rtctl.diagnose import export, played, repair
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED
+from rtctl.diagnose.graph import config, loop
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.config import write_model
-from rtctl.diagnose.results import MODEL, REPORT, RESULT, finite, fresh, put
-from rtctl.trace.bundle import load_case
+from rtctl.diagnose.graph.known import known_model
+from rtctl.diagnose.graph.model import GraphModel, nominal
+from rtctl.diagnose.results import EXPERIMENT, MODEL, REPORT, RESULT, TURN, finite, fresh, put
+from rtctl.diagnose.turn import over_turn
 
 
 def write(d: GraphDiagnosis, folder: Path, report: bool = True, base: Path | None = None) -> list[str]:
@@ -22,9 +26,20 @@ def write(d: GraphDiagnosis, folder: Path, report: bool = True, base: Path | Non
     faults: list[str] = []
     fresh(folder, base)
     try:
-        put(folder / MODEL, lambda path: write_model(d.decided.best.model, d.record, path, own_config(d)))
+        put(folder / MODEL, lambda path: write_model(d, path))
     except UserError as error:
         faults.append(f"{folder / MODEL} is not written: {error}")
+    if d.experiment is not None:
+        try:
+            plan = experiment_yaml(d)
+            put(folder / EXPERIMENT, lambda path: write_text(path, plan))
+        except UserError as error:
+            faults.append(f"{folder / EXPERIMENT} is not written: {error}")
+    source = d.record.source
+    if source is not None:
+        turn = over_turn(source, known_model(after(d), d.record))
+        if turn is not None:
+            put(folder / TURN, lambda path: export.write_turn(turn, path))
     if report:
         try:
             from rtctl.diagnose.graph import report as page
@@ -39,7 +54,52 @@ def write(d: GraphDiagnosis, folder: Path, report: bool = True, base: Path | Non
     return faults
 
 
+def after(d: GraphDiagnosis) -> GraphModel:
+    """The model that was found; the nominal one where nothing was, which would take up what is missing."""
+    return d.decided.best.model if d.verdict in (NAMED, AMBIGUOUS) else nominal(d.record.case)
+
+
+def write_model(d: GraphDiagnosis, path: Path) -> Path:
+    """Write the fitted model as the machine's config: of exchange format 1 by its parameters, else by a description.
+
+    Raises UserError where the machine would not be read again, or the file cannot be written.
+    """
+    record, model = d.record, d.decided.best.model
+    if record.source is not None:
+        return export.write_model(known_model(model, record), record.source, path, own_config(d))
+    return config.write_model(model, record, path, own_config(d))
+
+
+def experiment_yaml(d: GraphDiagnosis) -> str:
+    """The separating experiment as a config that `rtctl run` takes as it is. Raises UserError where that fails."""
+    assert d.experiment is not None
+    record, own = d.record, own_config(d)
+    if own is not None:
+        data = own
+    elif record.source is not None:
+        data = export.to_config(known_model(nominal(record.case), record), record.source)
+    else:
+        data = {**config.to_config(nominal(record.case), record), "law": loop.stand_in_law(record)}
+    names = [r.replace(" + ", " with ") for r in d.experiment["why"]["rivals"]]
+    return played.text(data, d.experiment, names, record.dt * len(record.t), own is not None)
+
+
 def own_config(d: GraphDiagnosis) -> dict[str, Any] | None:
     """The config in case.json of a recording that our own daemon made; None of any other."""
-    config = load_case(d.record.case.file.parent).get("config")
-    return config if isinstance(config, dict) and isinstance(config.get("machine"), dict) else None
+    if d.record.source is None:
+        return d.record.case.config
+    from rtctl.diagnose.folder import own_config as of_bundle
+
+    return of_bundle(d.record.case.file.parent)
+
+
+def changes(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
+    """(key, nominal value, new value) of each key of the config that the model changes, the terms last."""
+    record, model = d.record, d.decided.best.model
+    if record.source is not None:
+        return repair.between(known_model(nominal(record.case), record), known_model(model, record))
+    rows = [
+        (f"machine.{path}", f"{was:.4g} {unit}".rstrip(), f"{value:.4g} {unit}".rstrip())
+        for path, was, value, unit in config.changed(model, record)
+    ]
+    return rows + played.terms(model.resolved().terms, model.known())

@@ -13,14 +13,17 @@ import numpy as np
 
 from rtctl.diagnose.kernel import SLOTS, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
+from rtctl.laws import shaper
 from rtctl.loop import generate
 from rtctl.plants.graph.mechanics import Mechanics
 from rtctl.plants.graph.params import Q, Y
+from rtctl.plants.linear import MOST_DRIVES
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
 OPEN, TRACK, HELD = range(3)
+LAWS = {"rtctl.diagnose.law", "rtctl.laws.shaper"}  # modules of what closes a loop
 KIND = "described"  # of the lines of a term that a described machine has
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
@@ -39,7 +42,7 @@ from rtctl.plants.graph import plant as graph
 entry = njit(nogil=True, error_model="numpy", fastmath=False, cache=True)
 '''
 
-RUN = '''
+STEPS = '''
 @compiled
 def substep(job, p, m, t, forces, row):
     """One substep under the commands in m.volts, the recorded forces and the correction in job.correction."""
@@ -90,8 +93,9 @@ def look(p, m, t):
     """Readings of all sensors, SI, into m.y."""
     graph.read(p, m)
     reading(t, m)
+'''
 
-
+RUN = '''
 @entry
 def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     """Simulate len(seen) ticks after `lead` ticks at the first row; readings go to out (n, sensors), SI.
@@ -168,6 +172,71 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     return n
 '''
 
+LOOP = '''
+@entry
+def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, path, pace, out):
+    """Simulate len(ref) ticks with the loop closed by a law; readings go to out (n, sensors), SI.
+
+    For `lead` ticks before, the machine is kept at `seen` (1, followed) under the commands in the first row of `volts`
+    (n + 1, drives). Row k + 1 of `volts` is what is written at tick k. Returns the row at which the model ran away, n
+    where it did not.
+    """
+    job, loop, p, s, t = jobs[0], loops[0], ps[0], ss[0], ts[0]
+    m = s.m
+    graph.start(p, s)
+    n, drives = len(ref), volts.shape[1]
+    for k in range(-job.lead, n):
+        if k == 0:
+            m.t = 0.0
+            for i in range(p.nq):
+                m.x[i] += job.first_x[i]
+                m.x[p.nq + i] += job.first_v[i]
+        look(p, m, t)
+        for c in range(job.follows):
+            job.correction[c] = 0.0
+            if k < 0:
+                e = seen[0, c] - m.y[job.main[c]]
+                if job.speed[c] != 0:
+                    job.e[c], job.d[c] = 0.0, e
+                else:
+                    if k == -job.lead:
+                        job.e[c] = e
+                    job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
+                    job.e[c] = e
+                job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
+        if k >= 0:
+            for c in range(p.ny):
+                out[k, c] = m.y[c]
+            if k == 0:
+                shaper.reset(laws[0].shaper, loop.shaper, ref[0])
+            shaped = shaper.step(laws[0].shaper, loop.shaper, ref[k])
+            law.step(laws[0], law_states[0], shaped, w[k], loop.scale * m.y[loop.sensor])
+            for c in range(drives):
+                own = loop.give[c, 0] * law_states[0].u1 + loop.give[c, 1] * law_states[0].u2
+                volts[k + 1, c] = loop.beside[c] + own
+        for i in range(job.substeps):
+            for c in range(drives):
+                m.volts[c] = 0.0
+            for late in range(2 if job.part > 0.0 else 1):
+                share = job.part if late == 1 else 1.0 - job.part
+                row = max(k + (i - job.delay - late) // job.substeps, -1) + 1
+                for c in range(drives):
+                    m.volts[c] += share * volts[row, c]
+            substep(job, p, m, t, forces, max(k, 0))
+            if job.holds != 0:
+                hold(job, p, m, k, (i + 1.0) / job.substeps, path, pace)
+        if not (abs(m.y[loop.sensor]) < 1e12):
+            return max(k, 0)
+    return n
+'''
+
+CLOSED = state(  # of a closed loop
+    shaper=shaper.SHAPER_STATE,
+    sensor=int,  # whose reading the law gets
+    scale=float,  # that reading for one SI unit
+    give=(float, (MOST_DRIVES, 2)),  # command of each drive for one unit of either output of the law
+    beside=(float, MOST_DRIVES),  # and what it is beside them
+)
 JOB = state(
     mode=int,
     substeps=int,
@@ -212,16 +281,20 @@ def terms() -> tuple[Term, ...]:
     return tuple(term for term in TERMS.values() if any(term.act_at(site, KIND) for site in SITES))
 
 
-def source(code: Mechanics | None = None) -> str:
-    """The module's text; of machines with mechanics from a file it imports their integration by the file's hash."""
+def source(code: Mechanics | None = None, closed: bool = False) -> str:
+    """The module's text; of machines with mechanics from a file it imports their integration by the file's hash.
+
+    `closed`: with the loop closed by a law, else as fits simulate.
+    """
     known = terms()
     modules = {t.build.__module__ for t in known}
-    run = RUN.replace("{advance}", "linear.advance(m)")
+    steps = STEPS.replace("{advance}", "linear.advance(m)")
     if code is not None:
         modules.add(code.steps.__name__)
-        run = RUN.replace("{advance}", f"{code.steps.__name__}.advance(p, m)")
-    imports = "\n".join(generate.imported(m) for m in sorted(modules))
-    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), run]
+        steps = STEPS.replace("{advance}", f"{code.steps.__name__}.advance(p, m)")
+    imports = "\n".join(generate.imported(m) for m in sorted(modules | (LAWS if closed else set())))
+    run = LOOP if closed else RUN
+    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), steps, run]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
 
 
@@ -243,30 +316,39 @@ def _site(site: str, known: tuple[Term, ...]) -> str:
     return "\n".join(lines)
 
 
-def sources_hash() -> str:
+def sources_hash(closed: bool = False) -> str:
     """Hash over the sources that the kernel is compiled from."""
     import rtctl
     import rtctl.plants
 
     root, plants = Path(rtctl.__file__).parent, Path(next(iter(rtctl.plants.__path__)))
+    laws = [root / "diagnose" / "law.py", *sorted(root.glob("laws/*.py"))] if closed else []
     return hash_of([root / "idiom.py", plants / "linear.py", *sorted(plants.glob("graph/*.py")),
-                    *sorted(plants.glob("physics/*.py"))])  # fmt: skip
+                    *sorted(plants.glob("physics/*.py")), *laws])  # fmt: skip
 
 
 @cache
 def kernel(code: Mechanics | None = None) -> Kernel:
     """The kernel of all machines, or of those with the mechanics of a file; compiled, or taken from the cache."""
     known = terms()
-    path = generate.write_text(
-        "fit_graph" if code is None else f"fit_{code.name.lower()}", source(code), sources_hash()
-    )
     params = [(field(t.name), record_dtype(sample(t))) for t in known]
     states = [(field(t.name), t.state) for t in known if t.state is not None]
     whole = ("kind", "node", "link", "channel", "other")
     head = [*((name, np.int64) for name in whole), ("factor", np.float64)]
     slot = np.dtype(head + params, align=True)
     slots = state(q=(slot, SLOTS), z=(np.dtype([*states, ("spare", np.float64)], align=True), SLOTS))
-    return Kernel(generate.load(path), tuple(t.name for t in known), slot, slots)
+    return Kernel(_module("fit", code), tuple(t.name for t in known), slot, slots)
+
+
+@cache
+def closed_loop(code: Mechanics | None = None) -> ModuleType:
+    """The compiled simulation of the same with the loop closed by a law."""
+    return _module("loop", code, True)
+
+
+def _module(head: str, code: Mechanics | None, closed: bool = False) -> ModuleType:
+    name = f"{head}_graph" if code is None else f"{head}_{code.name.lower()}"
+    return generate.load(generate.write_text(name, source(code, closed), sources_hash(closed)))
 
 
 def fill_slot(kern: Kernel, slot: Any, settings: Any, place: Any, h: float) -> None:

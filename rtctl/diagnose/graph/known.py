@@ -11,9 +11,10 @@ import numpy as np
 
 from rtctl.diagnose.case import Case
 from rtctl.diagnose.graph.case import GraphCase
+from rtctl.diagnose.graph.model import GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.law_params import per_unit
-from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import resolution
@@ -42,7 +43,23 @@ def graph_record(record: Record) -> GraphRecord:
         counter = sensor.counts_per_unit is not None
         y[name] = (np.asarray(values, float) + (MIDDLE if counter else 0.0)) / sensor.scale
         grain[name] = abs(sensor.grain / sensor.scale)
-    return GraphRecord(case, record.t, record.dt, record.ref, record.w, record.u, y, grain, None, edges)
+    return GraphRecord(case, record.t, record.dt, record.ref, record.w, record.u, y, grain, None, edges, source=record)
+
+
+def known_model(model: GraphModel, record: GraphRecord) -> Model:
+    """A model of a machine of format 1 by the symbols of that format, as `rtctl simulate` and a config have it."""
+    source = record.source
+    assert source is not None
+    values = own(model.base, record.name)
+    owner = owner_model(source.case, source)
+    found = {symbol: values[paths[0]] for symbol, paths in record.case.machine.symbols.items() if symbol in owner.base}
+    kept = {symbol: owner.base[symbol] if same(value, owner.base[symbol]) else value for symbol, value in found.items()}
+    return owner.change(**kept).add(*model._replace(base=values).resolved().terms)
+
+
+def same(one: float, other: float) -> bool:
+    """Whether two values differ by rounding alone."""
+    return abs(one - other) <= 1e-12 * max(abs(one), abs(other))
 
 
 def graph_case(record: Record) -> GraphCase:

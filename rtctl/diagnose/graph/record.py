@@ -9,7 +9,8 @@ from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.columns import unwrap
 from rtctl.diagnose.graph.case import HELD_PROBLEMS, GraphCase, read_case
 from rtctl.diagnose.graph.kinematic import followed
-from rtctl.diagnose.graph.model import rigid
+from rtctl.diagnose.graph.model import GraphModel, rigid
+from rtctl.diagnose.record import Record
 from rtctl.trace.bundle import PARQUET, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
@@ -33,6 +34,7 @@ class GraphRecord(NamedTuple):
     positions: dict[str, np.ndarray] = {}  # body -> (n,) measured inputs, rad or m  # noqa: RUF012
     name: str = ""  # of the recording, where there are several of one machine
     scales: tuple[float, float, float] = (1.0, 1.0, 0.0)  # of a first position, a first speed, and a guess of the speed
+    source: Record | None = None  # the record of exchange format 1 that it was made of
 
     @property
     def main(self) -> str:
@@ -134,16 +136,20 @@ def _on(path: Path, columns: dict[str, np.ndarray], drive: Any) -> np.ndarray | 
 
 def _made(case: GraphCase, u: np.ndarray, main: str) -> dict[str, np.ndarray]:
     """Force (n,) that the drives were measured to make, N or Nm at the main body's, under the first drive's name."""
-    drives = list(case.machine.drives.items())
-    if not drives:
-        return {}
-    total, moved = np.zeros(len(u)), rigid(case.layout, case.values, main)
-    for number, (name, drive) in enumerate(drives):
+    at = levers(GraphModel(case.layout, case.values), main)
+    return {next(iter(at)): u @ np.array(list(at.values()))} if at else {}
+
+
+def levers(model: GraphModel, main: str) -> dict[str, float]:
+    """Force of each drive at the body `main` for one unit of its command, N or Nm, joints taken as rigid."""
+    machine, values, moved = model.layout.machine, model.base, rigid(model.layout, model.base, main)
+    out = {}
+    for name, drive in machine.drives.items():
         path = f"drives.{name}"
-        gain = case.values[f"{path}.gain"] * case.values.get(f"{path}.torque_constant", 1.0)
-        body = drive.body if drive.body is not None else case.machine.joints[str(drive.joint)].to
-        total += gain / case.values.get(f"{path}.resistance", 1.0) * moved.get(body, 0.0) * u[:, number]
-    return {drives[0][0]: total}
+        gain = values[f"{path}.gain"] * values.get(f"{path}.torque_constant", 1.0)
+        body = drive.body if drive.body is not None else machine.joints[str(drive.joint)].to
+        out[name] = gain / values.get(f"{path}.resistance", 1.0) * moved.get(body, 0.0)
+    return out
 
 
 def _check_problem(path: Path, record: GraphRecord) -> None:

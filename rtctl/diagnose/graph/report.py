@@ -1,7 +1,7 @@
 """Report of a diagnosis of a described machine: one HTML file that needs nothing else, and a table for the terminal."""
 
 from collections import defaultdict
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from rtctl.diagnose import numbers
+from rtctl.diagnose import numbers, played
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Interval
 from rtctl.diagnose.graph import figures, words
 from rtctl.diagnose.graph.answer import GraphDiagnosis
@@ -173,7 +173,29 @@ def rival_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
 
 
 def instead(d: GraphDiagnosis) -> list[str]:
-    """What to record next where this recording gives no name, a sentence each."""
+    """What to record next where this recording leaves several answers, a sentence each."""
+    if d.experiment is not None:
+        return run_next(d.experiment)
+    return [*([d.planned.untold] if d.planned.untold else []), *without_motion(d)]
+
+
+def run_next(experiment: dict[str, Any]) -> list[str]:
+    """What an experiment does, what it tells, how it is run, and how far each motion that was tried gets."""
+    why, seconds = experiment["why"], float(experiment["seconds"])
+    tried = sorted(why["distance"].items(), key=lambda item: -item[1])
+    far = "; ".join(f"{name.replace('_', ' ')} {value:.2g}" for name, value in tried)
+    return [
+        experiment["words"],
+        why["words"],
+        f"Put the machine where the recording began{played.room(experiment)}, run "
+        f"`{played.command(seconds)}` and diagnose both recordings together.",
+        f"Expected distance between the rivals by motion, over the noise: {far}.",
+        *(f"{name.replace('_', ' ')}: left out, {reason}." for name, reason in why["refused"].items()),
+    ]
+
+
+def without_motion(d: GraphDiagnosis) -> list[str]:
+    """The same where no motion was planned."""
     if d.verdict == AMBIGUOUS:
         names = list(dict.fromkeys(e.name for e in d.effects))
         pairs = [(a, b) for a in names for b in names if b in TERMS[a].look_alikes]

@@ -55,12 +55,25 @@ class Followed(NamedTuple):
         return FOLLOW_SPEED if self.shows_speed else FOLLOW
 
 
+class Ready(NamedTuple):
+    """A model at the first row of a recording."""
+
+    model: GraphModel  # with the numbers of the recording
+    params: Any
+    job: np.ndarray
+    p: np.ndarray
+    states: np.ndarray
+    slots: np.ndarray
+    offsets: np.ndarray  # (followed,) positions where their columns show 0, rad or m
+
+
 class Simulator:
     """A recording, ready to be simulated by models; one call is one run, and calls may go on in several threads."""
 
     def __init__(self, record: GraphRecord, follow: float | None = None):
         self.record, self.case = record, record.case
-        self.kernel = kernel.kernel(code_of(record.case.machine))
+        self.code = code_of(record.case.machine)
+        self.kernel = kernel.kernel(self.code)
         self.layout = record.case.layout
         self.elements = elements(self.layout)
         self.main = record.main
@@ -219,10 +232,37 @@ class Simulator:
         self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings, and the corrections (n, followed), in N or Nm at the body of each followed sensor."""
+        record, ready = self.record, self.ready(model, mode, coarse)
+        model, job, offsets = ready.model, ready.job, ready.offsets
+        n = len(self.seen) if n is None else n
+        seen = np.ascontiguousarray(self.watched[:n] + offsets)
+        path, pace = self.path_of(job, model, ready.params, float(offsets[0]))
+        out, push = np.full((n, ready.params.ny), np.nan), np.zeros((n, len(self.followed)))
+        static = self.case.problem == "static"  # forces were measured: the commands that made them do not count
+        done = self.kernel.module.run(
+            job, ready.p, ready.states, ready.slots, (np.zeros_like if static else np.asarray)(self.volts[:n]),
+            self.pushing(model)[:n], seen, path[:n], pace[:n], out, push,
+        )  # fmt: skip
+        out[max(done, 0) :] = np.nan
+        self.counted(out, offsets)
+        if static:  # what the drives would have to make, as their nominal gain tells it
+            name = next((c for c in self.channels if c not in self.layout.sensors), "")
+            made, share = (record.y[name][:n], self._told(name, model)) if name else (np.zeros(n), 1.0)
+            out = np.column_stack([out, push[:, 0] * share])
+            push[:, 0] -= made / share
+        return out, push
+
+    def counted(self, out: np.ndarray, offsets: np.ndarray) -> None:
+        """Let the readings (n, sensors) of followed sensors count from where their columns show 0."""
+        for one, offset in zip(self.followed, offsets, strict=True):
+            if offset:
+                out[:, self.layout.sensors[one.sensor]] -= offset
+
+    def ready(self, model: GraphModel, mode: int | None = None, coarse: bool = False) -> "Ready":
+        """The records that one run of a model takes, at the first row. Raises UserError for too many terms."""
         record, k = self.record, self.kernel
         mode = self.mode if mode is None else mode
         model = self.own(model).resolved().built()
-        n = len(self.seen) if n is None else n
         stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
         substeps = self.substeps * (2 if stiff else 1)
         coarse = coarse and not any(TERMS[str(getattr(t, "term", ""))].slips for t in model.terms)  # a matter of ticks
@@ -244,25 +284,8 @@ class Simulator:
         job = self._job(model, params, mode, substeps, stride)
         states = np.zeros(1, GRAPH_STATE)
         offsets = np.array([start_of(self, one, model.base) for one in self.followed])
-        seen = np.ascontiguousarray(self.watched[:n] + offsets)
-        self._begin(states, model, seen[0])
-        path, pace = self._held(job, model, params, float(offsets[0]))
-        out, push = np.full((n, params.ny), np.nan), np.zeros((n, len(self.followed)))
-        static = self.case.problem == "static"  # forces were measured: the commands that made them do not count
-        done = k.module.run(
-            job, p, states, slots, (np.zeros_like if static else np.asarray)(self.volts[:n]), self._pushing(model)[:n],
-            seen, path[:n], pace[:n], out, push,
-        )  # fmt: skip
-        out[max(done, 0) :] = np.nan
-        for one, offset in zip(self.followed, offsets, strict=True):
-            if offset:
-                out[:, self.layout.sensors[one.sensor]] -= offset
-        if static:  # what the drives would have to make, as their nominal gain tells it
-            name = next((c for c in self.channels if c not in self.layout.sensors), "")
-            made, share = (record.y[name][:n], self._told(name, model)) if name else (np.zeros(n), 1.0)
-            out = np.column_stack([out, push[:, 0] * share])
-            push[:, 0] -= made / share
-        return out, push
+        self._begin(states, model, self.watched[0] + offsets)
+        return Ready(model, params, job, p, states, slots, offsets)
 
     def _told(self, drive: str, model: GraphModel) -> float:
         """Force of a drive by its nominal gain over that by the model's."""
@@ -271,7 +294,7 @@ class Simulator:
                  for v in (one, two)]  # fmt: skip
         return gains[0] / gains[1]
 
-    def _held(self, job: np.ndarray, model: GraphModel, params: Any, start: float) -> tuple[np.ndarray, np.ndarray]:
+    def path_of(self, job: np.ndarray, model: GraphModel, params: Any, start: float) -> tuple[np.ndarray, np.ndarray]:
         """Positions and speeds (n, coordinates) of what moves as recorded; the job is told which."""
         moved = list(self.inputs)
         if job["mode"][0] == HELD:
@@ -288,7 +311,7 @@ class Simulator:
             job["share"][0, at] = 1.0 / ratio if one is moved[-1] else 0.0
         return path, pace
 
-    def _pushing(self, model: GraphModel) -> np.ndarray:
+    def pushing(self, model: GraphModel) -> np.ndarray:
         """Forces by the coordinates of a model that may have more of them than the description."""
         if len(self.forces) < 2 or model.layout is self.layout:
             return self.forces

@@ -53,7 +53,11 @@ def verdict(found: Found) -> Verdict:
         return answer(UNNAMED, beside, why)
     share = explained(found.base, best)
     if share < MOSTLY:
-        return answer(UNNAMED, best, f"{', '.join(best.names)} takes off {100 * share:.0f} % of what is missing")
+        bare = max((r for r in table if not r.fit.names), key=lambda r: r.merit)
+        why = f"{', '.join(best.names)} takes off {100 * share:.0f} % of what is missing"
+        if bare.unlisted:
+            return answer(UNNAMED, best, why)
+        return answer(NOTHING, found.base, f"{why}, and the rest is as noise of the sensors leaves it")
     confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS

@@ -4,11 +4,15 @@ import numpy as np
 import pytest
 
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.graph.known import graph_record
+from rtctl.diagnose.export import read_model, write_model
+from rtctl.diagnose.graph.known import graph_record, known_model
+from rtctl.diagnose.graph.loop import loop_of
 from rtctl.diagnose.graph.model import nominal, rigid
 from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import check
 from rtctl.diagnose.space import Space
+from rtctl.plants.physics import TERMS
 
 RATE, N = 500.0, 1200
 CASE = {
@@ -76,3 +80,27 @@ def test_edges_without_direction_are_told_by_the_model_that_follows_the_capstan(
     for name, ratio in (("reel1", 0.0125 / 0.036), ("reel2", -0.0125 / 0.024)):
         off = told.record.y[name] - ratio * record.y["encoder"]
         assert np.ptp(off) < 2.5 * told.record.grain[name]  # a count from edge to edge, and the first edge's place
+
+
+def test_a_model_is_told_by_the_symbols_of_the_format(tmp_path):
+    record = known()
+    source, path = record.source, "joints.tape1.stiffness"
+    model = Space(nominal(record.case), (path,), record.case.tolerance).model(np.array([0.1]))
+    term = TERMS["friction.coulomb"].settings(term="friction.coulomb", node="motor1", F_C=1e-3)
+    found = known_model(model.add(term), record)
+    owner = owner_model(source.case, source)
+    assert found.base == owner.base | {"c1": pytest.approx(500.0 * np.exp(0.1))}
+    assert found.terms == (term,)
+    file = write_model(found, source, tmp_path / "model.yaml")
+    again = read_model(file, source)
+    assert again.base["c1"] == pytest.approx(500.0 * np.exp(0.1), rel=1e-5)
+    assert again.terms[0].F_C == 1e-3
+
+
+def test_without_a_known_law_a_slow_one_stands_in():
+    record = known()
+    at = loop_of(record)
+    assert not at.known
+    assert at.sensor == "encoder"
+    assert at.give[0, 0] == -at.give[1, 0] == pytest.approx(0.5)  # one motor pulls either way
+    assert at.beside == pytest.approx(np.median(record.u, axis=0))
