@@ -11,7 +11,7 @@ from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect,
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.graph.experiment import Planned, left, planned
-from rtctl.diagnose.graph.fits import Fitted, refit
+from rtctl.diagnose.graph.fits import Fitted, prior, refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
@@ -24,6 +24,7 @@ from rtctl.trace.bundle import load_case
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
 Z90 = 1.645
+COUNTED = 700.0  # innovations that count for an interval at most: an error of a law moves its numbers more than noise
 
 
 class GraphDiagnosis(NamedTuple):
@@ -204,7 +205,9 @@ def _effects(decided: Verdict) -> tuple[Effect, ...]:
 
 def _spread(f: Fitted) -> np.ndarray:
     """Half width of the 90 % interval of each unknown."""
-    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(f.information)), 0.0)))
+    power = COUNTED / (COUNTED + f.like.size)
+    H = power * f.A + np.diag(prior(f.space))
+    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(H)), 0.0)))
 
 
 def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:

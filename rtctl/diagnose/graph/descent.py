@@ -3,7 +3,7 @@
 Derivatives are those of the residuals themselves, (blocks, sensors, unknowns): whatever noise a fit goes on under, they
 stay what they are, so that a fit goes on from those of the model that it extends. Between difference quotients
 Broyden's formula keeps them up to date. Where a step keeps less than it promised, the columns of the effects are taken
-anew first, then all that matter.
+anew first, then all.
 
 Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10; Broyden, Math. Comp. 19 (1965).
 """
@@ -16,13 +16,20 @@ import numpy as np
 
 from rtctl.diagnose.fit import bounded_step, parallel, trust
 from rtctl.diagnose.graph.likelihood import Likelihood
-from rtctl.diagnose.space import Space
+from rtctl.diagnose.space import WIDE, Space
 
-IDLE = 0.02  # standard deviations that a parameter moves over its whole tolerance: less needs no new derivative
+UNKNOWN = WIDE / 2  # standard deviation, in logarithm, of a parameter of which the owner says nothing
 HONEST = 0.3  # share of the promised gain that a step must keep
 SMALLEST = 1e-9  # step of an unknown
 STALE, EFFECTS, ALL = range(3)  # what of the derivatives was taken since the last step
 TRIES = {STALE: 3, EFFECTS: 3, ALL: 12}  # dampings
+
+
+def weights(space: Space) -> np.ndarray:
+    """Precision (unknowns,) of the prior in a fit: the owner's tolerances, and a weak one of what the owner does not
+    know, so that it does not stray where the recording does not tell it either; 0 of the effects."""
+    known = space.prior()
+    return np.asarray(np.where((known > 0.0) | (np.arange(len(known)) >= space.nb), known, 1.0 / UNKNOWN**2))
 
 
 class Point(NamedTuple):
@@ -66,7 +73,7 @@ class Descent:
 
     def _weigh(self) -> None:
         self.r = self.like.white(self.e)
-        self.weight = self.space.prior() * trust(self.r, self.like.together)
+        self.weight = weights(self.space) * trust(self.r, self.like.together)
         self.cost = self._cost(self.r, self.x)
 
     def _whiten(self) -> None:
@@ -74,18 +81,13 @@ class Descent:
         self.A = self.W.T @ self.W
 
     def _cost(self, r: np.ndarray, x: np.ndarray) -> float:
-        weight = self.space.prior() * trust(r, self.like.together)
+        weight = weights(self.space) * trust(r, self.like.together)
         return 0.5 * float(r @ r) + 0.5 * float(weight @ x**2)
 
     def renew(self, columns: Sequence[int]) -> None:
         """Take the derivatives in some columns anew."""
         derivatives(self.like, self.space, self.x, columns, self.J)
         self._whiten()
-
-    def mattering(self) -> list[int]:
-        """Columns of the effects, and of the parameters that move the residuals."""
-        moved = np.linalg.norm(self.W[:, : self.space.nb], axis=0) * self.space.reach()
-        return [*np.flatnonzero(moved > IDLE * np.sqrt(len(self.W))), *self.effects()]
 
     def effects(self) -> list[int]:
         """Columns of the effects."""
@@ -139,5 +141,5 @@ def descend(like: Likelihood, space: Space, at: Point, rounds: int, enough: floa
             fresh = STALE
             continue
         fresh = min(fresh + 1 if space.hypotheses else ALL, freshest)
-        now.renew(now.effects() if fresh == EFFECTS else now.mattering())
+        now.renew(now.effects() if fresh == EFFECTS else range(len(now.x)))
     return Point(now.x, now.e, now.J, fresh)

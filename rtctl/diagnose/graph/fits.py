@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.graph.descent import ALL, EFFECTS, Point, derivatives, descend
+from rtctl.diagnose.graph.descent import ALL, EFFECTS, Point, derivatives, descend, weights
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.space import COSINE, INVERSE, REST, SINE, SIZE, Space
@@ -20,6 +20,8 @@ from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
 ENOUGH = 2.0  # nats, that a further round must gain
+LOOSE = (3.0, 30.0, 300.0)  # times the curvature of the prior, below which a recording may say nothing
+MATTERS = 0.5  # nats of the prior that going back must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
 COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
@@ -65,17 +67,15 @@ class Fitted(NamedTuple):
     @property
     def log_evidence(self) -> float:
         """Logarithm of the evidence, nats, up to a constant that all models of the record share."""
-        weight, H = prior(self.space), self.information
-        keep = weight > 0.0
-        _, volume = np.linalg.slogdet(H[np.ix_(keep, keep)])
-        volume -= float(np.sum(np.log(weight[keep])))
+        weight = prior(self.space)
+        volume = float(np.linalg.slogdet(self.information)[1]) - float(np.sum(np.log(weight)))
         fitness = -self.power * self.loss - 0.5 * float(weight @ self.x**2)
         return fitness - 0.5 * float(volume)
 
 
 def prior(space: Space) -> np.ndarray:
     """Precision of the prior of each unknown: the owner's tolerance, and a typical size of each effect."""
-    out = list(space.prior()[: space.nb])
+    out = list(weights(space)[: space.nb])
     for h in space.hypotheses:
         for c in h.coordinates:
             width = 1.0 if np.isinf(c.high) or np.isinf(c.low) else max(0.3 * (c.high - c.low), 1e-3)
@@ -121,10 +121,38 @@ def refit(
         gain = best[0] - found[0]
         if gain > 0.0:
             best = found
+        else:  # derivatives that were taken later
+            best = best[0], best[1]._replace(J=found[1].J), best[2]
         if gain < ENOUGH:
             break
     loss, at, own = best
-    return _fitted(own, space, at, loss)
+    return relaxed(_fitted(own, space, at, loss))
+
+
+def relaxed(f: Fitted) -> Fitted:
+    """The model with what the recording does not tell back where the owner put it, as far as that costs nothing.
+
+    Difference quotients of a machine with dry friction are not exact: directions along which the recording says
+    nothing, as that of all forces and inertias together, look as if it said a little, and a fit that strayed along them
+    does not find back.
+    """
+    weight, best = prior(f.space), f
+    root = np.sqrt(weight)
+    values, vectors = np.linalg.eigh(f.power * f.A / np.outer(root, root))
+    for loose in LOOSE:
+        idle = vectors[:, values < loose]
+        z = f.x * root
+        x = (z - idle @ (idle.T @ z)) / root
+        gained = 0.5 * float(weight @ (f.x**2 - x**2))
+        if gained < MATTERS:
+            continue
+        x = np.clip(x, *f.space.bounds())
+        e = f.like.raw(f.space.model(x))
+        at = descend(f.like.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
+        trial = _fitted(f.like.told(at.e), f.space, at, f.like.loss(at.e))
+        if trial.log_evidence > best.log_evidence:
+            best = trial
+    return best
 
 
 def _fitted(own: Likelihood, space: Space, at: Point, loss: float) -> Fitted:

@@ -51,8 +51,8 @@ def test_lost_motion_of_a_joint_that_is_rigid_in_the_description():
 def test_an_uneven_lead():
     d = found("ratio")  # two positions do not tell whether the lead is uneven or the scale is
     assert d.verdict == AMBIGUOUS
-    assert [(e.name, e.node) for e in d.effects] == [("ripple.ratio", "nut"), ("ripple.encoder", "glass")]
-    assert d.effects[0].parameters["A"].value == pytest.approx(2e-5, rel=0.1)
+    assert {(e.name, e.node) for e in d.effects} == {("ripple.ratio", "nut"), ("ripple.encoder", "glass")}
+    assert d.effects[0].parameters["A"].value == pytest.approx(2e-5, rel=0.1)  # m, of either
 
 
 def test_values_that_the_program_took_are_not_told():
