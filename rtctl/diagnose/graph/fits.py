@@ -20,7 +20,7 @@ from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
 ENOUGH = 2.0  # nats, that a further round must gain
-LOOSE = (3.0, 30.0, 300.0)  # times the curvature of the prior, below which a recording may say nothing
+LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a recording may say nothing
 MATTERS = 0.5  # nats of the prior that going back must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
@@ -136,7 +136,7 @@ def relaxed(f: Fitted) -> Fitted:
     nothing, as that of all forces and inertias together, look as if it said a little, and a fit that strayed along them
     does not find back.
     """
-    weight, best = prior(f.space), f
+    weight = prior(f.space)
     root = np.sqrt(weight)
     values, vectors = np.linalg.eigh(f.power * f.A / np.outer(root, root))
     for loose in LOOSE:
@@ -150,9 +150,9 @@ def relaxed(f: Fitted) -> Fitted:
         e = f.like.raw(f.space.model(x))
         at = descend(f.like.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
         trial = _fitted(f.like.told(at.e), f.space, at, f.like.loss(at.e))
-        if trial.log_evidence > best.log_evidence:
-            best = trial
-    return best
+        if trial.log_evidence > f.log_evidence:
+            return trial
+    return f
 
 
 def _fitted(own: Likelihood, space: Space, at: Point, loss: float) -> Fitted:
