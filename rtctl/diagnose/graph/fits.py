@@ -24,6 +24,7 @@ LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a re
 MATTERS = 0.5  # nats of the prior that going back must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
+INEXACT = 0.05  # of the amplitude of what a law does: standard deviation of its error
 COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 
 
@@ -57,7 +58,7 @@ class Fitted(NamedTuple):
     @property
     def power(self) -> float:
         """Share of the likelihood that counts."""
-        return COARSE / (COARSE + self.like.size)
+        return self.like.exact * COARSE / (COARSE + self.like.size)
 
     @property
     def information(self) -> np.ndarray:
@@ -166,14 +167,31 @@ def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
     return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
 
 
+def exactness(base: Fitted, best: Fitted) -> float:
+    """Share of the likelihood that counts, where the best model changes so much that its laws may be wrong by more
+    than noise.
+
+    The error of a law is a share of what it does. It adds to the variance of the noise.
+    """
+    noise = np.maximum(*quiet(best))
+    change = np.sqrt(np.mean((base.e - best.e) ** 2, axis=0))
+    return float(1.0 / (1.0 + np.max(INEXACT * change / noise) ** 2))
+
+
+def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:
+    """Noise (sensors,) of counting, and of what differs from one block to the next without a pattern, SI."""
+    restless = np.std(np.diff(f.e, axis=0), axis=0) / np.sqrt(2.0)
+    return f.like.least * np.sqrt(f.like.mean), restless
+
+
 def explained(base: Fitted, best: Fitted) -> float:
     """Share of the power of the residual, above the noise of the sensor, that the best model takes off.
 
     Noise is what counting leaves, and what differs from one block to the next without a pattern. The sensor in which
     most is missing counts.
     """
-    restless = np.std(np.diff(best.e, axis=0), axis=0) / np.sqrt(2.0)
-    least = np.maximum(FLOOR * base.like.least * np.sqrt(base.like.mean), RESTLESS * restless)
+    level, restless = quiet(best)
+    least = np.maximum(FLOOR * level, RESTLESS * restless)
     before = np.sqrt(np.mean(base.e**2, axis=0))
     after = np.sqrt(np.mean(best.e**2, axis=0))
     c = int(np.argmax(before / least))

@@ -29,6 +29,7 @@ class Likelihood:
     """A recording, its noise and the rows that count."""
 
     together = 1.0  # errors that count as one in the weight of the prior (rtctl.diagnose.fit)
+    exact = 1.0  # share of it that counts, for what the laws of large effects are wrong by
 
     def __init__(self, sim: Simulator, noise: Sequence[Noise] | None = None, rows: tuple[int, int] | None = None):
         self.sim = sim
@@ -132,6 +133,12 @@ class Likelihood:
             Noise(np.ones(1), max(float(np.std(e[self.present(c), c])), float(self.least[c])))
             for c in range(e.shape[1])
         ]
+        return other
+
+    def trusted(self, exact: float) -> "Likelihood":
+        """The same of which a share counts."""
+        other = copy(self)
+        other.exact = exact
         return other
 
     def loss(self, e: np.ndarray) -> float:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
-from rtctl.diagnose.graph.fits import Fitted, explained, refit, without
+from rtctl.diagnose.graph.fits import INEXACT, Fitted, exactness, explained, refit, without
 from rtctl.diagnose.graph.hypotheses import combined, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened, screen
@@ -28,7 +28,6 @@ BEAM = 2
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
-FORM = 0.05  # of the amplitude that the effects before it took off, which a further one must take off: no law is exact
 FAR = 30.0  # nats behind the best at which a combination is dropped
 
 Progress = Callable[[str], None]
@@ -67,6 +66,10 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         if again is base:
             break
         base = again
+    share = exactness(base, min((base, *grown), key=lambda f: f.loss))
+    like = like.trusted(share)
+    known = {names: f._replace(like=f.like.trusted(share)) for names, f in known.items()}
+    base, grown = known[()], [known[key(f.names)] for f in grown]
     merit = partial(merit_of, odds=odds)
     beam = [base]
     for level in range(MOST):
@@ -117,7 +120,7 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], fl
     """Whether a further effect is worth its numbers, and more than what the laws of the others may be wrong by."""
     if merit(more) < merit(fewer) + WORTH:
         return False
-    return not fewer.names or (explained(fewer, more) > PART and amplitude(base.e, fewer.e, more.e) > FORM)
+    return not fewer.names or (explained(fewer, more) > PART and amplitude(base.e, fewer.e, more.e) > INEXACT)
 
 
 def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
