@@ -11,7 +11,7 @@ from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect,
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.graph.experiment import Planned, left, planned
-from rtctl.diagnose.graph.fits import Fitted, prior, refit
+from rtctl.diagnose.graph.fits import Z90, Fitted, prior, refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
@@ -23,7 +23,6 @@ from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import load_case
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
-Z90 = 1.645
 COUNTED = 700.0  # innovations that count for an interval at most: an error of a law moves its numbers more than noise
 
 

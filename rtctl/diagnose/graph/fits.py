@@ -24,6 +24,7 @@ LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a re
 MATTERS = 0.5  # nats of the prior that going back must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
+Z90 = 1.645  # standard deviations of a 90 % interval, each way
 INEXACT = 0.05  # of the amplitude of what a law does: standard deviation of its error
 COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 
@@ -94,7 +95,7 @@ def refit(
     known: np.ndarray | None = None,
     floor: Likelihood | None = None,
     rounds: int = 10,
-    freshest: int = ALL,
+    relax: bool = True,
 ) -> Fitted:
     """The model of `space` from x: by least squares and under the noise `floor`, then under the noise that it left.
 
@@ -113,12 +114,12 @@ def refit(
     def judged(at: Point) -> tuple[float, Point, Likelihood]:
         return like.loss(at.e), at, like.told(at.e)
 
-    tried = [judged(descend(like.flat(e), space, start, rounds, 1e-2, min(freshest, EFFECTS)))]
+    tried = [judged(descend(like.flat(e), space, start, rounds, 1e-2, EFFECTS))]
     if floor is not None:
-        tried.append(judged(descend(floor, space, start, rounds, 1e-2, min(freshest, EFFECTS))))
+        tried.append(judged(descend(floor, space, start, rounds, 1e-2, EFFECTS)))
     best = min(tried, key=lambda one: one[0])
     for _ in range(ROUNDS):
-        found = judged(descend(best[2], space, best[1], rounds, 1e-3, freshest))
+        found = judged(descend(best[2], space, best[1], rounds, 1e-3))
         gain = best[0] - found[0]
         if gain > 0.0:
             best = found
@@ -127,7 +128,8 @@ def refit(
         if gain < ENOUGH:
             break
     loss, at, own = best
-    return relaxed(_fitted(own, space, at, loss))
+    found = _fitted(own, space, at, loss)
+    return relaxed(found) if relax else found
 
 
 def relaxed(f: Fitted) -> Fitted:
@@ -167,15 +169,25 @@ def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
     return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
 
 
+def solid(f: Fitted) -> bool:
+    """Whether each effect of a model has a size that is not zero, by its 90 % interval."""
+    half = Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(f.information)), 0.0))
+    for index, h in enumerate(f.space.hypotheses):
+        sizes = f.space.columns(index)[h.sizes]
+        if len(sizes) and (np.abs(f.x[sizes]) < half[sizes]).all():
+            return False
+    return True
+
+
 def exactness(base: Fitted, best: Fitted) -> float:
     """Share of the likelihood that counts, where the best model changes so much that its laws may be wrong by more
     than noise.
 
-    The error of a law is a share of what it does. It adds to the variance of the noise.
+    The error of a law is a share of what it does. It adds to the amplitude of the noise.
     """
     noise = np.maximum(*quiet(best))
     change = np.sqrt(np.mean((base.e - best.e) ** 2, axis=0))
-    return float(1.0 / (1.0 + np.max(INEXACT * change / noise) ** 2))
+    return float(1.0 / (1.0 + np.max(INEXACT * change / noise)))
 
 
 def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:

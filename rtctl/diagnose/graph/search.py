@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
-from rtctl.diagnose.graph.fits import INEXACT, Fitted, exactness, explained, refit, without
+from rtctl.diagnose.graph.fits import INEXACT, Fitted, exactness, explained, refit, relaxed, solid, without
 from rtctl.diagnose.graph.hypotheses import combined, hypotheses
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened, screen
@@ -132,9 +132,12 @@ def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
 
 
 def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]) -> bool:
-    """Whether every effect of a combination adds to the combination without it, as far as that was fitted."""
+    """Whether every effect of a combination has a size, and adds to the combination without it, as far as that was
+    fitted."""
     if not f.names:
         return True
+    if not solid(f):
+        return False
     if len(f.names) == 1:
         return merit(f) > merit(base) + ENOUGH
     rest = (key(set(f.names) - {name}) for name in f.names)
@@ -168,7 +171,7 @@ def step(
         names = key((*parent.names, scores[0].hypothesis.name))
         if names not in known:
             fits = [
-                refit(like, parent.space.add(s.hypothesis), x, parent.J, looked.floor)
+                refit(like, parent.space.add(s.hypothesis), x, parent.J, looked.floor, relax=False)
                 for s in scores[:starts]
                 for x in looked.starts(s, starts)
             ]
@@ -182,7 +185,9 @@ def step(
     out = list(firsts.values())
     for term in sorted(firsts, key=lambda term: -firsts[term].log_evidence)[:BEAM]:
         out += [refitted(scores, 1) for scores in list(top[term].values())[1 : 1 + OTHERS]]
-    return out
+    for f in sorted(out, key=lambda f: -f.log_evidence)[:FIRST]:
+        known[key(f.names)] = relaxed(f)
+    return [known[key(f.names)] for f in out]
 
 
 def key(names: Iterable[str]) -> tuple[str, ...]:
