@@ -128,8 +128,8 @@ def refit(
         if gain < ENOUGH:
             break
     loss, at, own = best
-    found = _fitted(own, space, at, loss)
-    return relaxed(found) if relax else found
+    model = _fitted(own, space, at, loss)
+    return relaxed(model) if relax else model
 
 
 def relaxed(f: Fitted) -> Fitted:
