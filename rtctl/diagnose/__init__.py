@@ -15,7 +15,8 @@
     the judgement     decide, chances, anylaw, plausible; uncertainty (intervals), heldout and release (prediction)
     the answer        diagnosis, words, numbers, figures, report, missing
                       shrink (to what predicts), export and carry (as a config)
-    what comes next   experiment, motions, ordinary, plan, played (which one to run); repair (record, diagnose, run it, again)
+    what comes next   experiment, motions, ordinary, plan, played (which one to run)
+                      repair (record, diagnose, run it, again)
     many, concealed   folder, results; conceal, seal
     described         engines (which one), graph (machines of bodies and joints: a package of its own)
 """
