@@ -26,6 +26,7 @@ FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to 
 RESTLESS = 1.2  # times what differs from block to block, the same
 Z90 = 1.645  # standard deviations of a 90 % interval, each way
 INEXACT = 0.05  # of the amplitude of what a law does: standard deviation of its error
+SURELY = 0.2  # share of it that counts however large the effects are
 COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 
 
@@ -187,7 +188,7 @@ def exactness(base: Fitted, best: Fitted) -> float:
     """
     noise = np.maximum(*quiet(best))
     change = np.sqrt(np.mean((base.e - best.e) ** 2, axis=0))
-    return float(1.0 / (1.0 + np.max(INEXACT * change / noise)))
+    return max(float(1.0 / (1.0 + np.max(INEXACT * change / noise))), SURELY)
 
 
 def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:
