@@ -77,7 +77,7 @@ class Descent:
         self.cost = self._cost(self.r, self.x)
 
     def _whiten(self) -> None:
-        self.W = self.like.filtered(self.J)
+        self.W = self.like.white(self.J)
         self.A = self.W.T @ self.W
 
     def _cost(self, r: np.ndarray, x: np.ndarray) -> float:

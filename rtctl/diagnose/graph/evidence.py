@@ -71,7 +71,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
             entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
             small = [f for f in free if f.share < SIZE]
             entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
-    losses = [base.power * found.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
+    losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
     return tuple(sorted(out, key=lambda r: -r.probability))

@@ -22,8 +22,8 @@ from rtctl.config.errors import NoAnswer
 from rtctl.diagnose.fit import bounded_step
 from rtctl.diagnose.graph import loop, words
 from rtctl.diagnose.graph.descent import derivatives
-from rtctl.diagnose.graph.fits import COARSE, Fitted
-from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.likelihood import COARSE, Likelihood
 from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.loop import Loop
 from rtctl.diagnose.graph.model import GraphModel

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.descent import ALL, EFFECTS, Point, derivatives, descend, weights
+from rtctl.diagnose.graph.inexact import errors
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.space import COSINE, INVERSE, REST, SINE, SIZE, Space
@@ -27,7 +28,6 @@ RESTLESS = 1.2  # times what differs from block to block, the same
 Z90 = 1.645  # standard deviations of a 90 % interval, each way
 INEXACT = 0.05  # of the amplitude of what a law does: standard deviation of its error
 SURELY = 0.2  # share of it that counts however large the effects are
-COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 
 
 class Fitted(NamedTuple):
@@ -60,7 +60,7 @@ class Fitted(NamedTuple):
     @property
     def power(self) -> float:
         """Share of the likelihood that counts."""
-        return self.like.exact * COARSE / (COARSE + self.like.size)
+        return self.like.power
 
     @property
     def information(self) -> np.ndarray:
@@ -113,12 +113,15 @@ def refit(
     start = Point(x, e, derivatives(like, space, x, range(count, len(x)), J), EFFECTS if count else ALL)
 
     def judged(at: Point) -> tuple[float, Point, Likelihood]:
-        return like.loss(at.e), at, like.told(at.e)
+        own = like.told(at.e)
+        return own.loss(at.e), at, own
 
     tried = [judged(descend(like.flat(e), space, start, rounds, 1e-2, EFFECTS))]
     if floor is not None:
         tried.append(judged(descend(floor, space, start, rounds, 1e-2, EFFECTS)))
-    best = min(tried, key=lambda one: one[0])
+    at = min(tried, key=lambda one: one[0])[1]
+    like = like.slackened(errors(like, space, at.x, at.e))
+    best = judged(at)
     for _ in range(ROUNDS):
         found = judged(descend(best[2], space, best[1], rounds, 1e-3))
         gain = best[0] - found[0]
@@ -128,8 +131,9 @@ def refit(
             best = best[0], best[1]._replace(J=found[1].J), best[2]
         if gain < ENOUGH:
             break
-    loss, at, own = best
-    model = _fitted(own, space, at, loss)
+    at = best[1]
+    like = like.slackened(errors(like, space, at.x, at.e))
+    model = _fitted(like.told(at.e), space, at)
     return relaxed(model) if relax else model
 
 
@@ -153,15 +157,15 @@ def relaxed(f: Fitted) -> Fitted:
         x = np.clip(x, *f.space.bounds())
         e = f.like.raw(f.space.model(x))
         at = descend(f.like.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
-        trial = _fitted(f.like.told(at.e), f.space, at, f.like.loss(at.e))
+        trial = _fitted(f.like.told(at.e), f.space, at)
         if trial.log_evidence > f.log_evidence:
             return trial
     return f
 
 
-def _fitted(own: Likelihood, space: Space, at: Point, loss: float) -> Fitted:
-    white = own.filtered(at.J)
-    return Fitted(space, at.x, at.e, at.J, white.T @ white, own, loss)
+def _fitted(own: Likelihood, space: Space, at: Point) -> Fitted:
+    white = own.white(at.J)
+    return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e))
 
 
 def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:

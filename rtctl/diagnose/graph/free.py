@@ -147,7 +147,7 @@ def _solved(about: Linear, C: np.ndarray) -> _Solved:
     base, noise = about.base, about.like
     r = noise.white(base.e)
     n, k = len(base.x), C.shape[2]
-    M = np.hstack([about.white, noise.filtered(C)])
+    M = np.hstack([about.white, noise.white(C)])
     weight = np.concatenate([about.weight, np.ones(k)])
     H = M.T @ M + np.diag(weight)
     x = np.concatenate([base.x, np.zeros(k)])

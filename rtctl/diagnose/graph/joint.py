@@ -48,13 +48,13 @@ class Joint(Likelihood):
         """Residuals (blocks of all recordings, sensors), SI."""
         return np.concatenate([part.raw(model, coarse) for part in self._parts])
 
-    def white(self, e: np.ndarray) -> np.ndarray:
-        """Innovations of residuals (blocks, sensors), recording after recording."""
-        return np.concatenate([part.white(own) for part, own in self._cut(e)])
+    def plain(self, e: np.ndarray) -> np.ndarray:
+        """Innovations of residuals (blocks, sensors, ...), recording after recording, where the laws are exact."""
+        return np.concatenate([part.plain(own) for part, own in self._cut(e)])
 
-    def told(self, e: np.ndarray) -> "Joint":
+    def noisy(self, e: np.ndarray) -> "Joint":
         """The same with the noise of these residuals (blocks, sensors)."""
-        return self._of([part.told(own) for part, own in self._cut(e)])
+        return self._of([part.noisy(own) for part, own in self._cut(e)])
 
     def flat(self, e: np.ndarray) -> "Joint":
         """The same with white noise as loud as these residuals (blocks, sensors) in each recording."""
@@ -67,19 +67,15 @@ class Joint(Likelihood):
             sim.channels = [name for name in sim.channels if all(name in other.channels for other in sims)]
         return Joint([Likelihood(sim) for sim in sims])
 
-    def losses(self, e: np.ndarray, count: int) -> np.ndarray:
-        """Losses by segment (count,), nats: each recording has a share of the segments."""
+    def parted(self, e: np.ndarray, count: int) -> np.ndarray:
+        """Losses where the laws are exact, by segment (count,), nats: each recording has a share of the segments."""
         cuts = self._cut(e)
         shares = np.cumsum([len(own) for _, own in cuts]) * count // sum(len(own) for _, own in cuts)
         sizes = np.maximum(np.diff([0, *shares]), 1)
-        found = np.concatenate([part.losses(own, int(n)) for (part, own), n in zip(cuts, sizes, strict=True)])
+        found = np.concatenate([part.parted(own, int(n)) for (part, own), n in zip(cuts, sizes, strict=True)])
         out = found[:count]
         out[-1] += found[count:].sum()
         return out
-
-    def filtered(self, columns: np.ndarray) -> np.ndarray:
-        """The same filters on many residuals at once (blocks, sensors, columns): (innovations, columns)."""
-        return np.concatenate([part.filtered(own) for part, own in self._cut(columns)])
 
     @property
     def size(self) -> int:
@@ -94,15 +90,16 @@ class Joint(Likelihood):
     def split(self, share: float) -> tuple["Joint", "Joint"]:
         """The same of the first rows of each recording, and of the last `share` of each."""
         halves = [part.split(share) for part in self._parts]
-        return self._of([one for one, _ in halves]), self._of([two for _, two in halves])
+        bare = self.slackened(None)
+        return bare._of([one for one, _ in halves]), bare._of([two for _, two in halves])
 
     def during(self, begin: int, end: int) -> "Joint":
         """The same of rows `begin` to `end` of each recording."""
-        return self._of([part.during(begin, min(end, part.rows[1])) for part in self._parts])
+        return self.slackened(None)._of([part.during(begin, min(end, part.rows[1])) for part in self._parts])
 
     def _of(self, parts: Sequence[Likelihood]) -> "Joint":
         other = copy(self)
-        other._parts = tuple(parts)
+        other._parts, other._slack = tuple(parts), None
         other.rows = parts[0].rows
         return other
 

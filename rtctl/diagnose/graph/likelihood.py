@@ -16,12 +16,14 @@ from rtctl.diagnose.edges import Edges
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.noise import Noise, noise_of
 from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.graph.slack import Slack
 
 RATE = 500.0  # 1/s, of the averaged residuals
 ORDER = 20  # of the autoregression
 FORGET = 8.0  # over the bandwidth of the observer: until the start is forgotten
 QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
 EDGE = 0.03  # of a step: the least that an edge leaves, whose tick is known
+COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 WILD = 1e6  # residual of a model that runs away, in steps of noise
 
 
@@ -30,6 +32,8 @@ class Likelihood:
 
     together = 1.0  # errors that count as one in the weight of the prior (rtctl.diagnose.fit)
     exact = 1.0  # share of it that counts, for what the laws of large effects are wrong by
+    errors: np.ndarray | None = None  # (blocks, sensors, columns) what the laws of a model may be wrong by
+    _slack: Slack | None = None  # the same under this noise
 
     def __init__(self, sim: Simulator, noise: Sequence[Noise] | None = None, rows: tuple[int, int] | None = None):
         self.sim = sim
@@ -110,16 +114,49 @@ class Likelihood:
         return Likelihood(self.sim.directed(model))
 
     def white(self, e: np.ndarray) -> np.ndarray:
-        """Innovations of residuals (blocks, sensors), sensor after sensor."""
+        """Innovations of residuals (blocks, sensors, ...), sensor after sensor, and the errors of laws beneath."""
+        return self.plain(e) if self.slack is None else self.slack.stacked(self.plain(e))
+
+    def plain(self, e: np.ndarray) -> np.ndarray:
+        """The same where the laws are exact."""
         return np.concatenate([noise.whiten(e[self.present(c), c]) for c, noise in enumerate(self.noise)])
+
+    @property
+    def slack(self) -> Slack | None:
+        """What the laws may be wrong by, under this noise."""
+        if self._slack is None and self.errors is not None:
+            self._slack = Slack(self.plain(self.errors), self.power)
+        return self._slack
+
+    def slackened(self, errors: np.ndarray | None) -> "Likelihood":
+        """The same where laws may be wrong by columns (blocks, sensors, columns) of standard deviation one."""
+        other = copy(self)
+        other.errors, other._slack = errors, None
+        return other
+
+    def left(self, e: np.ndarray) -> np.ndarray:
+        """What errors of the laws leave of residuals (blocks, sensors)."""
+        if self.slack is None or self.errors is None:
+            return e
+        return np.asarray(e + self.errors @ self.slack.size(self.plain(e)))
+
+    @property
+    def power(self) -> float:
+        """Share of it that counts."""
+        return self.exact * COARSE / (COARSE + self.size)
 
     def residual(self, model: GraphModel, coarse: bool = False, at: str = "") -> np.ndarray:
         """Innovations of a model, as a fit minimises them."""
         return self.white(self.raw(model, coarse))
 
     def told(self, e: np.ndarray) -> "Likelihood":
+        """The same with the noise of these residuals (blocks, sensors), less what errors of the laws explain."""
+        return self.noisy(self.left(e))
+
+    def noisy(self, e: np.ndarray) -> "Likelihood":
         """The same with the noise of these residuals (blocks, sensors)."""
         other = copy(self)
+        other._slack = None
         other.noise = [noise_of(e[self.present(c), c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
         return other
 
@@ -129,6 +166,7 @@ class Likelihood:
         An autoregression holds a large effect for noise, so that a fit under it moves by events alone.
         """
         other = copy(self)
+        other._slack = None
         other.noise = [
             Noise(np.ones(1), max(float(np.std(e[self.present(c), c])), float(self.least[c])))
             for c in range(e.shape[1])
@@ -138,7 +176,7 @@ class Likelihood:
     def trusted(self, exact: float) -> "Likelihood":
         """The same of which a share counts."""
         other = copy(self)
-        other.exact = exact
+        other.exact, other._slack = exact, None
         return other
 
     def loss(self, e: np.ndarray) -> float:
@@ -147,6 +185,14 @@ class Likelihood:
 
     def losses(self, e: np.ndarray, count: int) -> np.ndarray:
         """The same by segment of the rows (count,), nats: their sum is the loss."""
+        if self.slack is None or self.errors is None:
+            return self.parted(e, count)
+        a = self.slack.size(self.plain(e))
+        beneath = 0.5 * float(a @ a) / self.power + self.slack.volume
+        return self.parted(e + self.errors @ a, count) + beneath / count
+
+    def parted(self, e: np.ndarray, count: int) -> np.ndarray:
+        """The same where the laws are exact."""
         out = np.zeros(count)
         for c in range(e.shape[1]):
             shown = e[self.present(c), c]
@@ -155,10 +201,6 @@ class Likelihood:
             segment = np.arange(len(e))[self.present(c)][own.order :] * count // len(e)
             out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
         return out
-
-    def filtered(self, columns: np.ndarray) -> np.ndarray:
-        """The same filters on many residuals at once (blocks, sensors, columns): (innovations, columns)."""
-        return np.concatenate([noise.whiten(columns[self.present(c), c]) for c, noise in enumerate(self.noise)])
 
     @property
     def size(self) -> int:
@@ -186,7 +228,7 @@ class Likelihood:
 
     def during(self, begin: int, end: int) -> "Likelihood":
         """The same of rows `begin` to `end`."""
-        other = copy(self)
+        other = self.slackened(None)
         other.rows = (max(begin, self.rows[0]), end)
         return other
 

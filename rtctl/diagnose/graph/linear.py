@@ -35,7 +35,7 @@ class Linear:
     @cached_property
     def white(self) -> np.ndarray:
         """Derivatives of the innovations (innovations, unknowns)."""
-        return self.like.filtered(self.raw)
+        return self.like.white(self.raw)
 
     @cached_property
     def H(self) -> np.ndarray:

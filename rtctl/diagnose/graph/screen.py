@@ -144,7 +144,7 @@ def _score(
     base, like = about.base, about.like
     n, k = len(base.x), len(changes)
     C = np.stack([change / step for change, step in changes], axis=2)
-    white = like.filtered(C)
+    white = like.white(C)
     cross = about.white.T @ white
     own = white.T @ white
     full = np.block([[about.H, cross], [cross.T, own + np.eye(k) / 9.0]])
@@ -166,4 +166,4 @@ def _score(
     A = about.H
     alone = np.linalg.solve(A + 1e-9 * np.diag(np.diag(A)) + 1e-300 * np.eye(n), cross) if n else cross[:0]
     norm = float(np.sqrt(max(own[0, 0] - (cross[:, 0] @ alone[:, 0] if n else 0.0), 0.0)))
-    return Score(h, base.loss - like.loss(about.left(dx, C)), float(power), (at,), norm)
+    return Score(h, base.loss - base.like.loss(about.left(dx, C)), float(power), (at,), norm)
