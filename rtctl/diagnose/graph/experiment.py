@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -226,8 +226,3 @@ def called(machine: Description, rivals: Sequence[Fitted]) -> list[str]:
     parts = [[n for n in f.names if n not in common] for f in rivals]
     said = [" with ".join(words.called(machine, n) for n in part) or "no further effect" for part in parts]
     return said if len(set(said)) == len(said) else [" + ".join(f.names) for f in rivals]
-
-
-def as_dict(found: Planned) -> dict[str, Any] | None:
-    """As in diagnosis.json."""
-    return None if found.experiment is None else found.experiment.as_dict()
