@@ -19,6 +19,7 @@ from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import WIDE, Space
 
 UNKNOWN = WIDE / 2  # standard deviation, in logarithm, of a parameter of which the owner says nothing
+ALONE = 1.0  # innovations that count as one in the weight of the prior
 HONEST = 0.3  # share of the promised gain that a step must keep
 SMALLEST = 1e-9  # step of an unknown
 STALE, EFFECTS, ALL = range(3)  # what of the derivatives was taken since the last step
@@ -73,7 +74,7 @@ class Descent:
 
     def _weigh(self) -> None:
         self.r = self.like.white(self.e)
-        self.weight = weights(self.space) * trust(self.r, self.like.together)
+        self.weight = weights(self.space) * trust(self.r, ALONE)
         self.cost = self._cost(self.r, self.x)
 
     def _whiten(self) -> None:
@@ -81,7 +82,7 @@ class Descent:
         self.A = self.W.T @ self.W
 
     def _cost(self, r: np.ndarray, x: np.ndarray) -> float:
-        weight = weights(self.space) * trust(r, self.like.together)
+        weight = weights(self.space) * trust(r, ALONE)
         return 0.5 * float(r @ r) + 0.5 * float(weight @ x**2)
 
     def renew(self, columns: Sequence[int]) -> None:

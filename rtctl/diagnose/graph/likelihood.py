@@ -28,7 +28,6 @@ WILD = 1e6  # residual of a model that runs away, in steps of noise
 class Likelihood:
     """A recording, its noise and the rows that count."""
 
-    together = 1.0  # errors that count as one in the weight of the prior (rtctl.diagnose.fit)
     exact = 1.0  # share of it that counts, for what the laws of large effects are wrong by
 
     def __init__(self, sim: Simulator, noise: Sequence[Noise] | None = None, rows: tuple[int, int] | None = None):
@@ -112,10 +111,6 @@ class Likelihood:
     def white(self, e: np.ndarray) -> np.ndarray:
         """Innovations of residuals (blocks, sensors), sensor after sensor."""
         return np.concatenate([noise.whiten(e[self.present(c), c]) for c, noise in enumerate(self.noise)])
-
-    def residual(self, model: GraphModel, coarse: bool = False, at: str = "") -> np.ndarray:
-        """Innovations of a model, as a fit minimises them."""
-        return self.white(self.raw(model, coarse))
 
     def told(self, e: np.ndarray) -> "Likelihood":
         """The same with the noise of these residuals (blocks, sensors)."""

@@ -22,8 +22,6 @@ def problem():
 class Flat:
     """A problem that is linear: the residual is A x - b under white noise of one."""
 
-    together = 1.0
-
     def __init__(self, A, b):
         self.A, self.b, self.calls = A, b, 0
 
