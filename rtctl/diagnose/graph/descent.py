@@ -9,12 +9,11 @@ Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10; Broyden, Math. 
 """
 
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.fit import bounded_step, parallel, trust
+from rtctl.diagnose.fit import bounded_step, quotients, trust
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import WIDE, Space
 
@@ -47,17 +46,12 @@ def derivatives(
 ) -> np.ndarray:
     """Difference quotients (blocks, sensors, unknowns) in some columns, away from the upper bound; the others are those
     of `into`, or 0."""
-    high, steps = space.bounds()[1], space.steps()
+    if into is not None and not columns:
+        return into
     start = like.raw(space.model(x), True)
-
-    def column(i: int) -> np.ndarray:
-        step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
-        moved = x.copy()
-        moved[i] += step
-        return np.asarray((like.raw(space.model(moved), True) - start) / step)
-
     J = np.zeros((*start.shape, len(x)), np.float32) if into is None else into
-    for i, values in zip(columns, parallel([partial(column, i) for i in columns]), strict=True):
+    found = quotients(lambda model: like.raw(model, True), space, x, start, columns)
+    for i, values in zip(columns, found, strict=True):
         J[..., i] = values
     return J
 

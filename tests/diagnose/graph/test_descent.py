@@ -78,6 +78,13 @@ def test_least_squares_of_a_linear_problem():
     np.testing.assert_allclose(found.x, np.linalg.lstsq(like.A, like.b, rcond=None)[0], atol=1e-4)
 
 
+def test_no_columns_cost_no_simulation():
+    like, space, _ = linear()
+    J = np.ones((50, 1, 4), np.float32)
+    assert derivatives(like, space, np.zeros(4), [], J) is J
+    assert like.calls == 0
+
+
 def test_derivatives_that_are_wrong_are_learned_or_taken_anew():
     like, space, truth = linear()
     x = np.zeros(4)
