@@ -22,7 +22,7 @@ from rtctl.config.errors import NoAnswer
 from rtctl.diagnose.fit import bounded_step
 from rtctl.diagnose.graph import loop, words
 from rtctl.diagnose.graph.descent import derivatives
-from rtctl.diagnose.graph.fits import COARSE, Fitted
+from rtctl.diagnose.graph.fits import Fitted, coarsened
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.loop import Loop
@@ -101,7 +101,7 @@ def design(record: GraphRecord, rivals: Sequence[Fitted], best: Fitted) -> Exper
             refused[motion.name] = outcome.trouble
             continue
         motions[motion.name] = motion
-        power = COARSE / (COARSE + outcome.size)
+        power = coarsened(outcome.size)
         gain = {
             f"{labels[i]} / {labels[j]}": max(float(min(outcome.gains[i, j], outcome.gains[j, i])), 0.0)
             for i, j in combinations(range(len(rivals)), 2)
@@ -194,7 +194,7 @@ class Bench:
 
 def remaining(like: Likelihood, f: Fitted) -> float:
     """Half the sum of squares, nats, that a fitted model leaves of a recording once all its numbers suit that best."""
-    power = COARSE / (COARSE + like.size)
+    power = coarsened(like.size)
     J = derivatives(like, f.space, f.x, range(len(f.x)))
     linear = Linear(f._replace(like=like, e=like.raw(f.model), J=J))
     r, white, weight = like.white(linear.base.e), linear.white, linear.weight
