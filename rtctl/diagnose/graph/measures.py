@@ -11,6 +11,7 @@ from rtctl.plants.element import Element
 from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.elements import contacts
 from rtctl.plants.graph.layout import NOWHERE, Layout
+from rtctl.plants.graph.params import drive_gain
 from rtctl.plants.physics import TERMS
 
 SMOOTH = 5e-3  # s, over which a speed is taken
@@ -66,12 +67,9 @@ class Measures:
         total = np.zeros(len(self.u))
         for name, channel in self.layout.drives.items():
             drive = self.machine.drives[name]
-            path = f"drives.{name}"
-            gain = self.values[f"{path}.gain"] * self.values.get(f"{path}.torque_constant", 1.0)
-            gain /= self.values.get(f"{path}.resistance", 1.0)
             body = str(drive.body or self.machine.joints[str(drive.joint)].to)
             if self.leaders.get(body, 0) == number:
-                total += gain * self.ratios.get(body, 0.0) * self.u[:, channel]
+                total += drive_gain(self.values, name) * self.ratios.get(body, 0.0) * self.u[:, channel]
         found = float(np.sqrt(np.mean(total**2)))
         share = 0.1 if found > 0.0 or not number else 1.0  # what no drive moves, another body moves
         return max(found, share * self.inertia(self.sim.followed[number].body) * a, LITTLE)

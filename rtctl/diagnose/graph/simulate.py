@@ -26,7 +26,7 @@ from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.graph.elements import elements, spot
 from rtctl.plants.graph.layout import NOWHERE
 from rtctl.plants.graph.mechanics import code_of
-from rtctl.plants.graph.params import build
+from rtctl.plants.graph.params import build, drive_gain
 from rtctl.plants.graph.plant import GRAPH_STATE, state_space
 from rtctl.plants.physics import TERMS, ordered
 
@@ -289,10 +289,7 @@ class Simulator:
 
     def _told(self, drive: str, model: GraphModel) -> float:
         """Force of a drive by its nominal gain over that by the model's."""
-        path, one, two = f"drives.{drive}", self.case.values, model.base
-        gains = [v[f"{path}.gain"] * v.get(f"{path}.torque_constant", 1.0) / v.get(f"{path}.resistance", 1.0)
-                 for v in (one, two)]  # fmt: skip
-        return gains[0] / gains[1]
+        return drive_gain(self.case.values, drive) / drive_gain(model.base, drive)
 
     def path_of(self, job: np.ndarray, model: GraphModel, params: Any, start: float) -> tuple[np.ndarray, np.ndarray]:
         """Positions and speeds (n, coordinates) of what moves as recorded; the job is told which."""
