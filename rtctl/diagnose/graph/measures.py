@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rtctl.diagnose.graph.model import own
+from rtctl.diagnose.graph.model import carried, moved_inertia, own
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.element import Element
 from rtctl.plants.graph.coupled import machine_params
@@ -186,13 +186,10 @@ class Measures:
     def inertia(self, node: str) -> float:
         """Inertia or mass of all that joints make move with a node, as the node feels it."""
         body = self.body_of(node)
-        number, total, counted = self.leaders.get(body, 0), 0.0, set()
-        for name, ratio in self.ratios.items():
-            at = self.layout.coordinate(name)
-            if ratio != 0.0 and self.leaders[name] == number and at not in counted:
-                counted.add(at)
-                total += (ratio / self.layout.ratio(name, self.values)) ** 2 * float(self.inertias[at])
-        return float(total / (self.ratios.get(body, 1.0) or 1.0) ** 2)
+        number = self.leaders.get(body, 0)
+        ratios = {name: ratio for name, ratio in self.ratios.items() if self.leaders[name] == number}
+        total = moved_inertia(self.inertias, carried(self.layout, self.values, ratios))
+        return total / (self.ratios.get(body, 1.0) or 1.0) ** 2
 
     def stiffness(self, node: str) -> float:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""

@@ -18,16 +18,17 @@ from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
-from rtctl.diagnose.graph.model import GraphModel, own, rigid
+from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.graph.elements import elements, spot
 from rtctl.plants.graph.layout import NOWHERE
+from rtctl.plants.graph.linearised import ringing
 from rtctl.plants.graph.mechanics import code_of
 from rtctl.plants.graph.params import build, drive_gain
-from rtctl.plants.graph.plant import GRAPH_STATE, state_space
+from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.physics import TERMS, ordered
 
 FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
@@ -108,8 +109,7 @@ class Simulator:
         weighs = any(body.weights for body in machine.bodies.values())
         if weighs or not self.layout.links:
             return LEAD if weighs else 0.0
-        poles = np.linalg.eigvals(state_space(build(self.layout, self.case.values, self.record.dt))[0])
-        swings = poles[np.abs(poles.imag) > 1e-3 * np.abs(poles)]
+        swings = ringing(build(self.layout, self.case.values, self.record.dt))
         return min(LEAD, FORGOTTEN / max(float(-swings.real.max()), 1e-9)) if len(swings) else LEAD
 
     def directed(self, model: GraphModel) -> "Simulator":
@@ -358,15 +358,10 @@ class Simulator:
         j["follows"] = len(self.followed)
         for number, one in enumerate(self.followed):
             j["main"][number], j["speed"][number] = model.layout.sensors[one.sensor], one.shows_speed
-            inertia = 0.0
-            push = np.zeros(j["push"].shape[1])
-            for name, ratio in rigid(self.layout, self.case.values, one.body).items():
-                at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
-                if ratio != 0.0:
-                    push[at] = params.inertia[at] * ratio / own_ratio
-            for at in range(model.layout.nq):
-                inertia += push[at] ** 2 / params.inertia[at]
-            j["push"][number] = push / inertia  # a unit of correction is a unit of force at the followed body
+            moved = carried(model.layout, model.base, rigid(self.layout, self.case.values, one.body))
+            inertia = moved_inertia(params.inertia, moved)
+            for at, ratio in moved.items():  # a unit of correction is a unit of force at the followed body
+                j["push"][number, at] = params.inertia[at] * ratio / inertia
             follow = self.follow * one.bandwidth / self.followed[0].bandwidth
             j["P"][number], j["D"][number] = follow**2 * inertia, 1.4 * follow * inertia
             j["a"][number] = -np.expm1(-10.0 * follow * dt)
