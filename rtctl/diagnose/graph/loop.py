@@ -15,6 +15,7 @@ from rtctl.diagnose import law
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.kernel import TRACK
 from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, nominal, rigid
+from rtctl.diagnose.graph.prepare import path_of, pushing, ready
 from rtctl.diagnose.graph.record import GraphRecord, levers
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.words import body_of
@@ -68,22 +69,22 @@ def run(sim: Simulator, loop: Loop, model: GraphModel, ref: np.ndarray, w: np.nd
     `ref` and `w` (n,) are the reference before shaping and the excitation. Readings are nan from the tick on at which
     the model ran away.
     """
-    ready = sim.ready(model, TRACK)
+    start = ready(sim, model, TRACK)
     n, drives = len(ref), sim.volts.shape[1]
     laws, wired = np.zeros(1, record_dtype(loop.law)), np.zeros(1, kernel.CLOSED)
     fill_record(laws[0], loop.law)
-    wired["sensor"], wired["scale"] = ready.model.layout.sensors[loop.sensor], loop.scale
+    wired["sensor"], wired["scale"] = start.model.layout.sensors[loop.sensor], loop.scale
     wired["give"][0, :drives], wired["beside"][0, :drives] = loop.give, loop.beside
-    job = ready.job
-    path, pace = sim.path_of(job, ready.model, ready.params, float(ready.offsets[0]))
-    out, volts = np.full((n, ready.params.ny), np.nan), np.zeros((n + 1, drives))
+    job = start.job
+    path, pace = path_of(sim, job, start.model, float(start.offsets[0]))
+    out, volts = np.full((n, start.params.ny), np.nan), np.zeros((n + 1, drives))
     volts[0] = sim.volts[0]
     done = kernel.closed_loop(sim.code).run(
-        job, wired, laws, loop.state.copy(), ready.p, ready.states, ready.slots, np.array(ref, float),
-        np.array(w, float), volts, sim.pushing(ready.model), sim.watched[:1] + ready.offsets, path, pace, out,
+        job, wired, laws, loop.state.copy(), start.p, start.states, start.slots, np.array(ref, float),
+        np.array(w, float), volts, pushing(sim, start.model), sim.watched[:1] + start.offsets, path, pace, out,
     )  # fmt: skip
     out[max(done, 0) :] = np.nan
-    sim.counted(out, ready.offsets)
+    sim.counted(out, start.offsets)
     return out, volts[1:]
 
 
