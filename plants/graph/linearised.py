@@ -19,6 +19,7 @@ from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.graph.plant import state_space
 
 STILL = 1e-4  # 1/s, below which an eigenvalue is a free motion
+RINGS = 1e-3  # least share of the imaginary part in an eigenvalue that rings
 
 
 class Mode(NamedTuple):
@@ -45,6 +46,13 @@ def linearised(p: Any) -> tuple[np.ndarray, np.ndarray]:
                 inverse = np.linalg.inv(coupled.at_start(code, p, p.coupled)[0])
                 A[p.nq : 2 * p.nq, i] -= pull * inverse[:, i]
     return A, B
+
+
+def ringing(p: GraphParams) -> np.ndarray:
+    """Eigenvalues, 1/s, of the springs and dampers of a machine without mechanics of a file that ring, without weight;
+    both of each pair."""
+    poles = np.linalg.eigvals(state_space(p)[0])
+    return np.asarray(poles[np.abs(poles.imag) > RINGS * np.abs(poles)])
 
 
 def sensor_row(machine: Description, p: GraphParams, name: str) -> np.ndarray:

@@ -127,6 +127,13 @@ def states_of(drive: Any) -> int:
     return 2 * (drive.bandwidth_hz is not None) + (drive.kind == "voltage" and drive.inductance is not None)
 
 
+def drive_gain(values: dict[str, float], name: str) -> float:
+    """Force of a drive on a body that is held, for one unit of its command, N or Nm."""
+    path = f"drives.{name}"
+    gain = values[f"{path}.gain"] * values.get(f"{path}.torque_constant", 1.0)
+    return gain / values.get(f"{path}.resistance", 1.0)
+
+
 def place(layout: Layout, element: Any, values: dict[str, float]) -> tuple[int, float, int, float]:
     """Where a drive or sensor is: coordinates and what one unit of each moves there."""
     if element.joint is not None:

@@ -76,6 +76,22 @@ def parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
         return list(pool.map(lambda job: job(), jobs))
 
 
+def quotients(
+    residual: Callable[[Any], np.ndarray], space: Space, x: np.ndarray, start: np.ndarray, columns: Sequence[int]
+) -> list[np.ndarray]:
+    """Difference quotients of a model's residual by the unknowns of some columns, each in the shape of the residual
+    `start` at x. A step goes up, or down where up would pass the upper bound."""
+    high, steps = space.bounds()[1], space.steps()
+
+    def column(i: int) -> np.ndarray:
+        step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
+        moved = x.copy()
+        moved[i] += step
+        return np.asarray((residual(space.model(moved)) - start) / step)
+
+    return parallel([partial(column, i) for i in columns])
+
+
 def jacobian(
     problem: Judge, space: Space, x: np.ndarray, columns: Sequence[int] | None = None, old: np.ndarray | None = None
 ) -> np.ndarray:
@@ -83,20 +99,12 @@ def jacobian(
 
     `columns` are those asked for; with `old`, columns that hardly matter are taken from there.
     """
-    high, steps = space.bounds()[1], space.steps()
     wanted = list(range(len(x))) if columns is None else list(columns)
     if old is not None:
         moved = np.linalg.norm(old[:, : space.nb], axis=0) * space.reach()
         wanted = [i for i in wanted if i >= space.nb or moved[i] > IDLE * np.sqrt(len(old))]
     start = problem.residual(space.model(x), coarse=True)
-
-    def column(i: int) -> np.ndarray:
-        step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
-        moved = x.copy()
-        moved[i] += step
-        return (problem.residual(space.model(moved), coarse=True) - start) / step
-
-    found = parallel([partial(column, i) for i in wanted])
+    found = quotients(lambda model: problem.residual(model, coarse=True), space, x, start, wanted)
     if old is None:
         return np.stack(found, axis=1) if found else np.zeros((len(start), 0))
     J = old.copy()

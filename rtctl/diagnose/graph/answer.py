@@ -11,8 +11,9 @@ from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect,
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.graph.experiment import Planned, left, planned
-from rtctl.diagnose.graph.fits import Z90, Fitted, prior, refit
+from rtctl.diagnose.graph.fits import Fitted, curvature, half_widths, refit
 from rtctl.diagnose.graph.joint import together
+from rtctl.diagnose.graph.likelihood import coarsened
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
 from rtctl.diagnose.graph.record import GraphRecord, load_record
@@ -204,9 +205,7 @@ def _effects(decided: Verdict) -> tuple[Effect, ...]:
 
 def _spread(f: Fitted) -> np.ndarray:
     """Half width of the 90 % interval of each unknown."""
-    power = COUNTED / (COUNTED + f.like.size)
-    H = power * f.A + np.diag(prior(f.space))
-    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(H)), 0.0)))
+    return half_widths(curvature(f, coarsened(f.like.size, COUNTED)))
 
 
 def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:

@@ -9,16 +9,16 @@ Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10; Broyden, Math. 
 """
 
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.fit import bounded_step, parallel, trust
+from rtctl.diagnose.fit import bounded_step, quotients, trust
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import WIDE, Space
 
 UNKNOWN = WIDE / 2  # standard deviation, in logarithm, of a parameter of which the owner says nothing
+ALONE = 1.0  # innovations that count as one in the weight of the prior
 HONEST = 0.3  # share of the promised gain that a step must keep
 SMALLEST = 1e-9  # step of an unknown
 STALE, EFFECTS, ALL = range(3)  # what of the derivatives was taken since the last step
@@ -46,17 +46,12 @@ def derivatives(
 ) -> np.ndarray:
     """Difference quotients (blocks, sensors, unknowns) in some columns, away from the upper bound; the others are those
     of `into`, or 0."""
-    high, steps = space.bounds()[1], space.steps()
+    if into is not None and not columns:
+        return into
     start = like.raw(space.model(x), True)
-
-    def column(i: int) -> np.ndarray:
-        step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
-        moved = x.copy()
-        moved[i] += step
-        return np.asarray((like.raw(space.model(moved), True) - start) / step)
-
     J = np.zeros((*start.shape, len(x)), np.float32) if into is None else into
-    for i, values in zip(columns, parallel([partial(column, i) for i in columns]), strict=True):
+    found = quotients(lambda model: like.raw(model, True), space, x, start, columns)
+    for i, values in zip(columns, found, strict=True):
         J[..., i] = values
     return J
 
@@ -73,7 +68,7 @@ class Descent:
 
     def _weigh(self) -> None:
         self.r = self.like.white(self.e)
-        self.weight = weights(self.space) * trust(self.r, self.like.together)
+        self.weight = weights(self.space) * trust(self.r, ALONE)
         self.cost = self._cost(self.r, self.x)
 
     def _whiten(self) -> None:
@@ -81,7 +76,7 @@ class Descent:
         self.A = self.W.T @ self.W
 
     def _cost(self, r: np.ndarray, x: np.ndarray) -> float:
-        weight = weights(self.space) * trust(r, self.like.together)
+        weight = weights(self.space) * trust(r, ALONE)
         return 0.5 * float(r @ r) + 0.5 * float(weight @ x**2)
 
     def renew(self, columns: Sequence[int]) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from rtctl.diagnose.fit import bounded_step
 from rtctl.diagnose.graph import loop, words
 from rtctl.diagnose.graph.descent import derivatives
 from rtctl.diagnose.graph.fits import Fitted
-from rtctl.diagnose.graph.likelihood import COARSE, Likelihood
+from rtctl.diagnose.graph.likelihood import Likelihood, coarsened
 from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.loop import Loop
 from rtctl.diagnose.graph.model import GraphModel
@@ -101,7 +101,7 @@ def design(record: GraphRecord, rivals: Sequence[Fitted], best: Fitted) -> Exper
             refused[motion.name] = outcome.trouble
             continue
         motions[motion.name] = motion
-        power = COARSE / (COARSE + outcome.size)
+        power = coarsened(outcome.size)
         gain = {
             f"{labels[i]} / {labels[j]}": max(float(min(outcome.gains[i, j], outcome.gains[j, i])), 0.0)
             for i, j in combinations(range(len(rivals)), 2)
@@ -194,7 +194,7 @@ class Bench:
 
 def remaining(like: Likelihood, f: Fitted) -> float:
     """Half the sum of squares, nats, that a fitted model leaves of a recording once all its numbers suit that best."""
-    power = COARSE / (COARSE + like.size)
+    power = coarsened(like.size)
     J = derivatives(like, f.space, f.x, range(len(f.x)))
     linear = Linear(f._replace(like=like, e=like.raw(f.model), J=J))
     r, white, weight = like.white(linear.base.e), linear.white, linear.weight
@@ -226,8 +226,3 @@ def called(machine: Description, rivals: Sequence[Fitted]) -> list[str]:
     parts = [[n for n in f.names if n not in common] for f in rivals]
     said = [" with ".join(words.called(machine, n) for n in part) or "no further effect" for part in parts]
     return said if len(set(said)) == len(said) else [" + ".join(f.names) for f in rivals]
-
-
-def as_dict(found: Planned) -> dict[str, Any] | None:
-    """As in diagnosis.json."""
-    return None if found.experiment is None else found.experiment.as_dict()

@@ -65,7 +65,7 @@ class Fitted(NamedTuple):
     @property
     def information(self) -> np.ndarray:
         """Second derivative (unknowns, unknowns) of the negative logarithm of the posterior."""
-        return np.asarray(self.power * self.A + np.diag(prior(self.space)))
+        return curvature(self, self.power)
 
     @property
     def log_evidence(self) -> float:
@@ -74,6 +74,17 @@ class Fitted(NamedTuple):
         volume = float(np.linalg.slogdet(self.information)[1]) - float(np.sum(np.log(weight)))
         fitness = -self.power * self.loss - 0.5 * float(weight @ self.x**2)
         return fitness - 0.5 * float(volume)
+
+
+def curvature(f: Fitted, power: float) -> np.ndarray:
+    """Second derivative (unknowns, unknowns) of the negative logarithm of a posterior, a share of whose likelihood
+    counts."""
+    return np.asarray(power * f.A + np.diag(prior(f.space)))
+
+
+def half_widths(information: np.ndarray) -> np.ndarray:
+    """Half widths (unknowns,) of the 90 % intervals, each way, by the second derivative of the posterior."""
+    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0)))
 
 
 def prior(space: Space) -> np.ndarray:
@@ -176,7 +187,7 @@ def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
 
 def solid(f: Fitted) -> bool:
     """Whether each effect of a model has a size that is not zero, by its 90 % interval."""
-    half = Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(f.information)), 0.0))
+    half = half_widths(f.information)
     for index, h in enumerate(f.space.hypotheses):
         sizes = f.space.columns(index)[h.sizes]
         if len(sizes) and (np.abs(f.x[sizes]) < half[sizes]).all():

@@ -6,6 +6,7 @@ recording has for itself. Residuals are stacked, recording after recording, so t
 Source: Ljung, System Identification (1999), ch. 7 and 14.3 for estimates from several data records.
 """
 
+import math
 from collections.abc import Sequence
 from copy import copy
 
@@ -179,7 +180,7 @@ def _check_values(first: GraphRecord, other: GraphRecord, differ: set[str]) -> N
         if path in differ or is_start(path) or path in first.case.made:
             continue
         a, b = one.get(path, 0.0), two.get(path, 0.0)
-        if abs(a - b) > SAME * max(abs(a), abs(b)):
+        if not math.isclose(a, b, rel_tol=SAME):
             raise UserError(
                 f"{other.case.file}: {path} is {b:g}, and {a:g} in {first.case.file}; say per_recording: [{path}] in "
                 "both where it differs between recordings, else give one value"

@@ -5,6 +5,7 @@ which numbers a parameter of the case stands for; what the case says of drives a
 description says.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from rtctl.plants.physics.place import PLANTS
 
 FORMAT = 1
 RATIOS = {"N": "R_t"}  # symbol of a ratio of two radii: one of them, which is as well known
+SAME = 1e-12  # relative, of two values that differ by rounding alone
 MIDDLE = 0.5  # counts from what a counter shows to where it is on average
 
 
@@ -53,13 +55,9 @@ def known_model(model: GraphModel, record: GraphRecord) -> Model:
     values = own(model.base, record.name)
     owner = owner_model(source.case, source)
     found = {symbol: values[paths[0]] for symbol, paths in record.case.machine.symbols.items() if symbol in owner.base}
-    kept = {symbol: owner.base[symbol] if same(value, owner.base[symbol]) else value for symbol, value in found.items()}
+    said = owner.base
+    kept = {s: said[s] if math.isclose(value, said[s], rel_tol=SAME) else value for s, value in found.items()}
     return owner.change(**kept).add(*model._replace(base=values).resolved().terms)
-
-
-def same(one: float, other: float) -> bool:
-    """Whether two values differ by rounding alone."""
-    return abs(one - other) <= 1e-12 * max(abs(one), abs(other))
 
 
 def graph_case(record: Record) -> GraphCase:

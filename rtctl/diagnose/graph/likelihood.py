@@ -30,7 +30,6 @@ WILD = 1e6  # residual of a model that runs away, in steps of noise
 class Likelihood:
     """A recording, its noise and the rows that count."""
 
-    together = 1.0  # errors that count as one in the weight of the prior (rtctl.diagnose.fit)
     exact = 1.0  # share of it that counts, for what the laws of large effects are wrong by
     errors: np.ndarray | None = None  # (blocks, sensors, columns) what the laws of a model may be wrong by
     _slack: Slack | None = None  # the same under this noise
@@ -143,11 +142,7 @@ class Likelihood:
     @property
     def power(self) -> float:
         """Share of it that counts."""
-        return self.exact * COARSE / (COARSE + self.size)
-
-    def residual(self, model: GraphModel, coarse: bool = False, at: str = "") -> np.ndarray:
-        """Innovations of a model, as a fit minimises them."""
-        return self.white(self.raw(model, coarse))
+        return self.exact * coarsened(self.size)
 
     def told(self, e: np.ndarray) -> "Likelihood":
         """The same with the noise of these residuals (blocks, sensors), less what errors of the laws explain."""
@@ -237,6 +232,11 @@ def sensor_body(sim: Simulator, name: str) -> str | None:
     """Body of a channel; None where it looks at none."""
     found = sim.case.machine.sensors.get(name)
     return None if found is None else found.body
+
+
+def coarsened(size: int, most: float = COARSE) -> float:
+    """Share of the likelihood of `size` innovations that counts where they count for `most` at most."""
+    return most / (most + size)
 
 
 def settled(sim: Simulator) -> int:

@@ -14,7 +14,8 @@ from pydantic import ValidationError
 from rtctl.diagnose import law
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.kernel import TRACK
-from rtctl.diagnose.graph.model import GraphModel, nominal, rigid
+from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, nominal, rigid
+from rtctl.diagnose.graph.prepare import path_of, pushing, ready
 from rtctl.diagnose.graph.record import GraphRecord, levers
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.words import body_of
@@ -24,15 +25,16 @@ from rtctl.idiom import fill_record, record_dtype
 from rtctl.laws import pd
 from rtctl.laws.limit import LimitParams
 from rtctl.own.files import OwnError
-from rtctl.plants.graph.plant import state_space
+from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.linearised import ringing
+from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.graph.units import measured_unit
 
 SLOWER = 0.2  # of the lowest natural frequency: bandwidth of a stand-in, at most
 DAMPED = 1.4  # times the bandwidth, rate of the stand-in's damping
 FILTER = 10.0  # times the bandwidth, that of its derivative
-RINGS = 1e-3  # least share of the imaginary part in a pole that rings
 SLOWEST = 1e-3  # Hz, below which it is a free motion
-COARSE = 1e-3  # s, substep of params that are only asked for poles
+COARSE = 1e-3  # s, substep of params that are only asked for poles and inertias
 METRES = "m"  # unit of a law that does not count in its sensor's
 
 
@@ -67,22 +69,22 @@ def run(sim: Simulator, loop: Loop, model: GraphModel, ref: np.ndarray, w: np.nd
     `ref` and `w` (n,) are the reference before shaping and the excitation. Readings are nan from the tick on at which
     the model ran away.
     """
-    ready = sim.ready(model, TRACK)
+    start = ready(sim, model, TRACK)
     n, drives = len(ref), sim.volts.shape[1]
     laws, wired = np.zeros(1, record_dtype(loop.law)), np.zeros(1, kernel.CLOSED)
     fill_record(laws[0], loop.law)
-    wired["sensor"], wired["scale"] = ready.model.layout.sensors[loop.sensor], loop.scale
+    wired["sensor"], wired["scale"] = start.model.layout.sensors[loop.sensor], loop.scale
     wired["give"][0, :drives], wired["beside"][0, :drives] = loop.give, loop.beside
-    job = ready.job
-    path, pace = sim.path_of(job, ready.model, ready.params, float(ready.offsets[0]))
-    out, volts = np.full((n, ready.params.ny), np.nan), np.zeros((n + 1, drives))
+    job = start.job
+    path, pace = path_of(sim, job, start.model, float(start.offsets[0]))
+    out, volts = np.full((n, start.params.ny), np.nan), np.zeros((n + 1, drives))
     volts[0] = sim.volts[0]
     done = kernel.closed_loop(sim.code).run(
-        job, wired, laws, loop.state.copy(), ready.p, ready.states, ready.slots, np.array(ref, float),
-        np.array(w, float), volts, sim.pushing(ready.model), sim.watched[:1] + ready.offsets, path, pace, out,
+        job, wired, laws, loop.state.copy(), start.p, start.states, start.slots, np.array(ref, float),
+        np.array(w, float), volts, pushing(sim, start.model), sim.watched[:1] + start.offsets, path, pace, out,
     )  # fmt: skip
     out[max(done, 0) :] = np.nan
-    sim.counted(out, ready.offsets)
+    sim.counted(out, start.offsets)
     return out, volts[1:]
 
 
@@ -135,8 +137,7 @@ def of_machine(settings: Any, record: GraphRecord) -> Loop:
     shares = shares_of(settings)
     if len(shares) == 1:
         p = p._replace(rounds=law.BOARD, output=converter(settings, 0))
-    limits = [d.limit or d.dac_range for d in settings.machine.drives.values() if d.limit or d.dac_range]
-    limit = min([settings.law.limit.high, *limits])
+    limit = min(settings.law.limit.high, most_of(settings.machine))
     give = np.column_stack([shares, np.zeros(len(shares))])
     return Loop(
         p, np.zeros(1, law.LAW_STATE), parts.feedback, float(sensor.scale), give, np.zeros(len(shares)), parts.unit,
@@ -151,8 +152,8 @@ def stand_in(record: GraphRecord) -> Loop:
     shares, gain, rate = _pd(record, model)
     dt, speed = record.dt, sensor.measures == "speed"
     p = neutral(1.0, dt)
-    limits = [d.limit or d.dac_range for d in case.machine.drives.values() if d.limit or d.dac_range]
-    most = float(min(limits)) if limits else LARGE
+    limit = most_of(case.machine)
+    most = min(limit, LARGE)
     p = p._replace(
         kind=law.PD, limit=LimitParams(-most, most, math.inf),
         pd=pd.of_gains(gain, 0.0 if speed else DAMPED * gain / rate, FILTER * rate / (2 * np.pi), dt),
@@ -160,8 +161,13 @@ def stand_in(record: GraphRecord) -> Loop:
     give = np.column_stack([shares, np.zeros(len(shares))])
     return Loop(
         p, np.zeros(1, law.LAW_STATE), record.main, 1.0, give, np.median(record.u, axis=0), _unit(record, record.main),
-        float(min(limits)) if limits else math.inf, False,
+        limit, False,
     )  # fmt: skip
+
+
+def most_of(machine: Description) -> float:
+    """Largest command that every drive of a machine takes, in its unit; inf where it has no drive."""
+    return float(min((d.limit or d.dac_range for d in machine.drives.values()), default=math.inf))
 
 
 def stand_in_law(record: GraphRecord) -> dict[str, Any]:
@@ -185,34 +191,24 @@ def stand_in_law(record: GraphRecord) -> dict[str, Any]:
 def _pd(record: GraphRecord, model: GraphModel) -> tuple[np.ndarray, float, float]:
     """Shares (drives,) of a stand-in's output, its gain in command by rad or m (or by their rate), and its bandwidth in
     rad/s."""
-    sensor = record.case.machine.sensors[record.main]
+    machine = record.case.machine
+    sensor = machine.sensors[record.main]
     at = np.array(list(levers(model, str(sensor.body)).values()))
     moving = at != 0.0
     shares = np.sign(at) / max(int(moving.sum()), 1)
     lever = float(np.abs(at).sum() / max(int(moving.sum()), 1))
-    inertia = moved_inertia(model, str(sensor.body))
-    rate = min(Simulator(record).follow, SLOWER * 2 * np.pi * lowest_mode(model))
+    params, ratios = model.params(COARSE), rigid(model.layout, model.base, str(sensor.body))
+    inertia = moved_inertia(params.inertia, carried(model.layout, model.base, ratios))
+    rate = min(Simulator(record).follow, SLOWER * 2 * np.pi * lowest_mode(machine, params))
     force = rate * inertia if sensor.measures == "speed" else rate**2 * inertia
     return shares, force / lever if lever else 0.0, rate
 
 
-def moved_inertia(model: GraphModel, main: str) -> float:
-    """Inertia at a body of all that moves with it on rigid joints, kg or kg m^2."""
-    machine = model.layout.machine
-    return sum(
-        ratio**2 * model.base[f"bodies.{name}.{'inertia' if machine.turns(name) else 'mass'}"]
-        for name, ratio in rigid(model.layout, model.base, main).items()
-        if ratio != 0.0
-    )
-
-
-def lowest_mode(model: GraphModel) -> float:
-    """Lowest frequency, Hz, at which the nominal machine rings with its joints; inf where it does not."""
-    machine = model.layout.machine
-    if machine.mechanics is not None or not model.layout.links:
+def lowest_mode(machine: Description, p: GraphParams) -> float:
+    """Lowest frequency, Hz, at which a machine rings with its joints; inf where it does not."""
+    if machine.mechanics is not None or not p.nl:
         return math.inf
-    poles = np.linalg.eigvals(state_space(model.params(COARSE))[0])
-    rings = np.abs(poles[np.abs(poles.imag) > RINGS * np.abs(poles)]) / (2 * np.pi)
+    rings = np.abs(ringing(p)) / (2 * np.pi)
     return float(min(rings[rings > SLOWEST], default=math.inf))
 
 

@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from rtctl.diagnose.graph.model import own
+from rtctl.diagnose.graph.model import carried, moved_inertia, own
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.element import Element
 from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.elements import contacts
 from rtctl.plants.graph.layout import NOWHERE, Layout
+from rtctl.plants.graph.params import drive_gain
 from rtctl.plants.physics import TERMS
 
 SMOOTH = 5e-3  # s, over which a speed is taken
@@ -66,12 +67,9 @@ class Measures:
         total = np.zeros(len(self.u))
         for name, channel in self.layout.drives.items():
             drive = self.machine.drives[name]
-            path = f"drives.{name}"
-            gain = self.values[f"{path}.gain"] * self.values.get(f"{path}.torque_constant", 1.0)
-            gain /= self.values.get(f"{path}.resistance", 1.0)
             body = str(drive.body or self.machine.joints[str(drive.joint)].to)
             if self.leaders.get(body, 0) == number:
-                total += gain * self.ratios.get(body, 0.0) * self.u[:, channel]
+                total += drive_gain(self.values, name) * self.ratios.get(body, 0.0) * self.u[:, channel]
         found = float(np.sqrt(np.mean(total**2)))
         share = 0.1 if found > 0.0 or not number else 1.0  # what no drive moves, another body moves
         return max(found, share * self.inertia(self.sim.followed[number].body) * a, LITTLE)
@@ -188,13 +186,10 @@ class Measures:
     def inertia(self, node: str) -> float:
         """Inertia or mass of all that joints make move with a node, as the node feels it."""
         body = self.body_of(node)
-        number, total, counted = self.leaders.get(body, 0), 0.0, set()
-        for name, ratio in self.ratios.items():
-            at = self.layout.coordinate(name)
-            if ratio != 0.0 and self.leaders[name] == number and at not in counted:
-                counted.add(at)
-                total += (ratio / self.layout.ratio(name, self.values)) ** 2 * float(self.inertias[at])
-        return float(total / (self.ratios.get(body, 1.0) or 1.0) ** 2)
+        number = self.leaders.get(body, 0)
+        ratios = {name: ratio for name, ratio in self.ratios.items() if self.leaders[name] == number}
+        total = moved_inertia(self.inertias, carried(self.layout, self.values, ratios))
+        return total / (self.ratios.get(body, 1.0) or 1.0) ** 2
 
     def stiffness(self, node: str) -> float:
         """Of a joint; elsewhere of a spring that the drives stretch over the span."""

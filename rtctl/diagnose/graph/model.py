@@ -2,6 +2,8 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from rtctl.diagnose.graph.case import GraphCase
 from rtctl.idiom import Settings
 from rtctl.plants.graph.coupled import machine_params
@@ -94,6 +96,17 @@ def rigid(layout: Layout, values: dict[str, float], main: str) -> dict[str, floa
                     out[other] = out[here] * ratio
                     todo.append(other)
     return {name: out.get(name, 0.0) for name in machine.bodies if not machine.is_frame(name)}
+
+
+def carried(layout: Layout, values: dict[str, float], ratios: dict[str, float]) -> dict[int, float]:
+    """Motion of each coordinate that moves, rad or m, where the bodies move by `ratios`."""
+    moving = {name: ratio for name, ratio in ratios.items() if ratio != 0.0}
+    return {layout.coordinate(name): ratio / layout.ratio(name, values) for name, ratio in moving.items()}
+
+
+def moved_inertia(inertia: np.ndarray, moved: dict[int, float]) -> float:
+    """Inertia, kg or kg m^2, at the body for whose unit the coordinates move by `moved`; `inertia` is that of each."""
+    return float(sum(ratio**2 * inertia[at] for at, ratio in moved.items()))
 
 
 def ratio_of(joint: Any, name: str, values: dict[str, float]) -> float:

@@ -11,6 +11,7 @@ from rtctl.diagnose.graph.case import HELD_PROBLEMS, GraphCase, read_case
 from rtctl.diagnose.graph.kinematic import followed
 from rtctl.diagnose.graph.model import GraphModel, rigid
 from rtctl.diagnose.record import Record
+from rtctl.plants.graph.params import drive_gain
 from rtctl.trace.bundle import PARQUET, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
@@ -145,10 +146,8 @@ def levers(model: GraphModel, main: str) -> dict[str, float]:
     machine, values, moved = model.layout.machine, model.base, rigid(model.layout, model.base, main)
     out = {}
     for name, drive in machine.drives.items():
-        path = f"drives.{name}"
-        gain = values[f"{path}.gain"] * values.get(f"{path}.torque_constant", 1.0)
         body = drive.body if drive.body is not None else machine.joints[str(drive.joint)].to
-        out[name] = gain / values.get(f"{path}.resistance", 1.0) * moved.get(body, 0.0)
+        out[name] = drive_gain(values, name) * moved.get(body, 0.0)
     return out
 
 

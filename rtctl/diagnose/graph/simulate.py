@@ -9,62 +9,30 @@ held    the main sensor's coordinate moves as it was recorded, and the force tha
 
 from copy import copy
 from functools import cached_property
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.config.errors import UserError
 from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, HELD_PROBLEMS, OWN_START, START
+from rtctl.diagnose.graph.case import HELD_PROBLEMS
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths
+from rtctl.diagnose.graph.observer import followed
+from rtctl.diagnose.graph.prepare import ABSENT, path_of, pushing, ready, stiff_ends
 from rtctl.diagnose.graph.record import GraphRecord
-from rtctl.diagnose.kernel import SLOTS
-from rtctl.idiom import fill_record, record_dtype
-from rtctl.plants.graph.elements import elements, spot
+from rtctl.plants.graph.elements import elements
 from rtctl.plants.graph.layout import NOWHERE
+from rtctl.plants.graph.linearised import ringing
 from rtctl.plants.graph.mechanics import code_of
-from rtctl.plants.graph.params import build
-from rtctl.plants.graph.plant import GRAPH_STATE, state_space
-from rtctl.plants.physics import TERMS, ordered
+from rtctl.plants.graph.params import build, drive_gain
 
-FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
-FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
-COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
 LEAD = 1.0  # s at the first row, at most, in which springs come to rest
 FORGOTTEN = 5.0  # time constants of what swings longest, after which it does so no more
 STEADY = 0.4  # rad a substep, of the quickest ring in which lost motion is crossed
 NEVER = np.iinfo(np.int64).max  # row
-ABSENT = np.zeros((1, 1))
-
-
-class Followed(NamedTuple):
-    """A sensor that the model is made to follow."""
-
-    sensor: str
-    body: str
-    shows_speed: bool
-
-    @property
-    def bandwidth(self) -> float:
-        """Usual bandwidth of its observer, rad/s."""
-        return FOLLOW_SPEED if self.shows_speed else FOLLOW
-
-
-class Ready(NamedTuple):
-    """A model at the first row of a recording."""
-
-    model: GraphModel  # with the numbers of the recording
-    params: Any
-    job: np.ndarray
-    p: np.ndarray
-    states: np.ndarray
-    slots: np.ndarray
-    offsets: np.ndarray  # (followed,) positions where their columns show 0, rad or m
 
 
 class Simulator:
@@ -108,8 +76,7 @@ class Simulator:
         weighs = any(body.weights for body in machine.bodies.values())
         if weighs or not self.layout.links:
             return LEAD if weighs else 0.0
-        poles = np.linalg.eigvals(state_space(build(self.layout, self.case.values, self.record.dt))[0])
-        swings = poles[np.abs(poles.imag) > 1e-3 * np.abs(poles)]
+        swings = ringing(build(self.layout, self.case.values, self.record.dt))
         return min(LEAD, FORGOTTEN / max(float(-swings.real.max()), 1e-9)) if len(swings) else LEAD
 
     def directed(self, model: GraphModel) -> "Simulator":
@@ -174,14 +141,6 @@ class Simulator:
         x = self.seen
         return float(np.std(x) if self.shows_speed else np.sqrt(np.mean(np.gradient(x, self.record.dt) ** 2)))
 
-    def _own_scales(self, params: Any, at: int) -> tuple[float, float]:
-        """Scales of the first position and speed of a coordinate: those of a ring as quick as the machine moves."""
-        ratio = next((r / self.layout.ratio(name, self.case.values) for name, r in self.ratios.items()
-                      if r and self.layout.coordinate(name) == at), 1.0)  # fmt: skip
-        stiffness = sum(c for end, c in stiff_ends(params) if end == at)
-        speed = self.pace * abs(ratio)
-        return speed * float(np.sqrt(params.inertia[at] / stiffness)) if stiffness else 0.0, speed
-
     def column(self, channel: str) -> int:
         """Column of a channel in what a run returns: that of its sensor, the last one for the force of the drives."""
         return self.layout.sensors.get(channel, len(self.layout.sensors))
@@ -232,16 +191,16 @@ class Simulator:
         self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
         """Readings, and the corrections (n, followed), in N or Nm at the body of each followed sensor."""
-        record, ready = self.record, self.ready(model, mode, coarse)
-        model, job, offsets = ready.model, ready.job, ready.offsets
+        record, start = self.record, ready(self, model, mode, coarse)
+        model, job, offsets = start.model, start.job, start.offsets
         n = len(self.seen) if n is None else n
         seen = np.ascontiguousarray(self.watched[:n] + offsets)
-        path, pace = self.path_of(job, model, ready.params, float(offsets[0]))
-        out, push = np.full((n, ready.params.ny), np.nan), np.zeros((n, len(self.followed)))
+        path, pace = path_of(self, job, model, float(offsets[0]))
+        out, push = np.full((n, start.params.ny), np.nan), np.zeros((n, len(self.followed)))
         static = self.case.problem == "static"  # forces were measured: the commands that made them do not count
         done = self.kernel.module.run(
-            job, ready.p, ready.states, ready.slots, (np.zeros_like if static else np.asarray)(self.volts[:n]),
-            self.pushing(model)[:n], seen, path[:n], pace[:n], out, push,
+            job, start.p, start.states, start.slots, (np.zeros_like if static else np.asarray)(self.volts[:n]),
+            pushing(self, model)[:n], seen, path[:n], pace[:n], out, push,
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         self.counted(out, offsets)
@@ -258,166 +217,6 @@ class Simulator:
             if offset:
                 out[:, self.layout.sensors[one.sensor]] -= offset
 
-    def ready(self, model: GraphModel, mode: int | None = None, coarse: bool = False) -> "Ready":
-        """The records that one run of a model takes, at the first row. Raises UserError for too many terms."""
-        record, k = self.record, self.kernel
-        mode = self.mode if mode is None else mode
-        model = self.own(model).resolved().built()
-        stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
-        substeps = self.substeps * (2 if stiff else 1)
-        coarse = coarse and not any(TERMS[str(getattr(t, "term", ""))].slips for t in model.terms)  # a matter of ticks
-        whole = self.mode == HELD or bool(self.inputs) or self.case.machine.mechanics is not None  # needs every tick
-        stride = max(1, int(COARSEST / record.dt)) if coarse and self.substeps == 1 and not whole else 1
-        substeps = 1 if stride > 1 else (substeps + 1) // 2 if coarse else substeps
-        h = record.dt * stride / substeps
-        params = model.params(h)
-        p = np.zeros(1, _dtype(params))
-        fill_record(p[0], params)
-        if len(model.terms) > SLOTS:
-            raise UserError(f"physics: has {len(model.terms)} terms; {SLOTS} is the most that can be simulated")
-        slots = np.zeros(1, k.slots)
-        acting = [t for t in ordered(list(model.terms)) if TERMS[str(getattr(t, "term", ""))].act]
-        there = self.elements if model.layout is self.layout else elements(model.layout)
-        for slot, settings in zip(slots[0]["q"], acting, strict=False):
-            s: Any = settings
-            kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s, model.layout, there, model.base), h)
-        job = self._job(model, params, mode, substeps, stride)
-        states = np.zeros(1, GRAPH_STATE)
-        offsets = np.array([start_of(self, one, model.base) for one in self.followed])
-        self._begin(states, model, self.watched[0] + offsets)
-        return Ready(model, params, job, p, states, slots, offsets)
-
     def _told(self, drive: str, model: GraphModel) -> float:
         """Force of a drive by its nominal gain over that by the model's."""
-        path, one, two = f"drives.{drive}", self.case.values, model.base
-        gains = [v[f"{path}.gain"] * v.get(f"{path}.torque_constant", 1.0) / v.get(f"{path}.resistance", 1.0)
-                 for v in (one, two)]  # fmt: skip
-        return gains[0] / gains[1]
-
-    def path_of(self, job: np.ndarray, model: GraphModel, params: Any, start: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and speeds (n, coordinates) of what moves as recorded; the job is told which."""
-        moved = list(self.inputs)
-        if job["mode"][0] == HELD:
-            assert self.held is not None
-            moved.append(self.held._replace(x=self.held.x + start) if start else self.held)
-        if not moved:
-            return ABSENT, ABSENT
-        path, pace = np.zeros((2, len(self.seen), model.layout.nq))
-        job["holds"] = 1
-        for one in moved:
-            at, ratio = model.layout.coordinate(one.body), model.layout.ratio(one.body, model.base)
-            path[:, at], pace[:, at] = one.x / ratio, one.v / ratio
-            job["held"][0, at] = 1
-            job["share"][0, at] = 1.0 / ratio if one is moved[-1] else 0.0
-        return path, pace
-
-    def pushing(self, model: GraphModel) -> np.ndarray:
-        """Forces by the coordinates of a model that may have more of them than the description."""
-        if len(self.forces) < 2 or model.layout is self.layout:
-            return self.forces
-        out = np.zeros((len(self.forces), model.layout.nq))
-        first: dict[int, str] = {}
-        for name, body in self.layout.bodies.items():
-            first.setdefault(body.coordinate, name)
-        for at, name in first.items():
-            if at != NOWHERE:
-                out[:, model.layout.coordinate(name)] += self.forces[:, at]
-        return out
-
-    def _begin(self, states: np.ndarray, model: GraphModel, first: np.ndarray) -> None:
-        """Put every coordinate where the first row of the followed sensors has it, the joints unstretched."""
-        x = states["m"]["x"][0]
-        mechanics = self.case.machine.mechanics
-        for name, place in (mechanics.at if mechanics is not None else {}).items():
-            x[model.layout.coordinate(name)] = place / model.layout.ratio(name, model.base)
-        first, rate = first.copy(), 0.0
-        if self.case.problem == "free":
-            first[0] += self.record.scales[0] * float(np.log(model.base[FIRST_POSITION]))
-            rate = self.record.scales[2] + self.record.scales[1] * float(np.log(model.base[FIRST_SPEED]))
-        for number in range(len(self.followed) - 1, -1, -1):
-            one = self.followed[number]
-            for name, ratio in rigid(self.layout, self.case.values, one.body).items():
-                if ratio == 0.0:
-                    continue
-                value = ratio * first[number] / model.layout.ratio(name, model.base)
-                at = model.layout.coordinate(name)
-                if one.shows_speed:
-                    x[model.layout.nq + at] = value
-                    states["m"]["v_before"][0, at] = value
-                else:
-                    x[at] = value
-                if rate and number == 0:
-                    speed = ratio * rate / model.layout.ratio(name, model.base)
-                    x[model.layout.nq + at] = states["m"]["v_before"][0, at] = speed
-
-    def _job(self, model: GraphModel, params: Any, mode: int, substeps: int, stride: int) -> np.ndarray:
-        job = np.zeros(1, kernel.JOB)
-        j = job[0]
-        dt = self.record.dt * stride
-        j["stride"] = stride
-        j["mode"], j["substeps"], j["rate"], j["release"] = mode, substeps, 1.0 / dt, self.release
-        j["lead"] = self.lead if mode == TRACK else 0
-        j["part"], j["delay"] = np.modf(self.case.delay_samples * substeps)
-        j["follows"] = len(self.followed)
-        for number, one in enumerate(self.followed):
-            j["main"][number], j["speed"][number] = model.layout.sensors[one.sensor], one.shows_speed
-            inertia = 0.0
-            push = np.zeros(j["push"].shape[1])
-            for name, ratio in rigid(self.layout, self.case.values, one.body).items():
-                at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
-                if ratio != 0.0:
-                    push[at] = params.inertia[at] * ratio / own_ratio
-            for at in range(model.layout.nq):
-                inertia += push[at] ** 2 / params.inertia[at]
-            j["push"][number] = push / inertia  # a unit of correction is a unit of force at the followed body
-            follow = self.follow * one.bandwidth / self.followed[0].bandwidth
-            j["P"][number], j["D"][number] = follow**2 * inertia, 1.4 * follow * inertia
-            j["a"][number] = -np.expm1(-10.0 * follow * dt)
-        for path, value in model.base.items():
-            if path.startswith(OWN_START):
-                name, what = path.removeprefix(OWN_START).rsplit(".", 1)
-                at, column = model.layout.coordinate(name), ("position", "speed").index(what)
-                j[("first_x", "first_v")[column]][at] = self._own_scales(params, at)[column] * float(np.log(value))
-        return job
-
-
-def followed(record: GraphRecord) -> tuple[Followed, ...]:
-    """Sensors that the observer follows: the main one, and of each body that joints do not connect with one of them."""
-    case = record.case
-    sensors = case.machine.sensors
-    order = [record.main, *(n for wanted in ("position", "speed") for n, s in sensors.items() if s.measures == wanted)]
-    out: list[Followed] = []
-    reached: set[str] = set()
-    for name in order:
-        body = str(sensors[name].body)
-        if name not in record.y or body in reached or (out and sensors[name].body is None):
-            continue
-        out.append(Followed(name, body, sensors[name].measures == "speed"))
-        reached |= {other for other, ratio in rigid(case.layout, case.values, body).items() if ratio != 0.0}
-    return tuple(out)
-
-
-def start_of(sim: Simulator, one: Followed, base: dict[str, float]) -> float:
-    """Position of a followed body where its column shows 0, rad or m."""
-    machine = sim.case.machine
-    first = base.get(START, 1.0) if one.sensor == sim.main else 1.0
-    offset = float(np.log(first * base.get(f"{BEGINS}.{one.body}", 1.0)))
-    if machine.mechanics is not None and not one.shows_speed:
-        offset += machine.mechanics.at.get(one.body, 0.0)
-    return offset
-
-
-def stiff_ends(params: Any) -> list[tuple[int, float]]:
-    """Coordinate and stiffness at it, N/m or Nm/rad, of each end of each spring."""
-    return [
-        (int(at), float(params.link_c[k] * lever**2))
-        for k in range(params.nl)
-        for at, lever in ((params.link_i[k], params.link_a[k]), (params.link_j[k], params.link_b[k]))
-    ]
-
-
-_dtypes: dict[type, np.dtype] = {}
-
-
-def _dtype(params: Any) -> np.dtype:
-    return _dtypes.setdefault(type(params), record_dtype(params))
+        return drive_gain(self.case.values, drive) / drive_gain(model.base, drive)

@@ -22,8 +22,6 @@ def problem():
 class Flat:
     """A problem that is linear: the residual is A x - b under white noise of one."""
 
-    together = 1.0
-
     def __init__(self, A, b):
         self.A, self.b, self.calls = A, b, 0
 
@@ -78,6 +76,13 @@ def test_least_squares_of_a_linear_problem():
     np.testing.assert_allclose(J[:, 0], like.A, rtol=1e-4, atol=1e-6)
     found = descend(like, space, Point(x, like.raw(x), J, ALL), 10, 1e-6)
     np.testing.assert_allclose(found.x, np.linalg.lstsq(like.A, like.b, rcond=None)[0], atol=1e-4)
+
+
+def test_no_columns_cost_no_simulation():
+    like, space, _ = linear()
+    J = np.ones((50, 1, 4), np.float32)
+    assert derivatives(like, space, np.zeros(4), [], J) is J
+    assert like.calls == 0
 
 
 def test_derivatives_that_are_wrong_are_learned_or_taken_anew():

@@ -12,7 +12,7 @@ from rtctl.plants.graph import plant as graph
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.drives import drive_force
 from rtctl.plants.graph.layout import NOWHERE, layout
-from rtctl.plants.graph.params import build
+from rtctl.plants.graph.params import build, drive_gain
 from rtctl.plants.graph.reel import reel_inertia, wound
 
 SEEN = {"eye": {"body": "a", "column": "eye"}}
@@ -73,6 +73,24 @@ def test_a_voltage_drive_runs_to_the_speed_of_its_back_emf(extra):
     assert s.m.y[0] == pytest.approx(speed, rel=1e-6)
     assert s.m.y[1] == pytest.approx((6.0 - K * speed) / R, rel=1e-6)
     assert drive_force(p, s.m, 0) == pytest.approx(dry + viscous * speed, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {"gain": 3.0},
+        {"gain": 3.0, "kind": "current", "torque_constant": 0.05},
+        {"gain": 3.0, "kind": "voltage", "torque_constant": 0.05, "resistance": 2.0},
+    ],
+)
+def test_gain_of_a_drive_is_its_force_at_rest(drive):
+    machine = Description.model_validate(
+        {"bodies": {"a": {"inertia": 1e-5}}, "drives": {"m": {"body": "a", **drive}}, "sensors": SEEN}
+    )
+    values = dict(machine.paths())
+    s = started(p := build(layout(machine), values, 1e-4))
+    s.m.u[0] = 2.0
+    assert drive_gain(values, "m") * 2.0 == pytest.approx(drive_force(p, s.m, 0))
 
 
 def test_a_pendulum_swings_with_its_small_period():
