@@ -55,11 +55,11 @@ class Joint(Likelihood):
 
     def noisy(self, e: np.ndarray) -> "Joint":
         """The same with the noise of these residuals (blocks, sensors)."""
-        return self._of([part.noisy(own) for part, own in self._cut(e)])
+        return self._of([part.noisy(own) for part, own in self._cut(e)], self.errors)
 
     def flat(self, e: np.ndarray) -> "Joint":
         """The same with white noise as loud as these residuals (blocks, sensors) in each recording."""
-        return self._of([part.flat(own) for part, own in self._cut(e)])
+        return self._of([part.flat(own) for part, own in self._cut(e)], self.errors)
 
     def directed(self, model: GraphModel) -> "Joint":
         """The same with the sensors that know no direction, as far as the model tells it in every recording."""
@@ -91,16 +91,15 @@ class Joint(Likelihood):
     def split(self, share: float) -> tuple["Joint", "Joint"]:
         """The same of the first rows of each recording, and of the last `share` of each."""
         halves = [part.split(share) for part in self._parts]
-        bare = self.slackened(None)
-        return bare._of([one for one, _ in halves]), bare._of([two for _, two in halves])
+        return self._of([one for one, _ in halves]), self._of([two for _, two in halves])
 
     def during(self, begin: int, end: int) -> "Joint":
         """The same of rows `begin` to `end` of each recording."""
-        return self.slackened(None)._of([part.during(begin, min(end, part.rows[1])) for part in self._parts])
+        return self._of([part.during(begin, min(end, part.rows[1])) for part in self._parts])
 
-    def _of(self, parts: Sequence[Likelihood]) -> "Joint":
+    def _of(self, parts: Sequence[Likelihood], errors: np.ndarray | None = None) -> "Joint":
         other = copy(self)
-        other._parts, other._slack = tuple(parts), None
+        other._parts, other.errors, other._slack = tuple(parts), errors, None
         other.rows = parts[0].rows
         return other
 

@@ -65,15 +65,6 @@ class Screened(NamedTuple):
         found = [pair for pairs in parallel([partial(placed, x) for x in xs]) for pair in pairs]
         return [x for _, x in sorted(found, key=lambda pair: pair[0])[:most]]
 
-    def promising(self, most: int) -> list[Score]:
-        """Scores in the order in which they deserve a fit: by what they gain, and by what least squares takes off, in
-        turns."""
-        by_power = sorted(self.scores, key=lambda s: -s.power)
-        out: list[Score] = []
-        for one, other in zip(self.scores, by_power, strict=True):
-            out += [s for s in (one, other) if not any(s is t for t in out[-2 * most :])]
-        return out
-
 
 def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     """Scores of all candidates."""

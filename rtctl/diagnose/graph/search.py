@@ -3,32 +3,30 @@
 Source: beam search over forward steps, with removal and exchange of each effect at the end.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
-from rtctl.diagnose.graph.fits import INEXACT, Fitted, exactness, explained, refit, relaxed, solid, without
-from rtctl.diagnose.graph.hypotheses import combined, hypotheses
+from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
+from rtctl.diagnose.graph.fits import INEXACT, Fitted, exactness, explained, refit, solid, without
 from rtctl.diagnose.graph.likelihood import Likelihood
-from rtctl.diagnose.graph.screen import Score, Screened, screen
+from rtctl.diagnose.graph.screen import Score, Screened
 from rtctl.diagnose.space import Space
 
 MOST = 3  # effects
 REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
 MORE = 1.0  # nats that this must bring
-NAMES = (8, 5, 4)  # terms that are refitted in each step, and in the exchange 4
-STARTS = 2  # of the first few of them
-FIRST = 3
-OTHERS = 3  # nodes of the best terms beside the first
-LEAST = 6.0  # nats that screening must promise for a refit
-BEAM = 2
+NAMES = (8, 8, 8)  # terms that are refitted in each step, beside one model or another
+OTHERS = 3  # of them beside what is left in an exchange
+BEAM = 4  # models that are extended
+ALIKE = 0.995  # cosine from which two models do the same
+EXCHANGES = 2
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
-FAR = 30.0  # nats behind the best at which a combination is dropped
 
 Progress = Callable[[str], None]
 
@@ -54,48 +52,88 @@ class Found(NamedTuple):
 
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
     """Fit the base, then what is missing beside it."""
-    progress("fitting the nominal parameters")
-    base = restarted(refit(like, space))
-    for _ in range(REBASED):
-        progress("screening every hypothesis")
-        looked, odds = screened(base)
-        known: dict[tuple[str, ...], Fitted] = {(): base}
-        progress("fitting effect 1")
-        grown = step(like, base, looked, known, NAMES[0])
-        again = rebased(base, grown)
-        if again is base:
-            break
-        base = again
+    base, grown, looked, odds = begun(like, space, progress)
     share = exactness(base, min((base, *grown), key=lambda f: f.loss))
+    base, *grown = [f._replace(like=f.like.trusted(share)) for f in (base, *grown)]
     like = like.trusted(share)
-    known = {names: f._replace(like=f.like.trusted(share)) for names, f in known.items()}
-    base, grown = known[()], [known[key(f.names)] for f in grown]
     merit = partial(merit_of, odds=odds)
-    beam = [base]
-    for level in range(MOST):
-        if level > 0:
-            grown = []
-            for parent in beam:
-                progress(f"fitting effect {level + 1} beside {', '.join(parent.names)}")
-                grown += step(like, parent, screened(parent)[0], known, NAMES[level])
-        better = [f for f in grown if adds(base, _parent(f, beam), f, merit)]
+    known: Known = {key(f.names): f for f in (base, *grown)}
+    parents = [base]
+    for level in range(1, MOST + 1):
+        better = [f for f in grown if adds(base, _parent(f, parents), f, merit)]
         if not better:
             break
         better.sort(key=merit, reverse=True)
-        beam = [f for f in better if merit(f) > merit(better[0]) - FAR][:BEAM]
-        beam[0] = known[key(beam[0].names)] = restarted(enriched(beam[0]))
-    progress("exchanging each effect")
-    best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
-    for index in range(len(best.names) if len(best.names) > 1 else 0):
-        rest = refit(like, *without(best, index))
-        known.setdefault(key(rest.names), rest)
-        step(like, rest, screened(rest)[0], known, NAMES[-1])
+        better[0] = known[key(better[0].names)] = restarted(enriched(better[0]))
+        if level == MOST:
+            break
+        parents = apart(base, better)
+        progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
+        grown = extended(like, parents, known, NAMES[level], merit)
+    for _ in range(EXCHANGES):
+        best = _best(base, known, merit)
+        progress(f"exchanging each of {', '.join(best.names)}")
+        for rest in _smaller(like, best, known):
+            known.setdefault(key(rest.names), rest)
+            for f in extended(like, [rest], known, OTHERS, merit):
+                if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
+                    known |= {key(g.names): g for g in _smaller(like, f, known)}
+        if _best(base, known, merit) is best:
+            break
     progress("asking for other forms of what was found")
-    best = max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
+    best = _best(base, known, merit)
     if best.names:
         known[key(best.names)] = enriched(best)
     standing = [f for f in known.values() if stands(base, f, known, merit)]
     return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
+
+
+def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, list[Fitted], Screened, float]:
+    """The base, models with one effect, what screening said of them, and the prior odds of one of them."""
+    progress("fitting the nominal parameters")
+    base = restarted(refit(like, space))
+    for _ in range(REBASED):
+        progress("screening every hypothesis")
+        looked = screened(base)
+        odds = float(np.log(max(len({score.hypothesis.name for score in looked.scores}), 1)))
+        progress("fitting effect 1")
+        grown = extended(like, [base], {(): base}, NAMES[0], partial(merit_of, odds=odds), looked)
+        again = rebased(base, grown)
+        if again is base:
+            break
+        base = again
+    return base, grown, looked, odds
+
+
+def apart(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
+    """The first few models of which each has other terms than those before, and changes the residual in another way."""
+    out: list[Fitted] = []
+    for f in fits:
+        terms = {h.term for h in f.space.hypotheses}
+        if len(out) < BEAM and all(
+            terms != {h.term for h in g.space.hypotheses} and likeness(base, f, g) < ALIKE for g in out
+        ):
+            out.append(f)
+    return out
+
+
+def likeness(base: Fitted, one: Fitted, other: Fitted) -> float:
+    """Cosine of the angle between what two models take off the residual, each sensor by its least noise."""
+    a, b = ((base.e - f.e) / base.like.least for f in (one, other))
+    return float(np.sum(a * b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
+
+
+def _best(base: Fitted, known: Known, merit: Merit) -> Fitted:
+    return max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
+
+
+def _smaller(like: Likelihood, f: Fitted, known: Known) -> list[Fitted]:
+    """The model without each of its effects, of several."""
+    out = []
+    for index, name in enumerate(f.names if len(f.names) > 1 else ()):
+        rest = known.get(key(set(f.names) - {name}))
+        out.append(rest if rest is not None else refit(like, *without(f, index)))
+    return out
 
 
 def rebased(base: Fitted, grown: Sequence[Fitted]) -> Fitted:
@@ -116,7 +154,7 @@ def merit_of(f: Fitted, odds: float) -> float:
     return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
 
 
-def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Callable[[Fitted], float]) -> bool:
+def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
     """Whether a further effect is worth its numbers, and more than what the laws of the others may be wrong by."""
     if merit(more) < merit(fewer) + WORTH:
         return False
@@ -131,7 +169,7 @@ def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
     return float(np.max(further / np.maximum(whole, 1e-300)))
 
 
-def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit: Callable[[Fitted], float]) -> bool:
+def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
     """Whether every effect of a combination has a size, and adds to the combination without it, as far as that was
     fitted."""
     if not f.names:
@@ -142,57 +180,6 @@ def stands(base: Fitted, f: Fitted, known: dict[tuple[str, ...], Fitted], merit:
         return merit(f) > merit(base) + ENOUGH
     rest = (key(set(f.names) - {name}) for name in f.names)
     return all(adds(base, known[names], f, merit) for names in rest if names in known)
-
-
-def screened(parent: Fitted) -> tuple[Screened, float]:
-    """Scores beside a model, and the prior odds of one of them."""
-    sim = parent.like.sim
-    model = parent.model
-    candidates = [
-        h for h in hypotheses(sim, model, combined(parent.like, model), model.terms) if h.name not in parent.names
-    ]
-    names = {h.name for h in candidates}
-    return screen(parent, candidates), float(np.log(max(len(names), 1)))
-
-
-def step(
-    like: Likelihood, parent: Fitted, looked: Screened, known: dict[tuple[str, ...], Fitted], most: int
-) -> list[Fitted]:
-    """Refits of a model with each of the most promising hypotheses beside it.
-
-    Each term is tried at its most promising node, then the best terms at their other nodes.
-    """
-    top: dict[str, dict[str, list[Score]]] = {}
-    for score in looked.promising(most):
-        if max(score.gain, score.power) > LEAST and (len(top) < most or score.hypothesis.term in top):
-            top.setdefault(score.hypothesis.term, {}).setdefault(score.hypothesis.name, []).append(score)
-
-    def refitted(scores: list[Score], starts: int) -> Fitted:
-        names = key((*parent.names, scores[0].hypothesis.name))
-        if names not in known:
-            fits = [
-                refit(like, parent.space.add(s.hypothesis), x, parent.J, looked.floor, relax=False)
-                for s in scores[:starts]
-                for x in looked.starts(s, starts)
-            ]
-            known[names] = max(fits, key=lambda f: f.log_evidence)
-        return known[names]
-
-    firsts = {
-        term: refitted(next(iter(nodes.values())), STARTS if rank < FIRST else 1)
-        for rank, (term, nodes) in enumerate(top.items())
-    }
-    out = list(firsts.values())
-    for term in sorted(firsts, key=lambda term: -firsts[term].log_evidence)[:BEAM]:
-        out += [refitted(scores, 1) for scores in list(top[term].values())[1 : 1 + OTHERS]]
-    for f in sorted(out, key=lambda f: -f.log_evidence)[:FIRST]:
-        known[key(f.names)] = relaxed(f)
-    return [known[key(f.names)] for f in out]
-
-
-def key(names: Iterable[str]) -> tuple[str, ...]:
-    """The names of a combination, in alphabetical order."""
-    return tuple(sorted(names))
 
 
 def _parent(f: Fitted, beam: list[Fitted]) -> Fitted:

@@ -26,7 +26,7 @@ def columns(effect: np.ndarray, speed: np.ndarray) -> np.ndarray:
 
 
 class Slack:
-    """Errors under one noise; `white` (innovations, columns) are their innovations, of which the share `power` counts."""
+    """Errors under one noise: `white` (innovations, columns) are their innovations, of which `power` counts."""
 
     def __init__(self, white: np.ndarray, power: float):
         self.white, self.power = white, power

@@ -1,0 +1,22 @@
+from graph_cases import BELT, RUB, case_of, command, named, record
+
+from rtctl.diagnose.graph.joint import together
+from rtctl.diagnose.graph.search import ALIKE, apart, likeness, search
+
+OFFSET = {"term": "drive.offset", "node": "amplifier", "offset": 0.03}
+
+
+def test_two_effects_are_found_together():
+    found = search(*together([record(case_of(BELT), command(0.6), [RUB, OFFSET])]))
+    assert set(found.best.names) == {"friction.coulomb:carriage", "drive.offset:amplifier"}
+
+
+def test_what_one_effect_is_wrong_by_is_no_second_one():
+    assert named().found.best.names == ("friction.coulomb:carriage",)
+
+
+def test_models_that_explain_the_same_are_extended_once():
+    found = named().found
+    best, base = found.best, found.base
+    assert likeness(base, best, best) > ALIKE
+    assert apart(base, [best, best._replace(x=best.x.copy())]) == [best]
