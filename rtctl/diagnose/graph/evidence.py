@@ -17,7 +17,7 @@ import numpy as np
 from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.free import SIZE, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
-from rtctl.diagnose.graph.search import Found, amplitude
+from rtctl.diagnose.graph.search import Found
 from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
 
 SEGMENTS = 32
@@ -80,6 +80,14 @@ def rivals(found: Found) -> tuple[Rival, ...]:
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:
     """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
     return amplitude(base.e, fit.e, free.e) > DISCREPANCY
+
+
+def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
+    """What a further effect takes off the residual (blocks, sensors) over what all take off, rms, of the sensor that
+    shows most of it."""
+    further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
+    whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
+    return float(np.max(further / np.maximum(whole, 1e-300)))
 
 
 def correction(fit: Fitted) -> np.ndarray:

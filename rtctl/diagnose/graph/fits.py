@@ -26,8 +26,6 @@ MATTERS = 0.5  # nats of the prior that going back must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
 Z90 = 1.645  # standard deviations of a 90 % interval, each way
-INEXACT = 0.05  # of the amplitude of what a law does: standard deviation of its error
-SURELY = 0.2  # share of it that counts however large the effects are
 
 
 class Fitted(NamedTuple):
@@ -193,17 +191,6 @@ def solid(f: Fitted) -> bool:
         if len(sizes) and (np.abs(f.x[sizes]) < half[sizes]).all():
             return False
     return True
-
-
-def exactness(base: Fitted, best: Fitted) -> float:
-    """Share of the likelihood that counts, where the best model changes so much that its laws may be wrong by more
-    than noise.
-
-    The error of a law is a share of what it does. It adds to the amplitude of the noise.
-    """
-    noise = np.maximum(*quiet(best))
-    change = np.sqrt(np.mean((base.e - best.e) ** 2, axis=0))
-    return max(float(1.0 / (1.0 + np.max(INEXACT * change / noise))), SURELY)
 
 
 def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:

@@ -30,7 +30,6 @@ WILD = 1e6  # residual of a model that runs away, in steps of noise
 class Likelihood:
     """A recording, its noise and the rows that count."""
 
-    exact = 1.0  # share of it that counts, for what the laws of large effects are wrong by
     errors: np.ndarray | None = None  # (blocks, sensors, columns) what the laws of a model may be wrong by
     _slack: Slack | None = None  # the same under this noise
 
@@ -142,7 +141,7 @@ class Likelihood:
     @property
     def power(self) -> float:
         """Share of it that counts."""
-        return self.exact * coarsened(self.size)
+        return coarsened(self.size)
 
     def told(self, e: np.ndarray) -> "Likelihood":
         """The same with the noise of these residuals (blocks, sensors), less what errors of the laws explain."""
@@ -166,12 +165,6 @@ class Likelihood:
             Noise(np.ones(1), max(float(np.std(e[self.present(c), c])), float(self.least[c])))
             for c in range(e.shape[1])
         ]
-        return other
-
-    def trusted(self, exact: float) -> "Likelihood":
-        """The same of which a share counts."""
-        other = copy(self)
-        other.exact, other._slack = exact, None
         return other
 
     def loss(self, e: np.ndarray) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
-from rtctl.diagnose.graph.fits import INEXACT, Fitted, exactness, explained, refit, solid, without
+from rtctl.diagnose.graph.fits import Fitted, explained, refit, solid, without
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened
 from rtctl.diagnose.space import Space
@@ -53,14 +53,11 @@ class Found(NamedTuple):
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
     """Fit the base, then what is missing beside it."""
     base, grown, looked, odds = begun(like, space, progress)
-    share = exactness(base, min((base, *grown), key=lambda f: f.loss))
-    base, *grown = [f._replace(like=f.like.trusted(share)) for f in (base, *grown)]
-    like = like.trusted(share)
     merit = partial(merit_of, odds=odds)
     known: Known = {key(f.names): f for f in (base, *grown)}
     parents = [base]
     for level in range(1, MOST + 1):
-        better = [f for f in grown if adds(base, _parent(f, parents), f, merit)]
+        better = [f for f in grown if adds(_parent(f, parents), f, merit)]
         if not better:
             break
         better.sort(key=merit, reverse=True)
@@ -154,19 +151,11 @@ def merit_of(f: Fitted, odds: float) -> float:
     return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
 
 
-def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
-    """Whether a further effect is worth its numbers, and more than what the laws of the others may be wrong by."""
+def adds(fewer: Fitted, more: Fitted, merit: Merit) -> bool:
+    """Whether a further effect is worth its numbers, and takes off a good part of what the others leave."""
     if merit(more) < merit(fewer) + WORTH:
         return False
-    return not fewer.names or (explained(fewer, more) > PART and amplitude(base.e, fewer.e, more.e) > INEXACT)
-
-
-def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
-    """What a further effect takes off the residual (blocks, sensors) over what all take off, rms, of the sensor that
-    shows most of it."""
-    further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
-    whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
-    return float(np.max(further / np.maximum(whole, 1e-300)))
+    return not fewer.names or explained(fewer, more) > PART
 
 
 def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
@@ -179,7 +168,7 @@ def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
     if len(f.names) == 1:
         return merit(f) > merit(base) + ENOUGH
     rest = (key(set(f.names) - {name}) for name in f.names)
-    return all(adds(base, known[names], f, merit) for names in rest if names in known)
+    return all(adds(known[names], f, merit) for names in rest if names in known)
 
 
 def _parent(f: Fitted, beam: list[Fitted]) -> Fitted:
