@@ -63,6 +63,29 @@ def substep(job, p, m, t, forces, row):
 
 
 @compiled
+def correct(job, p, m, seen, row, on, first):
+    """Corrections that make the followed sensors follow a row of `seen` (n, followed), into job.correction; 0 where not `on`.
+
+    At the `first` tick the error has no rate.
+    """
+    for c in range(job.follows):
+        job.correction[c] = 0.0
+        if on:
+            y = job.main[c]
+            e = seen[row, c] - m.y[y]
+            if job.speed[c] != 0:  # a rectified speed says how fast, not which way
+                if m.y[y] * m.x[p.nq + p.sensor_i[y]] * p.sensor_a[y] < 0.0:
+                    e = -e
+                job.e[c], job.d[c] = 0.0, e
+            else:
+                if first:
+                    job.e[c] = e
+                job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
+                job.e[c] = e
+            job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
+
+
+@compiled
 def hold(job, p, m, k, share, path, pace):
     """Put the held coordinates where they are at `share` of tick k, and into job.need the force that it takes.
 
@@ -126,21 +149,7 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
                 job.shift[i] = (m.y[main] - a * m.x[i]) / a
                 m.x[i] = path[at, i] - job.shift[i]
                 look(p, m, t)
-        for c in range(job.follows):
-            job.correction[c] = 0.0
-            if job.mode == 1 and k < job.release:
-                y = job.main[c]
-                e = seen[at, c] - m.y[y]
-                if job.speed[c] != 0:  # a rectified speed says how fast, not which way
-                    if m.y[y] * m.x[p.nq + p.sensor_i[y]] * p.sensor_a[y] < 0.0:
-                        e = -e
-                    job.e[c], job.d[c] = 0.0, e
-                else:
-                    if k == first:
-                        job.e[c] = e
-                    job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
-                    job.e[c] = e
-                job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
+        correct(job, p, m, seen, at, job.mode == 1 and k < job.release, k == first)
         if k >= 0:
             for c in range(p.ny):
                 for back in range(1, min(stride, k + 1)):  # rows in between lie on a line
@@ -192,18 +201,7 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
                 m.x[i] += job.first_x[i]
                 m.x[p.nq + i] += job.first_v[i]
         look(p, m, t)
-        for c in range(job.follows):
-            job.correction[c] = 0.0
-            if k < 0:
-                e = seen[0, c] - m.y[job.main[c]]
-                if job.speed[c] != 0:
-                    job.e[c], job.d[c] = 0.0, e
-                else:
-                    if k == -job.lead:
-                        job.e[c] = e
-                    job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
-                    job.e[c] = e
-                job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
+        correct(job, p, m, seen, 0, k < 0, k == -job.lead)
         if k >= 0:
             for c in range(p.ny):
                 out[k, c] = m.y[c]
