@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.kernel import SLOTS, field, sample
+from rtctl.diagnose.kernel import SLOTS, at_site, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import shaper
 from rtctl.loop import generate
@@ -63,10 +63,19 @@ def substep(job, p, m, t, forces, row):
 
 
 @compiled
-def correct(job, p, m, seen, row, on, first):
-    """Corrections that make the followed sensors follow a row of `seen` (n, followed), into job.correction; 0 where not `on`.
+def depart(job, p, m):
+    """Time 0, and every coordinate as far from rest, and as quick, as the recording begins."""
+    m.t = 0.0
+    for i in range(p.nq):
+        m.x[i] += job.first_x[i]
+        m.x[p.nq + i] += job.first_v[i]
 
-    At the `first` tick the error has no rate.
+
+@compiled
+def correct(job, p, m, seen, row, on, first):
+    """Corrections that make the followed sensors follow a row of `seen` (n, followed), into job.correction.
+
+    They are 0 where not `on`. At the `first` tick the error has no rate.
     """
     for c in range(job.follows):
         job.correction[c] = 0.0
@@ -137,10 +146,7 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     first = -(job.lead // stride) * stride
     for k in range(first, n + stride - 1, stride):
         if k == 0:
-            m.t = 0.0
-            for i in range(p.nq):
-                m.x[i] += job.first_x[i]
-                m.x[p.nq + i] += job.first_v[i]
+            depart(job, p, m)
         look(p, m, t)
         at = min(max(k, 0), n - 1)
         if job.mode == 2:  # what the sensor errs by is no motion
@@ -196,10 +202,7 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
     n, drives = len(ref), volts.shape[1]
     for k in range(-job.lead, n):
         if k == 0:
-            m.t = 0.0
-            for i in range(p.nq):
-                m.x[i] += job.first_x[i]
-                m.x[p.nq + i] += job.first_v[i]
+            depart(job, p, m)
         look(p, m, t)
         correct(job, p, m, seen, 0, k < 0, k == -job.lead)
         if k >= 0:
@@ -292,26 +295,8 @@ def source(code: Mechanics | None = None, closed: bool = False) -> str:
         steps = STEPS.replace("{advance}", f"{code.steps.__name__}.advance(p, m)")
     imports = "\n".join(generate.imported(m) for m in sorted(modules | (LAWS if closed else set())))
     run = LOOP if closed else RUN
-    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), steps, run]
+    parts = [HEADER.format(imports=imports), *(at_site(site, KIND, known) for site in SITES), steps, run]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
-
-
-def _site(site: str, known: tuple[Term, ...]) -> str:
-    lines = ["@compiled", f"def {site}(t, m):", f'    """Every term that acts at the {site}."""']
-    lines += [
-        "    for k in range(t.q.shape[0]):",
-        "        kind = t.q[k].kind",
-        "        if kind == 0:",
-        "            break",
-    ]
-    for number, term in enumerate(known, 1):
-        act = term.act_at(site, KIND)
-        if act is not None:
-            name = field(term.name)
-            line = act.format(p=f"t.q[k].{name}", s=f"t.z[k].{name}", m="m", i="t.q[k].node", r="t.q[k].factor",
-                              l="t.q[k].link", k="t.q[k].other", c="t.q[k].channel")  # fmt: skip
-            lines += [f"        if kind == {number}:", *(f"            {part}" for part in line.split("\n"))]
-    return "\n".join(lines)
 
 
 def sources_hash(closed: bool = False) -> str:
