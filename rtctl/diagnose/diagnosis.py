@@ -15,6 +15,10 @@ class Interval(NamedTuple):
     high: float
     unit: str = ""
 
+    def as_json(self) -> dict[str, Any]:
+        """Value, ends of the interval and unit, as in diagnosis.json."""
+        return {"value": self.value, "ci90": [self.low, self.high], "unit": self.unit}
+
 
 class Rival(NamedTuple):
     """A look-alike of an effect that was fitted in its place."""
@@ -93,9 +97,7 @@ def as_json(d: Diagnosis) -> dict[str, Any]:
                 "name": e.name,
                 "node": e.node,
                 "confidence": round(e.confidence, 4),
-                "parameters": {
-                    k: {"value": v.value, "ci90": [v.low, v.high], "unit": v.unit} for k, v in e.parameters.items()
-                },
+                "parameters": {k: v.as_json() for k, v in e.parameters.items()},
                 "look_alikes": [{"name": r.name, "node": r.node, "p_value": r.p_value} for r in e.look_alikes],
             }
             for e in d.effects

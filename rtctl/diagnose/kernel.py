@@ -251,7 +251,7 @@ def source(kind: str) -> str:
     modules = sorted({t.build.__module__ for t in terms} | {"rtctl.plants.linear"})
     imports = "\n".join(generate.imported(m) for m in modules if "physics" in m or "." not in m)
     parts = [HEADER.format(kind=kind, imports=imports)]
-    parts += [_site(site, kind, terms) for site in SITES]
+    parts += [at_site(site, kind, terms) for site in SITES]
     parts += [SPEED[kind]] if kind in SPEED else []
     indent = "\n    "
     parts.append(
@@ -264,7 +264,8 @@ def source(kind: str) -> str:
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
 
 
-def _site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
+def at_site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
+    """Text of the compiled function of a site: every term that acts there on a machine of a kind, slot by slot."""
     lines = ["@compiled", f"def {site}(t, m):", f'    """Every term that acts at the {site}."""']
     lines += [
         "    for k in range(t.q.shape[0]):",
@@ -277,7 +278,7 @@ def _site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
         if act is not None:
             name = field(term.name)
             line = act.format(p=f"t.q[k].{name}", s=f"t.z[k].{name}", m="m", i="t.q[k].node", r="t.q[k].factor",
-                              l="t.q[k].link", c="t.q[k].channel")  # fmt: skip
+                              l="t.q[k].link", k="t.q[k].other", c="t.q[k].channel")  # fmt: skip
             lines += [f"        if kind == {number}:", *(f"            {part}" for part in line.split("\n"))]
     return "\n".join(lines)
 

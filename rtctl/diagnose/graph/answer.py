@@ -92,9 +92,7 @@ class GraphDiagnosis(NamedTuple):
                     "name": e.name,
                     "node": e.node,
                     "confidence": round(e.confidence, 4),
-                    "parameters": {
-                        k: {"value": v.value, "ci90": [v.low, v.high], "unit": v.unit} for k, v in e.parameters.items()
-                    },
+                    "parameters": {k: v.as_json() for k, v in e.parameters.items()},
                     "look_alikes": [{"name": r.name, "node": r.node, "probability": r.p_value} for r in e.look_alikes],
                     "check": TERMS[e.name].check,
                 }
@@ -102,9 +100,7 @@ class GraphDiagnosis(NamedTuple):
             ],
             "located": None if self.located is None else self.located._asdict(),
             "why": self.decided.why,
-            "parameters": {
-                k: {"value": v.value, "ci90": [v.low, v.high], "unit": v.unit} for k, v in self.parameters.items()
-            },
+            "parameters": {k: v.as_json() for k, v in self.parameters.items()},
             "fit": {
                 "heldout_nrmse_before": self.heldout.before,
                 "heldout_nrmse_after": self.heldout.after,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.kernel import SLOTS, field, sample
+from rtctl.diagnose.kernel import SLOTS, at_site, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import shaper
 from rtctl.loop import generate
@@ -60,6 +60,38 @@ def substep(job, p, m, t, forces, row):
         for c in range(job.follows):
             m.f[i] += job.correction[c] * job.push[c, i]
     {advance}
+
+
+@compiled
+def depart(job, p, m):
+    """Time 0, and every coordinate as far from rest, and as quick, as the recording begins."""
+    m.t = 0.0
+    for i in range(p.nq):
+        m.x[i] += job.first_x[i]
+        m.x[p.nq + i] += job.first_v[i]
+
+
+@compiled
+def correct(job, p, m, seen, row, on, first):
+    """Corrections that make the followed sensors follow a row of `seen` (n, followed), into job.correction.
+
+    They are 0 where not `on`. At the `first` tick the error has no rate.
+    """
+    for c in range(job.follows):
+        job.correction[c] = 0.0
+        if on:
+            y = job.main[c]
+            e = seen[row, c] - m.y[y]
+            if job.speed[c] != 0:  # a rectified speed says how fast, not which way
+                if m.y[y] * m.x[p.nq + p.sensor_i[y]] * p.sensor_a[y] < 0.0:
+                    e = -e
+                job.e[c], job.d[c] = 0.0, e
+            else:
+                if first:
+                    job.e[c] = e
+                job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
+                job.e[c] = e
+            job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
 
 
 @compiled
@@ -114,10 +146,7 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
     first = -(job.lead // stride) * stride
     for k in range(first, n + stride - 1, stride):
         if k == 0:
-            m.t = 0.0
-            for i in range(p.nq):
-                m.x[i] += job.first_x[i]
-                m.x[p.nq + i] += job.first_v[i]
+            depart(job, p, m)
         look(p, m, t)
         at = min(max(k, 0), n - 1)
         if job.mode == 2:  # what the sensor errs by is no motion
@@ -126,21 +155,7 @@ def run(jobs, ps, ss, ts, volts, forces, seen, path, pace, out, push):
                 job.shift[i] = (m.y[main] - a * m.x[i]) / a
                 m.x[i] = path[at, i] - job.shift[i]
                 look(p, m, t)
-        for c in range(job.follows):
-            job.correction[c] = 0.0
-            if job.mode == 1 and k < job.release:
-                y = job.main[c]
-                e = seen[at, c] - m.y[y]
-                if job.speed[c] != 0:  # a rectified speed says how fast, not which way
-                    if m.y[y] * m.x[p.nq + p.sensor_i[y]] * p.sensor_a[y] < 0.0:
-                        e = -e
-                    job.e[c], job.d[c] = 0.0, e
-                else:
-                    if k == first:
-                        job.e[c] = e
-                    job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
-                    job.e[c] = e
-                job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
+        correct(job, p, m, seen, at, job.mode == 1 and k < job.release, k == first)
         if k >= 0:
             for c in range(p.ny):
                 for back in range(1, min(stride, k + 1)):  # rows in between lie on a line
@@ -187,23 +202,9 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
     n, drives = len(ref), volts.shape[1]
     for k in range(-job.lead, n):
         if k == 0:
-            m.t = 0.0
-            for i in range(p.nq):
-                m.x[i] += job.first_x[i]
-                m.x[p.nq + i] += job.first_v[i]
+            depart(job, p, m)
         look(p, m, t)
-        for c in range(job.follows):
-            job.correction[c] = 0.0
-            if k < 0:
-                e = seen[0, c] - m.y[job.main[c]]
-                if job.speed[c] != 0:
-                    job.e[c], job.d[c] = 0.0, e
-                else:
-                    if k == -job.lead:
-                        job.e[c] = e
-                    job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
-                    job.e[c] = e
-                job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
+        correct(job, p, m, seen, 0, k < 0, k == -job.lead)
         if k >= 0:
             for c in range(p.ny):
                 out[k, c] = m.y[c]
@@ -294,26 +295,8 @@ def source(code: Mechanics | None = None, closed: bool = False) -> str:
         steps = STEPS.replace("{advance}", f"{code.steps.__name__}.advance(p, m)")
     imports = "\n".join(generate.imported(m) for m in sorted(modules | (LAWS if closed else set())))
     run = LOOP if closed else RUN
-    parts = [HEADER.format(imports=imports), *(_site(site, known) for site in SITES), steps, run]
+    parts = [HEADER.format(imports=imports), *(at_site(site, KIND, known) for site in SITES), steps, run]
     return "\n\n".join(part.strip("\n") + "\n" for part in parts)
-
-
-def _site(site: str, known: tuple[Term, ...]) -> str:
-    lines = ["@compiled", f"def {site}(t, m):", f'    """Every term that acts at the {site}."""']
-    lines += [
-        "    for k in range(t.q.shape[0]):",
-        "        kind = t.q[k].kind",
-        "        if kind == 0:",
-        "            break",
-    ]
-    for number, term in enumerate(known, 1):
-        act = term.act_at(site, KIND)
-        if act is not None:
-            name = field(term.name)
-            line = act.format(p=f"t.q[k].{name}", s=f"t.z[k].{name}", m="m", i="t.q[k].node", r="t.q[k].factor",
-                              l="t.q[k].link", k="t.q[k].other", c="t.q[k].channel")  # fmt: skip
-            lines += [f"        if kind == {number}:", *(f"            {part}" for part in line.split("\n"))]
-    return "\n".join(lines)
 
 
 def sources_hash(closed: bool = False) -> str:

@@ -8,7 +8,7 @@ from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
-from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, rigid
+from rtctl.diagnose.graph.model import GraphModel, rigid
 from rtctl.diagnose.graph.observer import Followed
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
@@ -147,10 +147,15 @@ def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: 
     j["follows"] = len(sim.followed)
     for number, one in enumerate(sim.followed):
         j["main"][number], j["speed"][number] = model.layout.sensors[one.sensor], one.shows_speed
-        moved = carried(model.layout, model.base, rigid(sim.layout, sim.case.values, one.body))
-        inertia = moved_inertia(params.inertia, moved)
-        for at, ratio in moved.items():  # a unit of correction is a unit of force at the followed body
-            j["push"][number, at] = params.inertia[at] * ratio / inertia
+        inertia = 0.0
+        push = np.zeros(j["push"].shape[1])
+        for name, ratio in rigid(sim.layout, sim.case.values, one.body).items():
+            at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
+            if ratio != 0.0:
+                push[at] = params.inertia[at] * ratio / own_ratio
+        for at in range(model.layout.nq):
+            inertia += push[at] ** 2 / params.inertia[at]
+        j["push"][number] = push / inertia  # a unit of correction is a unit of force at the followed body
         follow = sim.follow * one.bandwidth / sim.followed[0].bandwidth
         j["P"][number], j["D"][number] = follow**2 * inertia, 1.4 * follow * inertia
         j["a"][number] = -np.expm1(-10.0 * follow * dt)
