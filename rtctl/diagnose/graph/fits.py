@@ -183,14 +183,14 @@ def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
     return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
 
 
-def solid(f: Fitted) -> bool:
-    """Whether each effect of a model has a size that is not zero, by its 90 % interval."""
-    half = half_widths(f.information)
+def faint(f: Fitted) -> list[int]:
+    """Numbers of the effects of a model whose sizes may all be zero, by their 90 % intervals."""
+    half, out = half_widths(f.information), []
     for index, h in enumerate(f.space.hypotheses):
         sizes = f.space.columns(index)[h.sizes]
         if len(sizes) and (np.abs(f.x[sizes]) < half[sizes]).all():
-            return False
-    return True
+            out.append(index)
+    return out
 
 
 def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:

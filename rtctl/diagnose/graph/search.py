@@ -11,7 +11,7 @@ import numpy as np
 
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
-from rtctl.diagnose.graph.fits import Fitted, explained, refit, solid, without
+from rtctl.diagnose.graph.fits import Fitted, explained, faint, refit, without
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened
 from rtctl.diagnose.space import Space
@@ -62,6 +62,8 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
             break
         better.sort(key=merit, reverse=True)
         better[0] = known[key(better[0].names)] = restarted(enriched(better[0]))
+        for rest in _smaller(like, better[0], known, faint(better[0])):
+            known.setdefault(key(rest.names), rest)
         if level == MOST:
             break
         parents = apart(base, better)
@@ -124,12 +126,13 @@ def _best(base: Fitted, known: Known, merit: Merit) -> Fitted:
     return max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
 
 
-def _smaller(like: Likelihood, f: Fitted, known: Known) -> list[Fitted]:
-    """The model without each of its effects, of several."""
+def _smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | None = None) -> list[Fitted]:
+    """The model without each of its effects, or without some of them, of several."""
     out = []
     for index, name in enumerate(f.names if len(f.names) > 1 else ()):
-        rest = known.get(key(set(f.names) - {name}))
-        out.append(rest if rest is not None else refit(like, *without(f, index)))
+        if which is None or index in which:
+            rest = known.get(key(set(f.names) - {name}))
+            out.append(rest if rest is not None else refit(like, *without(f, index)))
     return out
 
 
@@ -163,7 +166,7 @@ def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
     fitted."""
     if not f.names:
         return True
-    if not solid(f):
+    if faint(f):
         return False
     if len(f.names) == 1:
         return merit(f) > merit(base) + ENOUGH
