@@ -8,21 +8,36 @@ Source: Brynjarsdottir & O'Hagan, Learning about physical parameters: the import
 Problems 30 (2014); Woodbury's identity for the covariance.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.polynomial.legendre import legvander
 from scipy.linalg import cho_factor, cho_solve
+from scipy.ndimage import uniform_filter1d
 
 OFF = 0.05  # of what an effect does: standard deviation of its error
 ORDER = 3  # of the polynomials along what it does, and along the speed
+WIDTHS = (1, 4, 16, 64)  # blocks, of the averages between which bands of frequency lie
 
 
 def columns(effect: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Errors (blocks, sensors, columns) of standard deviation one of an effect (blocks, sensors) that is seen while the
-    machine moves with `speed` (blocks,)."""
+    """Errors (blocks, sensors, columns) of an effect (blocks, sensors) that is seen while the machine moves with
+    `speed` (blocks,): in size along what it does and along the speed, and in size and phase by bands of frequency."""
     done = effect / np.maximum(np.abs(effect).max(axis=0), 1e-300)
     fast = speed[:, None] / max(float(np.abs(speed).max(initial=0.0)), 1e-300)
-    smooth = np.concatenate([legvander(done, ORDER), legvander(fast, ORDER)[..., 1:] + 0.0 * effect[..., None]], axis=2)
-    return np.asarray(OFF / np.sqrt(smooth.shape[2]) * effect[..., None] * smooth)
+    along = [legvander(done, ORDER), legvander(fast, ORDER)[..., 1:] + 0.0 * effect[..., None]]
+    smooth = effect[..., None] * np.concatenate(along, axis=2)
+    means = [uniform_filter1d(effect, width, axis=0) for width in WIDTHS]
+    bands = [fine - coarse for fine, coarse in pairwise(means)]
+    turned = [
+        rate * _rms(band) / np.maximum(_rms(rate), 1e-300) for band in bands for rate in [np.gradient(band, axis=0)]
+    ]
+    parts = [OFF / np.sqrt(smooth.shape[2]) * smooth, OFF * np.stack([*bands, *turned], axis=2)]
+    return np.asarray(np.concatenate(parts, axis=2))
+
+
+def _rms(e: np.ndarray) -> np.ndarray:
+    return np.asarray(np.sqrt(np.mean(e**2, axis=0)))
 
 
 class Slack:
