@@ -26,6 +26,7 @@ ALIKE = 0.995  # cosine from which two models do the same
 EXCHANGES = 2
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
+SHARE = 0.1  # of the evidence of all effects together, which a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
 
 Progress = Callable[[str], None]
@@ -57,7 +58,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     known: Known = {key(f.names): f for f in (base, *grown)}
     parents = [base]
     for level in range(1, MOST + 1):
-        better = [f for f in grown if adds(_parent(f, parents), f, merit)]
+        better = [f for f in grown if adds(base, _parent(f, parents), f, merit)]
         if not better:
             break
         better.sort(key=merit, reverse=True)
@@ -154,9 +155,11 @@ def merit_of(f: Fitted, odds: float) -> float:
     return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
 
 
-def adds(fewer: Fitted, more: Fitted, merit: Merit) -> bool:
-    """Whether a further effect is worth its numbers, and takes off a good part of what the others leave."""
-    if merit(more) < merit(fewer) + WORTH:
+def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
+    """Whether a further effect is worth its numbers, and brings more than what the laws of the others may be wrong by:
+    a share of the evidence of all, and of the power that the others leave."""
+    gained = merit(more) - merit(fewer)
+    if gained < max(WORTH, SHARE * (merit(more) - merit(base))):
         return False
     return not fewer.names or explained(fewer, more) > PART
 
@@ -171,7 +174,7 @@ def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
     if len(f.names) == 1:
         return merit(f) > merit(base) + ENOUGH
     rest = (key(set(f.names) - {name}) for name in f.names)
-    return all(adds(known[names], f, merit) for names in rest if names in known)
+    return all(adds(base, known[names], f, merit) for names in rest if names in known)
 
 
 def _parent(f: Fitted, beam: list[Fitted]) -> Fitted:
