@@ -18,7 +18,7 @@ from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.free import SIZE, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.search import Found
-from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
+from rtctl.diagnose.graph.wander import LITTLE, log_density, pushes, wandering
 
 SEGMENTS = 32
 DRAWS = 300
@@ -47,19 +47,20 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     base = found.base
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
     sim = base.like.parts[0].sim
-    unit, before = Measures(sim, base.model.base, {}).of("force", str(sim.body)), correction(base)
+    unit, before = Measures(sim, base.model.base, {}).of("force", str(sim.body)), pushes(base)
 
-    def wrong(fit: Fitted) -> float:
-        """What the laws of a fit may be wrong by, in forces that move the machine: the correction has less of what the
-        effects are, also of those in a sensor or a drive."""
-        change = float(np.sqrt(np.mean((before - correction(fit)) ** 2))) if fit.names else 0.0
+    def wrong(fit: Fitted, pushed: list[np.ndarray]) -> float:
+        """What the laws of a fit may be wrong by, in forces that move the machine: the correction at the followed body
+        has less of what the effects are, also of those in a sensor or a drive."""
+        change = float(np.sqrt(np.mean((before[0] - pushed[0])[:, 0] ** 2))) if fit.names else 0.0
         return DISCREPANCY * change / unit if np.isfinite(change) else 0.0
 
     best = set(found.best.names)  # and whether a small error of fewer laws does as well
     entries: list[tuple[Fitted, Free | None, float]] = []
     for rank, fit in enumerate(fits):
-        off = wrong(fit)
-        share, wander = wandering(fit)
+        pushed = pushes(fit)
+        off = wrong(fit, pushed)
+        share, wander = wandering(fit, pushed)
         listed = found.merit(fit) + log_density(share, float(np.hypot(LITTLE, off)))
         entries.append((fit, None, listed))
         if wander is not None:
@@ -88,12 +89,6 @@ def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
     further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
     whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
     return float(np.max(further / np.maximum(whole, 1e-300)))
-
-
-def correction(fit: Fitted) -> np.ndarray:
-    """Correction (rows,) of the observer at the followed body of the first recording, N or Nm."""
-    sim = fit.like.parts[0].sim
-    return np.asarray(sim.everything(sim.own(fit.model))[1][fit.like.rows[0] :, 0])
 
 
 def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:

@@ -7,6 +7,8 @@ that lacks a force from a sensor that is noisy, whatever the colour of that nois
 Source: disturbance observer (Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mechatronics 1, 1996).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rtctl.diagnose.graph.fits import Fitted
@@ -18,16 +20,21 @@ SLOW = 3.0  # time constants of the observer, over which it is averaged
 LITTLE = 0.004  # of the force that moves the machine: standard deviation of what a description that is right leaves
 
 
-def wandering(fit: Fitted) -> tuple[float, Free | None]:
+def pushes(fit: Fitted) -> list[np.ndarray]:
+    """Corrections (rows, followed) of the observer in each recording, N or Nm at the followed bodies."""
+    return [part.sim.everything(part.sim.own(fit.model))[1][slice(*part.rows)] for part in fit.like.parts]
+
+
+def wandering(fit: Fitted, pushed: Sequence[np.ndarray]) -> tuple[float, Free | None]:
     """Rms of the force that a fit leaves, by the force that moves the machine, and the force itself, of the recording
-    and the followed body where it is largest; 0 and None where the model follows nothing."""
+    and the followed body where it is largest; 0 and None where the model follows nothing. `pushed` is that of the fit.
+    """
     share, worst = 0.0, None
-    for part in fit.like.parts:
+    for part, push in zip(fit.like.parts, pushed, strict=True):
         sim = part.sim
         if sim.mode != TRACK:
             continue
         model = sim.own(fit.model)
-        push = sim.everything(model)[1][slice(*part.rows)]
         measures = Measures(sim, model.base, {})
         width = max(1, round(SLOW / sim.follow / sim.record.dt))
         count = len(push) // width

@@ -6,7 +6,7 @@ from graph_cases import BELT, case_of, command, named, record
 
 from rtctl.diagnose.diagnosis import NAMED, UNNAMED
 from rtctl.diagnose.graph.answer import borne_out
-from rtctl.diagnose.graph.fits import prior, refit, relaxed
+from rtctl.diagnose.graph.fits import faint, prior, refit, relaxed
 from rtctl.diagnose.graph.joint import together
 
 FORCES = ("inertia", "mass", "dry", "viscous", "stiffness", "damping", "gain")
@@ -45,3 +45,11 @@ def test_a_name_that_predicts_worse_is_none():
     assert worse.verdict == UNNAMED
     assert "predicted worse than without" in worse.why
     assert not worse.confidence
+
+
+def test_an_effect_of_no_size_is_faint():
+    best = named().found.best
+    assert faint(best) == []
+    x = best.x.copy()
+    x[best.space.columns(0)[best.space.hypotheses[0].sizes]] *= 1e-3
+    assert faint(best._replace(x=x)) == [0]

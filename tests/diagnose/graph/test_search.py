@@ -1,7 +1,7 @@
 from graph_cases import BELT, RUB, case_of, command, named, record
 
 from rtctl.diagnose.graph.answer import diagnose_record
-from rtctl.diagnose.graph.search import ALIKE, apart, likeness
+from rtctl.diagnose.graph.search import ALIKE, adds, apart, likeness
 
 OFFSET = {"term": "drive.offset", "node": "amplifier", "offset": 0.03}
 
@@ -23,3 +23,16 @@ def test_models_that_explain_the_same_are_extended_once():
     best, base = found.best, found.base
     assert likeness(base, best, best) > ALIKE
     assert apart(base, [best, best._replace(x=best.x.copy())]) == [best]
+
+
+def test_a_further_effect_brings_a_share_of_all_evidence():
+    found = named().found
+    base, best = found.base, found.best
+    more = best._replace(x=best.x.copy())
+
+    def merit(brought):
+        return lambda f: {id(base): 0.0, id(best): 100.0, id(more): 100.0 + brought}[id(f)]
+
+    assert adds(base, base, best, merit(0.0))
+    assert not adds(base, best, more, merit(9.0))
+    assert adds(base, best, more, merit(12.0))  # it leaves no more than noise, as the one effect does

@@ -5,7 +5,7 @@ from graph_cases import PENDULUM, RATE, case_of, command, nothing, record
 from rtctl.diagnose.graph.answer import diagnose_record
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.joint import together
-from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
+from rtctl.diagnose.graph.wander import LITTLE, log_density, pushes, wandering
 
 FORCE = 0.4  # Nm, rms of the drive
 
@@ -18,7 +18,8 @@ def random_force(n, rms, seed=3):
 
 
 def test_a_machine_as_described_leaves_little():
-    share, _ = wandering(nothing().found.base)
+    base = nothing().found.base
+    share, _ = wandering(base, pushes(base))
     assert share < 3 * LITTLE
 
 
@@ -26,7 +27,8 @@ def test_a_random_force_is_measured():
     u = command(4.0)
     push = random_force(len(u), 0.1 * FORCE)
     like, space = together([record(case_of(PENDULUM), u, push=push)])
-    _, free = wandering(refit(like, space))
+    fit = refit(like, space)
+    _, free = wandering(fit, pushes(fit))
     assert free is not None
     assert (free.node, free.axis) == ("rod", "time")
     there = np.interp(free.knots, np.arange(len(u)) / RATE, push)
