@@ -48,7 +48,18 @@ def test_losses_add_up_and_residuals_are_stacked():
     assert like.loss(e) == pytest.approx(sum(p.loss(own) for p, own in zip(like.parts, parts, strict=True)))
     own = like.told(e)
     assert len(own.white(e)) == own.size
-    np.testing.assert_allclose(own.filtered(e[:, :, None])[:, 0], own.white(e))
+    np.testing.assert_allclose(own.white(e[:, :, None])[:, 0], own.white(e))
+
+
+def test_errors_of_a_law_are_shared_by_all_recordings():
+    like = both().found.like
+    model = both().decided.best.model
+    e = like.raw(model)
+    error = np.random.default_rng(2).standard_normal((*e.shape, 1)) * 3.0 * e.std()
+    loose = like.told(e).slackened(error)
+    wrong = e + 2.0 * error[..., 0]
+    assert np.abs(loose.left(wrong) - e).max() < 0.5 * np.abs(wrong - e).max()
+    assert loose.told(wrong).loss(wrong) < like.told(wrong).loss(wrong)
     early, late = like.split(0.25)
     assert len(early.raw(model)) + len(late.raw(model)) == pytest.approx(len(e), abs=2)
 

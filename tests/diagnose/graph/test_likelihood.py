@@ -38,7 +38,7 @@ def test_innovations_under_their_own_noise():
     white = own.white(e)
     assert len(white) == own.size
     np.testing.assert_allclose(np.mean(white**2), 1.0, rtol=0.3)
-    np.testing.assert_allclose(own.filtered(e[:, :, None])[:, 0], white)
+    np.testing.assert_allclose(own.white(e[:, :, None])[:, 0], white)
 
 
 def test_rows_of_a_part():
