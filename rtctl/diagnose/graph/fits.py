@@ -110,8 +110,10 @@ def refit(
     """The model of `space` from x: by least squares and under the noise `floor`, then under the noise that it left.
 
     Least squares finds large effects, a noise that knows them finds small ones. `known` (blocks, sensors, unknowns) are
-    the derivatives in the first columns, as a model with fewer effects has them.
+    the derivatives in the first columns, as a model with fewer effects has them. Parameters are fitted as if the laws
+    were exact: their errors weigh evidence, and would else stand for an effect that the fit left too small.
     """
+    like = like.slackened(None)
     low, high = space.bounds()
     x = np.clip(space.start() if x is None else np.asarray(x, float), low, high)
     e = like.raw(space.model(x))
@@ -128,9 +130,7 @@ def refit(
     tried = [judged(descend(like.flat(e), space, start, rounds, 1e-2, EFFECTS))]
     if floor is not None:
         tried.append(judged(descend(floor, space, start, rounds, 1e-2, EFFECTS)))
-    at = min(tried, key=lambda one: one[0])[1]
-    like = like.slackened(errors(like, space, at.x, at.e))
-    best = judged(at)
+    best = min(tried, key=lambda one: one[0])
     for _ in range(ROUNDS):
         found = judged(descend(best[2], space, best[1], rounds, 1e-3))
         gain = best[0] - found[0]
@@ -165,7 +165,8 @@ def relaxed(f: Fitted) -> Fitted:
             continue
         x = np.clip(x, *f.space.bounds())
         e = f.like.raw(f.space.model(x))
-        at = descend(f.like.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
+        exact = f.like.slackened(None)
+        at = descend(exact.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
         trial = _fitted(f.like.told(at.e), f.space, at)
         if trial.log_evidence > f.log_evidence:
             return trial

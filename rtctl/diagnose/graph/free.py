@@ -78,7 +78,7 @@ def axes(m: Measures, node: str) -> dict[str, np.ndarray]:
     }
     if m.turns(node) and np.ptp(x) > TURNS * 2 * np.pi:
         out["angle"] = np.mod(x, 2 * np.pi)
-    if sim.volts.shape[1]:
+    if sim.volts.shape[1] and sim.case.problem != "static":  # where the force is what the model predicts
         out["command"] = sim.volts[:, 0]
     return out
 
