@@ -3,16 +3,9 @@
 Source: Ljung & Box, Biometrika 65 (1978), as in the validation of system identification toolboxes.
 """
 
-from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
-
-from baselines.form import diagnosis
-from rtctl.diagnose.base import base_fit
-from rtctl.diagnose.problem import Problem
-from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import Simulator
 
 LAGS = 25
 LEVEL = 0.01
@@ -28,12 +21,3 @@ def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
     r = np.array([float(e[k:] @ e[:-k]) / power for k in range(1, lags + 1)])
     q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
     return float(chi2.sf(q, lags))
-
-
-def diagnose(record: Record) -> dict[str, Any]:
-    """`unnamed` where the error is not white; never a name."""
-    sim = Simulator(record)
-    problem = Problem(sim)
-    error = problem.error(base_fit(sim, problem).model)
-    worst = min(ljung_box(error[:, c]) for c in range(error.shape[1]))
-    return diagnosis(record.plant, [], unnamed=worst < LEVEL)

@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 
 from rtctl.plants.element import Element, Stand, element, stand
 from rtctl.plants.physics.place import Place, place
-from rtctl.plants.physics.placement import anywhere, by_kind, elements, having, met, nodes, standing
+from rtctl.plants.physics.placement import anywhere, by_kind, elements, having, nodes, standing
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Term
 
@@ -28,7 +28,7 @@ TERMS = _library()
 
 __all__ = [
     "TERMS", "Draw", "Element", "Needs", "Phrase", "Place", "Stand", "Term", "anywhere", "by_kind", "element",
-    "elements", "having", "met", "nodes", "only", "ordered", "place", "stand", "standing",
+    "elements", "having", "nodes", "only", "ordered", "place", "stand", "standing",
 ]  # fmt: skip
 
 

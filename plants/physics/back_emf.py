@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -66,9 +66,7 @@ BACK_EMF = Term(
     ),
     check="Look at the amplifier's mode (voltage or current), and measure the motor's current while it runs fast.",
     units={"b": "drag"},
-    needs=Needs(speeds=True),
     search=(Size("b", "drag", 0.2),),
-    makes_up=True,
     seldom=3.0,
     draws={"b": Draw(0.2, 1.0, "drag")},
 )

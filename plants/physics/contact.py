@@ -27,7 +27,7 @@ from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Limit, Size
-from rtctl.plants.physics.story import BEHIND, Draw, Needs, Phrase
+from rtctl.plants.physics.story import BEHIND, Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 from rtctl.plants.physics.transmission import undone
 
@@ -338,7 +338,6 @@ CREEP = Term(
         "Mark both sides of the contact and see whether the marks part over a long gentle move; look at its pressure."
     ),
     units={"kappa": "per_force", "rate": "yield"},
-    needs=Needs(second=(stand("joint", "contact rigid"),)),
     search=BY_WAY,
     contact=True,
     stiff=True,

@@ -14,7 +14,7 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Limit, Shape, Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 DEADBAND_FORMS = ("shift", "cut", "floor")
@@ -256,7 +256,6 @@ OFFSET = Term(
     check="Set the command to zero and measure the output of the amplifier; trim its zero.",
     search=(Size("offset", "volts", 0.05, signed=True, slight=0.05),),
     static=True,
-    defined=True,
     draws={"offset": Draw(0.05, 0.3, "volts", signed=True)},
 )
 DEADBAND = Term(
@@ -285,10 +284,8 @@ DEADBAND = Term(
         forms={"": "do nothing", "floor": "all give the same"},
     ),
     check="Raise the command slowly from zero and see where the output of the amplifier begins to follow.",
-    needs=Needs(command="small"),
     search=(Size("band", "volts", 0.1), Choice("form", ("shift", "cut", "floor"))),
     variants=Choice("form", ("shift", "cut", "floor")),
-    told_first=True,
     static=True,
     draws={"band": Draw(0.05, 0.3, "volts")},
     chosen={"form": ("shift", "cut", "floor")},
@@ -318,10 +315,8 @@ GAIN_ASYMMETRY = Term(
         need="commands of both signs",
     ),
     check=("Command the same size with either sign and measure both outputs; look for a weak half of the bridge."),
-    needs=Needs(command="signs"),
     search=(Size("a", "one", 0.1, signed=True),),
     static=True,
-    defined=True,
     draws={"a": Draw(0.03, 0.2, signed=True)},
 )
 SATURATION = Term(
@@ -351,7 +346,6 @@ SATURATION = Term(
         need="commands near the limit",
     ),
     check="Look at the current limit that is set in the amplifier and at the voltage of its supply.",
-    needs=Needs(command="large"),
     search=(Limit("limit", "peak", (0.5, 0.8)),),
     richer=(Shape("knee", "one", (0.15,), 6.0),),
     variants=Choice("form", ("parabola", "rapp")),

@@ -18,7 +18,7 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Shape, Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 THERMAL_FORMS = ("exponential", "linear", "hyperbolic")
@@ -173,10 +173,8 @@ LAG = Term(
         need="quick changes of the command",
     ),
     check="Look for a filter on the command input and at the gains of the current loop.",
-    needs=Needs(command="changes"),
     search=(Size("tau", "tick", 0.5, blur="driver"), Choice("order", (1, 2))),
     richer=(Shape("zeta", "one", (0.7,), 5.0),),
-    defined=True,
     late="bends",
     chosen={"order": (1, 2)},
 )

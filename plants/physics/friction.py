@@ -19,7 +19,7 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Shape, Size
-from rtctl.plants.physics.story import BOTH, Draw, Needs, Phrase
+from rtctl.plants.physics.story import BOTH, Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -167,7 +167,6 @@ COULOMB = Term(
     ),
     check="Pull slowly with a spring balance in both directions; look at bearings, wipers and seals.",
     search=(Size("F_C", "force", 0.1, signed=True, undoes="dry", slight=0.1),),
-    told_first=True,
     static=True,
     friction="dry",
     draws={"F_C": Draw(0.4, 1.0, "dry")},
@@ -195,11 +194,9 @@ VISCOUS = Term(
         need="moves at several speeds",
     ),
     check="Let it run out from several speeds; look at the grease, its amount and its temperature.",
-    needs=Needs(speeds=True),
     search=(Size("B", "drag", 0.1, signed=True, undoes="thick"),),
     static=True,
     friction="viscous",
-    makes_up=True,
 )
 QUADRATIC = Term(
     name="friction.quadratic",
@@ -226,7 +223,6 @@ QUADRATIC = Term(
     ),
     check="Look for a fan, a cover or an open wheel that moves air or oil.",
     search=(Size("Q", "drag2", 0.1),),
-    imitated=("friction.viscous", "friction.stribeck", "friction.coulomb", "drive.supply_sag"),
     static=True,
 )
 STRIBECK = Term(
@@ -257,12 +253,9 @@ STRIBECK = Term(
         "Pull slowly with a spring balance and compare the force that starts it with the force that "
         "keeps it moving; look at the lubrication."
     ),
-    needs=Needs(slow=True),
     search=(Size("F_s", "force", 0.1, offset="dry"), Shape("v_s", "speed", (0.012, 0.035, 0.1, 0.3, 0.9), 4.0)),
     variants=Choice("form", ("gaussian", "exponential", "tustin")),
-    told_first=True,
     static=True,
     falls_to="dry",
-    makes_up=True,
     chosen={"form": ("gaussian", "exponential", "tustin")},
 )

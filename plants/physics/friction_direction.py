@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Size
-from rtctl.plants.physics.story import BOTH, Draw, Needs, Phrase
+from rtctl.plants.physics.story import BOTH, Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -75,7 +75,6 @@ ASYMMETRY = Term(
     check=(
         "Pull slowly with a spring balance in one direction and then in the other; look at wipers, and at the level."
     ),
-    needs=Needs(ways="motion"),
     search=(Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
     richer=(Size("B_a", "drag", 0.05, signed=True),),
     static=True,

@@ -141,5 +141,4 @@ LOAD = Term(
     ),
     check="Pull slowly with and without the load; look at the bearing that carries it.",
     search=JOINTS,
-    makes_up=True,
 )

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.ripple import harmonics
-from rtctl.plants.physics.search import INF, Hint, OtherName, Shape, Size, Turn
+from rtctl.plants.physics.search import INF, Hint, Shape, Size, Turn
 from rtctl.plants.physics.story import PASSES, WAVES, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
@@ -153,11 +153,12 @@ THICKNESS = Term(
         need=WAVES,
     ),
     check="Measure the thickness of the strip or rail every few millimetres with a micrometer.",
-    needs=Needs(compared=True, alone="slides", second=(stand("body", "guided"), stand("sensor", "guided load"))),
+    needs=Needs(
+        compared=True,
+        alone="slides",
+    ),
     search=(Turn("A", "phi", "one", 5e-06), Hint("wavelength", "wavelength", 0.6, lengths=(0.012, INF))),
     richer=(Turn("A2", "phi2", "one", 1e-06), Turn("A3", "phi3", "one", 1e-06)),
-    other_name=OtherName("wavelength", "ripple.encoder", "turn"),
-    defined=True,
     draws={"A": Draw(2e-06, 3e-05), "wavelength": Draw(0.2, 1.0, "travel")},
 )
 STRIP = Term(
@@ -188,7 +189,6 @@ STRIP = Term(
         need=WAVES,
     ),
     check="Lay a straight edge along the strip and look for gaps; look at its tension and its supports.",
-    defined=True,
     draws={"longer": Draw(1e-05, 0.0001), "wavelength": Draw(0.2, 1.0, "travel")},
 )
 DIRT = Term(
@@ -226,6 +226,5 @@ DIRT = Term(
         Hint("at", "spot", 0.05, True),
         Shape("width", "span", (0.02,), 10.0),
     ),
-    defined=True,
     draws={"A": Draw(5e-06, 5e-05), "at": Draw(0.02, 0.08, "travel"), "width": Draw(0.005, 0.02, "travel")},
 )

@@ -22,7 +22,7 @@ from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.physics.presliding import bend
 from rtctl.plants.physics.search import Choice, Shape, Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 FORMS = ("dahl", "bouc_wen")
@@ -108,7 +108,6 @@ HYSTERESIS = Term(
         need="slow reversals under load",
     ),
     check="Block the far side, load the joint slowly by hand both ways and watch whether it comes back.",
-    needs=Needs(ways="push"),
     search=(Size("F_h", "force", 0.1), Shape("z_h", "twist", (0.05, 0.3, 3.0)), Choice("form", FORMS)),
     variants=Choice("form", FORMS),
     stiff=True,

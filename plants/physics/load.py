@@ -267,11 +267,10 @@ IMBALANCE = Term(
     ),
     units={"A": "force"},
     needs=Needs(
-        turns=0.5, turned=(stand("body", "rotor reel"), stand("body", "rotor wheel"), stand("body", "rotor bounded"))
+        turns=0.5,
     ),
     search=(Turn("A", "phi", "force", 0.1),),
     static=True,
-    defined=True,
     draws={"A": Draw(0.05, 0.3, "force"), "turn": Draw(1.0, 1.0, "turn")},
 )
 BUMP = Term(
@@ -308,7 +307,6 @@ BUMP = Term(
         Choice("form", ("drag", "hill", "push")),
     ),
     variants=Choice("form", ("drag", "hill", "push")),
-    closer="places",
     static=True,
     draws={"F": Draw(0.2, 1.0, "force"), "at": Draw(0.02, 0.08, "travel"), "width": Draw(0.01, 0.05, "travel")},
     chosen={"form": ("drag", "hill", "push")},

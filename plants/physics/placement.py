@@ -1,6 +1,5 @@
 """Nodes at which a term can stand: those of the elements of a plant that have what it asks for."""
 
-from collections.abc import Iterable
 from functools import lru_cache
 
 from rtctl.plants.element import GENERAL, Element, Stand
@@ -48,11 +47,6 @@ def _general(element: Element) -> Element:
 def having(plant: Plant, kind: str, trait: str) -> tuple[str, ...]:
     """Nodes of the elements of a kind that have a trait."""
     return tuple(e.node for e in elements(plant) if e.kind == kind and trait in e.traits)
-
-
-def met(stands: Iterable[Stand], plant: Plant) -> tuple[str, ...]:
-    """Nodes of the elements that meet any of the stands."""
-    return tuple(_stands(tuple(stands), elements(plant)))
 
 
 @lru_cache(maxsize=1024)

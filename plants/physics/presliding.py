@@ -24,7 +24,7 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Shape, Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 NEWTON = 40  # steps at most, from below: far from the root each is one unit of the exponent, near it digits double
@@ -144,7 +144,6 @@ PRESLIDING = Term(
         need="standstills and slow reversals",
     ),
     check="Push lightly without moving it, let go and see whether it springs back; look at seals and wipers.",
-    needs=Needs(slow=True),
     search=(Size("z_s", "span", 0.001, finest=2.0), Choice("form", ("dahl", "lugre"))),
     richer=(
         Size("rise", "one", 0.1, most=3.0),

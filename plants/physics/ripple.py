@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
-from rtctl.plants.physics.search import Hint, OtherName, Turn
+from rtctl.plants.physics.search import Hint, Turn
 from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
@@ -139,11 +139,8 @@ COGGING = Term(
     search=(Turn("A", "phi", "force", 0.05), Hint("per_turn", "order")),
     sliding=(Turn("A", "phi", "force", 0.05), Hint("turn", "wavelength", 0.4)),
     richer=(Turn("A2", "phi2", "force", 0.02), Turn("A3", "phi3", "force", 0.02)),
-    told_first=True,
     counted=("per_turn",),
-    more_starts=6,
     static=True,
-    defined=True,
     draws={"A": Draw(0.02, 0.3, "force"), "turn": Draw(1.0, 1.0, "turn")},
     chosen={"per_turn": (3.0, 5.0, 7.0, 12.0, 24.0)},
 )
@@ -187,7 +184,5 @@ ENCODER = Term(
     search=(DISC,),
     sliding=(Turn("A", "phi", "one", 1e-05), Hint("turn", "wavelength", 0.4, lengths=(0.0, 0.045))),
     richer=(Turn("A2", "phi2", "one", 0.0005), Turn("A3", "phi3", "one", 0.0005)),
-    other_name=OtherName("turn", "guide.thickness", "wavelength"),
-    defined=True,
     draws={"A": Draw(0.0003, 0.01, "lever"), "turn": Draw(1.0, 1.0, "turn")},
 )

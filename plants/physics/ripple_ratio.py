@@ -145,7 +145,6 @@ RATIO = Term(
     search=(ERROR, Choice("end", ENDS), Choice("order", (1.0, 2.0))),
     richer=(Turn("A2", "phi2", "one", 3e-4), Turn("A3", "phi3", "one", 3e-4)),
     stiff=True,
-    defined=True,
     draws={"A": Draw(3e-4, 1e-2, "lever")},
     chosen={"end": ENDS},
 )

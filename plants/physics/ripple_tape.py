@@ -180,7 +180,6 @@ REEL = Term(
     needs=Needs(turns=0.5),
     search=(Turn("e", "phi", "one", 0.0001),),
     richer=(Turn("e2", "phi2", "one", 3e-05), Turn("e3", "phi3", "one", 3e-05)),
-    defined=True,
     draws={"e": Draw(5e-05, 0.0005)},
 )
 CAPSTAN = Term(
@@ -220,6 +219,5 @@ CAPSTAN = Term(
     needs=Needs(turns=0.5),
     search=(Turn("a", "phi", "one", 1e-05),),
     richer=(Turn("a2", "phi2", "one", 3e-06), Turn("a3", "phi3", "one", 3e-06)),
-    defined=True,
     draws={"a": Draw(1e-05, 0.0001)},
 )

@@ -87,8 +87,6 @@ TORQUE = Term(
     search=(Turn("A", "phi", "one", 0.05), Hint("per_turn", "order")),
     richer=(Turn("A2", "phi2", "one", 0.02), Turn("A3", "phi3", "one", 0.02)),
     counted=("per_turn",),
-    more_starts=6,
-    defined=True,
     draws={"A": Draw(0.03, 0.2)},
     chosen={"per_turn": (3.0, 6.0, 12.0, 24.0)},
 )

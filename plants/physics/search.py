@@ -101,12 +101,4 @@ class Choice(NamedTuple):
     measure: str = ""
 
 
-class OtherName(NamedTuple):
-    """The same law under the name of another term, where a lone sensor cannot tell them apart."""
-
-    own: str  # parameter
-    term: str
-    name: str  # of the parameter there
-
-
 Part = Size | Limit | Shape | Turn | At | Hint | Where | Rest | Jumps | Choice

@@ -197,9 +197,7 @@ MISSED_COUNTS = Term(
     ),
     check="Look at the screen and the plug of the cable of the sensor, and at its highest count rate.",
     units={"at": "s"},
-    needs=Needs(second=(stand("sensor", "slides load"),)),
     search=(Jumps("size"),),
-    defined=True,
     draws={"each": Draw(0.003, 0.03, "lever", signed=True), "mark": Draw(0.02, 0.08, "travel"), "size": Draw(0.0, 0.0)},
 )
 RECTIFIED = Term(
@@ -236,9 +234,8 @@ RECTIFIED = Term(
         "Move it by hand there and back and see whether the reading comes back; look at the second "
         "channel of the sensor."
     ),
-    needs=Needs(ways="motion", compared=True, alone="unsigned"),
+    needs=Needs(compared=True, alone="unsigned"),
     search=(Choice("share", (1.0,)),),
-    defined=True,
     unsigned=True,
     draws={"share": Draw(0.5, 1.0)},
 )
@@ -273,8 +270,9 @@ SCALE = Term(
         need="a second sensor to compare with",
     ),
     check=("Move by a known length and compare the reading; look at the counts per turn and the radius that were set."),
-    needs=Needs(compared=True, second=(stand("sensor"), stand("body", "capstan"))),
+    needs=Needs(
+        compared=True,
+    ),
     search=(Size("relative", "one", 0.001, signed=True),),
-    defined=True,
     draws={"relative": Draw(0.001, 0.005, signed=True)},
 )

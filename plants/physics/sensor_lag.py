@@ -79,6 +79,5 @@ SENSOR_LAG = Term(
     ),
     check="Look for a filter in the sensor, its converter or the input card, and at the averaging that is set there.",
     search=(Size("tau", "tick", 1.0, blur="driver"),),
-    defined=True,
     draws={"tau": Draw(0.5, 3.0, "tick")},
 )

@@ -10,7 +10,7 @@ from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.drive import ramp
 from rtctl.plants.physics.search import Limit
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
@@ -67,7 +67,6 @@ SLEW = Term(
         need="large quick changes of the command",
     ),
     check="Command a large step and watch the output of the amplifier; look for a ramp that is set in it.",
-    needs=Needs(command="changes"),
     search=(Limit("rate", "pace", (0.2, 0.6)),),
     draws={"rate": Draw(0.2, 0.6, "pace")},
 )

@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from rtctl.plants.element import Stand
-
 BOTH = "moves in both directions"
 TURNS = "at least a full turn"
 BEHIND = "long moves, with a sensor behind the contact"
@@ -32,14 +30,8 @@ class Needs(NamedTuple):
     """What a record must contain so that the effect can be tested."""
 
     turns: float = 0.0  # turns of its node
-    turned: tuple[Stand, ...] = ()  # where they are asked for; without it wherever the term stands
-    ways: str = ""  # "motion": both ways; "push": a motion or a push both ways
-    slow: bool = False  # standstills, or a crawl
-    speeds: bool = False  # more than one speed
-    command: str = ""  # of its drive: "changes", and besides "signs": both; "small": near zero; "large": near the limit
     compared: bool = False  # another sensor to compare with
     alone: str = ""  # what a lone sensor shows it by all the same: "slides" its node, "unsigned" the reading
-    second: tuple[Stand, ...] = ()  # where a record of one sensor shows nothing of it
     stiffness: bool = False  # a spring at its node
     dry: bool = False  # dry friction at its node, which it alters
 

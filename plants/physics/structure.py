@@ -135,7 +135,6 @@ RESONANCE = Term(
         Shape("f_Hz", "ring", (3.0, 6.0, 11.0, 19.0, 30.0, 43.0, 60.0, 85.0, 120.0, 165.0, 225.0), 1.4),
         Shape("zeta", "one", (0.02,), 30.0),
     ),
-    closer="frequencies",
     stiff=True,
     draws={"f_Hz": Draw(0.04, 0.2, "rate"), "mass": Draw(0.1, 0.4, "inertia"), "zeta": Draw(0.01, 0.1)},
 )

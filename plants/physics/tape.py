@@ -168,7 +168,6 @@ SLACK = Term(
     ),
     check="Watch the tape in quick reversals and see whether it hangs through; look at its pretension.",
     search=(Choice("share", (1.0,)), Choice("other", (1.0, 0.0))),
-    closer="tolerance",
     stiff=True,
     draws={"share": Draw(0.8, 1.0)},
 )

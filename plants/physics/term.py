@@ -32,7 +32,7 @@ from pydantic import Field
 
 from rtctl.idiom import Settings
 from rtctl.plants.element import Stand
-from rtctl.plants.physics.search import Choice, OtherName, Part
+from rtctl.plants.physics.search import Choice, Part
 from rtctl.plants.physics.story import NOTHING, Draw, Needs, Phrase
 
 SITES = ("command", "force", "last", "reading")
@@ -72,35 +72,27 @@ class Term:
         default_factory=dict
     )  # parameter -> unit, or dimension by its node (quantities.py)
     contact: bool = False  # acts in m and N where its contact drives a tape or a carriage
-    told_first: bool = False  # among the sizes that a verdict of nothing names
 
     # what a record must hold, and how it is looked for
     needs: Needs = NOTHING
     search: tuple[Part, ...] = ()  # of the plain form; without it the first of `typical` is the size
     sliding: tuple[Part, ...] = ()  # the same where its node slides, if that is another
-    imitated: tuple[str, ...] = ()  # names that a fit takes for it
     richer: tuple[Part, ...] = ()  # further parameters, tried once the plain form stands
     richer_at: str = ""  # kind of element at which it has its richer form; all of them without it
     variants: Choice | None = None  # a setting that is tried in its other values once the term stands
     counted: tuple[str, ...] = ()  # parameters that are whole numbers: slots and poles
-    other_name: OtherName | None = None
-    more_starts: int = 0  # that a search keeps beyond the usual number
-    closer: str = ""  # a closer look: at all "frequencies", all over the "tolerance", at the likeliest "places"
     static: bool = False  # a function of what `axis` says, without memory
-    defined: bool = False  # its sizes are numbers by definition: constants, factors, times, waves
     joint: Callable[[Any], dict[str, float]] | None = None  # numbers of the joint at its node
     seldom: float = 0.0  # nats of prior odds against it: another name of the same law is the usual one
     late: str = ""  # "delay" of what is commanded, or what "bends" to one
     stiff: bool = False  # alters a spring: simulated in shorter steps
     slips: bool = False  # lets go what a contact carries: the bodies behind it move freely
     unsigned: bool = False  # a reading without direction
-    clock: bool = False  # of the ticks: shows in the noise, not in the error of a fit
 
     # friction
     friction: str = ""  # it is this friction of a body, at its first size: "dry", "viscous"
     falls_to: str = ""  # friction of its node to which its own falls with speed: "dry"
     replaces: str = ""  # friction of its node whose place it takes: "dry"
-    makes_up: bool = False  # drags in the place of dry friction that a fit takes away
 
     # how large one is hidden by `plant --conceal`
     draws: Mapping[str, Draw] = field(default_factory=dict)  # ranges in place of the typical ones

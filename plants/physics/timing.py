@@ -169,7 +169,6 @@ DELAY = Term(
         "ticks that each of them holds."
     ),
     search=(Size("extra", "tick", 0.5, blur="driver"),),
-    defined=True,
     late="delay",
     draws={"extra": Draw(0.3, 1.5, "tick")},
 )
@@ -202,8 +201,6 @@ JITTER = Term(
         need="fast motion",
     ),
     check="Look at what else runs on the computer of the controller and at the priority of its loop.",
-    defined=True,
-    clock=True,
     draws={"sigma": Draw(0.05, 0.3, "tick"), "rate": Draw(1.0, 1.0, "hertz")},
     chosen={"form": ("gaussian", "uniform")},
 )

@@ -22,7 +22,7 @@ from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants import linear
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Shape, Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 FIRM = 25.0  # times the stiffness at which the lighter side rings slowly: as good as rigid
@@ -183,11 +183,9 @@ BACKLASH = Term(
         need="reversals",
     ),
     check="Hold one side of the coupling and turn the other by hand; look at keys, set screws and gear teeth.",
-    needs=Needs(ways="push"),
     search=(Size("gap", "twist", (0.3, 5.0, 60.0)), Choice("damping", (0.0, 1.0)), Choice("edge", (0.005, 0.1))),
     richer=(Shape("edge", "one", (0.05,), 20.0),),
     variants=Choice("damping", (0.0, 1.0)),
-    told_first=True,
     units={"c": "stiffness"},
     richer_at="joint",
     stiff=True,

@@ -21,7 +21,7 @@ def diagnose(
         list[str],
         typer.Argument(
             metavar="BUNDLE...",
-            help="Folder with recording.parquet and case.json, or a folder of such; several of one described machine; "
+            help="Folder with recording.parquet and case.json, or a folder of such; several of one machine; "
             "with --closed-loop a CONFIG.",
         ),
     ],
@@ -33,14 +33,6 @@ def diagnose(
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Where the results go; BUNDLE/diagnosis if absent."),
     ] = None,
-    engine: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME",
-            help="rules, or likelihood: which of the two judges a reel unit, linear drive or axis. A described machine "
-            "is always judged by its likelihood.",
-        ),
-    ] = "rules",
     json: JsonOption = False,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     jobs: Annotated[
@@ -54,7 +46,7 @@ def diagnose(
         bool,
         typer.Option(
             "--together",
-            help="The bundles, or all in the folder, are of one described machine: one verdict.",
+            help="The bundles, or all in the folder, are of one machine: one verdict.",
         ),
     ] = False,
     terms: Annotated[
@@ -114,10 +106,7 @@ def diagnose(
       rtctl diagnose --closed-loop ivu --for 25s --reference constant_speed
     """
     from rtctl.cli.diagnose_console import DiagnoseConsole
-    from rtctl.diagnose.engines import ENGINES
 
-    if engine not in ENGINES:
-        _refuse(f"--engine {engine}", f"is not known; it is {' or '.join(ENGINES)}")
     console = DiagnoseConsole(json)
     _register(terms or [])
     _couple(mechanics, machine)
@@ -126,7 +115,7 @@ def diagnose(
             _refuse("--heldout", "goes with a BUNDLE, not with --closed-loop")
         if len(what) > 1 or together:
             _refuse("--closed-loop", "takes one CONFIG")
-        _machine(console, what[0], set_, mode, reference, common.seconds(duration, "--for"), out, report, json, engine)
+        _machine(console, what[0], set_, mode, reference, common.seconds(duration, "--for"), out, report, json)
         return
     alone = {"--for": duration, "--reference": reference, "--mode": mode, "--set": set_}
     for option, given in alone.items():
@@ -136,15 +125,15 @@ def diagnose(
     from rtctl.diagnose.folder import tasks
 
     bundle = Path(what[0])
-    found = tasks(bundle, out, heldout, engine) if len(what) == 1 else []
+    found = tasks(bundle, out, heldout) if len(what) == 1 else []
     if together or len(what) > 1:
-        from rtctl.diagnose.engines import of_one_machine
+        from rtctl.diagnose.bundles import of_one_machine
 
         if heldout is not None:
             _refuse("--heldout", "goes with one BUNDLE; of several the last part of each is held out")
         bundles = [task.bundle for task in found] or [Path(one) for one in what]
-        of_one_machine(bundles, together, engine)
-        _bundle(console, bundles[0], None, out, report, json, engine, bundles[1:])
+        of_one_machine(bundles, together)
+        _bundle(console, bundles[0], None, out, report, json, bundles[1:])
     elif found:
         if terms:
             _refuse("--term", "goes with one bundle, not with a folder of them")
@@ -154,7 +143,7 @@ def diagnose(
         assert length is not None
         _folder(console, found, jobs, length, report, again, json)
     else:
-        _bundle(console, bundle, heldout, out, report, json, engine)
+        _bundle(console, bundle, heldout, out, report, json)
 
 
 def _register(terms: list[str]) -> None:
@@ -194,20 +183,17 @@ def _bundle(
     out: Path | None,
     report: bool,
     json: bool,
-    engine: str,
     more: Sequence[Path] = (),
 ) -> None:
-    from rtctl.diagnose.engines import diagnose_into
+    from rtctl.diagnose.bundles import diagnose_into
     from rtctl.diagnose.results import FOLDER
 
     folder = out if out is not None else bundle / FOLDER
     with console.stages() as stage:
-        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage, engine, more)
-    console.notes([*made.data.get("warnings", made.diagnosis.record.case.warnings), *made.faults])
+        made = diagnose_into(bundle, other, folder, report, bundle if out is None else None, stage, more)
+    console.notes([*made.data["warnings"], *made.faults])
     if json:
         common.print_json(made.data)
-    elif made.described:
-        console.described(made.diagnosis, folder)
     else:
         console.result(made.diagnosis, folder)
 
@@ -252,27 +238,26 @@ def _machine(
     out: Path | None,
     report: bool,
     json: bool,
-    engine: str,
 ) -> None:
-    from rtctl.diagnose import engines, repair
+    from rtctl.diagnose import repair
+    from rtctl.diagnose.graph import files as results
     from rtctl.diagnose.results import finite
     from rtctl.own import files
 
     config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)
     files.refuse_plant(config, f"{what}: ")
-    judge = engines.judge(engine, not isinstance(config.machine, str))
     config = repair.ready(config, mode)
     folder = out if out is not None else common.default_folder(config.name)
     with console.stages() as stage:
-        made = repair.repair(config, folder, length, stage, **judge.repairs)
+        made = repair.repair(config, folder, length, stage)
         stage("writing the results")
-        faults = judge.write(made, folder, report)
-    rows = judge.changes(made.last)
+        faults = results.write(made.last, folder, report)
+    rows = results.changes(made.last)
     console.notes([*made.last.record.case.warnings, *faults])
     if json:
-        common.print_json(finite(_repaired(made, judge.as_json(made.last), rows)))
+        common.print_json(finite(_repaired(made, made.last.as_json(), rows)))
     else:
-        console.repaired(made, folder, rows, judge.described)
+        console.repaired(made, folder, rows)
 
 
 def _repaired(made: "Repair", data: dict[str, Any], rows: list[tuple[str, str, str]]) -> dict[str, Any]:

@@ -79,13 +79,6 @@ class DiagnoseConsole:
 
     def result(self, d: Any, folder: Path) -> None:
         """Verdict, effects, look-alikes, and where the rest is."""
-        from rtctl.diagnose.report import terminal
-
-        self.out.print(terminal(d), soft_wrap=not self.out.is_terminal)
-        self.files(folder)
-
-    def described(self, d: Any, folder: Path) -> None:
-        """The same of a described machine."""
         from rtctl.diagnose.graph.report import terminal
 
         self.out.print(terminal(d), soft_wrap=not self.out.is_terminal)
@@ -99,11 +92,11 @@ class DiagnoseConsole:
             if (folder / name).is_file():
                 self.out.print(f"{word:11}{folder / name}", highlight=False, markup=False, soft_wrap=True)
 
-    def repaired(self, made: Any, folder: Path, rows: list[tuple[str, str, str]], described: bool = False) -> None:
+    def repaired(self, made: Any, folder: Path, rows: list[tuple[str, str, str]]) -> None:
         """The last verdict and what the model has that the owner's had not: `rows` of key, was and is."""
         for bundle, trip in zip(made.bundles, made.trips, strict=True):
             self.out.print(f"{'recorded':11}{bundle}" + (f", tripped: {trip}" if trip else ""), highlight=False)
-        (self.described if described else self.result)(made.last, folder)
+        self.result(made.last, folder)
         if not rows:
             self.out.print("The model is as it was.")
             return

@@ -23,7 +23,6 @@ from rtctl.plants import axis, ivu, ldu
 MAX_SECTIONS = 8
 DAMPING = math.sqrt(0.5)  # of a drive of which the owner says nothing
 
-Plant = Literal["ivu", "ldu", "axis"]
 PARAMETERS: dict[str, type[Settings]] = {
     "ivu": ivu.IvuParameters,
     "ldu": ldu.LduParameters,

@@ -10,7 +10,6 @@ Source: thesis 7.1.3 and 7.4 for the sensors; two-phase decoding, in which the d
 same.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,14 +82,6 @@ def one_a_tick(found: Edges) -> Edges:
     last = np.append(first[1:], len(found.rows)) - 1
     at, middle = 0.5 * (found.at[first] + found.at[last]), np.full(len(first), 0.5)
     return Edges(found.channel, found.rows[first], at, found.sigma[first], found.group[first], middle)
-
-
-def alike(some: Sequence[Edges], others: Sequence[Edges]) -> bool:
-    """Whether both say the same of every count."""
-    return len(some) == len(others) and all(
-        a.channel == b.channel and np.array_equal(np.diff(a.at), np.diff(b.at))
-        for a, b in zip(some, others, strict=True)
-    )
 
 
 def followed(predicted: np.ndarray, turns: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -11,61 +11,16 @@ prediction error in closed loop.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from rtctl.diagnose.model import Model
 from rtctl.diagnose.problem import TOGETHER
 from rtctl.diagnose.space import Space
-from rtctl.diagnose.stretches import rms
 
-TOLL = 0.08  # share of the cost that a further number of a term must take off
 THREADS = 2
-IDLE = 0.02  # rms error that a parameter moves over its whole tolerance: less needs no derivative of its own
 
 Result = TypeVar("Result")
-
-
-class Judge(Protocol):
-    """What a fit asks of a recording: weighed errors of a model, and how many of them go together as one."""
-
-    together: float
-
-    def residual(self, model: Any, coarse: bool = False) -> np.ndarray:
-        """Errors (rows,) of a model."""
-        ...
-
-
-class Fit(NamedTuple):
-    """A model fitted to a record."""
-
-    space: Space
-    x: np.ndarray
-    r: np.ndarray  # weighted error (rows,)
-    J: np.ndarray  # (rows, unknowns), of r by x
-    cost: float  # half the sum of squares and of the prior
-
-    @property
-    def model(self) -> Model:
-        """The model itself."""
-        return self.space.model(self.x)
-
-    @property
-    def rms(self) -> float:
-        """Of the weighted error: 1 or less is all noise."""
-        return rms(self.r)
-
-    @property
-    def merit(self) -> float:
-        """Cost with a toll for each number of the terms: a further one must take off a share of what there is."""
-        return self.cost * (1.0 + TOLL * sum(max(len(h.coordinates), 1) for h in self.space.hypotheses))
-
-    def bound(self) -> list[str]:
-        """Unknowns that ended at a bound."""
-        low, high = self.space.bounds()
-        near = np.minimum(self.x - low, high - self.x) < 1e-6
-        return [name for name, is_near in zip(self.space.labels(), near, strict=True) if is_near]
 
 
 def parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
@@ -90,96 +45,6 @@ def quotients(
         return np.asarray((residual(space.model(moved)) - start) / step)
 
     return parallel([partial(column, i) for i in columns])
-
-
-def jacobian(
-    problem: Judge, space: Space, x: np.ndarray, columns: Sequence[int] | None = None, old: np.ndarray | None = None
-) -> np.ndarray:
-    """Forward differences (rows, columns) of the residual by x, away from the upper bound.
-
-    `columns` are those asked for; with `old`, columns that hardly matter are taken from there.
-    """
-    wanted = list(range(len(x))) if columns is None else list(columns)
-    if old is not None:
-        moved = np.linalg.norm(old[:, : space.nb], axis=0) * space.reach()
-        wanted = [i for i in wanted if i >= space.nb or moved[i] > IDLE * np.sqrt(len(old))]
-    start = problem.residual(space.model(x), coarse=True)
-    found = quotients(lambda model: problem.residual(model, coarse=True), space, x, start, wanted)
-    if old is None:
-        return np.stack(found, axis=1) if found else np.zeros((len(start), 0))
-    J = old.copy()
-    for i, values in zip(wanted, found, strict=True):
-        J[:, i] = values
-    return J
-
-
-def fit(
-    problem: Judge,
-    space: Space,
-    x: np.ndarray | None = None,
-    rounds: int = 20,
-    enough: float = 2e-3,
-    J: np.ndarray | None = None,
-    rough: bool = False,
-    give_up: Callable[[float], bool] | None = None,
-) -> Fit:
-    """Least squares from `x`.
-
-    Between full Jacobians the last one is kept up to date by Broyden's formula, which costs nothing; a guess `J` saves
-    the first. Stops when a round gains less than `enough` of the cost with a fresh Jacobian (`rough`: with any, in
-    coarse simulations), or where `give_up(cost)` says so. Source: Broyden, Math. Comp. 19 (1965).
-    """
-    low, high = space.bounds()
-    x = np.clip(space.start() if x is None else np.array(x, float), low, high)
-    r = problem.residual(space.model(x), rough)
-    weight = space.prior() * trust(r, problem.together)
-
-    def total(r: np.ndarray, x: np.ndarray) -> float:
-        return 0.5 * float(r @ r) + 0.5 * float(weight @ x**2)
-
-    cost = total(r, x)
-    damping, fresh = 1e-4, J is None
-    J = jacobian(problem, space, x) if J is None else J
-    for _ in range(rounds):
-        g = J.T @ r + weight * x
-        H = J.T @ J + np.diag(weight)
-        gained = False
-        for _ in range(12 if fresh else 3):
-            dx = bounded_step(H, g, x, low, high, damping)
-            if not np.abs(dx).max(initial=0.0) > 1e-9:
-                break
-            trial = problem.residual(space.model(x + dx), rough)
-            new = total(trial, x + dx)
-            if new < cost:
-                gained = True
-                break
-            damping *= 10
-        if not gained:
-            if fresh or rough:
-                break
-            J, fresh, damping = jacobian(problem, space, x, old=J), True, 1e-4
-            continue
-        share = (cost - new) / max(cost, 1e-30)
-        hoped = -(g @ dx + 0.5 * dx @ H @ dx)
-        honest = (cost - new) > 0.3 * hoped
-        if honest:
-            J = J + np.outer(trial - r - J @ dx, dx) / float(dx @ dx)
-        x, r, damping = x + dx, trial, max(damping / 10, 1e-8)
-        weight = space.prior() * trust(r, problem.together)
-        cost = total(r, x)
-        if give_up is not None and give_up(cost):
-            break
-        if share < enough and (fresh or rough):
-            break
-        if not honest or share < enough:
-            J, fresh = jacobian(problem, space, x, old=J), True
-        else:
-            fresh = False
-    if rough:
-        r = problem.residual(space.model(x))
-        weight = space.prior() * trust(r, problem.together)
-        cost = total(r, x)
-    return Fit(space, x, r, J, cost)
 
 
 def trust(r: np.ndarray, together: float = TOGETHER) -> float:

@@ -1,4 +1,4 @@
-"""Diagnoses on disk: the files of one, and a folder of bundles worked through by several processes.
+"""A folder of bundles, diagnosed by several processes.
 
 A bundle whose diagnosis is there and newer than its recording is not diagnosed again, so that work that was broken off
 goes on where it stopped. Of several processes each simulates with one thread, so that as many as there are cores use
@@ -21,10 +21,8 @@ from typing import Any, NamedTuple
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.failures import told
-from rtctl.config.files import write_text
-from rtctl.diagnose.engines import RULES
-from rtctl.diagnose.results import EXPERIMENT, FOLDER, MODEL, RESULT, TURN, finite, fresh, put
-from rtctl.trace.bundle import ARROWS, CASE, PARQUET, load_case
+from rtctl.diagnose.results import FOLDER, RESULT
+from rtctl.trace.bundle import ARROWS, CASE, PARQUET
 
 SECOND = "-heldout"  # a bundle of this name beside another is a second recording of the same machine
 ALONE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -39,7 +37,6 @@ class Task(NamedTuple):
     bundle: Path
     out: Path
     other: Path | None = None
-    engine: str = RULES
 
 
 class Outcome(NamedTuple):
@@ -62,60 +59,12 @@ class Outcome(NamedTuple):
 Work = Callable[[Task, bool], Outcome]
 
 
-def write(
-    d: Any, folder: Path, config: dict[str, Any] | None = None, report: bool = True, base: Path | None = None
-) -> list[str]:
-    """diagnosis.json, model.yaml, experiment.yaml where there is one, report.html; each is there whole or not at all.
-
-    `config` is the recorded machine's own, see `own_config`. Where `base` is given, no link may lead out of it.
-    Returns a sentence on each file but the first that could not be made: the verdict stands without them. Raises
-    UserError where the disk does not take them.
-    """
-    from rtctl.diagnose.diagnosis import as_json
-    from rtctl.diagnose.export import write_model, write_turn
-    from rtctl.diagnose.repair import experiment_yaml
-    from rtctl.diagnose.turn import of_diagnosis
-
-    faults: list[str] = []
-    fresh(folder, base)
-    try:
-        put(folder / MODEL, lambda path: write_model(d.after, d.record, path, config, d.left_out))
-    except UserError as error:
-        faults.append(f"{folder / MODEL} is not written: {error}")
-    if d.experiment is not None:
-        text = experiment_yaml(d, config)
-        put(folder / EXPERIMENT, lambda path: write_text(path, text))
-    turn = of_diagnosis(d)
-    if turn is not None:
-        put(folder / TURN, lambda path: write_turn(turn, path))
-    if report:
-        try:
-            from rtctl.diagnose import report as page
-
-            html = page.html(d)
-            put(folder / page.NAME, lambda path: write_text(path, html))
-        except UserError:
-            raise
-        except Exception as error:  # a figure that fails must not take the verdict with it
-            faults.append(f"the report is not written: {told(error)[1]}")
-    result = json.dumps(finite(as_json(d)), indent=1) + "\n"
-    put(folder / RESULT, lambda path: write_text(path, result))
-    return faults
-
-
-def own_config(bundle: Path) -> dict[str, Any] | None:
-    """The config in case.json of a bundle that our own daemon recorded; None of any other."""
-    case = load_case(bundle)
-    config = case.get("config")
-    return config if isinstance(config, dict) and config.get("machine") == case.get("plant") else None
-
-
 def is_bundle(folder: Path) -> bool:
     """Whether the folder is a bundle, or what is left of one."""
     return any((folder / name).is_file() for name in (CASE, PARQUET, ARROWS))
 
 
-def tasks(folder: Path, out: Path | None = None, other: Path | None = None, engine: str = RULES) -> list[Task]:
+def tasks(folder: Path, out: Path | None = None, other: Path | None = None) -> list[Task]:
     """A task for each bundle in `folder`, by name; none where it is no folder of bundles.
 
     Results go to `out`/NAME, or into each bundle. A second recording is `other`/NAME, or NAME-heldout beside NAME.
@@ -128,7 +77,7 @@ def tasks(folder: Path, out: Path | None = None, other: Path | None = None, engi
         if name.endswith(SECOND) and name.removesuffix(SECOND) in found:
             continue
         second = other / name if other is not None else found.get(name + SECOND)
-        made.append(Task(name, bundle, out / name if out is not None else bundle / FOLDER, second, engine))
+        made.append(Task(name, bundle, out / name if out is not None else bundle / FOLDER, second))
     return made
 
 
@@ -149,11 +98,11 @@ def done(task: Task) -> Outcome | None:
 
 def one(task: Task, report: bool) -> Outcome:
     """Diagnose one bundle into its folder. Nothing is raised: what went wrong is told in the outcome."""
-    from rtctl.diagnose.engines import diagnose_into
+    from rtctl.diagnose.bundles import diagnose_into
 
     began = time.monotonic()
     try:
-        made = diagnose_into(task.bundle, task.other, task.out, report, task.out.parent, engine=task.engine)
+        made = diagnose_into(task.bundle, task.other, task.out, report, task.out.parent)
         return Outcome(task.name, 0, time.monotonic() - began, made.data, "; ".join(made.faults))
     except (UserError, NoAnswer) as error:
         return Outcome(task.name, error.exit_code, time.monotonic() - began, message=_line(error))

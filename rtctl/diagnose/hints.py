@@ -9,115 +9,15 @@ squares on cosine and sine of the angle, since angles are not evenly sampled.
 """
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
-from rtctl.diagnose.model import Model
-from rtctl.diagnose.problem import settled
-from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import TRACK, Simulator, per_unit, resolution, way
-
-FAST = {"ivu": 8.0, "ldu": 2.0, "axis": 4.0}  # times the tracking bandwidth: how quickly the observer follows
 MOST = 4  # hints of a kind
 JUMPS = 47
 AROUND = 8  # ticks that a jump is compared with
 SURE, UNSURE = 6.0, 4.0  # times the noise from tick to tick: a jump, and one if there are others like it
 TWIN = 1.4  # times another jump nearby, which is as large
 ALIKE = 2.5  # times the same: jumps that differ by less may be of one size
-SENSORS = {"ivu": ("encoder",), "ldu": ("encoder", "scale"), "axis": ("sensor",)}
-CALM = {"ivu": 0.02, "ldu": 2e-3}  # s, over which an acceleration is taken
-SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)])
-WHOLE = tuple(map(float, range(2, 49)))  # of slots and poles: where it turns fast none stands out, and each is tried
-SEEN = 2.0  # times the observer's bandwidth: a quicker ripple is not in what it shows
 SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
-FINEST = 1000.0  # waves along the way of an axis: 1 mm of a screw on a metre
-WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
-
-
-def observe(sim: Simulator, model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Readings (n, sensors) of the model kept close to the track, and the input (n,) that it took to keep it there."""
-    for faster in (FAST[sim.record.plant], 1.0):  # a flexible machine bears only so much
-        out, _, push = sim.everything(model, TRACK, follow=faster * sim.follow)
-        if np.isfinite(out).all():
-            break
-    return out, push
-
-
-def hints(sim: Simulator, model: Model) -> dict[str, list]:
-    """Suggestions by kind (and node): order, wavelength, spot, grip, and jump (time, size) of each sensor."""
-    record = sim.record
-    start = settled(sim)
-    read = sim.run(model)
-    _, push = observe(sim, model)
-    whole = way(record)
-    x = whole[start:]
-    d = push[start:]
-    thin = max(1, len(x) // 8000)
-    rate = uniform_filter1d(np.abs(np.gradient(x)) / record.dt, SMOOTH)[::thin]
-    x, d = x[::thin], d[::thin]
-    quick = SEEN * FAST[record.plant] * sim.follow
-    ratios = {"": 1.0}
-    base = model.base
-    if record.plant == "ivu":
-        ratios = {":motor1": base["R_c"] / base["R1"], ":motor2": -base["R_c"] / base["R2"]}
-    elif record.plant == "ldu":
-        ratios = {":motor": base["N"], ":wheel": 1.0}
-    found: dict[str, list] = grips(record, base, read[:, 0])
-    for node, ratio in ratios.items():
-        shown = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
-        found["order" + node] = [*shown, *(n for n in WHOLE if n not in shown)]
-    if record.plant != "ivu":
-        gone = x * (base["R_c"] if record.plant == "ldu" else 1.0)
-        target = d
-        if "scale_counts" in record.y:
-            target = _second(sim, model, start)[::thin]
-        span = float(np.ptp(gone)) or 1.0
-        waves = span * np.geomspace(0.1, 2.0, WAVES)
-        found["wavelength"] = peaks(waves, spectrum(gone, target, 2 * np.pi / waves), MOST)
-        if record.plant == "axis":  # of forces and of readings, whose errors the observer takes for forces
-            turns = np.arange(2.5, FINEST, 0.25)  # waves along the whole way
-            height = seen(gone, target, rate, 2 * np.pi * turns / span, quick)
-            fine = peaks(span / turns, height, MOST)
-            found["wavelength"] += [w for w in fine if all(abs(w / v - 1) > 0.1 for v in found["wavelength"])]
-        found["spot"] = spots(x, target, MOST)
-    else:
-        found["spot"] = spots(x, d, MOST)
-    low, span = float(whole.min()), float(np.ptp(whole)) or 1.0
-    found["spot"] = [float((x.min() + share * np.ptp(x) - low) / span) for share in found["spot"]]
-    for channel, sensor in enumerate(SENSORS[record.plant]):
-        if channel < len(sim.channels) and sim.channels[channel] != "speed":  # of which no jump stays
-            error = record.y[sim.channels[channel]] - read[:, channel]
-            unit = per_unit(record.case)[channel]
-            count = 1.0 if record.plant != "axis" else resolution(record) * unit
-            found[f"jump:{sensor}"] = [
-                (float(record.t[k] - record.t[0]), size / unit) for k, size in jumps(error, count)
-            ]
-    return found
-
-
-def grips(
-    record: Record, base: dict[str, float], read: np.ndarray, shares: tuple[float, ...] = SLIPPING
-) -> dict[str, list]:
-    """Limits that would hold a contact for these `shares` of the time, from the simulated reading (n,)."""
-    if record.plant == "axis":
-        return {}
-    w = max(1, round(CALM[record.plant] / record.dt))
-    x = read / per_unit(record.case)[0]
-    v = (x[2 * w :] - x[: -2 * w]) / (2 * w * record.dt)
-    a = (x[2 * w :] - 2 * x[w:-w] + x[: -2 * w]) / (w * record.dt) ** 2
-    if record.plant == "ivu":
-        carried = {"capstan": (base["J_c"] * a + base["tau_Fc"] * np.sign(v)) / base["R_c"]}
-    else:
-        R, N = base["R_c"], base["N"]
-        force = base["M"] * R * a + base["F_c"] * np.sign(v) + base["B_c"] * R * v
-        carried = {"capstan": force, "wheel": (force * R + (base["J_t"] + base["J_c"] + base["J_e"]) * a) / N}
-    return {f"grip:{node}": [float(f) for f in np.quantile(np.abs(F), shares)] for node, F in carried.items()}
-
-
-def _second(sim: Simulator, model: Model, start: int) -> np.ndarray:
-    """Error of the second sensor where the model is kept on the first one's track, counts."""
-    out, _ = observe(sim, model)
-    return (sim.record.y[sim.channels[1]] - out[:, 1])[start:]
 
 
 def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray) -> np.ndarray:

@@ -4,65 +4,19 @@ How a search walks through a term's parameters is told by the term itself (plant
 of what the recording shows of the node: its rms speed, its span, the rms force of its drive.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import product
 
 import numpy as np
 
-from rtctl.diagnose.model import Model, dry_with_terms
-from rtctl.diagnose.quantities import of_case
-from rtctl.diagnose.record import Record
-from rtctl.diagnose.scales import node_scales
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, REST, SHAPE, SINE, SIZE, Coordinate, Hypothesis
-from rtctl.diagnose.tacho import counts_up
 from rtctl.diagnose.yardstick import Measures
-from rtctl.idiom import Settings
 from rtctl.own.term import sizes
-from rtctl.plants.physics import TERMS, Element, Term, having, nodes, only, standing
+from rtctl.plants.physics import TERMS, Element, Term, having
 from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Rest, Shape, Size, Turn, Where
 
-FALLING = only("falls_to", "dry")  # to what dry friction there is
-USUAL = {("ldu", "carriage"), ("ivu", "motor1"), ("ivu", "motor2"), ("ivu", "capstan"), ("axis", "carriage")}  # nodes
 ONCE = 1.5  # times a turn: what comes less often is no cogging of a shaft that may be out of balance, which has teeth
-SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
-
-
-def hypotheses(
-    record: Record,
-    base: dict[str, float],
-    hints: dict[str, list] | None = None,
-    only: Iterable[str] = (),
-    beside: Sequence[Settings] = (),
-) -> list[Hypothesis]:
-    """All of them for this plant, one for each start; `only` restricts to terms by name.
-
-    `hints` gives, as "kind" or "kind:node", what the record suggests for a Hint (see `hints.py`). `beside` are the
-    terms that the model has already: friction that falls with speed asks for dry friction that it falls to.
-    """
-    model = Model(record.plant, base, tuple(beside), of_case(record.case))
-    scales = node_scales(record, base)
-    measures = Measures(record, base, scales, hints or {})
-    lone = len(record.y) < 2
-    blind = record.shows_speed or counts_up(record)  # what a sensor without direction makes of any motion
-    out = []
-    for name, term in TERMS.items():
-        if name in only or (not only and searched(name)):
-            for node in nodes(term, record.plant):
-                found = standing(term, record.plant, node)
-                assert found is not None
-                stand, element = found
-                slides = sliding(element, model)
-                if (
-                    stand.again
-                    or not (stand.offered or name in only)
-                    or (lone and term.needs.compared and not shows_alone(term, element, slides, blind))
-                    or (slides and "turns" in stand.needs and not term.sliding)
-                    or (term.falls_to and dry_with_terms(model, node) <= SLIGHT * measures.of("force", node))
-                ):
-                    continue
-                out += starts_of(name, node, (term.sliding if slides else ()) or parts_of(name), measures)
-    return out
 
 
 def searched(name: str) -> bool:
@@ -70,20 +24,9 @@ def searched(name: str) -> bool:
     return bool(sizes(name) or TERMS[name].search)
 
 
-def sliding(element: Element, model: Model) -> bool:
-    """Whether an element slides: by its traits, and by the units of the machine where it may do either."""
-    return "slides" in element.traits and not ("turns" in element.traits and model.units.rotary)
-
-
 def shows_alone(term: Term, element: Element, slides: bool, blind: bool) -> bool:
     """Whether the only sensor of the only body shows a term that elsewhere takes another sensor to compare with."""
     return "lone" in element.traits and {"slides": slides, "unsigned": blind}.get(term.needs.alone, False)
-
-
-def hinted(name: str) -> bool:
-    """Whether the record suggests starts of a term."""
-    term = TERMS[name]
-    return any(isinstance(part, Hint | Jumps | At) for part in (*term.search, *term.sliding))
 
 
 def parts_of(name: str) -> tuple[Part, ...]:

@@ -10,30 +10,17 @@ from rtctl.diagnose.quantities import Quantities, of_case, quantities
 from rtctl.diagnose.tacho import signed
 from rtctl.idiom import Settings
 from rtctl.plants import axis, ivu, ldu
-from rtctl.plants.physics import only
 
 if TYPE_CHECKING:
     from rtctl.diagnose.record import Record
 
 DIRECT = 20e3  # Hz: bandwidth of a drive of which the owner says nothing
 
-FITTED = {  # what a fit may move, in the order of the Jacobian's columns; the rest is geometry and counts
-    "ivu": (
-        "R1", "R2", "J_m1", "J_m2", "J_1", "J_2", "J_c", "K_m1", "K_m2", "tau_F1", "tau_F2", "tau_Fc",
-        "c_m1", "c_m2", "k_m1", "k_m2", "c1", "c2", "k1", "k2",
-    ),
-    "ldu": (
-        "R_c", "J_m", "J_t", "J_c", "J_e", "M", "K_m1", "K_m2", "B_c", "B_m", "F_c", "k_s", "k_c", "b_s", "b_c",
-    ),
-    "axis": ("M", "K", "F_v", "F_c", "k"),
-}  # fmt: skip
-ADDS_DRY = only("friction", "dry")  # term that adds to the dry friction of a node at any speed
 DRY = {  # parameter that the dry friction of a node is, or comes from
     "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
     "ldu": {"capstan": "F_c", "carriage": "F_c"},
     "axis": {"carriage": "F_c"},
 }
-KNOWN = 1e-3  # a tolerance below this is no freedom
 
 
 class Model(NamedTuple):
@@ -101,24 +88,10 @@ def guess(record: "Record", base: dict[str, float]) -> dict[str, float]:
     return {"M": abs(M), "F_v": max(F_v, 1e-3 * abs(M) * np.sqrt(abs(k / M))), "k": max(k, 0.0)}
 
 
-def free_parameters(case: Case, model: Model) -> tuple[str, ...]:
-    """Parameters that the owner's value may miss, in the fixed order."""
-    known = {"K"} if not np.isfinite(case.tolerance("M")) else set()  # of an unknown mass only the ratio is seen
-    names = (n for n in FITTED[case.plant] if n not in known)
-    return tuple(n for n in names if model.base.get(n, 0.0) != 0.0 and case.tolerance(n) > KNOWN)
-
-
 def dry_friction(kind: str, base: dict[str, float], node: str) -> float:
     """Dry friction that a plant's parameters give a node, Nm or N; 0 where its equations have none."""
     dry = base.get(DRY[kind].get(node, ""), 0.0)
     return dry * base.get("R_c", 1.0) if (kind, node) == ("ldu", "capstan") else dry
-
-
-def dry_with_terms(model: Model, node: str) -> float:
-    """The same with what terms add to it at any speed."""
-    terms: list[Any] = list(model.terms)
-    added = sum(float(t.F_C) for t in terms if (t.term, t.node) == (ADDS_DRY, node))
-    return dry_friction(model.kind, model.base, node) + added
 
 
 def plant_params(model: Model, case: Case, h: float) -> Any:

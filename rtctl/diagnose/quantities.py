@@ -23,11 +23,6 @@ DIMENSIONS = {  # unit of a quantity where a node turns, and where it slides
     "yield": ("rad/(s Nm)", "m/(s N)"),
 }  # fmt: skip
 TURNED = {slides: turns for turns, slides in DIMENSIONS.values()}  # unit on a sliding axis -> on a rotary one
-NODES = {
-    "motor": "the motor", "capstan": "the capstan", "wheel": "the friction wheel",
-    "encoder": "the encoder", "scale": "the scale", "sensor": "the sensor", "drive": "the drive", "loop": "the loop",
-    "tape1": "the tape at reel 1", "tape2": "the tape at reel 2",
-}  # fmt: skip
 NAMES = {"V": "volt", "A": "ampere", "N": "newton", "Nm": "newton metre"}  # of a command's unit
 
 
@@ -83,16 +78,6 @@ def quantities(x_unit: str | None, u_unit: str | None = VOLT) -> Quantities:
     )
 
 
-def node_words(node: str, units: Quantities) -> str:
-    """A node as it is called at the machine: "motor 1", "the tape at reel 2"; a rotary axis has a rotor."""
-    if node == "carriage":
-        return units.body
-    if node in NODES:
-        return NODES[node]
-    stem = node.rstrip("0123456789")
-    return f"{stem} {node[len(stem) :]}".strip() if node else "the machine"
-
-
 @lru_cache
 def settings_in(model: type[Settings], units: Quantities) -> type[Settings]:
     """Settings class with the fields and bounds of an axis's parameters, whose messages give the units of this axis."""
@@ -108,8 +93,3 @@ def settings_in(model: type[Settings], units: Quantities) -> type[Settings]:
 def of_case(case: Any) -> Quantities:
     """Of a case (rtctl.diagnose.case.Case)."""
     return quantities(case.sensors.unit, case.drive.unit)
-
-
-def of_main(case: Any) -> Quantities:
-    """Of the main sensor's motion: that of a reel unit and of a linear drive is the turning of a shaft."""
-    return of_case(case) if case.plant == "axis" else quantities(ANGLES[0], case.drive.unit)

@@ -165,15 +165,6 @@ def check(
     return record._replace(case=case._replace(warnings=tuple(warnings)))
 
 
-def split(record: Record, heldout: float = 0.25) -> tuple[slice, slice]:
-    """Rows to fit on and rows to predict: the last share `heldout` of the record. Raises ValueError beyond 0..0.9."""
-    if not 0.0 < heldout <= 0.9:
-        raise ValueError(f"the held-out share is {heldout:g}; it should be above 0 and at most 0.9")
-    n = len(record.t)
-    cut = n - max(1, round(heldout * n))
-    return slice(0, cut), slice(cut, n)
-
-
 def law_agreement(record: Record) -> Agreement | None:
     """The recomputed law against the recorded command; None where there is no law to recompute."""
     again = recompute_law(record)

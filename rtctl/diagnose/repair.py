@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path
 from rtctl.diagnose import played
-from rtctl.diagnose.diagnosis import AMBIGUOUS, Diagnosis
+from rtctl.diagnose.graph.answer import GraphDiagnosis, diagnose
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.ordinary import USE
 
@@ -32,11 +32,11 @@ class Repair(NamedTuple):
     """What a machine taught: recordings and diagnoses in order; the last one counts."""
 
     bundles: tuple[Path, ...]
-    diagnoses: tuple[Any, ...]  # Diagnosis, or GraphDiagnosis
+    diagnoses: tuple[GraphDiagnosis, ...]
     trips: tuple[str, ...]  # of the recordings: "" for none
 
     @property
-    def last(self) -> Any:
+    def last(self) -> GraphDiagnosis:
         """The diagnosis whose model is written."""
         return self.diagnoses[-1]
 
@@ -90,26 +90,23 @@ def repair(
     length: float | None = None,
     progress: Say = lambda text: None,
     record: Callable[[Any, Path, float], dict[str, Any]] | None = None,
-    diagnose: Callable[[Path, Path | None, Say], Any] | None = None,
-    both: bool = False,
+    diagnose: Callable[..., Any] = diagnose,
 ) -> Repair:
     """Record the machine of a config that is `ready` into bundles in `out`, and diagnose it.
 
-    `record` runs the machine (see `run`), `diagnose` is the judge. With `both` the recording of an experiment is
-    diagnosed together with the first, which `diagnose` gets beside it; else by itself. Raises UserError and NoAnswer as
-    these do; what becomes of the experiment cannot undo the first diagnosis.
+    `record` runs the machine (see `run`), `diagnose` is the judge; the recording of an experiment is diagnosed together
+    with the first. Raises UserError and NoAnswer as these do; what becomes of the experiment cannot undo the first
+    diagnosis.
     """
-    from rtctl.diagnose import chain
-
-    run_, diagnose = record or run, diagnose or chain.diagnose
+    run_ = record or run
     seconds = LENGTH.get(config.kind, OTHERS) if length is None else length
     bundle = out / RECORDING
     progress(f"recording {seconds:g} s")
     trips = [run_(config, bundle, seconds)["tripped"] or ""]
     if trips[0]:
         progress(f"the run ended early, with a trip: {trips[0]}")
-    first = diagnose(bundle, None, progress)
-    if first.experiment is None or (first.verdict != AMBIGUOUS and not both):
+    first = diagnose(bundle, progress=progress)
+    if first.experiment is None:
         return Repair((bundle,), (first,), tuple(trips))
     names = " or ".join(dict.fromkeys(e.name for e in first.effects)) or first.verdict
     second = out / SECOND
@@ -117,7 +114,7 @@ def repair(
     progress(f"{names}: recording the experiment that separates them, {seconds:g} s")
     trips.append(run_(config, second, seconds)["tripped"] or "")
     try:
-        again = diagnose(second, bundle if both else None, progress)
+        again = diagnose(bundle, second, progress=progress)
     except (NoAnswer, UserError) as error:
         progress(f"the experiment says nothing: {error}")
         return Repair((bundle, second), (first,), tuple(trips))
@@ -134,26 +131,8 @@ def run(config: Any, bundle: Path, seconds: float, say: Say = lambda text: None)
     return whole(Session(config, bundle, seconds, arm=True, say=say).run())
 
 
-def experiment_yaml(d: Diagnosis, config: dict[str, Any] | None = None) -> str:
-    """The separating experiment as a config that `rtctl run` takes as it is: the machine's own, playing what it says.
-
-    `config` is what case.json of our own recordings holds. Raises UserError where the two do not go together.
-    """
-    from rtctl.diagnose.export import to_config
-
-    assert d.experiment is not None
-    data = config if config is not None else to_config(d.owner, d.record)
-    names = list(dict.fromkeys(e.name for e in d.effects))
-    return played.text(data, d.experiment, names, d.record.dt * len(d.record.t), config is not None)
-
-
-def changes(d: Diagnosis) -> list[tuple[str, str, str]]:
-    """(key, owner's value, new value) of each key of the config that the model changes, the terms last."""
-    return between(d.owner, d.after)
-
-
 def between(owner: Model, after: Model) -> list[tuple[str, str, str]]:
-    """The same of two models."""
+    """(key, owner's value, new value) of each key of the config that a model changes, the terms last."""
     rows = []
     for name, value in after.base.items():
         was = owner.base.get(name)

@@ -12,12 +12,11 @@ from copy import copy
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose import kernel
 from rtctl.diagnose.case import Case
-from rtctl.diagnose.kernel import CLOSED, OPEN, TRACK
+from rtctl.diagnose.kernel import CLOSED, TRACK
 from rtctl.diagnose.law_params import began, law_params, law_state, per_unit
 from rtctl.diagnose.model import Model, plant_params
 from rtctl.diagnose.record import Record
@@ -29,7 +28,6 @@ from rtctl.plants.physics.place import PLANTS
 
 NEVER = np.iinfo(np.int64).max  # row
 FASTEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
-MODES = {"open": OPEN, "track": TRACK, "closed": CLOSED}
 SUBSTEP = {"ivu": 1e-3, "ldu": 100e-6, "axis": 0.25e-3}  # s, at most: the linear part is exact at any
 COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
@@ -225,14 +223,6 @@ def channels(record: Record) -> tuple[str, ...]:
     """Recorded sensors in the order of the plant's, those that are missing left out at the end."""
     wanted = CHANNELS.get(record.plant, tuple(record.y))
     return tuple(name for name in wanted if name in record.y)
-
-
-def way(record: Record) -> np.ndarray:
-    """Where the main sensor's body was as that saw it, (n,) rad or m; of a sensor of speed the way since row 0."""
-    main = channels(record)[0]
-    if main != "speed":
-        return np.asarray(record.y[main] / per_unit(record.case)[0])
-    return np.asarray(cumulative_trapezoid(record.y[main], dx=record.dt, initial=0.0))
 
 
 def resolution(record: Record) -> float:

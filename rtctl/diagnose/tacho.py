@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 if TYPE_CHECKING:
-    from rtctl.diagnose.record import Record
+    pass
 
 ORDER = 8  # rows of the past
 ROUNDS = 15
@@ -24,9 +24,6 @@ TUNE = 4.685  # of Tukey's weights: 95 % efficient where all is normal
 NORMAL = 1.4826  # standard deviation by the median of sizes
 FEWEST = 5 * ORDER  # rows
 BACK = 0.05  # share of the highest speed, and of the time
-LOOK = 0.01  # s over which a rate is a difference
-SHARP = 0.6  # between 1/3 of a V and 1 of a parabola
-TOUCHES = 2  # of zero, fewer of which prove nothing
 LAGS, LONGEST = 25, 0.2  # lags tried, in ticks, up to that share of the record
 
 
@@ -51,40 +48,6 @@ def noise(y: np.ndarray, u: np.ndarray) -> float:
 def folded(speed: np.ndarray, u: np.ndarray) -> bool:
     """Whether a speed (n,) never goes below zero although the command (n,) pushes both ways."""
     return bool(speed.min() > -BACK * speed.max() and min(np.mean(u > 0), np.mean(u < 0)) > BACK)
-
-
-def unsigned(record: "Record") -> bool:
-    """Whether a recording of an axis shows a speed without its sign."""
-    return record.shows_speed and folded(record.y["speed"], record.u[:, 0])
-
-
-def counts_up(record: "Record") -> bool:
-    """Whether a recording of an axis shows a position that adds up the way in either direction: its rate never goes
-    below zero although the command pushes both ways, and comes to zero with a kink, as the size of a speed does."""
-    if record.plant != "axis" or record.shows_speed:
-        return False
-    x = next(iter(record.y.values()))
-    look = max(1, min(round(LOOK / record.dt), len(x) // FEWEST))
-    rate = (x[look:] - x[:-look]) / (look * record.dt)
-    rate = rate if abs(rate.max()) >= abs(rate.min()) else -rate
-    return folded(rate, record.u[look:, 0]) and kinks(rate)
-
-
-def kinks(rate: np.ndarray) -> bool:
-    """Whether most of the touches of zero of a rate (n,) are V-shaped.
-
-    From four levels down to one and up again a V takes three times the time that it spends below that level; a parabola
-    takes as long for both, and a machine that stands still less.
-    """
-    level = BACK * float(rate.max())
-    sharp = []
-    far = np.flatnonzero(rate > 4.0 * level)
-    for k in np.flatnonzero(np.diff(far) > 1):
-        low = np.flatnonzero(rate[far[k] : far[k + 1]] < level)
-        if len(low):
-            dwell = low[-1] - low[0] + 1
-            sharp.append(dwell < SHARP * (far[k + 1] - far[k] - dwell))
-    return len(sharp) >= TOUCHES and float(np.mean(sharp)) > 0.5
 
 
 def signed(speed: np.ndarray, u: np.ndarray) -> np.ndarray:

@@ -19,7 +19,6 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.stats import t as student
 
-from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, Diagnosis
 from rtctl.diagnose.hints import peaks, spectrum
 from rtctl.diagnose.model import Model
 from rtctl.diagnose.quantities import of_case
@@ -80,14 +79,6 @@ def over_turn(record: Record, model: Model) -> Turn | None:
     band[counts == 0] = np.nan
     middles = (np.arange(PLACES) + 0.5) / PLACES * 2 * np.pi
     return Turn(middles, found, band, counts, told, float(np.ptp(x)) / (2 * np.pi))
-
-
-def of_diagnosis(d: Diagnosis) -> Turn | None:
-    """The map of a diagnosed record: by the model that was found, without the terms that act on the turn, or else by
-    the owner's. What was fitted to a record that nothing explains would make the torque smaller than it is."""
-    if not turns(d.record):
-        return None
-    return over_turn(d.record, d.after if d.verdict in (NAMED, AMBIGUOUS) else d.owner)
 
 
 def turns(record: Record) -> bool:

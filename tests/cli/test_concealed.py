@@ -3,16 +3,16 @@ diagnosed, the model run against it."""
 
 import os
 import signal
-from functools import partial
 
-from rtctl.diagnose import chain, find
-from rtctl.diagnose.export import read_model, write_model
-from rtctl.diagnose.hypotheses import hypotheses
+from narrowed import only
+
+from rtctl.diagnose.export import read_model
+from rtctl.diagnose.graph import answer, files
 from rtctl.diagnose.kernel import TRACK
 from rtctl.diagnose.measure import compare
+from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import load_record
 from rtctl.diagnose.seal import open_seal
-from rtctl.trace.bundle import load_case
 
 AMONG = (  # the library in full takes a minute on the LDU
     "friction.stribeck", "friction.coulomb", "friction.viscous", "drive.offset", "drive.deadband", "load.spring",
@@ -38,12 +38,12 @@ def test_what_a_plant_conceals_is_named_by_a_diagnosis_of_its_capture(started, r
         plant.communicate(timeout=30)
     record = load_record(folder)
     assert 1 / record.dt == 500
-    monkeypatch.setattr(find, "hypotheses", partial(hypotheses, only=AMONG))
-    told = chain.diagnose_record(record)
+    only(monkeypatch, *AMONG)
+    told = answer.diagnose(folder)
     (entry,) = open_seal(seal)[0]["physics"]
     assert (told.verdict, [e.name for e in told.effects]) == ("named", [entry["term"]])
-    path = write_model(told.after, record, tmp_path / "model.yaml", load_case(folder)["config"])
+    path = files.write_model(told, tmp_path / "model.yaml")
     channel = next(iter(record.y))
-    models = (told.before, read_model(path, record))
+    models = (owner_model(record.case, record), read_model(path, record))
     before, after = (compare(record, model, TRACK, skip=len(record.t) // 4).channels[channel].rmse for model in models)
     assert after < 0.6 * before

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from narrowed import only
 from rich.console import Console
 
 from rtctl.cli import diagnose_console
@@ -59,7 +60,9 @@ def record_into(folder, n=5000):
 def bundle(tmp_path_factory):
     """Diagnosed once, its results in the bundle."""
     folder = record_into(tmp_path_factory.mktemp("many") / "axis")
-    assert main(["diagnose", str(folder)]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        only(patch, "load.spring", "structure.stiffening", "drive.offset", "friction.coulomb")
+        assert main(["diagnose", str(folder)]) == 0
     return folder
 
 
@@ -81,7 +84,8 @@ def test_the_model_does_better_than_the_owners_belief(rtctl, bundle):
     assert nrmse[0] < 0.2 * nrmse[1]
 
 
-def test_json_is_all_of_standard_output(rtctl, bundle, tmp_path):
+def test_json_is_all_of_standard_output(rtctl, bundle, tmp_path, monkeypatch):
+    only(monkeypatch, "load.spring")
     code, out, _ = rtctl("diagnose", bundle, "--json", "--no-report", "--out", tmp_path)
     found = json.loads(out)
     assert code == 0
@@ -141,7 +145,8 @@ def test_mistakes(rtctl, tmp_path, monkeypatch, words, message):
 
 def test_a_machine_that_is_recorded_and_diagnosed(rtctl, tmp_path, monkeypatch):
     """What is shown of it; what is done is the business of `repair`."""
-    from rtctl.diagnose import folder, repair
+    from rtctl.diagnose import repair
+    from rtctl.diagnose.graph import files
 
     seen = {}
 
@@ -152,9 +157,8 @@ def test_a_machine_that_is_recorded_and_diagnosed(rtctl, tmp_path, monkeypatch):
         return repair.Repair((out / "recording",), (d,), ("",))
 
     monkeypatch.setattr(repair, "repair", recorded)
-    monkeypatch.setattr(repair, "changes", lambda d: [("plant.physics.0", "-", "load.spring at carriage")])
-    monkeypatch.setattr(folder, "own_config", lambda bundle: None)
-    monkeypatch.setattr(folder, "write", lambda *_: ["no report"])
+    monkeypatch.setattr(files, "changes", lambda d: [("plant.physics.0", "-", "load.spring at carriage")])
+    monkeypatch.setattr(files, "write", lambda *_: ["no report"])
     monkeypatch.setattr(diagnose_console.DiagnoseConsole, "result", lambda *_: None)
     code, out, err = rtctl("diagnose", "--closed-loop", "axis", "--for", "3s", "--out", tmp_path)
     assert code == 0

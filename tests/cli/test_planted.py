@@ -2,16 +2,14 @@
 
 import shutil
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import pytest
 import small
+from narrowed import only
 
 from rtctl.api import load_config, record
 from rtctl.cli.main import main
-from rtctl.diagnose import find
-from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.trace.bundle import CASE, PARQUET
 from rtctl.trace.orders import ORDERS
 
@@ -48,7 +46,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def call(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[list[str], Path], int]:
     """`call(words, folder)`: exit code of a command in that folder; searches and pictures are cut short."""
-    monkeypatch.setattr(find, "hypotheses", partial(hypotheses, only=("load.spring",)))
+    only(monkeypatch, "load.spring")
     for name in ("overlay", "distributions", "along", "png"):
         monkeypatch.setattr(f"rtctl.campaign.figures.{name}", lambda *_: "")
 

@@ -8,17 +8,15 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import small
+from narrowed import only
 
 from rtctl.api import load_config, record
 from rtctl.cli.main import main
-from rtctl.diagnose import find
-from rtctl.diagnose.hypotheses import hypotheses
 
 CALLS = ("open", "os.mkdir", "os.rename", "os.remove", "os.listdir", "os.scandir", "os.link", "os.truncate", "os.chmod")
 FAULTS = (
@@ -99,7 +97,7 @@ def command(
     request: pytest.FixtureRequest, runtime: Path, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[[Path], int]:
     """`command(out)` calls the command of this name; searches and pictures, which refuse nothing, are cut short."""
-    monkeypatch.setattr(find, "hypotheses", partial(hypotheses, only=("load.spring",)))
+    only(monkeypatch, "load.spring")
     for name in ("overlay", "distributions", "along", "png"):
         monkeypatch.setattr(f"rtctl.campaign.figures.{name}", lambda *_: "")
     return lambda out: main(COMMANDS[request.param](here, out))

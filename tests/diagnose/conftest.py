@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +10,11 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.decide import complete, worth
-from rtctl.diagnose.fit import Fit
-from rtctl.diagnose.hints import grips
-from rtctl.diagnose.hypotheses import hypotheses
-from rtctl.diagnose.kernel import CLOSED, OPEN
+from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import Model, owner_model
-from rtctl.diagnose.name import Search, search
-from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record, check
-from rtctl.diagnose.simulate import CHANNELS, Simulator
+from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -157,26 +150,6 @@ def tilted(make_axis: Callable[..., Axis]) -> Axis:
 
 
 @pytest.fixture(scope="session")
-def searched() -> Callable[[Axis], tuple[Problem, Fit, Search]]:
-    """`searched(axis)` is problem, base fit and search with a dozen hypotheses, done once for each axis."""
-    done: dict[int, tuple[Problem, Fit, Search]] = {}
-
-    def make(made: Axis) -> tuple[Problem, Fit, Search]:
-        if id(made) not in done:
-            problem = Problem(made.sim)
-            base = base_fit(made.sim, problem)
-            asked = hypotheses(made.record, base.model.base, only=RIVALS)
-            done[id(made)] = (
-                problem,
-                base,
-                search(problem, base, lambda _: asked, partial(complete, problem, base), partial(worth, problem, base)),
-            )
-        return done[id(made)]
-
-    return make
-
-
-@pytest.fixture(scope="session")
 def practice() -> Path:
     """Folder of the practice bundles, which lies beside the project where it is there at all."""
     folder = SHARED / "blind" / "practice"
@@ -263,33 +236,3 @@ def moved(blank):
         return record, owner_model(record.case).base
 
     return make
-
-
-class Contact:
-    """A linear drive under two sines of voltage, whose wheel may slip."""
-
-    def __init__(self, case: Any):
-        n = 20000
-        t, zero = 1e-4 * np.arange(n), np.zeros(n)
-        u = 1.2 * np.sin(2 * np.pi * 3.0 * t) + 0.8 * np.sin(2 * np.pi * 11.0 * t)
-        self.empty = Record("ldu", case, t, 1e-4, zero, zero, u[:, None], dict.fromkeys(CHANNELS["ldu"], zero), {})
-        self.plain = owner_model(case)
-
-    def carried(self, share: float) -> float:
-        """Torque that the wheel would carry for this share of the time, if it held."""
-        ways = Simulator(self.empty).run(self.plain, OPEN)[:, 0]
-        return grips(self.empty, self.plain.base, ways, (share,))["grip:wheel"][0]
-
-    def slipping(self, model: Model, F_max: float) -> Model:
-        """The model with a wheel that carries no more than F_max."""
-        return model.add(TERMS["transmission.slip"].settings(node="wheel", F_max=F_max))
-
-    def seen(self, machine: Model) -> Simulator:
-        """The recording of a machine, ready to be followed."""
-        out = Simulator(self.empty).run(machine, OPEN)
-        return Simulator(self.empty._replace(y={n: np.floor(out[:, c]) for c, n in enumerate(CHANNELS["ldu"])}))
-
-
-@pytest.fixture
-def contact(case_of: Callable[..., Path]) -> Contact:
-    return Contact(read_case(case_of("ldu"), "."))

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.edges import alike, directions, edges
+from rtctl.diagnose.edges import directions, edges
 from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
@@ -94,51 +92,3 @@ def reels(case_of):
     out, volts, _ = Simulator(empty).everything(model, CLOSED, directed=True)
     y = {names[0]: np.floor(out[:, 0]), **{name: counter(out[:, c]) for c, name in enumerate(names) if c}}
     return Simulator(empty._replace(u=volts, y=y)), model
-
-
-def test_a_reel_off_centre_shows_at_its_edges_alone(reels):
-    sim, model = reels
-    plain = Problem(sim)
-    base = base_fit(sim, plain)
-    assert base.rms < 2.0 * plain.floor  # by the capstan it may be noise
-    problem = plain.seen_by(base.model)
-    assert [sim.channels[e.channel] for e in problem.edges] == ["reel1_counts", "reel2_counts"]
-    errors = problem.by_sensor(problem.residual(base.model))
-    assert list(errors) == ["capstan_counts", "reel1_counts", "reel2_counts"]
-    loud = {name: float(np.sqrt(np.mean(e**2))) for name, e in errors.items()}
-    assert loud["reel1_counts"] > 1.5 > 1.2 > loud["reel2_counts"]
-    true = problem.by_sensor(problem.residual(model))
-    assert np.sqrt(np.mean(true["reel1_counts"] ** 2)) < 1.2
-
-
-def test_errors_are_in_the_order_of_time_and_none_is_lost(reels):
-    sim, model = reels
-    problem = Problem(sim).seen_by(model)
-    r = problem.residual(model)
-    assert (np.diff(problem.time_rows) >= 0).all() and len(r) == len(problem.time_rows)
-    parts = problem.by_sensor(r)
-    assert sum(map(len, parts.values())) == len(r)
-    np.testing.assert_allclose(parts["capstan_counts"], problem.error(model)[:, 0])
-    assert len(problem.at_rows("reel1_counts", parts["reel1_counts"])) == len(parts["capstan_counts"])
-    first = Problem(sim, 4000, problem.channels, problem.mean, problem.edges)
-    assert all(e.rows.max() < 4000 for e in first.edges)
-    share = sum(problem.balance**2 * len(e.rows) for e in problem.edges) / len(parts["capstan_counts"])
-    assert share == pytest.approx(0.5)
-
-
-def test_reels_are_read_alike_where_every_step_is():
-    one, other = edges(counter(WAY), WAY, 1), edges(counter(WAY), 1.02 * WAY, 1)
-    assert alike([one], [other]) and alike([], [])
-    assert not alike([one], []) and not alike([one], [one._replace(channel=2)])
-    turned = one.at.copy()
-    turned[40:] -= 2.0  # one edge that went past the other way
-    assert not alike([one], [one._replace(at=turned)])
-
-
-def test_reels_that_were_misread_are_told_by_a_better_model(reels):
-    sim, model = reels
-    well = Problem(sim).seen_by(model)
-    assert well.agrees(model)
-    wrong = [e._replace(at=np.where(np.arange(len(e.at)) < 60, e.at, e.at - 2.0)) for e in well.edges]
-    assert not Problem(sim, edges=wrong).agrees(model)
-    assert not Problem(sim).agrees(model)  # reels that took no part, and now can

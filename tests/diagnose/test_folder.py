@@ -6,18 +6,13 @@ import select
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from rtctl.config.errors import UserError
-from rtctl.diagnose import diagnosis, export, folder, report
-from rtctl.diagnose.folder import BAD, OURS, RESULT, Outcome, Task, diagnose_all, done, finite, one, tasks
+from rtctl.diagnose.folder import BAD, OURS, RESULT, Outcome, Task, diagnose_all, done, one, tasks
 from rtctl.trace.bundle import CASE, PARQUET
 
 WORK = '''
@@ -173,69 +168,12 @@ def test_a_bad_bundle_is_told_in_one_line(tmp_path):
 
 
 def test_our_own_fault_is_told_as_ours(tmp_path, monkeypatch):
-    from rtctl.diagnose import chain
+    from rtctl.diagnose.graph import answer
 
-    def broken(*_):
+    def broken(*_, **__):
         raise ZeroDivisionError("oh")
 
-    monkeypatch.setattr(chain, "diagnose", broken)
+    monkeypatch.setattr(answer, "diagnose", broken)
     (tmp_path / "case.json").write_text('{"plant": "axis"}')
     outcome = one(Task("a", tmp_path, tmp_path), report=False)
     assert outcome.code == OURS and "internal error: ZeroDivisionError('oh')" in outcome.message
-
-
-@pytest.fixture
-def plain(monkeypatch):
-    """A diagnosis of which only the writing counts."""
-    monkeypatch.setattr(diagnosis, "as_json", lambda d: {"verdict": "nothing", "bad": float("nan"), "n": np.float64(2)})
-    monkeypatch.setattr(export, "write_model", lambda after, record, path, config, left: path.write_text(f"{config}"))
-    monkeypatch.setattr(report, "html", lambda d: "<p>")
-    return SimpleNamespace(after=None, left_out=(), record=SimpleNamespace(plant="ivu"), experiment=None)
-
-
-def test_all_files_and_nothing_else(tmp_path, plain):
-    assert folder.write(plain, tmp_path / "new", {"machine": "axis"}) == []
-    assert {p.name for p in (tmp_path / "new").iterdir()} == {"diagnosis.json", "model.yaml", "report.html"}
-    assert json.loads((tmp_path / "new" / RESULT).read_text()) == {"verdict": "nothing", "bad": None, "n": 2.0}
-    assert (tmp_path / "new" / "model.yaml").read_text() == "{'machine': 'axis'}"
-
-
-def test_the_verdict_stands_where_model_and_report_cannot_be_made(tmp_path, plain, monkeypatch):
-    (tmp_path / "model.yaml").write_text("old")
-
-    def refuse(*_):
-        raise UserError("M is too large")
-
-    def fail(_):
-        raise KeyError("figure")
-
-    monkeypatch.setattr(export, "write_model", refuse)
-    monkeypatch.setattr(report, "html", fail)
-    faults = folder.write(plain, tmp_path)
-    assert len(faults) == 2 and "M is too large" in faults[0] and "KeyError('figure')" in faults[1]
-    assert {p.name for p in tmp_path.iterdir()} == {RESULT}
-
-
-def test_an_experiment_of_another_time_is_taken_away(tmp_path, plain):
-    (tmp_path / "experiment.yaml").write_text("old")
-    folder.write(plain, tmp_path, report=False)
-    assert not (tmp_path / "experiment.yaml").exists()
-
-
-def test_where_nothing_can_be_written(tmp_path, plain):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UserError, match="file"):
-        folder.write(plain, tmp_path / "file")
-
-
-def test_whose_config_it_is(tmp_path):
-    path = bundle(tmp_path / "a")
-    assert folder.own_config(path) is None
-    for config, ours in (({"machine": "axis"}, True), ({"machine": "ivu"}, False), ("axis", False)):
-        (path / CASE).write_text(json.dumps({"plant": "axis", "config": config}))
-        assert (folder.own_config(path) is not None) == ours
-
-
-@given(st.recursive(st.floats() | st.integers() | st.none() | st.text(), lambda c: st.lists(c) | st.tuples(c, c)))
-def test_finite_is_json(value):
-    json.dumps(finite({"value": value, "array": np.array([1.0, np.inf])}), allow_nan=False)

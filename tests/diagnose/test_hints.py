@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.diagnose.hints import MOST, ORDERS, WHOLE, hints, jumps, observe, peaks, spectrum, spots
+from rtctl.diagnose.hints import MOST, ORDERS, jumps, peaks, spectrum, spots
 
 
 def turning(n=6000, turns=3.0, seed=0):
@@ -104,61 +104,3 @@ def test_two_jumps_within_a_few_ticks_are_two():
 def test_in_noise_nothing_jumps():
     error = 0.5 * np.random.default_rng(1).standard_normal(4000)
     assert jumps(error, 1.0) == []
-
-
-def test_what_keeps_the_model_on_track_is_what_it_lacks(make_axis):
-    """A constant of 0.2 V at the drive shows as 0.2 V while the axis moves."""
-    made = make_axis({"term": "drive.offset", "node": "drive", "offset": 0.2}, step=0.0)
-    _, push = observe(made.sim, made.model._replace(terms=()))
-    x = made.uncut
-    moving = np.abs(np.gradient(x, 1e-3)) > 0.05
-    assert np.median(push[500:][moving[500:]]) == pytest.approx(0.2, rel=0.05)
-
-
-def test_a_bump_on_the_way_is_suggested_as_a_spot(make_axis):
-    bump = {"term": "load.bump", "node": "carriage", "F": 60.0, "at": 0.05, "width": 2e-3, "form": "push"}
-    made = make_axis(bump)
-    plain = made.model._replace(terms=())
-    found = hints(made.sim, plain)
-    assert set(found) == {"order", "wavelength", "spot", "jump:sensor"}
-    x = made.record.y["x"]
-    assert min(abs(x.min() + s * np.ptp(x) - 0.05) for s in found["spot"][:2]) < 4e-3
-    assert all(len(v) <= MOST * (1 + (kind == "wavelength")) for kind, v in found.items() if kind != "order")
-    assert set(WHOLE) <= set(found["order"]) and len(found["order"]) <= MOST + len(WHOLE)
-
-
-@pytest.mark.parametrize(("turn", "A"), [(4e-3, 4.0), (4e-4, 40.0)])
-def test_a_short_wave_of_the_drive_is_suggested(make_axis, turn, A):
-    """Shorter than a tenth of the way, where it passes slowly enough for the observer."""
-    made = make_axis({"term": "ripple.cogging", "node": "carriage", "A": A, "turn": turn})
-    found = hints(made.sim, made.model._replace(terms=()))
-    assert min(abs(w / turn - 1) for w in found["wavelength"]) < 0.03
-
-
-def test_a_two_reel_unit_is_asked_about_each_of_its_motors(monkeypatch, plain, blank):
-    """By the ratio of its radii, the second one backwards; places along a carriage are not for it."""
-    from rtctl.diagnose import hints as module
-    from rtctl.diagnose.model import owner_model
-
-    n = 3000
-    angle = 40 * (1 - np.cos(np.linspace(0, 4 * np.pi, n)))
-    record = blank("ivu", np.ones((n, 2)), np.round(angle * 10000 / (2 * np.pi)))
-    base = owner_model(record.case).base
-    push = np.cos(6.0 * angle * base["R_c"] / base["R1"])
-
-    class Sim:
-        channels = ("capstan_counts",)
-        seen = record.y["capstan_counts"]
-        follow = 10.0
-
-        @staticmethod
-        def run(model):
-            return record.y["capstan_counts"][:, None] + np.zeros((1, 3))
-
-    Sim.record = record  # type: ignore[attr-defined]
-    monkeypatch.setattr(module, "observe", lambda sim, model: (None, push))
-    found = hints(Sim, owner_model(record.case))  # type: ignore[arg-type]
-    assert set(found) == {"order:motor1", "order:motor2", "spot", "grip:capstan", "jump:encoder"}
-    assert found["grip:capstan"] == sorted(found["grip:capstan"])
-    assert found["order:motor1"][0] == pytest.approx(6.0, abs=0.26)
-    assert found["order:motor2"][0] == pytest.approx(6.0 * base["R2"] / base["R1"], abs=0.26)

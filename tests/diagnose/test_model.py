@@ -6,7 +6,7 @@ import pytest
 from rtctl.config.errors import UserError
 from rtctl.diagnose.case import read_case
 from rtctl.diagnose.kernel import OPEN
-from rtctl.diagnose.model import FITTED, Model, free_parameters, owner_model, plant_params
+from rtctl.diagnose.model import Model, owner_model, plant_params
 from rtctl.diagnose.record import Record, check
 from rtctl.diagnose.simulate import Simulator
 from rtctl.plants import axis, ivu, ldu
@@ -48,28 +48,6 @@ def test_params_of_a_linear_drive_are_those_of_its_own_build(blank):
     given = {**case.parameters, "B_c": 0.0, "K_m2": 0.0}
     wanted = ldu.build(ldu.LduSettings(parameters=given), 1e-4, (2 * np.pi * 900.0, 0.6))
     same(plant_params(owner_model(case), case, 1e-4), wanted)
-
-
-@pytest.mark.parametrize("kind", ["ivu", "ldu", "axis"])
-def test_what_may_move_is_what_is_there_and_not_exact(blank, kind):
-    case = blank(kind, np.zeros((5, 2 if kind == "ivu" else 1))).case
-    model = owner_model(case)
-    free = free_parameters(case, model)
-    assert list(free) == [n for n in FITTED[kind] if n in free]  # the order of the Jacobian's columns
-    assert "R_c" not in free or kind == "ldu"
-    assert all(model.base[n] != 0.0 for n in free)
-    zero = model.change(**{free[-1]: 0.0})
-    assert free_parameters(case, zero) == free[:-1]
-
-
-def test_where_the_owner_is_certain_nothing_moves(blank):
-    case = blank("axis", np.zeros(5), reaches={"parameter_tolerance": 0.0}).case
-    assert free_parameters(case, owner_model(case)) == ()
-
-
-def test_of_an_unknown_mass_the_force_stays_fixed(blank):
-    case = blank("axis", np.zeros(5), reaches={"parameter_tolerance": None}).case
-    assert free_parameters(case, owner_model(case)) == ("M", "F_v", "F_c")
 
 
 def test_a_mass_spring_damper_of_which_nobody_says_anything_is_guessed_from_its_record():

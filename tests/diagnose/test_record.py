@@ -8,7 +8,7 @@ import pytest
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.record import check, law_agreement, load_record, recompute_law, split
+from rtctl.diagnose.record import check, law_agreement, load_record, recompute_law
 from rtctl.trace.bundle import load_case, save_case
 
 SHARED = Path(__file__).parents[2].parent / "shared"
@@ -265,14 +265,6 @@ def test_an_angle_that_starts_anew_each_turn(bundle_of, columns_of, case_of):
     columns["x"] = true % (2 * np.pi)
     record = load_record(bundle_of(columns, case_of("axis", sensors__unit="rad")))
     assert np.allclose(record.y["x"], true)
-
-
-def test_split_keeps_the_end(good):
-    record = load_record(good("axis"))
-    assert split(record) == (slice(0, 2250), slice(2250, 3000))
-    assert split(record, 0.5) == (slice(0, 1500), slice(1500, 3000))
-    with pytest.raises(ValueError, match="held-out share"):
-        split(record, 0.0)
 
 
 @pytest.mark.parametrize("name", [f"case-{k:04d}" for k in range(1, 25)])

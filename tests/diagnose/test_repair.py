@@ -9,14 +9,16 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from narrowed import only
 
 from rtctl.cli.common import load_config
 from rtctl.cli.main import main
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path
-from rtctl.diagnose import repair
+from rtctl.diagnose import played, repair
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.folder import own_config, write
+from rtctl.diagnose.export import to_config
+from rtctl.diagnose.graph.files import write
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.motions import MENU, Limits
 from rtctl.diagnose.record import Record, load_record
@@ -52,7 +54,7 @@ class Bench:
         self.played.append((config.reference, bundle.name, seconds))
         return {"tripped": self.trips.pop(0) if self.trips else None}
 
-    def diagnose(self, bundle, other, progress):
+    def diagnose(self, *bundles, progress):
         answer = self.answers.pop(0)
         if isinstance(answer, Exception):
             raise answer
@@ -68,7 +70,7 @@ def axis(config):
 
 
 def test_one_recording_where_it_is_clear(axis, tmp_path):
-    bench = Bench(found("named", EXPERIMENT))
+    bench = Bench(found("named"))
     made = bench.repair(axis, tmp_path)
     assert [name for _, name, _ in bench.played] == ["recording"]
     assert bench.played[0][2] == repair.LENGTH["axis"]
@@ -86,9 +88,9 @@ def test_the_experiment_where_two_answers_are_left(axis, tmp_path):
     assert any("drive.lag or timing.delay" in text for text in bench.said)
 
 
-@pytest.mark.parametrize("verdict, experiment", [("ambiguous", None), ("nothing", EXPERIMENT), ("unnamed", EXPERIMENT)])
-def test_no_experiment_without_need_or_plan(axis, tmp_path, verdict, experiment):
-    bench = Bench(found(verdict, experiment))
+@pytest.mark.parametrize("verdict", ["ambiguous", "nothing", "unnamed"])
+def test_no_experiment_without_a_plan(axis, tmp_path, verdict):
+    bench = Bench(found(verdict))
     assert bench.repair(axis, tmp_path).last.verdict == verdict
     assert len(bench.played) == 1
 
@@ -140,19 +142,25 @@ def small(before, after, experiment=None):
     case = read_case({"plant": "axis", "sample_rate": 1000.0, "parameters": before.base, "controller": None}, ".")
     t = np.arange(2000) * 1e-3
     record = Record("axis", case, t, 1e-3, t * np.nan, 0 * t, np.zeros((2000, 1)), {"x": t}, {})
-    return SimpleNamespace(owner=before, after=after, record=record, experiment=experiment, effects=found("").effects)
+    return SimpleNamespace(owner=before, after=after, record=record, experiment=experiment)
+
+
+def text(d, own=None):
+    """The file of its experiment."""
+    data = to_config(d.owner, d.record) if own is None else own
+    return played.text(data, d.experiment, ["drive.lag", "timing.delay"], 2.0, own is not None)
 
 
 AXIS = Model("axis", {"M": 95.0, "K": 35.0, "F_v": 200.0, "F_c": 20.0, "k": 0.0})
 
 
 def test_what_the_experiment_file_holds():
-    text = repair.experiment_yaml(small(AXIS, AXIS, EXPERIMENT))
-    head = "".join(line for line in text.splitlines() if line.startswith("#"))
-    assert any("`rtctl run experiment.yaml --for 7s`" in line for line in text.splitlines())  # in one line, to copy
+    file = text(small(AXIS, AXIS, EXPERIMENT))
+    head = "".join(line for line in file.splitlines() if line.startswith("#"))
+    assert any("`rtctl run experiment.yaml --for 7s`" in line for line in file.splitlines())  # in one line, to copy
     assert "Crawl" in head and "drive.lag from timing.delay" in head and "--for 7s" in head and "not ours" in head
-    assert "\n  - [0.5, 0.02]\n" in text  # a knot a line
-    settings = CONFIGS["axis"].model_validate(yaml.safe_load(text))
+    assert "\n  - [0.5, 0.02]\n" in file  # a knot a line
+    settings = CONFIGS["axis"].model_validate(yaml.safe_load(file))
     assert settings.reference.knots[1] == (0.5, 0.02)
     assert settings.plant.parameters.M == 95.0
     assert settings.loop.mode == "fused"  # a stand-in needs no clock
@@ -165,7 +173,7 @@ def test_the_head_says_how_much_room_it_needs_and_what_else_was_tried():
         "distance": {"dither": 0.2, "slow_ramp": 3.0},
         "refused": {"warm_up": "too far"},
     }
-    head = [line for line in repair.experiment_yaml(small(AXIS, AXIS, plan)).splitlines() if line.startswith("#")]
+    head = [line for line in text(small(AXIS, AXIS, plan)).splitlines() if line.startswith("#")]
     assert "with room of -20 to 50 mm around it" in " ".join(head)
     assert [line.split()[1] for line in head if line.startswith("#     ")] == ["slow_ramp", "dither", "warm_up"]
 
@@ -176,7 +184,7 @@ def test_every_motion_is_played_from_the_file_as_it_is(tmp_path, make):
     motion = make(limits, 1.0)
     plan = {"reference": {"unit": "m", "knots": motion.knots, "repeat": motion.repeat, "relative": True}}
     path = tmp_path / "experiment.yaml"
-    path.write_text(repair.experiment_yaml(small(AXIS, AXIS, {**plan, "seconds": motion.seconds})))
+    path.write_text(text(small(AXIS, AXIS, {**plan, "seconds": motion.seconds})))
     settings = load_config(str(path), [])
     params = reference.build(settings.reference, 1e-3)
     state, setpoint = np.zeros(1, reference.REFERENCE_STATE), np.zeros(1, reference.SETPOINT)
@@ -190,7 +198,7 @@ def test_every_motion_is_played_from_the_file_as_it_is(tmp_path, make):
 
 def test_the_file_is_run_as_it_is(runtime, tmp_path):
     path = tmp_path / "experiment.yaml"
-    path.write_text(repair.experiment_yaml(small(AXIS, AXIS, EXPERIMENT)))
+    path.write_text(text(small(AXIS, AXIS, EXPERIMENT)))
     assert main(["run", str(path), "--for", "3s", "--out", str(tmp_path / "run")]) == 0
     again = load_record(tmp_path / "run")
     assert np.ptp(again.ref) == pytest.approx(0.02, rel=0.01)
@@ -198,23 +206,24 @@ def test_the_file_is_run_as_it_is(runtime, tmp_path):
 
 def test_the_experiment_on_our_own_machine_is_its_config(config):
     own = config("axis", set={"law.limit.high": 6.0}).model_dump(mode="json", exclude_unset=True)
-    text = repair.experiment_yaml(small(AXIS, AXIS, EXPERIMENT), own)
-    settings = CONFIGS["axis"].model_validate(yaml.safe_load(text))
-    assert "not ours" not in text
+    file = text(small(AXIS, AXIS, EXPERIMENT), own)
+    settings = CONFIGS["axis"].model_validate(yaml.safe_load(file))
+    assert "not ours" not in file
     assert settings.law.limit.high == 6.0 and settings.name == own["name"]
 
 
 @given(M=st.floats(1.0, 1e3), k=st.floats(1.0, 1e4))
 def test_changes_are_those_of_the_model(M, k):
     spring = TERMS["load.spring"].settings(**{**SPRING, "k": k})
-    rows = repair.changes(small(AXIS, AXIS.change(M=M).add(spring)))
+    rows = repair.between(AXIS, AXIS.change(M=M).add(spring))
     keys = [key for key, _, _ in rows]
     assert ("plant.parameters.M" in keys) == (abs(M - 95.0) > 1e-4 * max(M, 95.0))
     assert keys[-1] == "plant.physics.0" and "load.spring at carriage" in rows[-1][2]
-    assert repair.changes(small(AXIS, AXIS)) == []
+    assert repair.between(AXIS, AXIS) == []
 
 
-def test_a_spring_on_an_emulated_axis_is_found_and_added(runtime, config, tmp_path):
+def test_a_spring_on_an_emulated_axis_is_found_and_added(runtime, config, tmp_path, monkeypatch):
+    only(monkeypatch, "load.spring", "friction.coulomb", "drive.offset")
     machine = repair.ready(config("axis", set={"plant.physics": [SPRING]}))
     made = repair.repair(machine, tmp_path, 9.0)
     record = load_record(made.bundle)
@@ -222,7 +231,7 @@ def test_a_spring_on_an_emulated_axis_is_found_and_added(runtime, config, tmp_pa
     assert record.y["x"] - record.columns["x"] == pytest.approx(0.5e-6)  # the middle of what a count stands for
     assert owner_model(record.case).terms == ()  # the recording does not say what is hidden
     assert "load.spring" in {e.name for e in made.last.effects}, made.last.effects
-    assert write(made.last, tmp_path, own_config(made.bundle), report=False) == []
+    assert write(made.last, tmp_path, report=False) == []
     written = yaml.safe_load((tmp_path / "model.yaml").read_text())
     spring = next(entry for entry in written["plant"]["physics"] if entry["term"] == "load.spring")
     assert spring["k"] == pytest.approx(800.0, rel=0.1)

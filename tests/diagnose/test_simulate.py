@@ -10,12 +10,10 @@ from scipy.signal import cont2discrete
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.hints import grips
 from rtctl.diagnose.kernel import CLOSED, OPEN, SLOTS, TRACK
 from rtctl.diagnose.model import owner_model, plant_params
-from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import Simulator, channels, gear, lever, per_unit, pushes, resolution, rigid_gain
+from rtctl.diagnose.simulate import Simulator, channels, per_unit, resolution, rigid_gain
 from rtctl.idiom import tick
 from rtctl.plants import axis, linear
 from rtctl.plants.graph import plant as graph
@@ -242,43 +240,3 @@ def test_resolution_is_what_the_owner_says_or_the_smallest_step_that_occurs(blan
     unsaid = blank("axis", np.zeros(500), steps, sensors={})
     assert resolution(unsaid) == pytest.approx(4e-6)
     assert resolution(blank("ivu", np.zeros((10, 2)))) == pytest.approx(2 * np.pi / 10000)
-
-
-def test_pushed_behind_every_model_is_corrected_as_one_that_slips(contact):
-    sim = contact.seen(contact.plain)
-    nearly = contact.plain.change(M=1.1 * contact.plain.base["M"])
-    endless = contact.slipping(nearly, 1e3)
-    own, alike, slips = sim.run(nearly), sim.pushed_behind().run(nearly), sim.run(endless)
-    assert np.std(own - slips) > 10 * np.std(alike - slips)
-    np.testing.assert_array_equal(sim.run(nearly), own)  # the simulator itself is as it was
-
-
-@pytest.mark.parametrize("share", [0.6, 0.8])  # of what the wheel would carry of the time
-def test_a_model_that_slips_is_kept_on_the_track_of_a_machine_that_slips(contact, share):
-    slips = contact.slipping(contact.plain, contact.carried(share))
-    sim = contact.seen(slips)
-    well, badly = (Problem(sim).residual(model).std() for model in (slips, contact.plain))
-    assert well < 1.0 and badly > 10.0
-
-
-def test_tape_that_slips_is_kept_on_track_with_all_that_it_moves(case_of):
-    """A push at the capstan alone, which is next to no inertia once the tape slides on it, would run away."""
-    case, n = read_case(case_of("ivu"), "."), 5000
-    t, zero = 2e-3 * np.arange(n), np.zeros(n)
-    ref = 4.0 * (1 - np.cos(2 * np.pi * 0.7 * t)) + 1.0 * np.sin(2 * np.pi * 1.9 * t)
-    names = ("capstan_counts", "reel1_counts", "reel2_counts")
-    empty = Record("ivu", case, t, 2e-3, ref, zero, np.zeros((n, 2)), dict.fromkeys(names, zero), {})
-    plain = owner_model(case)
-    quiet = Simulator(empty).run(plain, CLOSED)[:, 0]
-    F_max = grips(empty, plain.base, quiet, (0.7,))["grip:capstan"][0]
-    slips = plain.add(TERMS["transmission.slip"].settings(node="capstan", F_max=F_max))
-    out, volts, _ = Simulator(empty).everything(slips, CLOSED)
-    record = empty._replace(u=volts, y={name: np.floor(out[:, c]) for c, name in enumerate(names)})
-    sim = Simulator(record)
-    nearly = slips.change(K_m1=1.02 * slips.base["K_m1"])
-    well, near, badly = (np.std(sim.seen - sim.run(model)[:, 0]) for model in (slips, nearly, plain))
-    assert well < 1.0 and near < 0.5 * badly and badly > 10.0
-    whole = pushes(record, plain.base, "")
-    assert sum(whole[node] * gear("ivu", plain.base, node) for node in whole) == pytest.approx(
-        lever(record, plain.base)
-    )

@@ -5,18 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rtctl.diagnose import chain, find
-from rtctl.diagnose.base import base_fit
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.diagnose.kernel import OPEN, TRACK
 from rtctl.diagnose.measure import begin, compare, free_run
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.preflight import preflight
-from rtctl.diagnose.problem import Problem
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import Simulator, resolution, way
-from rtctl.diagnose.tacho import counts_up, folded, noise, signed
+from rtctl.diagnose.simulate import Simulator, resolution
+from rtctl.diagnose.tacho import folded, noise, signed
 from rtctl.plants.physics import TERMS
 
 RATE, ROWS, NOISE = 50.0, 500, 0.01
@@ -40,13 +35,6 @@ def recorded(*terms, case=None, u=None, noisy=NOISE, **parameters):
     model = owner_model(read_case(CASE, ".")).change(**parameters).add(*terms)
     shown = Simulator(blank).run(model, OPEN)[:, 0] + noisy * np.random.default_rng(1).standard_normal(ROWS)
     return blank._replace(y={"speed": shown}), model
-
-
-def test_a_free_run_shows_the_speed_of_the_exact_solution():
-    record, _ = recorded(u=np.ones(ROWS), noisy=0.0)
-    t = record.t
-    np.testing.assert_allclose(record.y["speed"], 2.0 * (1.0 - np.exp(-2.0 * t)), atol=1e-6)
-    np.testing.assert_allclose(way(record), 2.0 * t - (1.0 - np.exp(-2.0 * t)), atol=1e-3)
 
 
 def test_what_misleads_a_position_misleads_a_speed():
@@ -105,77 +93,8 @@ def test_a_free_run_begins_with_the_speed_that_the_first_rows_have_either_way(bl
     assert compare(cut, model, OPEN, skip=20).as_json()["unit"] == {"speed": "m/s"}
 
 
-@pytest.mark.parametrize(("terms", "hisses"), [((), True), ((RINGS,), False)])
-def test_what_the_command_foretells_is_no_hiss(terms, hisses):
-    """Random commands make what is missing look random; random forces know nothing of them."""
-    record, model = recorded(*terms)
-    shaken = 2.0 * np.random.default_rng(3).standard_normal(ROWS) * hisses
-    forced = Simulator(record).commanded(record.u + shaken[:, None]).run(model, OPEN)[:, 0]
-    noisy = forced + NOISE * np.random.default_rng(4).standard_normal(ROWS)
-    sim = Simulator(record._replace(y={"speed": noisy}))
-    problem = Problem(sim)
-    assert problem.commanded(base_fit(sim, problem).r) != hisses
-
-
-def test_random_forces_leave_no_more_than_they_do_from_row_to_row():
-    record, model = recorded(noisy=0.0)
-    pushed = record.u + 0.5 * np.random.default_rng(3).standard_normal((ROWS, 1))
-    shaken = Simulator(record).commanded(pushed).run(model, OPEN)[:, 0]
-    problem = Problem(Simulator(record._replace(y={"speed": shaken})))
-    left = problem.residual(model)
-    assert 1.2 * problem.floor < np.std(left) < problem.loudest * problem.floor
-    assert problem.loudest < 4.0
-    assert not problem.hiss(left * 2.0 * problem.loudest)
-
-
-@pytest.mark.parametrize("known", [True, False])
-def test_parameters_are_fitted_as_if_the_missing_sign_were_known(known):
-    nothing = {"parameters": {}, "drive": {"newton_per_volt": 4.0}, "reaches": {"parameter_tolerance": None}}
-    record, _ = recorded(BLIND, case=None if known else nothing, M=1.2, F_v=1.6)
-    sim = Simulator(record)
-    fitted = base_fit(sim, Problem(sim)).model.base
-    assert fitted["M"] / fitted["K"] == pytest.approx(1.2 / 4.0, rel=0.02)
-    assert fitted["F_v"] / fitted["K"] == pytest.approx(1.6 / 4.0, rel=0.15)
-    assert not {t.term for t in base_fit(sim, Problem(sim)).model.terms}
-
-
-def test_a_sensor_without_direction_is_asked_for_where_a_speed_is_shown_and_can_only_then_be_told():
-    record, _ = recorded(BLIND)
-    found = {h.name for h in hypotheses(record, owner_model(record.case).base)}
-    assert "sensor.rectified:sensor" in found and "sensor.scale:sensor" not in found
-    for shown in (recorded()[0], record):
-        assert "sensor.rectified:sensor" not in preflight(shown).cannot_test
-    assert any("never goes below zero" in finding for finding in preflight(record).findings)
-    assert "sensor.rectified:sensor" in preflight(recorded(u=np.ones(ROWS))[0]).cannot_test
-
-
-@pytest.mark.parametrize("terms", [(), (BLIND, RINGS)])
-def test_it_is_named(terms, monkeypatch):
-    """Two effects at once, of machines like the coupled drives of Wigren & Schoukens (2013), or none."""
-    names = ("sensor.rectified", "structure.resonance", "friction.coulomb", "drive.deadband", "drive.lag")
-    monkeypatch.setattr(find, "hypotheses", lambda *given, beside: hypotheses(*given, only=names, beside=beside))
-    record, _ = recorded(*terms, M=1.1, F_v=1.7)
-    told = chain.diagnose_record(record)
-    assert told.verdict == ("named" if terms else "nothing")
-    assert {e.name for e in told.effects} == {t.term for t in terms}
-    if terms:
-        f = next(e.parameters["f_Hz"] for e in told.effects if "f_Hz" in e.parameters)
-        assert f.value == pytest.approx(1.7, rel=0.03)
-        assert told.heldout_after < 3.0 * told.noise_floor < 0.5 * told.heldout_before
-
-
 def counted(rate, command):
     """A position that shows the sum of `rate` under a command."""
     return SimpleNamespace(
         plant="axis", shows_speed=False, dt=1e-3, y={"x": np.cumsum(rate) * 1e-3}, u=command[:, None]
     )
-
-
-def test_a_position_that_adds_up_either_direction_is_told_from_one_that_stops_or_turns():
-    phase = 3e-3 * np.arange(8000)
-    v, u = np.sin(phase), np.cos(phase)
-    assert counts_up(counted(np.abs(v), u))
-    assert not counts_up(counted(v, u))
-    assert not counts_up(counted(1.0 - u, v))  # comes to rest and goes on, without a kink
-    assert not counts_up(counted(np.maximum(v, 0.0), u))  # held where it is pushed back
-    assert not counts_up(counted(np.abs(v), u + 3.0))  # pushed one way only

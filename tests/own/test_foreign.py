@@ -1,17 +1,15 @@
 """Text of an own file that came with data is not run."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from narrowed import only
 from rtctl_config import loaded
 
 from rtctl.api import record
 from rtctl.cli.main import main
-from rtctl.diagnose import find
-from rtctl.diagnose.hypotheses import hypotheses
 from rtctl.machines import CONFIGS
 from rtctl.own import files
 from rtctl.own.model import without_code
@@ -59,7 +57,7 @@ def bundle(
     monkeypatch: pytest.MonkeyPatch,
 ) -> Own:  # fmt: skip
     """A recording under an own law, whose text in case.json has got another line since."""
-    monkeypatch.setattr(find, "hypotheses", partial(hypotheses, only=("friction.viscous",)))
+    only(monkeypatch, "friction.viscous")
     monkeypatch.chdir(tmp_path)
     file = config_file("ivu", {"try.py": law()}, position={"kind": "./try.py:Try", "gain": 20})
     steps = "reference={steps: [{at: 0.1, to: 1.0}]}"

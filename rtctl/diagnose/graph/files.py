@@ -15,6 +15,7 @@ from rtctl.diagnose.graph.known import known_model
 from rtctl.diagnose.graph.model import GraphModel, nominal
 from rtctl.diagnose.results import EXPERIMENT, MODEL, REPORT, RESULT, TURN, finite, fresh, put
 from rtctl.diagnose.turn import over_turn
+from rtctl.trace.bundle import load_case
 
 
 def write(d: GraphDiagnosis, folder: Path, report: bool = True, base: Path | None = None) -> list[str]:
@@ -88,9 +89,9 @@ def own_config(d: GraphDiagnosis) -> dict[str, Any] | None:
     """The config in case.json of a recording that our own daemon made; None of any other."""
     if d.record.source is None:
         return d.record.case.config
-    from rtctl.diagnose.folder import own_config as of_bundle
-
-    return of_bundle(d.record.case.file.parent)
+    case = load_case(d.record.case.file.parent)
+    own = case.get("config")
+    return own if isinstance(own, dict) and own.get("machine") == case.get("plant") else None
 
 
 def changes(d: GraphDiagnosis) -> list[tuple[str, str, str]]:

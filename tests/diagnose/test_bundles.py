@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from rtctl.cli.main import app
 from rtctl.config.errors import UserError
-from rtctl.diagnose.engines import diagnose_into, is_described, of_one_machine
+from rtctl.diagnose.bundles import diagnose_into, of_one_machine
 from rtctl.diagnose.folder import Task, one
 from rtctl.diagnose.graph.second import predicted
 
@@ -22,16 +22,8 @@ def bench(tmp_path_factory):
     return folder / "swing"
 
 
-@pytest.mark.parametrize(
-    ("case", "described"), [({"format": 2}, True), ({"machine": {}}, True), ({"plant": "axis"}, False), ({}, False)]
-)
-def test_engine_by_the_form_of_the_case(case, described):
-    assert is_described(case) == described
-
-
 def test_files(bench, tmp_path):
     made = diagnose_into(bench, None, tmp_path / "out")
-    assert made.described
     assert made.data["verdict"] == "nothing"
     assert not made.faults
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"diagnosis.json", "model.yaml", "report.html"}
