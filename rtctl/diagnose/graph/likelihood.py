@@ -14,7 +14,7 @@ import numpy as np
 
 from rtctl.diagnose.edges import Edges
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.graph.noise import Noise, noise_of
+from rtctl.diagnose.graph.noise import Noise, noises_of, whitened
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.slack import Slack
 
@@ -102,10 +102,11 @@ class Likelihood:
         told = self.sim.edges[name].between(begin + 1, begin + (end - begin) // self.mean * self.mean)
         return told, (told.rows - begin) // self.mean
 
-    def present(self, c: int) -> np.ndarray | slice:
-        """Blocks in which sensor `c` shows something: all, or those with an edge."""
-        name = self.sim.channels[c]
-        return np.unique(self.edges_in(name)[1]) if name in self.sim.edges else slice(None)
+    @property
+    def present(self) -> list[np.ndarray]:
+        """Blocks in which each sensor shows something: all, or those with an edge."""
+        every = np.arange((self.rows[1] - self.rows[0]) // self.mean)
+        return [np.unique(self.edges_in(n)[1]) if n in self.sim.edges else every for n in self.sim.channels]
 
     def directed(self, model: GraphModel) -> "Likelihood":
         """The same with the sensors that know no direction, as the model tells the directions of their edges."""
@@ -117,7 +118,7 @@ class Likelihood:
 
     def plain(self, e: np.ndarray) -> np.ndarray:
         """The same where the laws are exact."""
-        return np.concatenate([noise.whiten(e[self.present(c), c]) for c, noise in enumerate(self.noise)])
+        return np.concatenate(whitened(self.noise, e, self.present))
 
     @property
     def slack(self) -> Slack | None:
@@ -151,7 +152,7 @@ class Likelihood:
         """The same with the noise of these residuals (blocks, sensors)."""
         other = copy(self)
         other._slack = None
-        other.noise = [noise_of(e[self.present(c), c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
+        other.noise = noises_of(e, self.present, ORDER, self.least)
         return other
 
     def flat(self, e: np.ndarray) -> "Likelihood":
@@ -162,8 +163,8 @@ class Likelihood:
         other = copy(self)
         other._slack = None
         other.noise = [
-            Noise(np.ones(1), max(float(np.std(e[self.present(c), c])), float(self.least[c])))
-            for c in range(e.shape[1])
+            Noise(np.ones(1), max(float(np.std(e[rows, c])), float(self.least[c])))
+            for c, rows in enumerate(self.present)
         ]
         return other
 
@@ -182,20 +183,17 @@ class Likelihood:
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
         """The same where the laws are exact."""
         out = np.zeros(count)
-        for c in range(e.shape[1]):
-            shown = e[self.present(c), c]
-            own = noise_of(shown, ORDER, float(self.least[c]))
-            r = own.whiten(shown)
-            segment = np.arange(len(e))[self.present(c)][own.order :] * count // len(e)
+        present = self.present
+        noises = noises_of(e, present, ORDER, self.least)
+        for own, rows, r in zip(noises, present, whitened(noises, e, present), strict=True):
+            segment = rows[own.order :] * count // len(e)
             out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
         return out
 
     @property
     def size(self) -> int:
         """Number of innovations."""
-        blocks = (self.rows[1] - self.rows[0]) // self.mean
-        shown = [len(np.arange(blocks)[self.present(c)]) for c in range(len(self.noise))]
-        return sum(n - noise.order for n, noise in zip(shown, self.noise, strict=True))
+        return sum(len(rows) - noise.order for rows, noise in zip(self.present, self.noise, strict=True))
 
     @property
     def parts(self) -> Sequence["Likelihood"]:
