@@ -24,6 +24,7 @@ OTHERS = 3  # of them beside what is left in an exchange
 BEAM = 4  # models that are extended
 ALIKE = 0.995  # cosine from which two models do the same
 EXCHANGES = 2
+RIVALS, NEAR = 3, 5.0  # models that are asked for other forms, and nats by which the best may be ahead of them
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
 SHARE = 0.1  # of the evidence of all effects together, which a further one must bring
@@ -56,13 +57,13 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     base, grown, looked, odds = begun(like, space, progress)
     merit = partial(merit_of, odds=odds)
     known: Known = {key(f.names): f for f in (base, *grown)}
-    parents = [base]
+    parents, asked = [base], set[tuple[str, ...]]()
     for level in range(1, MOST + 1):
         better = [f for f in grown if adds(base, _parent(f, parents), f, merit)]
         if not better:
             break
-        better.sort(key=merit, reverse=True)
-        better[0] = known[key(better[0].names)] = restarted(enriched(better[0]))
+        better = enriched_near(better, known, merit, asked)
+        better[0] = known[key(better[0].names)] = restarted(better[0])
         for rest in _smaller(like, better[0], known, faint(better[0])):
             known.setdefault(key(rest.names), rest)
         if level == MOST:
@@ -81,9 +82,8 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         if _best(base, known, merit) is best:
             break
     progress("asking for other forms of what was found")
-    best = _best(base, known, merit)
-    if best.names:
-        known[key(best.names)] = enriched(best)
+    standing = [f for f in known.values() if stands(base, f, known, merit)]
+    enriched_near([f for f in standing if f.names], known, merit, asked)
     standing = [f for f in known.values() if stands(base, f, known, merit)]
     return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
 
@@ -103,6 +103,17 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, l
             break
         base = again
     return base, grown, looked, odds
+
+
+def enriched_near(fits: Sequence[Fitted], known: Known, merit: Merit, asked: set[tuple[str, ...]]) -> list[Fitted]:
+    """Models, best first, of which the best and those near it are in the forms that the recording asks for: a rival in
+    its plain form is no rival."""
+    order = sorted(fits, key=merit, reverse=True)
+    for f in order[:RIVALS]:
+        if merit(f) > merit(order[0]) - NEAR and key(f.names) not in asked:
+            known[key(f.names)] = enriched(f)
+            asked.add(key(f.names))
+    return sorted((known[key(f.names)] for f in order), key=merit, reverse=True)
 
 
 def apart(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
