@@ -27,7 +27,7 @@ EXCHANGES = 2
 RIVALS, NEAR = 3, 5.0  # models that are asked for other forms, and nats by which the best may be ahead of them
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
-SHARE = 0.1  # of the evidence of all effects together, which a further one must bring
+SHARE = 0.05  # of the evidence of all effects together, which a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
 
 Progress = Callable[[str], None]
