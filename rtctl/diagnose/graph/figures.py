@@ -216,7 +216,8 @@ def untold(d: GraphDiagnosis, name: str) -> bool:
     v = d.parameters[name]
     if weight <= 0.0 or v.value == 0.0:
         return False
-    half = 0.5 * abs(float(np.log(max(v.high / v.low, 1.0)))) if v.low * v.high > 0 else np.inf
+    ends = np.abs(np.log((v.low / v.value, v.high / v.value))) if v.low * v.high > 0 else np.inf
+    half = float(np.max(ends))  # the owner's own bound may cut off one of them
     return half > OWN * 1.645 / np.sqrt(weight)
 
 
