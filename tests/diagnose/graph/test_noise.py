@@ -60,7 +60,7 @@ def test_what_moves_two_sensors_counts_once():
 
 def test_sensors_of_their_own_tell_nothing_of_each_other():
     e = np.random.default_rng(6).standard_normal((20_000, 2))
-    one, two = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
+    _, two = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
     assert np.abs(two.beside[0]).max() < 0.03
     np.testing.assert_allclose(two.sigma, 1.0, rtol=0.02)
 
