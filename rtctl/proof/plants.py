@@ -16,6 +16,7 @@ LDU_NODES = {"motor": 0, "wheel": 1, "capstan": 2, "carriage": 2, "encoder": 3}
 EXACT = ("R_c", "R_min", "rho_tape", "h_tape", "J_10", "J_20", "N", "R_s", "R_t")
 RADII = ("R1", "R2")
 SUBSTEPS = {"ivu": 50, "ldu": 12, "axis": 20}  # a tick: 40 us, 8.3 us, 50 us
+GIVES = 0.02  # of the finest count: how far dry friction of a sound machine gives before it slides; more is presliding
 
 
 def reel_inertia(p: dict[str, float], R: float, core: float) -> float:
@@ -132,7 +133,8 @@ def ldu(rng: np.random.Generator, how: str, edge: bool, other_law: bool) -> Setu
     machine.spring(m, 2, 3, 1.0, -1.0, t["k_c"], t["b_c"])
     machine.node(m, 0, B=t["K_m2"])
     machine.node(m, 2, B=t["B_c"] + t["R_c"] ** 2 * t["B_m"])
-    machine.dry(m, 2, t["R_c"] * t["F_c"], 5e-5, friction_law(rng), 6e-3)
+    finest = min(2 * math.pi / 20000, 5e-7 / p["R_c"])  # rad, whichever sensors the case has
+    machine.dry(m, 2, t["R_c"] * t["F_c"], GIVES * finest, friction_law(rng), 6e-3)
     w = 2 * math.pi * 3000.0 * (1.0 + rng.uniform(-0.1, 0.1))
     machine.drive(m, 0, node=0, K=t["K_m1"], amp=0.1, current_limit=0.3, w=w, zeta=0.7071)
     machine.sensor(m, 0, node=3, gain=20000 / (2 * math.pi))
@@ -173,11 +175,12 @@ def axis(rng: np.random.Generator, how: str, edge: bool, other_law: bool) -> Set
     delay = float(rng.integers(0, 2))
     m["nq"], m["nu"], m["ny"], m["Ts"], m["delay"], m["sub"] = 1, 1, 1, Ts, delay, SUBSTEPS["axis"]
     machine.node(m, 0, J=t["M"], B=t["F_v"], k_pos=t.get("k", 0.0))
-    machine.dry(m, 0, t["F_c"], 2e-7, friction_law(rng), 1e-5)
+    law = friction_law(rng)
     band = 2 * math.pi * 1000.0 * (1.0 + rng.uniform(-0.1, 0.1))
     machine.drive(m, 0, node=0, K=t["K"], amp=1.0, w=band, zeta=0.7071)
     pitch = 1e-6 if sort == "spring" else float(rng.choice([5e-7, 2e-6]))
     machine.sensor(m, 0, node=0, gain=1.0 / pitch)
+    machine.dry(m, 0, t["F_c"], GIVES * pitch, law, 1e-5)
     case = _case("axis", 1000.0, p, delay, {"parameter_tolerance": 0.15})
     case["sensors"] = {"x_resolution_m": pitch}
     case["drive"] = {
