@@ -16,7 +16,6 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.problem import TOGETHER
 from rtctl.diagnose.space import Space
 from rtctl.diagnose.stretches import rms
 
@@ -182,8 +181,8 @@ def fit(
     return Fit(space, x, r, J, cost)
 
 
-def trust(r: np.ndarray, together: float = TOGETHER) -> float:
-    """By how much the owner's values outweigh the errors' count.
+def trust(r: np.ndarray, together: float = 1.0) -> float:
+    """By how much the owner's values outweigh the errors' count, of which `together` count as one.
 
     Errors of neighbouring ticks go together, and where the model lacks something they are no noise at all. Without this
     weight, parameters that hardly matter run into their bounds to serve what is missing, and the way back is barred.
