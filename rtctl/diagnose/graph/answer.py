@@ -69,11 +69,10 @@ class GraphDiagnosis(NamedTuple):
             at = self.located
             where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
             return f"Something is missing{where}, and no name of the library explains it."
-        said = [words.clause(machine, e, model) for e in self.effects]
+        sure = [words.clause(machine, e, model) for e in self.effects if e.confidence >= SURE]
         if self.verdict == NAMED:
-            text = "; ".join(said)
+            text = "; ".join(sure)
             return f"{text[:1].upper()}{text[1:]}."
-        sure = [text for e, text in zip(self.effects, said, strict=True) if e.confidence >= SURE]
         open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
         first = "; ".join(sure)
         text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
