@@ -9,6 +9,7 @@ Source: Ljung, System Identification (1999), ch. 7 and 16.4.
 
 from collections.abc import Sequence
 from copy import copy
+from functools import cached_property
 
 import numpy as np
 
@@ -102,7 +103,7 @@ class Likelihood:
         told = self.sim.edges[name].between(begin + 1, begin + (end - begin) // self.mean * self.mean)
         return told, (told.rows - begin) // self.mean
 
-    @property
+    @cached_property
     def present(self) -> list[np.ndarray]:
         """Blocks in which each sensor shows something: all, or those with an edge."""
         every = np.arange((self.rows[1] - self.rows[0]) // self.mean)
@@ -152,7 +153,7 @@ class Likelihood:
         """The same with the noise of these residuals (blocks, sensors)."""
         other = copy(self)
         other._slack = None
-        other.noise = noises_of(e, self.present, ORDER, self.least)
+        other.noise, _ = noises_of(e, self.present, ORDER, self.least)
         return other
 
     def flat(self, e: np.ndarray) -> "Likelihood":
@@ -183,9 +184,7 @@ class Likelihood:
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
         """The same where the laws are exact."""
         out = np.zeros(count)
-        present = self.present
-        noises = noises_of(e, present, ORDER, self.least)
-        for own, rows, r in zip(noises, present, whitened(noises, e, present), strict=True):
+        for rows, own, r in zip(self.present, *noises_of(e, self.present, ORDER, self.least), strict=True):
             segment = rows[own.order :] * count // len(e)
             out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
         return out
@@ -216,6 +215,7 @@ class Likelihood:
         """The same of rows `begin` to `end`."""
         other = self.slackened(None)
         other.rows = (max(begin, self.rows[0]), end)
+        other.__dict__.pop("present", None)
         return other
 
 

@@ -13,6 +13,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
 SPAN = 3  # innovations before and after, of each earlier sensor, that foretell one of a later sensor
+ROWS = 20  # innovations for each coefficient, without which nothing is foretold
 
 
 class Noise(NamedTuple):
@@ -49,20 +50,24 @@ def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
     return Noise(a, max(float(np.sqrt(np.mean(innovation**2))), least))
 
 
-def noises_of(e: np.ndarray, present: Sequence[np.ndarray], order: int, least: np.ndarray) -> list[Noise]:
-    """Noise of each sensor of residuals (n, sensors) that show in the rows `present` of each.
+def noises_of(
+    e: np.ndarray, present: Sequence[np.ndarray], order: int, least: np.ndarray
+) -> tuple[list[Noise], list[np.ndarray]]:
+    """Noise of each sensor of residuals (n, sensors) that show in the rows `present` of each, and their innovations
+    by their standard deviation, as `whitened` gives them.
 
     A force without a law moves all sensors at once: the innovations of the first sensors foretell those of the later.
     The determinant of the covariance is the product of what is left.
     """
     out: list[Noise] = []
+    white: list[np.ndarray] = []
     grids: list[np.ndarray | None] = []
     for c, rows in enumerate(present):
         own = noise_of(e[rows, c], order, float(least[c]))
         rest, at = own.filtered(e[rows, c]), rows[own.order :]
         known = [(d, neighbours(grid, at)) for d, grid in enumerate(grids) if grid is not None]
-        beside = [np.zeros(2 * SPAN + 1)] * c
-        if known and len(at) > 20 * len(known) * (2 * SPAN + 1):
+        beside, left = [np.zeros(2 * SPAN + 1)] * c, rest
+        if known and len(at) > ROWS * len(known) * (2 * SPAN + 1):
             M = np.concatenate([found for _, found in known], axis=1)
             A = M.T @ M
             A[np.diag_indices_from(A)] += 1e-9 * np.trace(A) + 1e-300
@@ -72,8 +77,9 @@ def noises_of(e: np.ndarray, present: Sequence[np.ndarray], order: int, least: n
             left = rest - M @ told
             own = own._replace(sigma=max(float(np.sqrt(np.mean(left**2))), float(least[c])), beside=tuple(beside))
         out.append(own)
+        white.append(left / own.sigma)
         grids.append(gridded(rest, at, len(e)) if len(rows) == len(e) else None)
-    return out
+    return out, white
 
 
 def whitened(noises: Sequence[Noise], e: np.ndarray, present: Sequence[np.ndarray]) -> list[np.ndarray]:

@@ -72,20 +72,18 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
         grown = extended(like, parents, known, NAMES[level], merit)
     for _ in range(EXCHANGES):
-        best = _best(base, known, merit)
+        best = standing(base, known, merit)[0]
         progress(f"exchanging each of {', '.join(best.names)}")
         for rest in _smaller(like, best, known):
             known.setdefault(key(rest.names), rest)
             for f in extended(like, [rest], known, OTHERS, merit):
                 if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
                     known |= {key(g.names): g for g in _smaller(like, f, known)}
-        if _best(base, known, merit) is best:
+        if standing(base, known, merit)[0] is best:
             break
     progress("asking for other forms of what was found")
-    standing = [f for f in known.values() if stands(base, f, known, merit)]
-    enriched_near([f for f in standing if f.names], known, merit, asked)
-    standing = [f for f in known.values() if stands(base, f, known, merit)]
-    return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
+    enriched_near([f for f in standing(base, known, merit) if f.names], known, merit, asked)
+    return Found(like, base, tuple(looked.scores), tuple(standing(base, known, merit)), odds)
 
 
 def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, list[Fitted], Screened, float]:
@@ -134,10 +132,6 @@ def likeness(base: Fitted, one: Fitted, other: Fitted) -> float:
     return float(np.sum(a * b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
 
 
-def _best(base: Fitted, known: Known, merit: Merit) -> Fitted:
-    return max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
-
-
 def _smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | None = None) -> list[Fitted]:
     """The model without each of its effects, or without some of them, of several."""
     out = []
@@ -173,6 +167,11 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
     if gained < max(WORTH, SHARE * (merit(more) - merit(base))):
         return False
     return not fewer.names or explained(fewer, more) > PART
+
+
+def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
+    """The models that stand, best first."""
+    return sorted((f for f in known.values() if stands(base, f, known, merit)), key=merit, reverse=True)
 
 
 def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:

@@ -49,18 +49,19 @@ def test_what_moves_two_sensors_counts_once():
     rng = np.random.default_rng(5)
     force = lfilter([1.0], A, rng.standard_normal(20_000))
     e = np.stack([force, np.roll(force, 1)], axis=1) + 0.1 * rng.standard_normal((20_000, 2))
-    both = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
+    both, white = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
     alone = noise_of(e[:, 1], 4, 1e-9)
     assert both[0] == noise_of(e[:, 0], 4, 1e-9)._replace(a=both[0].a)
     assert both[1].sigma < 0.6 * alone.sigma
     first, second = whitened(both, e, [ALL, ALL])
+    np.testing.assert_allclose(white, (first, second))
     np.testing.assert_allclose((first.std(), second.std()), 1.0, rtol=0.01)
     assert abs(np.corrcoef(first, second)[0, 1]) < 0.02
 
 
 def test_sensors_of_their_own_tell_nothing_of_each_other():
     e = np.random.default_rng(6).standard_normal((20_000, 2))
-    _, two = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
+    (_, two), _ = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
     assert np.abs(two.beside[0]).max() < 0.03
     np.testing.assert_allclose(two.sigma, 1.0, rtol=0.02)
 
@@ -70,8 +71,8 @@ def test_a_sensor_that_shows_edges_now_and_then():
     e = rng.standard_normal((20_000, 2))
     e[:, 1] = 0.8 * e[:, 0] + 0.6 * e[:, 1]
     rows = ALL[::7]
-    _, two = both = noises_of(e, [ALL, rows], 0, np.full(2, 1e-9))
-    np.testing.assert_allclose(two.beside[0], [0, 0, 0, 0.8, 0, 0, 0], atol=0.04)
+    both, _ = noises_of(e, [ALL, rows], 0, np.full(2, 1e-9))
+    np.testing.assert_allclose(both[1].beside[0], [0, 0, 0, 0.8, 0, 0, 0], atol=0.04)
     many = rng.standard_normal((20_000, 2, 3))
     whole = whitened(both, many, [ALL, rows])
     single = whitened(both, many[..., 1], [ALL, rows])
