@@ -12,6 +12,7 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.edges import Edges
 from rtctl.diagnose.graph.model import GraphModel
@@ -23,6 +24,7 @@ RATE = 500.0  # 1/s, of the averaged residuals
 ORDER = 20  # of the autoregression
 FORGET = 8.0  # over the bandwidth of the observer: until the start is forgotten
 QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
+SMOOTH = 9  # blocks, over which the rate of a reading is taken
 EDGE = 0.03  # of a step: the least that an edge leaves, whose tick is known
 COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 WILD = 1e6  # residual of a model that runs away, in steps of noise
@@ -109,6 +111,21 @@ class Likelihood:
         every = np.arange((self.rows[1] - self.rows[0]) // self.mean)
         return [np.unique(self.edges_in(n)[1]) if n in self.sim.edges else every for n in self.sim.channels]
 
+    @cached_property
+    def growth(self) -> list[np.ndarray]:
+        """What the variance of each sensor's residual may grow with (blocks present, columns): whether it moves, where
+        it counts, and the square of its rate, by which a tick that is late shows."""
+        begin, end = self.rows
+        blocks = (end - begin) // self.mean
+        y = self.target[begin:end][: blocks * self.mean].reshape(blocks, self.mean, -1).mean(axis=1)
+        rate = np.gradient(uniform_filter1d(y, SMOOTH, axis=0), axis=0) ** 2  # by the block
+        out = []
+        for c, (name, rows) in enumerate(zip(self.sim.channels, self.present, strict=True)):
+            grain = self.sim.record.grain[name]
+            moves = [rate[:, c] / (rate[:, c] + grain**2)] if grain > 0.0 else []
+            out.append(np.stack([*moves, rate[:, c]], axis=1)[rows])
+        return out
+
     def directed(self, model: GraphModel) -> "Likelihood":
         """The same with the sensors that know no direction, as the model tells the directions of their edges."""
         return Likelihood(self.sim.directed(model))
@@ -153,7 +170,7 @@ class Likelihood:
         """The same with the noise of these residuals (blocks, sensors)."""
         other = copy(self)
         other._slack = None
-        other.noise, _ = noises_of(e, self.present, ORDER, self.least)
+        other.noise, _ = noises_of(e, self.present, ORDER, self.least, self.growth)
         return other
 
     def flat(self, e: np.ndarray) -> "Likelihood":
@@ -184,9 +201,18 @@ class Likelihood:
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
         """The same where the laws are exact."""
         out = np.zeros(count)
-        for rows, own, r in zip(self.present, *noises_of(e, self.present, ORDER, self.least), strict=True):
+        for rows, own, r in zip(self.present, *noises_of(e, self.present, ORDER, self.least, self.growth), strict=True):
             segment = rows[own.order :] * count // len(e)
             out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
+        return out
+
+    def foretold(self, e: np.ndarray, other: "Likelihood") -> float:
+        """Negative logarithm of the likelihood of residuals under the noise that `other` rows showed, nats."""
+        out = 0.0
+        for (part, own), before in zip(self.cut(e), other.parts, strict=True):
+            noises = [noise.averaged() for noise in before.noise]
+            white = whitened(noises, own, part.present)
+            out += sum(len(r) * float(np.log(n.sigma)) + 0.5 * float(r @ r) for n, r in zip(noises, white, strict=True))
         return out
 
     @property
@@ -198,6 +224,10 @@ class Likelihood:
     def parts(self) -> Sequence["Likelihood"]:
         """The likelihood of each recording: this one."""
         return (self,)
+
+    def cut(self, e: np.ndarray) -> list[tuple["Likelihood", np.ndarray]]:
+        """The part of residuals (blocks, ...) that belongs to each recording."""
+        return [(self, e)]
 
     @property
     def spread(self) -> np.ndarray:
@@ -215,7 +245,9 @@ class Likelihood:
         """The same of rows `begin` to `end`."""
         other = self.slackened(None)
         other.rows = (max(begin, self.rows[0]), end)
-        other.__dict__.pop("present", None)
+        other.noise = [noise.averaged() for noise in self.noise]
+        for derived in ("present", "growth"):
+            other.__dict__.pop(derived, None)
         return other
 
 

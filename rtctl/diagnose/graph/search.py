@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.graph.clock import clock, timed
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
 from rtctl.diagnose.graph.fits import Fitted, explained, faint, refit, without
@@ -55,6 +56,7 @@ class Found(NamedTuple):
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
     """Fit the base, then what is missing beside it."""
     base, grown, looked, odds = begun(like, space, progress)
+    like = base.like  # with the times of the ticks
     merit = partial(merit_of, odds=odds)
     known: Known = {key(f.names): f for f in (base, *grown)}
     parents, asked = [base], set[tuple[str, ...]]()
@@ -90,6 +92,11 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, l
     """The base, models with one effect, what screening said of them, and the prior odds of one of them."""
     progress("fitting the nominal parameters")
     base = restarted(refit(like, space))
+    told = clock(base)
+    if told.gain > 0.0:
+        progress("telling the times of the ticks")
+        like = timed(base, told)
+        base = refit(like, space, base.x)
     for _ in range(REBASED):
         progress("screening every hypothesis")
         looked = screened(base)
