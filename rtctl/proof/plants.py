@@ -133,12 +133,13 @@ def ldu(rng: np.random.Generator, how: str, edge: bool, other_law: bool) -> Setu
     machine.spring(m, 2, 3, 1.0, -1.0, t["k_c"], t["b_c"])
     machine.node(m, 0, B=t["K_m2"])
     machine.node(m, 2, B=t["B_c"] + t["R_c"] ** 2 * t["B_m"])
-    finest = min(2 * math.pi / 20000, 5e-7 / p["R_c"])  # rad, whichever sensors the case has
+    gains = 20000 / (2 * math.pi), p["R_c"] / 5e-7  # counts a rad of encoder and scale, whichever the case has
+    finest = 1.0 / max(gains)  # rad
     machine.dry(m, 2, t["R_c"] * t["F_c"], GIVES * finest, friction_law(rng), 6e-3)
     w = 2 * math.pi * 3000.0 * (1.0 + rng.uniform(-0.1, 0.1))
     machine.drive(m, 0, node=0, K=t["K_m1"], amp=0.1, current_limit=0.3, w=w, zeta=0.7071)
-    machine.sensor(m, 0, node=3, gain=20000 / (2 * math.pi))
-    machine.sensor(m, 1, node=2, gain=p["R_c"] / 5e-7)
+    machine.sensor(m, 0, node=3, gain=gains[0])
+    machine.sensor(m, 1, node=2, gain=gains[1])
     scale = rng.random() < 0.75
     case = _case("ldu", 10000.0, p, 1.0, {"parameter_tolerance": 0.15, "radius_tolerance": 1e-5})
     case["sensors"] = {"encoder_counts_per_rev": 20000} | ({"scale_m_per_count": 5e-7} if scale else {})

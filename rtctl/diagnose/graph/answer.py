@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
 from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
+from rtctl.diagnose.graph.clock import UNSTEADY
 from rtctl.diagnose.graph.experiment import Planned, left, planned
 from rtctl.diagnose.graph.fits import Fitted, curvature, half_widths, refit
 from rtctl.diagnose.graph.joint import together
@@ -69,11 +70,10 @@ class GraphDiagnosis(NamedTuple):
             at = self.located
             where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
             return f"Something is missing{where}, and no name of the library explains it."
-        said = [words.clause(machine, e, model) for e in self.effects]
+        sure = [words.clause(machine, e, model) for e in self.effects if e.confidence >= SURE]
         if self.verdict == NAMED:
-            text = "; ".join(said)
+            text = "; ".join(sure)
             return f"{text[:1].upper()}{text[1:]}."
-        sure = [text for e, text in zip(self.effects, said, strict=True) if e.confidence >= SURE]
         open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
         first = "; ".join(sure)
         text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
@@ -160,7 +160,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             found=found,
             decided=decided,
             effects=effects,
-            located=_located(found, decided),
+            located=_located(found, decided, effects),
             parameters=_parameters(decided.best, like.sim.record),
             heldout=heldout,
             planned=planned(like.sim.record, decided),
@@ -172,11 +172,10 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
 
 def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
     """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
-    if decided.verdict not in (NAMED, AMBIGUOUS) or heldout.after < heldout.before:
+    if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > 0.0:
         return decided
     names = ", ".join(decided.best.names)
-    errors = f"{heldout.after:.2g} instead of {heldout.before:.2g} of the spread"
-    why = f"with {names} the last rows are predicted worse than without: {errors}"
+    why = f"with {names} the last rows are predicted worse than without, by {-heldout.gain:.3g} nats"
     return decided._replace(verdict=UNNAMED, confidence=(), rivals=(), why=why)
 
 
@@ -193,7 +192,14 @@ def _effects(decided: Verdict) -> tuple[Effect, ...]:
             if not name.startswith(f"{h.term}:")
         )
         out.append(Effect(h.term, h.node, min(decided.confidence[i], 0.99), _sizes(best, i, spread), looks))
-    if decided.verdict == AMBIGUOUS and len(out) == 1:
+    ticks = decided.ticks
+    if ticks is not None:
+        name, node, parameter = UNSTEADY
+        size = Interval(
+            ticks.sigma, ticks.low, ticks.high, words.unit_at(best.like.sim.case.machine, name, node, parameter)
+        )
+        out.append(Effect(name, node, min(ticks.probability, 0.99), {parameter: size}, ()))
+    if decided.verdict == AMBIGUOUS and len(best.names) == 1:
         others = [r for r in out[0].look_alikes if r.p_value > (1.0 - SURE) / 2][:2]
         out += [Effect(r.name, r.node, r.p_value, {}, (), f"{out[0].name}:{out[0].node}") for r in others]
     return tuple(out)
@@ -254,7 +260,7 @@ def first_of(record: GraphRecord, path: str, values: tuple[float, ...]) -> tuple
     return tuple(float(offset + scale * np.log(v)) for v in values)
 
 
-def _located(found: Found, decided: Verdict) -> Located | None:
+def _located(found: Found, decided: Verdict, effects: tuple[Effect, ...]) -> Located | None:
     if decided.verdict == NOTHING:
         return None
     base, best = found.base, decided.best
@@ -268,9 +274,8 @@ def _located(found: Found, decided: Verdict) -> Located | None:
         if free is not None:
             return Located(channel, free.node, free.axis, f"along the {free.axis}", begin, share)
         return Located(channel, str(found.like.sim.body), "time", "over the whole recording", begin, share)
-    h = best.space.hypotheses[0]
-    axis = TERMS[h.term].axis
-    return Located(channel, h.node, axis, f"along the {axis}", begin, share)
+    axis = TERMS[effects[0].name].axis
+    return Located(channel, effects[0].node, axis, f"along the {axis}", begin, share)
 
 
 def _cannot(found: Found) -> list[str]:

@@ -18,7 +18,6 @@ from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import WIDE, Space
 
 UNKNOWN = WIDE / 2  # standard deviation, in logarithm, of a parameter of which the owner says nothing
-ALONE = 1.0  # innovations that count as one in the weight of the prior
 HONEST = 0.3  # share of the promised gain that a step must keep
 SMALLEST = 1e-9  # step of an unknown
 STALE, EFFECTS, ALL = range(3)  # what of the derivatives was taken since the last step
@@ -63,21 +62,17 @@ class Descent:
         self.like, self.space = like, space
         self.x, self.e, self.J, _ = at
         self.low, self.high = space.bounds()
-        self._weigh()
-        self._whiten()
-
-    def _weigh(self) -> None:
-        self.r = self.like.white(self.e)
-        self.weight = weights(self.space) * trust(self.r, ALONE)
+        self.prior = weights(space)
+        self.r = like.white(self.e)
         self.cost = self._cost(self.r, self.x)
+        self._whiten()
 
     def _whiten(self) -> None:
         self.W = self.like.white(self.J)
         self.A = self.W.T @ self.W
 
     def _cost(self, r: np.ndarray, x: np.ndarray) -> float:
-        weight = weights(self.space) * trust(r, ALONE)
-        return 0.5 * float(r @ r) + 0.5 * float(weight @ x**2)
+        return 0.5 * float(r @ r) + 0.5 * float((self.prior * trust(r)) @ x**2)
 
     def renew(self, columns: Sequence[int]) -> None:
         """Take the derivatives in some columns anew."""
@@ -91,7 +86,8 @@ class Descent:
     def step(self, damping: float, tries: int) -> tuple[float, float, float]:
         """Go to where the cost is lower; what was gained and what was promised, and the damping that it took; 0 and 0
         where no step gains."""
-        H, g = self.A + np.diag(self.weight), self.W.T @ self.r + self.weight * self.x
+        weight = self.prior * trust(self.r)
+        H, g = self.A + np.diag(weight), self.W.T @ self.r + weight * self.x
         for _ in range(tries):
             dx = bounded_step(H, g, self.x, self.low, self.high, damping)
             if not np.abs(dx).max(initial=0.0) > SMALLEST:
@@ -99,13 +95,13 @@ class Descent:
             x = self.x + dx
             e = self.like.raw(self.space.model(x))
             r = self.like.white(e)
-            gained = self.cost - self._cost(r, x)
+            cost = self._cost(r, x)
+            gained = self.cost - cost
             if gained > 0.0:
                 promised = -float(g @ dx + 0.5 * dx @ H @ dx)
                 if gained > HONEST * promised:
                     self._learn(dx, e - self.e, r - self.r)
-                self.x, self.e = x, e
-                self._weigh()
+                self.x, self.e, self.r, self.cost = x, e, r, cost
                 return gained, promised, damping
             damping *= 10
         return 0.0, 0.0, damping

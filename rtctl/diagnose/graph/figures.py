@@ -8,6 +8,7 @@ from rtctl.diagnose.diagnosis import NOTHING
 from rtctl.diagnose.figures import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.case import is_start
+from rtctl.diagnose.graph.fits import Z90
 from rtctl.diagnose.graph.missing import Missing, subjects
 from rtctl.diagnose.graph.posterior import rivals
 from rtctl.diagnose.graph.words import called, channel_unit, here, value_unit
@@ -216,8 +217,9 @@ def untold(d: GraphDiagnosis, name: str) -> bool:
     v = d.parameters[name]
     if weight <= 0.0 or v.value == 0.0:
         return False
-    half = 0.5 * abs(float(np.log(max(v.high / v.low, 1.0)))) if v.low * v.high > 0 else np.inf
-    return half > OWN * 1.645 / np.sqrt(weight)
+    ends = np.abs(np.log((v.low / v.value, v.high / v.value))) if v.low * v.high > 0 else np.inf
+    half = float(np.max(ends))  # the owner's own bound may cut off one of them
+    return half > OWN * Z90 / np.sqrt(weight)
 
 
 __all__ = ["heldout", "missing_force", "parameters", "posterior", "untold", "value_unit"]

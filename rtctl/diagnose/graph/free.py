@@ -7,17 +7,18 @@ what it still explains beside a name says that the law of that name is not the m
 Source: Robinson, Root-N-consistent semiparametric regression, Econometrica 56 (1988).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from rtctl.diagnose.fit import bounded_step, parallel
-from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.measures import Measures, speed
+from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.scales import spaced
 
 HATS = 10  # of a first look at each axis
@@ -25,6 +26,7 @@ FINE = 30  # of the axes that explain most
 SECOND = 2  # axes that are looked at again
 SMOOTH = 0.25  # of the range: distance over which a free force is alike, by its prior
 SIZE = 0.3  # of the force that moves a node: standard deviation of a free force, by its prior
+PARTS = (1.0, 0.5, 0.25)  # of the step of the linear model, at which it is simulated
 TURNS = 1.5  # turns from which on an angle is another axis than the position
 
 
@@ -109,18 +111,22 @@ def _fitted(
     apart = np.abs(np.subtract.outer(*[np.arange(len(knots)) / (len(knots) - 1)] * 2))
     root = np.linalg.cholesky(np.exp(-apart / SMOOTH))  # of the prior's covariance (Ornstein and Uhlenbeck, 1930)
 
-    def pushed(part: Likelihood, values: np.ndarray, hat: np.ndarray) -> np.ndarray:
-        sim, model = part.sim, part.sim.own(base.model)
+    def pushed(part: Likelihood, values: np.ndarray, hat: np.ndarray, whole: GraphModel) -> np.ndarray:
+        sim, model = part.sim, part.sim.own(whole)
         forces = np.zeros((len(values), sim.layout.nq))
         own = sim.layout.ratio(node, model.base)
         forces[:, sim.layout.coordinate(node)] = own * unit * np.interp(values, knots, hat)
         return part.of_readings(sim.pushed(forces).run(model, n=part.rows[1], coarse=True))
 
-    def column(hat: np.ndarray) -> np.ndarray:
-        found = [pushed(part, own, hat) for part, own in zip(like.parts, values, strict=True)]
+    def change(hat: np.ndarray, model: GraphModel) -> np.ndarray:
+        """What a force by hats does to the residuals (blocks, sensors) of coarse simulations."""
+        found = [pushed(part, own, hat, model) for part, own in zip(like.parts, values, strict=True)]
         return np.asarray(np.concatenate(found) - start)
 
-    C = np.stack(parallel([partial(column, hat) for hat in np.eye(len(knots))]), axis=2) @ root
+    def moved(scale: float, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return change(scale * (root @ z), base.space.model(x))
+
+    C = np.stack(parallel([partial(change, hat, base.model) for hat in np.eye(len(knots))]), axis=2) @ root
     out = []
     for share in shares:
         scale = share / SIZE
@@ -128,6 +134,8 @@ def _fitted(
         left = max(solved, key=lambda s: s.evidence).e
         solved.append(_solved(abouts[0].under(like.told(left)), C * scale))
         best = max(solved, key=lambda s: s.evidence)
+        if best.evidence > 0.0:
+            best = _simulated(base, best, partial(moved, scale))
         force = unit * scale * (root @ best.z)
         rms = float(np.sqrt(np.mean(np.interp(along[:: len(along) // 2000 + 1], knots, force) ** 2))) / whole
         out.append(Free(node, axis, share, best.gain, best.e, best.evidence, knots, force, rms))
@@ -139,6 +147,28 @@ class _Solved(NamedTuple):
     evidence: float
     e: np.ndarray
     z: np.ndarray  # (columns,) in standard deviations of the prior
+    dx: np.ndarray  # step of the base's parameters
+    volume: float  # of the posterior, nats
+
+
+def _simulated(base: Fitted, solved: _Solved, change: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> _Solved:
+    """The same as a simulation has it, as far along the step as it gains most.
+
+    What lets go of dry friction, or closes a gap, is no sum of what single hats did.
+    """
+    tried = []
+    for part in PARTS:
+        dx, z = part * solved.dx, part * solved.z
+        e = base.e + change(base.x + dx, z)
+        tried.append(_judged(base, e, dx, z, solved.volume))
+    return max(tried, key=lambda s: s.evidence)
+
+
+def _judged(base: Fitted, e: np.ndarray, dx: np.ndarray, z: np.ndarray, volume: float) -> _Solved:
+    weight = prior(base.space)
+    odds = 0.5 * float(weight @ ((base.x + dx) ** 2 - base.x**2) + z @ z)
+    gain = base.loss - base.like.loss(e)
+    return _Solved(gain, base.power * gain - odds - 0.5 * volume, e, z, dx, volume)
 
 
 def _solved(about: Linear, C: np.ndarray) -> _Solved:
@@ -159,6 +189,4 @@ def _solved(about: Linear, C: np.ndarray) -> _Solved:
     volume = np.linalg.slogdet(inner)[1]
     if n:
         volume -= np.linalg.slogdet(inner[:n, :n])[1]
-    prior = 0.5 * float(weight @ (x + dx) ** 2 - weight[:n] @ base.x**2)
-    gain = base.loss - base.like.loss(e)
-    return _Solved(gain, base.power * gain - prior - 0.5 * float(volume), e, dx[n:])
+    return _judged(base, e, dx[:n], dx[n:], float(volume))

@@ -51,15 +51,15 @@ class Joint(Likelihood):
 
     def plain(self, e: np.ndarray) -> np.ndarray:
         """Innovations of residuals (blocks, sensors, ...), recording after recording, where the laws are exact."""
-        return np.concatenate([part.plain(own) for part, own in self._cut(e)])
+        return np.concatenate([part.plain(own) for part, own in self.cut(e)])
 
     def noisy(self, e: np.ndarray) -> "Joint":
         """The same with the noise of these residuals (blocks, sensors)."""
-        return self._of([part.noisy(own) for part, own in self._cut(e)], self.errors)
+        return self._of([part.noisy(own) for part, own in self.cut(e)], self.errors)
 
     def flat(self, e: np.ndarray) -> "Joint":
         """The same with white noise as loud as these residuals (blocks, sensors) in each recording."""
-        return self._of([part.flat(own) for part, own in self._cut(e)], self.errors)
+        return self._of([part.flat(own) for part, own in self.cut(e)], self.errors)
 
     def directed(self, model: GraphModel) -> "Joint":
         """The same with the sensors that know no direction, as far as the model tells it in every recording."""
@@ -70,7 +70,7 @@ class Joint(Likelihood):
 
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
         """Losses where the laws are exact, by segment (count,), nats: each recording has a share of the segments."""
-        cuts = self._cut(e)
+        cuts = self.cut(e)
         shares = np.cumsum([len(own) for _, own in cuts]) * count // sum(len(own) for _, own in cuts)
         sizes = np.maximum(np.diff([0, *shares]), 1)
         found = np.concatenate([part.parted(own, int(n)) for (part, own), n in zip(cuts, sizes, strict=True)])
@@ -103,7 +103,7 @@ class Joint(Likelihood):
         other.rows = parts[0].rows
         return other
 
-    def _cut(self, e: np.ndarray) -> list[tuple[Likelihood, np.ndarray]]:
+    def cut(self, e: np.ndarray) -> list[tuple[Likelihood, np.ndarray]]:
         """The part of residuals (blocks, ...) that belongs to each recording."""
         sizes = [(part.rows[1] - part.rows[0]) // part.mean for part in self._parts]
         return list(zip(self._parts, np.split(e, np.cumsum(sizes)[:-1]), strict=True))

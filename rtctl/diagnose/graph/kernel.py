@@ -45,7 +45,7 @@ entry = njit(nogil=True, error_model="numpy", fastmath=False, cache=True)
 STEPS = '''
 @compiled
 def substep(job, p, m, t, forces, row):
-    """One substep under the commands in m.volts, the recorded forces and the correction in job.correction."""
+    """One substep under the commands in m.volts and the recorded forces."""
     command(t, m)
     graph.take(p, m)
     linear.midpoint(m)
@@ -57,8 +57,6 @@ def substep(job, p, m, t, forces, row):
     last(t, m)
     for i in range(p.nq):
         m.f[i] += job.need[i]
-        for c in range(job.follows):
-            m.f[i] += job.correction[c] * job.push[c, i]
     {advance}
 
 
@@ -73,9 +71,10 @@ def depart(job, p, m):
 
 @compiled
 def correct(job, p, m, seen, row, on, first):
-    """Corrections that make the followed sensors follow a row of `seen` (n, followed), into job.correction.
+    """Move the state so that the followed sensors follow a row of `seen` (n, followed); the force that would have
+    done the same to a free body goes into job.correction.
 
-    They are 0 where not `on`. At the `first` tick the error has no rate.
+    Nothing moves where not `on`. At the `first` tick the error has no rate.
     """
     for c in range(job.follows):
         job.correction[c] = 0.0
@@ -92,6 +91,9 @@ def correct(job, p, m, seen, row, on, first):
                 job.d[c] += job.a[c] * ((e - job.e[c]) * job.rate - job.d[c])
                 job.e[c] = e
             job.correction[c] = job.P[c] * job.e[c] + job.D[c] * job.d[c]
+            for i in range(p.nq):
+                m.x[i] += job.K[c] * e * job.way[c, i]
+                m.x[p.nq + i] += job.L[c] * e * job.way[c, i]
 
 
 @compiled
@@ -250,10 +252,12 @@ JOB = state(
     follows=int,
     main=(int, Q),  # numbers of the sensors that are followed
     speed=(int, Q),  # 1: it shows a speed
-    P=(float, Q),  # of the correction, in units of `push` a rad or m
-    D=(float, Q),
+    way=(float, (Q, Q)),  # motion of each coordinate for one unit of motion of each followed body
+    K=(float, Q),  # what of its error each followed body is moved by at a tick
+    L=(float, Q),  # and what its speed is raised by, for a unit of the error
+    P=(float, Q),  # force that would do the same, N or Nm at the followed body, for a unit of the error
+    D=(float, Q),  # and of its rate
     a=(float, Q),
-    push=(float, (Q, Q)),  # what one unit of each correction pushes each coordinate with
     correction=(float, Q),
     first_x=(float, Q),  # how far each coordinate is from rest at the first row, and its speed
     first_v=(float, Q),

@@ -9,12 +9,14 @@ Source: Ljung, System Identification (1999), ch. 7 and 16.4.
 
 from collections.abc import Sequence
 from copy import copy
+from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.edges import Edges
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.graph.noise import Noise, noise_of
+from rtctl.diagnose.graph.noise import Noise, noises_of, whitened
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.slack import Slack
 
@@ -22,6 +24,7 @@ RATE = 500.0  # 1/s, of the averaged residuals
 ORDER = 20  # of the autoregression
 FORGET = 8.0  # over the bandwidth of the observer: until the start is forgotten
 QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
+SMOOTH = 9  # blocks, over which the rate of a reading is taken
 EDGE = 0.03  # of a step: the least that an edge leaves, whose tick is known
 COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
 WILD = 1e6  # residual of a model that runs away, in steps of noise
@@ -102,10 +105,26 @@ class Likelihood:
         told = self.sim.edges[name].between(begin + 1, begin + (end - begin) // self.mean * self.mean)
         return told, (told.rows - begin) // self.mean
 
-    def present(self, c: int) -> np.ndarray | slice:
-        """Blocks in which sensor `c` shows something: all, or those with an edge."""
-        name = self.sim.channels[c]
-        return np.unique(self.edges_in(name)[1]) if name in self.sim.edges else slice(None)
+    @cached_property
+    def present(self) -> list[np.ndarray]:
+        """Blocks in which each sensor shows something: all, or those with an edge."""
+        every = np.arange((self.rows[1] - self.rows[0]) // self.mean)
+        return [np.unique(self.edges_in(n)[1]) if n in self.sim.edges else every for n in self.sim.channels]
+
+    @cached_property
+    def growth(self) -> list[np.ndarray]:
+        """What the variance of each sensor's residual may grow with (blocks present, columns): whether it moves, where
+        it counts, and the square of its rate, by which a tick that is late shows."""
+        begin, end = self.rows
+        blocks = (end - begin) // self.mean
+        y = self.target[begin:end][: blocks * self.mean].reshape(blocks, self.mean, -1).mean(axis=1)
+        rate = np.gradient(uniform_filter1d(y, SMOOTH, axis=0), axis=0) ** 2  # by the block
+        out = []
+        for c, (name, rows) in enumerate(zip(self.sim.channels, self.present, strict=True)):
+            grain = self.sim.record.grain[name]
+            moves = [rate[:, c] / (rate[:, c] + grain**2)] if grain > 0.0 else []
+            out.append(np.stack([*moves, rate[:, c]], axis=1)[rows])
+        return out
 
     def directed(self, model: GraphModel) -> "Likelihood":
         """The same with the sensors that know no direction, as the model tells the directions of their edges."""
@@ -117,7 +136,7 @@ class Likelihood:
 
     def plain(self, e: np.ndarray) -> np.ndarray:
         """The same where the laws are exact."""
-        return np.concatenate([noise.whiten(e[self.present(c), c]) for c, noise in enumerate(self.noise)])
+        return np.concatenate(whitened(self.noise, e, self.present))
 
     @property
     def slack(self) -> Slack | None:
@@ -151,7 +170,7 @@ class Likelihood:
         """The same with the noise of these residuals (blocks, sensors)."""
         other = copy(self)
         other._slack = None
-        other.noise = [noise_of(e[self.present(c), c], ORDER, float(self.least[c])) for c in range(e.shape[1])]
+        other.noise, _ = noises_of(e, self.present, ORDER, self.least, self.growth)
         return other
 
     def flat(self, e: np.ndarray) -> "Likelihood":
@@ -162,8 +181,8 @@ class Likelihood:
         other = copy(self)
         other._slack = None
         other.noise = [
-            Noise(np.ones(1), max(float(np.std(e[self.present(c), c])), float(self.least[c])))
-            for c in range(e.shape[1])
+            Noise(np.ones(1), max(float(np.std(e[rows, c])), float(self.least[c])))
+            for c, rows in enumerate(self.present)
         ]
         return other
 
@@ -182,25 +201,33 @@ class Likelihood:
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
         """The same where the laws are exact."""
         out = np.zeros(count)
-        for c in range(e.shape[1]):
-            shown = e[self.present(c), c]
-            own = noise_of(shown, ORDER, float(self.least[c]))
-            r = own.whiten(shown)
-            segment = np.arange(len(e))[self.present(c)][own.order :] * count // len(e)
+        for rows, own, r in zip(self.present, *noises_of(e, self.present, ORDER, self.least, self.growth), strict=True):
+            segment = rows[own.order :] * count // len(e)
             out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
+        return out
+
+    def foretold(self, e: np.ndarray, other: "Likelihood") -> float:
+        """Negative logarithm of the likelihood of residuals under the noise that `other` rows showed, nats."""
+        out = 0.0
+        for (part, own), before in zip(self.cut(e), other.parts, strict=True):
+            noises = [noise.averaged() for noise in before.noise]
+            white = whitened(noises, own, part.present)
+            out += sum(len(r) * float(np.log(n.sigma)) + 0.5 * float(r @ r) for n, r in zip(noises, white, strict=True))
         return out
 
     @property
     def size(self) -> int:
         """Number of innovations."""
-        blocks = (self.rows[1] - self.rows[0]) // self.mean
-        shown = [len(np.arange(blocks)[self.present(c)]) for c in range(len(self.noise))]
-        return sum(n - noise.order for n, noise in zip(shown, self.noise, strict=True))
+        return sum(len(rows) - noise.order for rows, noise in zip(self.present, self.noise, strict=True))
 
     @property
     def parts(self) -> Sequence["Likelihood"]:
         """The likelihood of each recording: this one."""
         return (self,)
+
+    def cut(self, e: np.ndarray) -> list[tuple["Likelihood", np.ndarray]]:
+        """The part of residuals (blocks, ...) that belongs to each recording."""
+        return [(self, e)]
 
     @property
     def spread(self) -> np.ndarray:
@@ -218,6 +245,9 @@ class Likelihood:
         """The same of rows `begin` to `end`."""
         other = self.slackened(None)
         other.rows = (max(begin, self.rows[0]), end)
+        other.noise = [noise.averaged() for noise in self.noise]
+        for derived in ("present", "growth"):
+            other.__dict__.pop(derived, None)
         return other
 
 

@@ -1,32 +1,50 @@
-"""Noise of a sensor's residual: an autoregression that whitens it, and the variance of what it cannot predict.
+"""Noise of the sensors' residuals: an autoregression of each, what the sensors tell of each other, and the variance of
+what neither predicts, which may grow with speed.
+
+Counts are silent at rest, and a tick that comes late shows a reading that is off by the more the faster it moves.
 
 Source: Ljung, System Identification (1999), ch. 4; Kay, Modern Spectral Estimation (1988), ch. 7 for the covariance
-method with both directions of time.
+method with both directions of time; Davidian & Carroll, Variance function estimation, JASA 82 (1987).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
+from scipy.optimize import nnls
 from scipy.signal import lfilter
+
+SPAN = 3  # innovations before and after, of each earlier sensor, that foretell one of a later sensor
+ROWS = 20  # innovations for each coefficient, without which nothing is foretold
+VARIANCES = 5  # rounds of a variance function, each weighed by the one before
 
 
 class Noise(NamedTuple):
-    """Autoregression of one sensor's residual."""
+    """Noise of one sensor's residual: an autoregression, and what the innovations of the sensors before it foretell."""
 
     a: np.ndarray  # (p + 1,) whitening filter, a[0] = 1
-    sigma: float  # standard deviation of the innovation
+    sigma: float | np.ndarray  # standard deviation of the innovations: of all, or of each (n - p,)
+    beside: tuple[np.ndarray, ...] = ()  # of each sensor before it: (2 SPAN + 1,) coefficients, the earliest first
 
     @property
     def order(self) -> int:
         """Number of past values."""
         return len(self.a) - 1
 
-    def whiten(self, e: np.ndarray) -> np.ndarray:
-        """Innovations (n - p, ...) of residuals (n, ...), by their standard deviation."""
+    def averaged(self) -> "Noise":
+        """The same with one standard deviation for all rows, as other rows need it."""
+        return self._replace(sigma=float(np.sqrt(np.mean(np.square(self.sigma)))))
+
+    def filtered(self, e: np.ndarray) -> np.ndarray:
+        """What the past does not foretell (n - p, ...) of residuals (n, ...), in their unit."""
         if e.size == 0:  # of no fitted parameter
             return np.zeros((max(len(e) - self.order, 0), *e.shape[1:]))
-        return np.asarray(lfilter(self.a, [1.0], e, axis=0)[self.order :] / self.sigma)
+        return np.asarray(lfilter(self.a, [1.0], e, axis=0)[self.order :])
+
+    def scaled(self, rest: np.ndarray) -> np.ndarray:
+        """Innovations (n - p, ...) by their standard deviation."""
+        return np.asarray((rest.T / self.sigma).T)
 
 
 def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
@@ -42,3 +60,85 @@ def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
     a = np.concatenate([[1.0], -solve_toeplitz(r[:-1], r[1:])]) if order else np.ones(1)
     innovation = lfilter(a, [1.0], e)[order:]
     return Noise(a, max(float(np.sqrt(np.mean(innovation**2))), least))
+
+
+def levels(rest: np.ndarray, growth: np.ndarray, least: float, known: np.ndarray | float = 0.0) -> np.ndarray:
+    """Standard deviation (n,) of each of the innovations (n,), whose variance is what is `known` of it (n,), a constant
+    and a share of each column of `growth` (n, columns), none of them negative; it is not below `least`.
+
+    The square of a normal variable scatters by its own mean, so that each is weighed by the round before.
+    """
+    power = rest**2
+    B = np.column_stack([np.ones(len(rest)), growth])
+    B[:, 1:] /= np.maximum(B[:, 1:].mean(axis=0), 1e-300)
+    variance = np.full(len(rest), max(float(power.mean()), least**2))
+    for _ in range(VARIANCES):
+        weighed = B / variance[:, None]
+        H = weighed.T @ weighed
+        H[np.diag_indices_from(H)] *= 1.0 + 1e-9
+        L = np.linalg.cholesky(H)
+        found, _ = nnls(L.T, np.linalg.solve(L, weighed.T @ ((power - known) / variance)))
+        variance = np.maximum(B @ found + known, least**2)
+    return np.sqrt(variance)
+
+
+def noises_of(
+    e: np.ndarray, present: Sequence[np.ndarray], order: int, least: np.ndarray, growth: Sequence[np.ndarray] = ()
+) -> tuple[list[Noise], list[np.ndarray]]:
+    """Noise of each sensor of residuals (n, sensors) that show in the rows `present` of each, and their innovations
+    by their standard deviation, as `whitened` gives them. `growth` (rows, columns) is what the variance of each sensor
+    may grow with.
+
+    A force without a law moves all sensors at once: the innovations of the first sensors foretell those of the later.
+    The determinant of the covariance is the product of what is left.
+    """
+    out: list[Noise] = []
+    white: list[np.ndarray] = []
+    grids: list[np.ndarray | None] = []
+    for c, rows in enumerate(present):
+        own = noise_of(e[rows, c], order, float(least[c]))
+        rest, at = own.filtered(e[rows, c]), rows[own.order :]
+        known = [(d, neighbours(grid, at)) for d, grid in enumerate(grids) if grid is not None]
+        beside, left = [np.zeros(2 * SPAN + 1)] * c, rest
+        if known and len(at) > ROWS * len(known) * (2 * SPAN + 1):
+            M = np.concatenate([found for _, found in known], axis=1)
+            A = M.T @ M
+            A[np.diag_indices_from(A)] += 1e-9 * np.trace(A) + 1e-300
+            told = np.linalg.solve(A, M.T @ rest)
+            for (d, _), own_part in zip(known, np.split(told, len(known)), strict=True):
+                beside[d] = own_part
+            left = rest - M @ told
+            own = own._replace(sigma=max(float(np.sqrt(np.mean(left**2))), float(least[c])), beside=tuple(beside))
+        if growth and len(left) > ROWS * growth[c].shape[1]:
+            own = own._replace(sigma=levels(left, growth[c][own.order :], float(least[c])))
+        out.append(own)
+        white.append(left / own.sigma)
+        grids.append(gridded(rest, at, len(e)) if len(rows) == len(e) else None)
+    return out, white
+
+
+def whitened(noises: Sequence[Noise], e: np.ndarray, present: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Innovations of residuals (n, sensors, ...), of each sensor, by their standard deviation."""
+    out: list[np.ndarray] = []
+    grids: list[np.ndarray | None] = []
+    for c, (noise, rows) in enumerate(zip(noises, present, strict=True)):
+        rest, at = noise.filtered(e[rows, c]), rows[noise.order :]
+        needed = any(len(later.beside) > c and later.beside[c].any() for later in noises[c + 1 :])
+        grids.append(gridded(rest, at, len(e)) if needed else None)
+        for grid, told in zip(grids, noise.beside, strict=False):
+            if grid is not None and told.any():
+                rest = rest - np.tensordot(neighbours(grid, at), told, axes=(1, 0))
+        out.append(noise.scaled(rest))
+    return out
+
+
+def gridded(rest: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
+    """Innovations (n + 2 SPAN, ...) on all rows, 0 where there is none and beyond both ends."""
+    out = np.zeros((n + 2 * SPAN, *rest.shape[1:]))
+    out[at + SPAN] = rest
+    return out
+
+
+def neighbours(grid: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Innovations (rows, 2 SPAN + 1, ...) around each of some rows."""
+    return np.stack([grid[at + lag] for lag in range(2 * SPAN + 1)], axis=1)

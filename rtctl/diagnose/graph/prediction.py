@@ -17,6 +17,7 @@ class Heldout(NamedTuple):
     before: float
     after: float
     floor: float
+    gain: float  # nats by which the best predicts them better, each under the noise of the rows before
     rows: tuple[int, int]
     models: tuple[GraphModel, GraphModel]  # base and best, as the rows before were fitted
     late: Likelihood  # of the held-out rows
@@ -26,18 +27,15 @@ def predict(base: Fitted, best: Fitted) -> Heldout:
     """Held-out error of the base and of the best model, each fitted to the rows before."""
     like = base.like
     first, late = like.split(HELD)
-    models = [
-        f.space.model(refit(first, f.space, f.x, rounds=6).x) if f.space.names or f.space.hypotheses else f.model
-        for f in (base, best)
-    ]
-    return judged(like, late, (models[0], models[1]), first.rows)
+    fits = [refit(first, f.space, f.x, rounds=6) if f.space.names or f.space.hypotheses else f for f in (base, best)]
+    return judged(like, late, (fits[0], fits[1]), first.rows)
 
 
-def judged(
-    whole: Likelihood, late: Likelihood, models: tuple[GraphModel, GraphModel], rows: tuple[int, int]
-) -> Heldout:
+def judged(whole: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted], rows: tuple[int, int]) -> Heldout:
     """Errors of the base and the best model on the rows of `late`, by the spread of each sensor on those of `whole`."""
-    spread = whole.spread
-    before, after = (float(np.sqrt(np.mean(np.mean(late.raw(m) ** 2, axis=0) / spread**2))) for m in models)
+    spread, models = whole.spread, (fits[0].model, fits[1].model)
+    residuals = [late.raw(m) for m in models]
+    before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)
     floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
-    return Heldout(before, after, min(floor, after), rows, models, late)
+    one, two = (late.foretold(e, f.like) for e, f in zip(residuals, fits, strict=True))
+    return Heldout(before, after, min(floor, after), one - two, rows, models, late)

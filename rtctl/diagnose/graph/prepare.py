@@ -20,6 +20,7 @@ from rtctl.plants.physics import TERMS, ordered
 if TYPE_CHECKING:
     from rtctl.diagnose.graph.simulate import Simulator
 
+DAMPED = 1.4  # twice the damping ratio of the observer
 COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
 ABSENT = np.zeros((1, 1))
 
@@ -147,17 +148,15 @@ def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: 
     j["follows"] = len(sim.followed)
     for number, one in enumerate(sim.followed):
         j["main"][number], j["speed"][number] = model.layout.sensors[one.sensor], one.shows_speed
-        inertia = 0.0
-        push = np.zeros(j["push"].shape[1])
         for name, ratio in rigid(sim.layout, sim.case.values, one.body).items():
             at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
-            if ratio != 0.0:
-                push[at] = params.inertia[at] * ratio / own_ratio
-        for at in range(model.layout.nq):
-            inertia += push[at] ** 2 / params.inertia[at]
-        j["push"][number] = push / inertia  # a unit of correction is a unit of force at the followed body
+            j["way"][number, at] = ratio / own_ratio
+        inertia = float(params.inertia[: model.layout.nq] @ j["way"][number, : model.layout.nq] ** 2)
         follow = sim.follow * one.bandwidth / sim.followed[0].bandwidth
-        j["P"][number], j["D"][number] = follow**2 * inertia, 1.4 * follow * inertia
+        j["P"][number], j["D"][number] = follow**2 * inertia, DAMPED * follow * inertia
+        j["K"][number], j["L"][number] = (
+            (0.0, DAMPED * follow * dt) if one.shows_speed else (DAMPED * follow * dt, follow**2 * dt)
+        )
         j["a"][number] = -np.expm1(-10.0 * follow * dt)
     for path, value in model.base.items():
         if path.startswith(OWN_START):

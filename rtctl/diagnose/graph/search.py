@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.graph.clock import clock, timed
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
 from rtctl.diagnose.graph.fits import Fitted, explained, faint, refit, without
@@ -24,9 +25,10 @@ OTHERS = 3  # of them beside what is left in an exchange
 BEAM = 4  # models that are extended
 ALIKE = 0.995  # cosine from which two models do the same
 EXCHANGES = 2
+RIVALS, NEAR = 3, 5.0  # models that are asked for other forms, and nats by which the best may be ahead of them
 ENOUGH = 5.0  # nats of evidence that a first effect must bring
 WORTH = 3.0  # nats that a further one must bring
-SHARE = 0.1  # of the evidence of all effects together, which a further one must bring
+SHARE = 0.05  # of the evidence of all effects together, which a further one must bring
 PART = 0.3  # share of the power that the others leave, which a further effect must take off
 
 Progress = Callable[[str], None]
@@ -54,15 +56,16 @@ class Found(NamedTuple):
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
     """Fit the base, then what is missing beside it."""
     base, grown, looked, odds = begun(like, space, progress)
+    like = base.like  # with the times of the ticks
     merit = partial(merit_of, odds=odds)
     known: Known = {key(f.names): f for f in (base, *grown)}
-    parents = [base]
+    parents, asked = [base], set[tuple[str, ...]]()
     for level in range(1, MOST + 1):
         better = [f for f in grown if adds(base, _parent(f, parents), f, merit)]
         if not better:
             break
-        better.sort(key=merit, reverse=True)
-        better[0] = known[key(better[0].names)] = restarted(enriched(better[0]))
+        better = enriched_near(better, known, merit, asked)
+        better[0] = known[key(better[0].names)] = restarted(better[0])
         for rest in _smaller(like, better[0], known, faint(better[0])):
             known.setdefault(key(rest.names), rest)
         if level == MOST:
@@ -71,27 +74,29 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
         grown = extended(like, parents, known, NAMES[level], merit)
     for _ in range(EXCHANGES):
-        best = _best(base, known, merit)
+        best = standing(base, known, merit)[0]
         progress(f"exchanging each of {', '.join(best.names)}")
         for rest in _smaller(like, best, known):
             known.setdefault(key(rest.names), rest)
             for f in extended(like, [rest], known, OTHERS, merit):
                 if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
                     known |= {key(g.names): g for g in _smaller(like, f, known)}
-        if _best(base, known, merit) is best:
+        if standing(base, known, merit)[0] is best:
             break
     progress("asking for other forms of what was found")
-    best = _best(base, known, merit)
-    if best.names:
-        known[key(best.names)] = enriched(best)
-    standing = [f for f in known.values() if stands(base, f, known, merit)]
-    return Found(like, base, tuple(looked.scores), tuple(sorted(standing, key=merit, reverse=True)), odds)
+    enriched_near([f for f in standing(base, known, merit) if f.names], known, merit, asked)
+    return Found(like, base, tuple(looked.scores), tuple(standing(base, known, merit)), odds)
 
 
 def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, list[Fitted], Screened, float]:
     """The base, models with one effect, what screening said of them, and the prior odds of one of them."""
     progress("fitting the nominal parameters")
     base = restarted(refit(like, space))
+    told = clock(base)
+    if told.gain > 0.0:
+        progress("telling the times of the ticks")
+        like = timed(base, told)
+        base = refit(like, space, base.x)
     for _ in range(REBASED):
         progress("screening every hypothesis")
         looked = screened(base)
@@ -103,6 +108,17 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, l
             break
         base = again
     return base, grown, looked, odds
+
+
+def enriched_near(fits: Sequence[Fitted], known: Known, merit: Merit, asked: set[tuple[str, ...]]) -> list[Fitted]:
+    """Models, best first, of which the best and those near it are in the forms that the recording asks for: a rival in
+    its plain form is no rival."""
+    order = sorted(fits, key=merit, reverse=True)
+    for f in order[:RIVALS]:
+        if merit(f) > merit(order[0]) - NEAR and key(f.names) not in asked:
+            known[key(f.names)] = enriched(f)
+            asked.add(key(f.names))
+    return sorted((known[key(f.names)] for f in order), key=merit, reverse=True)
 
 
 def apart(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
@@ -121,10 +137,6 @@ def likeness(base: Fitted, one: Fitted, other: Fitted) -> float:
     """Cosine of the angle between what two models take off the residual, each sensor by its least noise."""
     a, b = ((base.e - f.e) / base.like.least for f in (one, other))
     return float(np.sum(a * b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
-
-
-def _best(base: Fitted, known: Known, merit: Merit) -> Fitted:
-    return max((f for f in known.values() if stands(base, f, known, merit)), key=merit)
 
 
 def _smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | None = None) -> list[Fitted]:
@@ -162,6 +174,11 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
     if gained < max(WORTH, SHARE * (merit(more) - merit(base))):
         return False
     return not fewer.names or explained(fewer, more) > PART
+
+
+def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
+    """The models that stand, best first."""
+    return sorted((f for f in known.values() if stands(base, f, known, merit)), key=merit, reverse=True)
 
 
 def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:

@@ -98,7 +98,7 @@ class Simulator:
                 grain[name] = 1.0 / abs(scale)
         other = copy(self)
         other.record, other.edges = self.record._replace(y=y, grain=grain), found
-        shown = {*self.channels, *found}
+        shown = {*self.channels, *found} - (self.record.edges.keys() - found.keys())
         other.channels = [name for name in (*self.layout.sensors, *self.case.machine.drives) if name in shown]
         return other
 

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
+from rtctl.diagnose.graph.clock import Clock, clock
 from rtctl.diagnose.graph.evidence import Rival, rivals
 from rtctl.diagnose.graph.fits import Fitted, explained
 from rtctl.diagnose.graph.free import Free
@@ -25,10 +26,21 @@ class Verdict(NamedTuple):
     beside: Fitted  # the model beside which it stands
     why: str  # one sentence
     table: tuple[Rival, ...]  # all rivals, the most probable first
+    ticks: Clock | None = None  # their times, where they are off
 
 
 def verdict(found: Found) -> Verdict:
-    """Verdict of a search."""
+    """Verdict of a search, and of the times of the ticks: those show in the noise that the best model leaves."""
+    decided = of_motion(found)
+    ticks = clock(decided.best)
+    if ticks.probability < SURE:
+        return decided
+    kind = NAMED if decided.verdict == NOTHING else decided.verdict
+    return decided._replace(verdict=kind, ticks=ticks)
+
+
+def of_motion(found: Found) -> Verdict:
+    """Verdict on what moves the machine."""
     table = rivals(found)
     named: dict[tuple[str, ...], float] = {}
     for rival in table:

@@ -1,7 +1,7 @@
 import pytest
 from graph_cases import named, nothing, unnamed
 
-from rtctl.diagnose.diagnosis import NAMED, NOTHING, UNNAMED
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
 from rtctl.diagnose.graph.case import START
 
 
@@ -51,3 +51,12 @@ def test_json_has_the_keys_of_the_exchange_format(d):
     } <= set(data)
     assert set(data["fit"]) == {"heldout_nrmse_before", "heldout_nrmse_after", "noise_floor"}
     assert all(len(p["ci90"]) == 2 for p in data["parameters"].values())
+
+
+def test_a_rival_without_a_size_is_called_by_its_name():
+    d = named()
+    rival = Effect("drive.gain_asymmetry", "amplifier", 0.3, {}, (), "friction.coulomb:carriage")
+    effects = (d.effects[0]._replace(confidence=0.6), rival)
+    told = d._replace(decided=d.decided._replace(verdict=AMBIGUOUS), effects=effects)
+    assert "cannot tell which" in told.headline
+    assert "at the amplifier" in told.headline

@@ -41,7 +41,7 @@ def test_every_unknown_has_a_prior():
 def test_a_name_that_predicts_worse_is_none():
     d = named()
     assert borne_out(d.decided, d.heldout).verdict == NAMED
-    worse = borne_out(d.decided, d.heldout._replace(before=0.1, after=0.2))
+    worse = borne_out(d.decided, d.heldout._replace(gain=-5.0))
     assert worse.verdict == UNNAMED
     assert "predicted worse than without" in worse.why
     assert not worse.confidence

@@ -49,6 +49,8 @@ def test_losses_add_up_and_residuals_are_stacked():
     own = like.told(e)
     assert len(own.white(e)) == own.size
     np.testing.assert_allclose(own.white(e[:, :, None])[:, 0], own.white(e))
+    early, late = like.split(0.25)
+    assert len(early.raw(model)) + len(late.raw(model)) == pytest.approx(len(e), abs=2)
 
 
 def test_errors_of_a_law_are_shared_by_all_recordings():
@@ -60,8 +62,6 @@ def test_errors_of_a_law_are_shared_by_all_recordings():
     wrong = e + 2.0 * error[..., 0]
     assert np.abs(loose.left(wrong) - e).max() < 0.5 * np.abs(wrong - e).max()
     assert loose.told(wrong).loss(wrong) < like.told(wrong).loss(wrong)
-    early, late = like.split(0.25)
-    assert len(early.raw(model)) + len(late.raw(model)) == pytest.approx(len(e), abs=2)
 
 
 @cache

@@ -82,6 +82,12 @@ def test_edges_without_direction_are_told_by_the_model_that_follows_the_capstan(
         assert np.ptp(off) < 2.5 * told.record.grain[name]  # a count from edge to edge, and the first edge's place
 
 
+def test_a_reel_without_an_edge_shows_nothing():
+    told = Simulator(known()).directed(nominal(known().case))
+    still = told.record._replace(edges={name: np.zeros(len(told.record.t)) for name in told.record.edges})
+    assert Simulator(still).directed(nominal(still.case)).channels == ["encoder"]
+
+
 def test_a_model_is_told_by_the_symbols_of_the_format(tmp_path):
     record = known()
     source, path = record.source, "joints.tape1.stiffness"

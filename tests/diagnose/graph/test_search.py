@@ -34,5 +34,5 @@ def test_a_further_effect_brings_a_share_of_all_evidence():
         return lambda f: {id(base): 0.0, id(best): 100.0, id(more): 100.0 + brought}[id(f)]
 
     assert adds(base, base, best, merit(0.0))
-    assert not adds(base, best, more, merit(9.0))
-    assert adds(base, best, more, merit(12.0))  # it leaves no more than noise, as the one effect does
+    assert not adds(base, best, more, merit(5.0))
+    assert adds(base, best, more, merit(6.0))  # it leaves no more than noise, as the one effect does

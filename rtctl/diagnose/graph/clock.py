@@ -1,0 +1,100 @@
+"""Ticks off their times: no motion shows them, but the noise of what moves, which then grows with its rate.
+
+A tick that comes late by d shows a reading that is d times its rate further on, and the d of all sensors are the same.
+They move the machine, too: a command acts until the next one is written, and a law with a derivative answers a late
+reading, which is ahead, with a command against the motion that is then cut short. On average that is a force along
+the motion, by the square of their standard deviation. `timed` reads each d back from the residual and holds each
+command for as long as it was.
+
+Source: Cervin et al., How does control timing affect performance, IEEE Control Systems 23(3) (2003).
+"""
+
+from copy import copy
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.special import expit, logsumexp
+
+from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.joint import Joint
+from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.noise import levels
+from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.plants.physics import TERMS
+
+STEADY, CERTAIN = 0.025, 4e-6  # of a tick, and s: less is what the clock of any computer does
+MOST = 0.5  # of a tick
+GRID = 60  # standard deviations that are tried, alike in their logarithm
+OTHER = 3.0  # nats: prior odds against a noise of one sensor that grows with its rate for a reason of its own
+SLOW, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which a force is averaged
+TAIL = 0.05
+UNSTEADY = next((t.name, t.stands[0].element, *t.typical) for t in TERMS.values() if t.clock)  # term, node, size
+
+
+class Clock(NamedTuple):
+    """Times of the ticks, as the noise of a fit tells of them."""
+
+    sigma: float  # s, standard deviation
+    low: float  # 90 % interval
+    high: float
+    gain: float  # nats of evidence that they are off by more than those of any clock
+
+    @property
+    def probability(self) -> float:
+        """That they are."""
+        return float(expit(self.gain))
+
+
+def clock(fit: Fitted) -> Clock:
+    """Times of the ticks by the residuals of a fit. What speaks against them is a clock as any other, and a noise of
+    each sensor that grows with its rate on its own."""
+    dt = fit.like.sim.record.dt
+    least = max(STEADY * dt, CERTAIN)
+    if MOST * dt <= least:
+        return Clock(0.0, 0.0, 0.0, -np.inf)
+    sizes = np.geomspace(least, MOST * dt, GRID)
+    each = np.concatenate([_likely(part, own, sizes) for part, own in fit.like.cut(fit.e)]) * fit.power
+    likely = each.sum(axis=0)
+    weight = np.exp(likely - likely.max())
+    total = np.cumsum(weight) / weight.sum()
+    low, middle, high = (float(np.interp(q, total, sizes)) for q in (TAIL, 0.5, 1.0 - TAIL))
+    own = float(np.sum(logsumexp(each, axis=1) - np.log(GRID))) - OTHER
+    gain = float(logsumexp(likely) - np.log(GRID) - np.logaddexp(likely[0], own))
+    return Clock(middle, low, high, gain)
+
+
+def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Logarithm of the likelihood (sensors, sizes) of residuals where ticks are off by each of `sizes`, s."""
+    out = np.zeros((len(part.noise), len(sizes)))
+    every = zip(part.noise, part.present, part.growth, part.least, strict=True)
+    for c, (noise, rows, growth, least) in enumerate(every):
+        rest, grows = noise.filtered(e[rows, c]), growth[noise.order :]
+        rate = grows[:, -1] / (part.mean * part.sim.record.dt) ** 2
+        late = rate * float(noise.a @ noise.a) / part.mean
+        for k, size in enumerate(sizes):
+            level = levels(rest, grows[:, :-1], least, size**2 * late)
+            out[c, k] = -float(np.sum(np.log(level) + 0.5 * (rest / level) ** 2))
+    return out
+
+
+def timed(fit: Fitted, found: Clock) -> Likelihood:
+    """The likelihood of a fit whose commands are held for as long as they were, on average over PUSH ticks."""
+    parts = [copy(part) for part in fit.like.parts]
+    for part in parts:
+        part.sim = _timed(part.sim, part.sim.own(fit.model), part, found.sigma)
+    return parts[0] if len(parts) == 1 else Joint(parts)
+
+
+def _timed(sim: Simulator, model: GraphModel, part: Likelihood, sigma: float) -> Simulator:
+    other, dt = copy(sim), sim.record.dt
+    y = sim.run(model)[:, sim.layout.sensors[sim.main]]
+    e, rate = sim.seen - y, np.gradient(y, dt)
+    noise = (
+        float(np.mean(np.quantile(part.noise[part.channels.index(sim.column(sim.main))].sigma, 0.05))) * part.mean**0.5
+    )
+    late = (e - uniform_filter1d(e, SLOW)) * rate * sigma**2 / ((sigma * rate) ** 2 + noise**2)
+    longer = np.append(np.diff(late), 0.0) / dt
+    other.volts = np.ascontiguousarray(sim.volts + uniform_filter1d(sim.volts * longer[:, None], PUSH, axis=0))
+    return other
