@@ -88,6 +88,7 @@ class Term:
     stiff: bool = False  # alters a spring: simulated in shorter steps
     slips: bool = False  # lets go what a contact carries: the bodies behind it move freely
     unsigned: bool = False  # a reading without direction
+    clock: bool = False  # of the ticks: shows in the noise, not in the error of a fit
 
     # friction
     friction: str = ""  # it is this friction of a body, at its first size: "dry", "viscous"

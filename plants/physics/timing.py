@@ -201,6 +201,7 @@ JITTER = Term(
         need="fast motion",
     ),
     check="Look at what else runs on the computer of the controller and at the priority of its loop.",
+    clock=True,
     draws={"sigma": Draw(0.05, 0.3, "tick"), "rate": Draw(1.0, 1.0, "hertz")},
     chosen={"form": ("gaussian", "uniform")},
 )

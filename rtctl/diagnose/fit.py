@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rtctl.diagnose.problem import TOGETHER
 from rtctl.diagnose.space import Space
 
 THREADS = 2
@@ -45,15 +44,6 @@ def quotients(
         return np.asarray((residual(space.model(moved)) - start) / step)
 
     return parallel([partial(column, i) for i in columns])
-
-
-def trust(r: np.ndarray, together: float = TOGETHER) -> float:
-    """By how much the owner's values outweigh the errors' count.
-
-    Errors of neighbouring ticks go together, and where the model lacks something they are no noise at all. Without this
-    weight, parameters that hardly matter run into their bounds to serve what is missing, and the way back is barred.
-    """
-    return together * max(1.0, float(np.mean(r**2)))
 
 
 def bounded_step(

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rtctl.plants.element import element, stand
-from rtctl.plants.physics import TERMS, by_kind, having, met, nodes, only, standing
+from rtctl.plants.element import element
+from rtctl.plants.physics import TERMS, by_kind, nodes, standing
 
 SHAFTS = {"ivu": "motor1 motor2 reel1 reel2 capstan", "ldu": "motor wheel capstan carriage", "axis": "carriage"}
 PLACES = (
@@ -75,14 +75,6 @@ def test_what_described_machines_are_asked_about_no_plant_is():
     assert {name for name, term in TERMS.items() if not by_kind(term) and nodes(term, fan)} == {
         "friction.position", "load.gravity", "load.inertia"
     }  # fmt: skip
-
-
-def test_elements_by_trait():
-    assert having("ivu", "body", "reel") == ("reel1", "reel2")
-    assert met((stand("sensor"), stand("body", "capstan")), "ldu") == ("encoder", "scale", "capstan")
-    assert only("slips") == "transmission.slip"
-    with pytest.raises(StopIteration):
-        only("slips", "never")
 
 
 def test_a_supply_is_looked_for_at_one_drive_or_at_each():
