@@ -46,6 +46,15 @@ def quotients(
     return parallel([partial(column, i) for i in columns])
 
 
+def trust(r: np.ndarray, together: float = 1.0) -> float:
+    """By how much the owner's values outweigh the errors' count, of which `together` count as one.
+
+    Errors of neighbouring ticks go together, and where the model lacks something they are no noise at all. Without this
+    weight, parameters that hardly matter run into their bounds to serve what is missing, and the way back is barred.
+    """
+    return together * max(1.0, float(np.mean(r**2)))
+
+
 def bounded_step(
     H: np.ndarray, g: np.ndarray, x: np.ndarray, low: np.ndarray, high: np.ndarray, damping: float
 ) -> np.ndarray:
