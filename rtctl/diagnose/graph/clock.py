@@ -66,16 +66,21 @@ def clock(fit: Fitted) -> Clock:
 
 
 def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Logarithm of the likelihood (sensors, sizes) of residuals where ticks are off by each of `sizes`, s."""
-    out = np.zeros((len(part.noise), len(sizes)))
-    every = zip(part.noise, part.present, part.growth, part.least, strict=True)
-    for c, (noise, rows, growth, least) in enumerate(every):
+    """Logarithm of the likelihood (positions, sizes) of residuals where ticks are off by each of `sizes`, s.
+
+    Inertia keeps the rate of a position alike from tick to tick; that of a force or a current tells nothing of time.
+    """
+    sensors = part.sim.case.machine.sensors
+    shown = [c for c, name in enumerate(part.sim.channels) if name in sensors and sensors[name].measures == "position"]
+    out = np.zeros((len(shown), len(sizes)))
+    for row, c in enumerate(shown):
+        noise, rows, growth, least = part.noise[c], part.present[c], part.growth[c], part.least[c]
         rest, grows = noise.filtered(e[rows, c]), growth[noise.order :]
         rate = grows[:, -1] / (part.mean * part.sim.record.dt) ** 2
         late = rate * float(noise.a @ noise.a) / part.mean
         for k, size in enumerate(sizes):
             level = levels(rest, grows[:, :-1], least, size**2 * late)
-            out[c, k] = -float(np.sum(np.log(level) + 0.5 * (rest / level) ** 2))
+            out[row, k] = -float(np.sum(np.log(level) + 0.5 * (rest / level) ** 2))
     return out
 
 
