@@ -14,7 +14,7 @@ from rtctl.diagnose.graph.clock import UNSTEADY
 from rtctl.diagnose.graph.experiment import Planned, left, planned
 from rtctl.diagnose.graph.fits import Fitted, curvature, half_widths, refit
 from rtctl.diagnose.graph.joint import together
-from rtctl.diagnose.graph.likelihood import coarsened
+from rtctl.diagnose.graph.likelihood import COUNTED, coarsened
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
 from rtctl.diagnose.graph.record import GraphRecord, load_record
@@ -25,7 +25,6 @@ from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import load_case
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
-COUNTED = 700.0  # innovations that count for an interval at most: an error of a law moves its numbers more than noise
 
 
 class GraphDiagnosis(NamedTuple):

@@ -18,7 +18,7 @@ from scipy.special import expit, logsumexp
 
 from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.joint import Joint
-from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.likelihood import COUNTED, Likelihood, coarsened
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.noise import levels
 from rtctl.diagnose.graph.simulate import Simulator
@@ -57,7 +57,7 @@ def clock(fit: Fitted) -> Clock:
     sizes = np.geomspace(least, MOST * dt, GRID)
     each = np.concatenate([_likely(part, own, sizes) for part, own in fit.like.cut(fit.e)]) * fit.power
     likely = each.sum(axis=0)
-    weight = np.exp(likely - likely.max())
+    weight = np.exp((likely - likely.max()) * coarsened(fit.like.size, COUNTED) / fit.power)
     total = np.cumsum(weight) / weight.sum()
     low, middle, high = (float(np.interp(q, total, sizes)) for q in (TAIL, 0.5, 1.0 - TAIL))
     own = float(np.sum(logsumexp(each, axis=1) - np.log(GRID))) - OTHER

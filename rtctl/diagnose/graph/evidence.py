@@ -60,11 +60,12 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     for rank, fit in enumerate(fits):
         pushed = pushes(fit)
         off = wrong(fit, pushed)
-        share, wander = wandering(fit, pushed)
-        listed = found.merit(fit) + log_density(share, float(np.hypot(LITTLE, off)))
+        wander = wandering(fit, pushed)
+        usual = float(np.linalg.norm([LITTLE, off, wander.noise]))
+        listed = found.merit(fit) + log_density(wander.share, usual)
         entries.append((fit, None, listed))
-        if wander is not None:
-            entries.append((fit, wander, found.merit(fit) + log_density(share, SIZE) - UNLISTED))
+        if wander.free is not None:
+            entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, SIZE) - UNLISTED))
         if rank < BESIDE or set(fit.names) < best:
             shares = (SIZE, *((off,) if fit.names and off > LEAST else ()))
             free = free_forces(fit, shares)

@@ -27,6 +27,7 @@ QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
 SMOOTH = 9  # blocks, over which the rate of a reading is taken
 EDGE = 0.03  # of a step: the least that an edge leaves, whose tick is known
 COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
+COUNTED = 700.0  # the same for an interval: an error of a law moves its numbers more than noise
 WILD = 1e6  # residual of a model that runs away, in steps of noise
 
 

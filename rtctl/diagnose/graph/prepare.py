@@ -8,7 +8,7 @@ from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
-from rtctl.diagnose.graph.model import GraphModel, rigid
+from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, rigid
 from rtctl.diagnose.graph.observer import Followed
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rtctl.diagnose.graph.simulate import Simulator
 
 DAMPED = 1.4  # twice the damping ratio of the observer
+SMOOTHED = 10.0  # bandwidths of the observer: that of the rate of its error
 COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
 ABSENT = np.zeros((1, 1))
 
@@ -148,16 +149,16 @@ def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: 
     j["follows"] = len(sim.followed)
     for number, one in enumerate(sim.followed):
         j["main"][number], j["speed"][number] = model.layout.sensors[one.sensor], one.shows_speed
-        for name, ratio in rigid(sim.layout, sim.case.values, one.body).items():
-            at, own_ratio = model.layout.coordinate(name), model.layout.ratio(name, model.base)
-            j["way"][number, at] = ratio / own_ratio
-        inertia = float(params.inertia[: model.layout.nq] @ j["way"][number, : model.layout.nq] ** 2)
+        moved = carried(model.layout, model.base, rigid(sim.layout, sim.case.values, one.body))
+        for at, ratio in moved.items():
+            j["way"][number, at] = ratio
+        inertia = moved_inertia(params.inertia, moved)
         follow = sim.follow * one.bandwidth / sim.followed[0].bandwidth
         j["P"][number], j["D"][number] = follow**2 * inertia, DAMPED * follow * inertia
         j["K"][number], j["L"][number] = (
             (0.0, DAMPED * follow * dt) if one.shows_speed else (DAMPED * follow * dt, follow**2 * dt)
         )
-        j["a"][number] = -np.expm1(-10.0 * follow * dt)
+        j["a"][number] = -np.expm1(-SMOOTHED * follow * dt)
     for path, value in model.base.items():
         if path.startswith(OWN_START):
             name, what = path.removeprefix(OWN_START).rsplit(".", 1)

@@ -8,15 +8,20 @@ Source: disturbance observer (Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mech
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import lfilter
 
 from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.free import SIZE, Free
 from rtctl.diagnose.graph.kernel import TRACK
+from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.measures import Measures
+from rtctl.diagnose.graph.prepare import DAMPED, SMOOTHED
 
 SLOW = 3.0  # time constants of the observer, over which it is averaged
+LONG = 20_000  # ticks of noise, by which its part is measured
 LITTLE = 0.004  # of the force that moves the machine: standard deviation of what a description that is right leaves
 
 
@@ -25,11 +30,17 @@ def pushes(fit: Fitted) -> list[np.ndarray]:
     return [part.sim.everything(part.sim.own(fit.model))[1][slice(*part.rows)] for part in fit.like.parts]
 
 
-def wandering(fit: Fitted, pushed: Sequence[np.ndarray]) -> tuple[float, Free | None]:
-    """Rms of the force that a fit leaves, by the force that moves the machine, and the force itself, of the recording
-    and the followed body where it is largest; 0 and None where the model follows nothing. `pushed` is that of the fit.
-    """
-    share, worst = 0.0, None
+class Wander(NamedTuple):
+    """Force that comes and goes, of the recording and the followed body where it is largest."""
+
+    share: float = 0.0  # rms, by the force that moves the machine
+    noise: float = 0.0  # what noise of the sensor makes of it, the same way
+    free: Free | None = None  # the force itself; None where the model follows nothing
+
+
+def wandering(fit: Fitted, pushed: Sequence[np.ndarray]) -> Wander:
+    """The force that a fit leaves; `pushed` is what its observer pushed with."""
+    worst = Wander()
     for part, push in zip(fit.like.parts, pushed, strict=True):
         sim = part.sim
         if sim.mode != TRACK:
@@ -45,10 +56,28 @@ def wandering(fit: Fitted, pushed: Sequence[np.ndarray]) -> tuple[float, Free | 
         for number, one in enumerate(sim.followed):
             whole = measures.of("force", one.body)
             rms = float(np.std(slow[:, number])) / whole
-            if rms > share:
-                share = rms
-                worst = Free(one.body, "time", SIZE, 0.0, fit.e, 0.0, t, slow[:, number], rms)
-    return share, worst
+            if rms > worst.share:
+                free = Free(one.body, "time", SIZE, 0.0, fit.e, 0.0, t, slow[:, number], rms)
+                worst = Wander(rms, heard(part, number, width, measures.inertia(one.body)) / whole, free)
+    return worst
+
+
+def heard(part: Likelihood, number: int, width: int, inertia: float) -> float:
+    """Standard deviation of the mean over `width` ticks of what the observer makes of the noise of a followed sensor, N
+    or Nm at its body, which feels an inertia of `inertia`."""
+    sim, one = part.sim, part.sim.followed[number]
+    if one.shows_speed or sim.column(one.sensor) not in part.channels:
+        return 0.0
+    noise = part.noise[part.channels.index(sim.column(one.sensor))].averaged()
+    follow = sim.follow * one.bandwidth / sim.followed[0].bandwidth
+    w = follow * sim.record.dt
+    white = np.random.default_rng(0).standard_normal(LONG)
+    e = lfilter([1.0, -2.0, 1.0], [1.0, DAMPED * w - 2.0, 1.0 - DAMPED * w + w**2], white)
+    a = -np.expm1(-SMOOTHED * w)
+    rate = lfilter([a], [1.0, a - 1.0], np.diff(e, prepend=e[0])) / sim.record.dt
+    push = inertia * (follow**2 * e + DAMPED * follow * rate)
+    slow = push[: LONG // width * width].reshape(-1, width).mean(axis=1)
+    return float(noise.sigma) * np.sqrt(part.mean) * float(np.std(slow))
 
 
 def log_density(share: float, spread: float) -> float:

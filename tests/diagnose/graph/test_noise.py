@@ -1,7 +1,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from rtctl.diagnose.graph.noise import Noise, noise_of, noises_of, whitened
+from rtctl.diagnose.graph.noise import Noise, levels, noise_of, noises_of, whitened
 
 A = np.array([1.0, -1.5, 0.7])  # of a known process
 ALL = np.arange(20_000)
@@ -78,3 +78,24 @@ def test_a_sensor_that_shows_edges_now_and_then():
     single = whitened(both, many[..., 1], [ALL, rows])
     for one, other in zip(whole, single, strict=True):
         np.testing.assert_allclose(one[:, 1], other)
+
+
+def test_noise_that_grows():
+    rng = np.random.default_rng(8)
+    square = rng.uniform(0.0, 4.0, 20_000) ** 2
+    e = np.sqrt(0.04 + 0.09 * square) * rng.standard_normal(len(square))
+    found = levels(e, square[:, None], 1e-9)
+    np.testing.assert_allclose(found**2, 0.04 + 0.09 * square, rtol=0.1)
+    np.testing.assert_allclose(levels(e, square[:, None], 1e-9, 0.09 * square), found, rtol=0.1)
+    assert levels(e, square[:, None], 0.5).min() == 0.5
+    (noise,), (white,) = noises_of(e[:, None], [ALL], 0, np.full(1, 1e-9), [square[:, None]])
+    np.testing.assert_allclose(white.std(), 1.0, rtol=0.01)
+    assert abs(np.std(white[square < 1.0]) / np.std(white[square > 9.0]) - 1.0) < 0.05
+    np.testing.assert_allclose(noise.averaged().sigma, e.std(), rtol=0.01)
+
+
+def test_noise_that_does_not_grow():
+    rng = np.random.default_rng(9)
+    square = rng.uniform(0.0, 4.0, 20_000) ** 2
+    found = levels(rng.standard_normal(len(square)), square[:, None], 1e-9)
+    np.testing.assert_allclose(found, 1.0, rtol=0.06)

@@ -80,3 +80,16 @@ def test_ratios_of_rigid_joints():
     case = blank(case_of(BELT), np.zeros(100)).case
     assert rigid(case.layout, case.values, "motor") == {"motor": 1.0, "carriage": 0.0127}
     assert rigid(case.layout, case.values, "carriage")["motor"] == pytest.approx(1 / 0.0127)
+
+
+def test_a_held_body_follows_without_breaking_loose():
+    case = case_of(PENDULUM)
+    stiff = {**case, "machine": {**PENDULUM, "bodies": {"rod": {"inertia": 9.8e-3, "dry": 0.5}}}}
+    made = blank(stiff, np.zeros(1000))
+    y = np.where(np.arange(1000) < 300, 0.0, 0.02)  # it was moved by hand and rests again, far below what lets it go
+    sim = Simulator(made._replace(y={"encoder": y}))
+    out, push = sim.everything(nominal(made.case))
+    assert abs(out[-1, 0] - 0.02) < 1e-4
+    rest = np.diff(out[600:, 0])
+    assert (np.abs(rest) < 1e-6).all()
+    assert abs(push[-1, 0]) < 1e-3

@@ -19,8 +19,9 @@ def random_force(n, rms, seed=3):
 
 def test_a_machine_as_described_leaves_little():
     base = nothing().found.base
-    share, _ = wandering(base, pushes(base))
-    assert share < 3 * LITTLE
+    found = wandering(base, pushes(base))
+    assert found.share < 3 * LITTLE
+    assert 0.0 < found.noise < LITTLE
 
 
 def test_a_random_force_is_measured():
@@ -28,7 +29,7 @@ def test_a_random_force_is_measured():
     push = random_force(len(u), 0.1 * FORCE)
     like, space = together([record(case_of(PENDULUM), u, push=push)])
     fit = refit(like, space)
-    _, free = wandering(fit, pushes(fit))
+    free = wandering(fit, pushes(fit)).free
     assert free is not None
     assert (free.node, free.axis) == ("rod", "time")
     there = np.interp(free.knots, np.arange(len(u)) / RATE, push)
@@ -47,3 +48,15 @@ def test_density_of_a_share():
     density = np.exp([log_density(v, LITTLE) for v in values])
     mean = np.sqrt(np.sum(density * values**2) / np.sum(density))
     assert mean == pytest.approx(LITTLE, rel=0.01)
+
+
+def test_noise_of_a_sensor_is_no_force():
+    u = command(4.0)
+    made = record(case_of(PENDULUM), u)
+    noisy = made._replace(y={"encoder": made.y["encoder"] + 2e-3 * np.random.default_rng(4).standard_normal(len(u))})
+    like, space = together([noisy])
+    fit = refit(like, space)
+    found = wandering(fit, pushes(fit))
+    assert found.share > 2 * LITTLE
+    assert found.noise == pytest.approx(found.share, rel=0.4)
+    assert diagnose_record(noisy).verdict == "nothing"

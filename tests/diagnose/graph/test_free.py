@@ -1,0 +1,23 @@
+import numpy as np
+from graph_cases import nothing, unnamed
+
+from rtctl.diagnose.graph.free import axes, free_forces
+from rtctl.diagnose.graph.measures import Measures
+
+
+def test_a_force_counts_by_what_its_simulation_leaves():
+    base = unnamed().found.base
+    best = max(free_forces(base), key=lambda f: f.evidence)
+    assert best.evidence > 0.0
+    like, model = base.like, base.model
+    sim = like.sim
+    along = axes(Measures(sim, model.base, {}), best.node)[best.axis]
+    force = np.interp(along, best.knots, best.force)[:, None]
+    e = like.of_readings(sim.pushed(force).run(model))
+    taken, told = np.mean(base.e**2) - np.mean(e**2), np.mean(base.e**2) - np.mean(best.e**2)
+    assert told > 0.0
+    assert taken > 0.3 * told  # the parameters of the base moved along with it
+
+
+def test_a_machine_as_described_asks_for_no_force():
+    assert all(f.evidence < 3.0 for f in free_forces(nothing().found.base))
