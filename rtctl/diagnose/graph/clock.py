@@ -18,6 +18,7 @@ from scipy.special import expit, logsumexp
 
 from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.joint import Joint
+from rtctl.diagnose.graph.kernel import TRACK
 from rtctl.diagnose.graph.likelihood import COUNTED, Likelihood, coarsened
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.noise import levels
@@ -52,7 +53,7 @@ def clock(fit: Fitted) -> Clock:
     each sensor that grows with its rate on its own."""
     dt = fit.like.sim.record.dt
     least = max(STEADY * dt, CERTAIN)
-    if MOST * dt <= least:
+    if MOST * dt <= least or fit.like.sim.mode != TRACK:
         return Clock(0.0, 0.0, 0.0, -np.inf)
     sizes = np.geomspace(least, MOST * dt, GRID)
     each = np.concatenate([_likely(part, own, sizes) for part, own in fit.like.cut(fit.e)]) * fit.power
@@ -93,12 +94,13 @@ def timed(fit: Fitted, found: Clock) -> Likelihood:
 
 
 def _timed(sim: Simulator, model: GraphModel, part: Likelihood, sigma: float) -> Simulator:
+    """The simulator of one recording with the commands as long as they were held, where a position tells of it."""
+    if sim.shows_speed:
+        return sim
     other, dt = copy(sim), sim.record.dt
     y = sim.run(model)[:, sim.layout.sensors[sim.main]]
     e, rate = sim.seen - y, np.gradient(y, dt)
-    noise = (
-        float(np.mean(np.quantile(part.noise[part.channels.index(sim.column(sim.main))].sigma, 0.05))) * part.mean**0.5
-    )
+    noise = float(np.min(part.noise[part.channels.index(sim.column(sim.main))].sigma)) * part.mean**0.5  # at rest
     late = (e - uniform_filter1d(e, SLOW)) * rate * sigma**2 / ((sigma * rate) ** 2 + noise**2)
     longer = np.append(np.diff(late), 0.0) / dt
     other.volts = np.ascontiguousarray(sim.volts + uniform_filter1d(sim.volts * longer[:, None], PUSH, axis=0))

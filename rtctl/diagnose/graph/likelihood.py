@@ -115,16 +115,18 @@ class Likelihood:
     @cached_property
     def growth(self) -> list[np.ndarray]:
         """What the variance of each sensor's residual may grow with (blocks present, columns): whether it moves, where
-        it counts, and the square of its rate, by which a tick that is late shows."""
+        it counts, and of a position the square of its rate, by which a tick that is late shows."""
         begin, end = self.rows
         blocks = (end - begin) // self.mean
         y = self.target[begin:end][: blocks * self.mean].reshape(blocks, self.mean, -1).mean(axis=1)
         rate = np.gradient(uniform_filter1d(y, SMOOTH, axis=0), axis=0) ** 2  # by the block
-        out = []
+        out, sensors = [], self.sim.case.machine.sensors
         for c, (name, rows) in enumerate(zip(self.sim.channels, self.present, strict=True)):
             grain = self.sim.record.grain[name]
-            moves = [rate[:, c] / (rate[:, c] + grain**2)] if grain > 0.0 else []
-            out.append(np.stack([*moves, rate[:, c]], axis=1)[rows])
+            columns = [rate[:, c] / (rate[:, c] + grain**2)] if grain > 0.0 else []
+            if name in sensors and sensors[name].measures == "position":
+                columns.append(rate[:, c])
+            out.append(np.stack(columns, axis=1)[rows] if columns else np.zeros((len(rows), 0)))
         return out
 
     def directed(self, model: GraphModel) -> "Likelihood":
