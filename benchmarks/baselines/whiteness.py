@@ -3,7 +3,6 @@
 Source: Ljung & Box, Biometrika 65 (1978), as in the validation of system identification toolboxes.
 """
 
-
 import numpy as np
 from scipy.stats import chi2
 

@@ -6,8 +6,6 @@ from typing import Any
 import numpy as np
 from scipy.stats import t
 
-from rtctl.diagnose.scales import spaced
-
 LEAST = 12  # samples in a bin
 GAP = 0.25  # of the axis: no line is drawn across
 
@@ -37,3 +35,10 @@ def binned(
                 out.append((np.nan,) * 4)
             out.append((at, float(middle(y[here])), half, float(middle(law[here]))))
     return np.array(out, float).reshape(-1, 4).T
+
+
+def spaced(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
+    """Places (count,) among sorted values (n,): each step has the same sum of its shares of the way from low to high
+    and of the values."""
+    share = 0.5 * ((values - low) / ((high - low) or 1.0) + np.linspace(0.0, 1.0, len(values)))
+    return np.interp(np.linspace(0.0, 1.0, count), share, values)

@@ -7,7 +7,7 @@ from rtctl_config import TEMPLATES
 
 from rtctl.config.errors import UserError
 from rtctl.diagnose import kernel
-from rtctl.diagnose.hypotheses import Size, parts_of
+from rtctl.diagnose.graph.starts import Size, parts_of
 from rtctl.own.files import OwnError, Source, trust
 from rtctl.own.term import own_term, register, register_file, sizes, texts
 from rtctl.plants.physics import TERMS

@@ -5,7 +5,7 @@ import numpy as np
 from rtctl.diagnose.forms import forms, is_rich
 from rtctl.diagnose.graph.fits import Fitted, refit
 from rtctl.diagnose.graph.measures import Measures
-from rtctl.diagnose.hypotheses import starts_of
+from rtctl.diagnose.graph.starts import starts_of
 from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis, Space
 from rtctl.plants.physics import TERMS, standing
 
@@ -70,7 +70,7 @@ def richer(f: Fitted, h: Hypothesis) -> list[Hypothesis]:
     measures = Measures(sim, f.model.base, {})
     own = {c.name for c in h.coordinates}
     out = []
-    for more in starts_of(h.term, h.node, term.richer, measures):  # type: ignore[arg-type]
+    for more in starts_of(h.term, h.node, term.richer, measures):
         added = tuple(c for c in more.coordinates if c.name not in own)
         if added:
             out.append(h._replace(coordinates=(*h.coordinates, *added), fixed={**h.fixed, **more.fixed}))

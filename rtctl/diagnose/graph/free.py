@@ -19,7 +19,7 @@ from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.linear import DAMPING, Linear
 from rtctl.diagnose.graph.measures import Measures, speed
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.scales import spaced
+from rtctl.diagnose.missing import spaced
 
 HATS = 10  # of a first look at each axis
 FINE = 30  # of the axes that explain most

@@ -10,8 +10,8 @@ from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.measures import Measures, lever, way
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.graph.starts import parts_of, searched, shows_alone, starts_of
 from rtctl.diagnose.hints import MOST, ORDERS, jumps, peaks, seen, spectrum, spots
-from rtctl.diagnose.hypotheses import parts_of, searched, shows_alone, starts_of
 from rtctl.diagnose.space import Hypothesis
 from rtctl.idiom import Settings
 from rtctl.plants.graph.description import Sensor
@@ -66,7 +66,7 @@ def hypotheses(
             ):
                 continue
             for parts in stand.ways or ((term.sliding if slides else ()) or parts_of(name),):
-                out += starts_of(name, node, parts, measures)  # type: ignore[arg-type]
+                out += starts_of(name, node, parts, measures)
     return out
 
 

@@ -34,7 +34,7 @@ class Scales(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What the starts of a search ask of a recording (rtctl.diagnose.hypotheses)."""
+    """What the starts of a search ask of a recording (starts.py)."""
 
     plant: tuple[Element, ...]
     dt: float  # s

@@ -1,4 +1,4 @@
-"""Every hypothesis that a record can be asked about: each term of the library at each node where it can stand.
+"""Starts of a hypothesis: where a search begins to walk through the parameters of a term at a node.
 
 How a search walks through a term's parameters is told by the term itself (plants/physics/search.py). Starts are shares
 of what the recording shows of the node: its rms speed, its span, the rms force of its drive.
@@ -9,8 +9,8 @@ from itertools import product
 
 import numpy as np
 
+from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.space import COSINE, INVERSE, PLACE, REST, SHAPE, SINE, SIZE, Coordinate, Hypothesis
-from rtctl.diagnose.yardstick import Measures
 from rtctl.own.term import sizes
 from rtctl.plants.physics import TERMS, Element, Term, having
 from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Rest, Shape, Size, Turn, Where
@@ -94,14 +94,12 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
                 turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
                 step, longest = min(1e-2, TURN / turns), part.reach
                 if part.kind == "wavelength":  # less than a whole one is a spring and a push, or any curve
-                    least = 2 if _sprung(m) else 1  # where a spring has to bend a single one may be its own law's
-                    longest = min(longest, float(np.log(turns / (2 * np.pi * least))))
+                    longest = min(longest, float(np.log(turns / (2 * np.pi))))
                 if longest > 0.0:
                     yield (Coordinate(part.name, SHAPE, value, -part.reach, longest, step=step),), {}
     elif isinstance(part, Where):
         yield (), {}
-        if not _sprung(m):  # whose own spring would take up all but a push
-            yield (), {part.name: m.scale(node).at(0.5)}
+        yield (), {part.name: m.scale(node).at(0.5)}
     elif isinstance(part, Rest):
         yield (Coordinate(part.name, REST, part.share * m.of(part.measure, node), offset=m.scale(node).at(0.5)),), {}
     elif isinstance(part, Jumps):
@@ -122,8 +120,3 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
     else:
         for value in part.values:
             yield (), {part.name: value * m.of(part.measure, node) if part.measure else value}
-
-
-def _sprung(m: Measures) -> bool:
-    """Whether it is an axis on a spring."""
-    return m.record.plant == "axis" and m.base.get("k", 0.0) > 0.0

@@ -1,1 +1,0 @@
-"""The errors that a fit sees: which rows and sensors count, and what they weigh."""

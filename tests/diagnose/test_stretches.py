@@ -1,1 +1,0 @@
-"""Loudness of stretches, and what is usual."""
