@@ -75,7 +75,7 @@ ASYMMETRY = Term(
     check=(
         "Pull slowly with a spring balance in one direction and then in the other; look at wipers, and at the level."
     ),
-    needs=Needs(ways="motion"),
+    needs=Needs(ways="motion", dry=True),
     search=(Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9),),
     richer=(Size("B_a", "drag", 0.05, signed=True),),
     static=True,
