@@ -28,6 +28,7 @@ from rtctl.plants.physics import TERMS
 STEADY, CERTAIN = 0.025, 4e-6  # of a tick, and s: less is what the clock of any computer does
 MOST = 0.5  # of a tick
 GRID = 60  # standard deviations that are tried, alike in their logarithm
+CHANCE = 0.3  # of the power of a residual, which must be chance where it tells of time
 OTHER = 3.0  # nats: prior odds against a noise of one sensor that grows with its rate for a reason of its own
 SLOW, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which a force is averaged
 TAIL = 0.05
@@ -48,15 +49,17 @@ class Clock(NamedTuple):
         return float(expit(self.gain))
 
 
-def clock(fit: Fitted) -> Clock:
-    """Times of the ticks by the residuals of a fit. What speaks against them is a clock as any other, and a noise of
-    each sensor that grows with its rate on its own."""
+def clock(fit: Fitted, chance: float = CHANCE) -> Clock:
+    """Times of the ticks by the residuals of a fit, of the sensors of which at least a share `chance` is chance.
+
+    What speaks against them is a clock as any other, and a noise of each sensor that grows with its rate on its own.
+    """
     dt = fit.like.sim.record.dt
     least = max(STEADY * dt, CERTAIN)
     if MOST * dt <= least or fit.like.sim.mode != TRACK:
         return Clock(0.0, 0.0, 0.0, -np.inf)
     sizes = np.geomspace(least, MOST * dt, GRID)
-    each = np.concatenate([_likely(part, own, sizes) for part, own in fit.like.cut(fit.e)]) * fit.power
+    each = np.concatenate([_likely(part, own, sizes, chance) for part, own in fit.like.cut(fit.e)]) * fit.power
     likely = each.sum(axis=0)
     weight = np.exp((likely - likely.max()) * coarsened(fit.like.size, COUNTED) / fit.power)
     total = np.cumsum(weight) / weight.sum()
@@ -66,13 +69,18 @@ def clock(fit: Fitted) -> Clock:
     return Clock(middle, low, high, gain)
 
 
-def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray, chance: float) -> np.ndarray:
     """Logarithm of the likelihood (positions, sizes) of residuals where ticks are off by each of `sizes`, s.
 
-    Inertia keeps the rate of a position alike from tick to tick; that of a force or a current tells nothing of time.
+    Inertia keeps the rate of a position alike from tick to tick; that of a force or a current tells nothing of time. A
+    residual that its past foretells is motion that the model lacks, and what grows there is its own.
     """
     sensors = part.sim.case.machine.sensors
-    shown = [c for c, name in enumerate(part.sim.channels) if name in sensors and sensors[name].measures == "position"]
+    shown = [
+        c
+        for c, name in enumerate(part.sim.channels)
+        if name in sensors and sensors[name].measures == "position" and _chance(part, e, c) > chance
+    ]
     out = np.zeros((len(shown), len(sizes)))
     for row, c in enumerate(shown):
         noise, rows, growth, least = part.noise[c], part.present[c], part.growth[c], part.least[c]
@@ -83,6 +91,12 @@ def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray) -> np.ndarray:
             level = levels(rest, grows[:, :-1], least, size**2 * late)
             out[row, k] = -float(np.sum(np.log(level) + 0.5 * (rest / level) ** 2))
     return out
+
+
+def _chance(part: Likelihood, e: np.ndarray, c: int) -> float:
+    """Share of the power of a sensor's residual that its past does not foretell."""
+    own = e[part.present[c], c]
+    return float(np.mean(part.noise[c].filtered(own) ** 2) / max(np.var(own), 1e-300))
 
 
 def timed(fit: Fitted, found: Clock) -> Likelihood:

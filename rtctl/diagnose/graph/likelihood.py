@@ -15,6 +15,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.edges import Edges
+from rtctl.diagnose.graph.kernel import HELD
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.noise import Noise, noises_of, whitened
 from rtctl.diagnose.graph.simulate import Simulator
@@ -115,7 +116,8 @@ class Likelihood:
     @cached_property
     def growth(self) -> list[np.ndarray]:
         """What the variance of each sensor's residual may grow with (blocks present, columns): whether it moves, where
-        it counts, and of a position the square of its rate, by which a tick that is late shows."""
+        it counts, and of a position, or of a force that a recorded motion makes, the square of its rate: by it an error
+        of time shows."""
         begin, end = self.rows
         blocks = (end - begin) // self.mean
         y = self.target[begin:end][: blocks * self.mean].reshape(blocks, self.mean, -1).mean(axis=1)
@@ -126,6 +128,8 @@ class Likelihood:
             columns = [rate[:, c] / (rate[:, c] + grain**2)] if grain > 0.0 else []
             if name in sensors and sensors[name].measures == "position":
                 columns.append(rate[:, c])
+            elif self.sim.mode == HELD:  # when friction turns is known to a row, and a force jumps there
+                columns.append(np.gradient(y[:, c]) ** 2)
             out.append(np.stack(columns, axis=1)[rows] if columns else np.zeros((len(rows), 0)))
         return out
 

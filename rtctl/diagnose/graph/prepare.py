@@ -12,8 +12,9 @@ from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, rigid
 from rtctl.diagnose.graph.observer import Followed
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
+from rtctl.plants.element import Element
 from rtctl.plants.graph.elements import elements, spot
-from rtctl.plants.graph.layout import NOWHERE
+from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.plant import GRAPH_STATE
 from rtctl.plants.physics import TERMS, ordered
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 DAMPED = 1.4  # twice the damping ratio of the observer
 SMOOTHED = 10.0  # bandwidths of the observer: that of the rate of its error
 COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
+RUBS = "dry"  # trait of a body with dry friction
 ABSENT = np.zeros((1, 1))
 
 
@@ -57,7 +59,7 @@ def ready(sim: "Simulator", model: GraphModel, mode: int | None = None, coarse: 
         raise UserError(f"physics: has {len(model.terms)} terms; {SLOTS} is the most that can be simulated")
     slots = np.zeros(1, k.slots)
     acting = [t for t in ordered(list(model.terms)) if TERMS[str(getattr(t, "term", ""))].act]
-    there = sim.elements if model.layout is sim.layout else elements(model.layout)
+    there = sim.elements if model.layout is sim.layout else places(model.layout)
     for slot, settings in zip(slots[0]["q"], acting, strict=False):
         s: Any = settings
         kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s, model.layout, there, model.base), h)
@@ -66,6 +68,11 @@ def ready(sim: "Simulator", model: GraphModel, mode: int | None = None, coarse: 
     offsets = np.array([start_of(sim, one, model.base) for one in sim.followed])
     _begin(sim, states, model, sim.watched[0] + offsets)
     return Ready(model, params, job, p, states, slots, offsets)
+
+
+def places(layout: Layout) -> tuple[Element, ...]:
+    """Elements of a machine. A body of which the description gives no dry friction may be found to have it."""
+    return tuple(e._replace(traits=e.traits | {RUBS}) if e.kind == "body" else e for e in elements(layout))
 
 
 def path_of(sim: "Simulator", job: np.ndarray, model: GraphModel, start: float) -> tuple[np.ndarray, np.ndarray]:

@@ -92,11 +92,12 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, l
     """The base, models with one effect, what screening said of them, and the prior odds of one of them."""
     progress("fitting the nominal parameters")
     base = restarted(refit(like, space))
-    told = clock(base)
+    told = clock(base, 0.0)
     if told.gain > 0.0:
         progress("telling the times of the ticks")
-        like = timed(base, told)
-        base = refit(like, space, base.x)
+        held = refit(timed(base, told), space, base.x)
+        if held.log_evidence > base.log_evidence + MORE:
+            like, base = held.like, held
     for _ in range(REBASED):
         progress("screening every hypothesis")
         looked = screened(base)

@@ -19,9 +19,8 @@ from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths
 from rtctl.diagnose.graph.observer import followed
-from rtctl.diagnose.graph.prepare import ABSENT, path_of, pushing, ready, stiff_ends
+from rtctl.diagnose.graph.prepare import ABSENT, path_of, places, pushing, ready, stiff_ends
 from rtctl.diagnose.graph.record import GraphRecord
-from rtctl.plants.graph.elements import elements
 from rtctl.plants.graph.layout import NOWHERE
 from rtctl.plants.graph.linearised import ringing
 from rtctl.plants.graph.mechanics import code_of
@@ -43,7 +42,7 @@ class Simulator:
         self.code = code_of(record.case.machine)
         self.kernel = kernel.kernel(self.code)
         self.layout = record.case.layout
-        self.elements = elements(self.layout)
+        self.elements = places(self.layout)
         self.main = record.main
         sensor = record.case.machine.sensors[self.main]
         self.shows_speed = sensor.measures == "speed"
