@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Size
-from rtctl.plants.physics.story import BOTH, Draw, Phrase
+from rtctl.plants.physics.story import BOTH, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 

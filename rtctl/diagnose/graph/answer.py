@@ -13,6 +13,7 @@ from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is
 from rtctl.diagnose.graph.clock import UNSTEADY
 from rtctl.diagnose.graph.experiment import Planned, left, planned
 from rtctl.diagnose.graph.fits import Fitted, curvature, half_widths, refit
+from rtctl.diagnose.graph.held import likelier, suits
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.likelihood import COUNTED, coarsened
 from rtctl.diagnose.graph.model import RECORDING
@@ -145,7 +146,11 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         if any(part.sim.record.edges for part in like.parts):  # a model that follows the others tells their directions
             progress("telling the directions of edges")
             like = like.directed(refit(like, space).model)
-        found = search(like, space, progress)
+        found = search(likelier(like, space), space, progress)
+        other = suits(found.best)
+        if other is not None:
+            progress("taking the commands the other way between their samples")
+            found = search(other, space, progress)
         progress("weighing names against forces without one")
         decided = verdict(found)
         progress("predicting rows that were not fitted")

@@ -19,6 +19,7 @@ KEYS = (
     "format", "sample_rate", "machine", "delay_samples", "tolerance", "physics", "inputs", "problem", "group",
     "per_recording", "controller", "loop", "controller_known", "notes",
 )  # fmt: skip
+OPEN_LOOP = "none"  # kind of controller
 PROBLEMS = ("driven", "free", "kinematic", "static")
 DEFAULT_TOLERANCE = 0.15
 EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
@@ -54,6 +55,7 @@ class GraphCase(NamedTuple):
     plant: str = ""  # kind of plant by which the owner calls the machine: effects stand at its nodes alone
     called: dict[str, str] = {}  # noqa: RUF012  # path -> symbol by which the owner calls it
     config: dict[str, Any] | None = None  # of a recording by our own daemon: plain data of the machine's config
+    open_loop: bool = False  # no controller wrote the commands
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
@@ -153,6 +155,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         warnings=tuple(warnings),
         file=where,
         config=_own_config(case),
+        open_loop=(case.get("controller") or {}).get("kind") == OPEN_LOOP,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rtctl.diagnose.case import Case
-from rtctl.diagnose.graph.case import GraphCase
+from rtctl.diagnose.graph.case import OPEN_LOOP, GraphCase
 from rtctl.diagnose.graph.model import GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.law_params import per_unit
@@ -87,6 +87,7 @@ def graph_case(record: Record) -> GraphCase:
         format=FORMAT,
         plant=case.plant,
         called=called,
+        open_loop=case.controller.kind == OPEN_LOOP,
     )
 
 

@@ -1,0 +1,64 @@
+"""What a command did between its samples, where no controller held it: it was held, or sampled from a smooth one.
+
+A generator in the laboratory has a filter behind it, a DAC in a loop holds. Of a recording in open loop nobody may have
+written down which. Held for smooth is half a tick of delay and a little of gain.
+"""
+
+from copy import copy
+
+import numpy as np
+
+from rtctl.diagnose.graph.fits import Fitted, refit
+from rtctl.diagnose.graph.joint import Joint
+from rtctl.diagnose.graph.kernel import TRACK
+from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.space import Space
+
+SLOWEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
+CLEARLY = 5.0  # nats
+
+
+def other_way(like: Likelihood) -> Likelihood | None:
+    """The likelihood with the commands taken the other way between their samples; None where a controller held them."""
+    known = not all(part.sim.case.open_loop for part in like.parts)
+    if known or like.sim.mode != TRACK or not like.sim.volts.size:
+        return None
+    parts = [copy(part) for part in like.parts]
+    for part in parts:
+        part.sim = _other(part.sim)
+    return parts[0] if len(parts) == 1 else Joint(parts)
+
+
+def _other(sim: Simulator) -> Simulator:
+    out = copy(sim)
+    held = np.ascontiguousarray(sim.record.u)
+    out.volts = np.ascontiguousarray(half_a_tick_on(held)) if np.array_equal(sim.volts, held) else held
+    return out
+
+
+def likelier(like: Likelihood, space: Space) -> Likelihood:
+    """The way that the description alone follows better."""
+    other = other_way(like)
+    if other is None or refit(other, space).log_evidence < refit(like, space).log_evidence:
+        return like
+    return other
+
+
+def suits(best: Fitted) -> Likelihood | None:
+    """The other way, where a model that was found follows the recording clearly better by it."""
+    other = other_way(best.like)
+    if other is None:
+        return None
+    return other if refit(other, best.space, best.x).log_evidence > best.log_evidence + CLEARLY else None
+
+
+def half_a_tick_on(volts: np.ndarray) -> np.ndarray:
+    """The command (n, drives) that, held over each tick, moves a mass at the ticks as the smooth one does.
+
+    With f in cycles a tick, 1 / (j w)^2 over the double integrator with a hold is sinc(f)^2 / cos(pi f) and half a tick
+    of lead. Source: Astrom, Hagander & Sternby, Zeros of sampled systems, Automatica 20 (1984).
+    """
+    f = np.fft.rfftfreq(len(volts))
+    turn = np.sinc(f) ** 2 / np.maximum(np.cos(np.pi * f), SLOWEST) * np.exp(1j * np.pi * f)
+    return np.fft.irfft(np.fft.rfft(volts, axis=0) * turn[:, None], len(volts), axis=0)
