@@ -77,8 +77,8 @@ class Likelihood:
                 e[:, c] = self._by_edges(name, out, len(e))
         wild = WILD * self.least
         if not (np.abs(e) < wild).all():  # ran away: no noise explains it
-            e[~(np.abs(e) < wild).all(axis=1)] = wild
-            e[::2] *= -1.0
+            gone = ~(np.abs(e) < wild).all(axis=1)
+            e[gone] = wild * np.random.default_rng(0).choice((-1.0, 1.0), (int(gone.sum()), e.shape[1]))
         beside = np.array([self._floats(name) for name in self.sim.channels])
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
 

@@ -78,3 +78,13 @@ def test_flat_noise_is_as_loud_as_the_residual():
     np.testing.assert_allclose(white.reshape(e.shape[1], -1).std(axis=1), 1.0)
     least = like().flat(np.zeros_like(e))
     np.testing.assert_allclose([noise.sigma for noise in least.noise], like().least)
+
+
+def test_a_model_that_runs_away_is_explained_by_no_noise():
+    """Not even by an autoregression, for which a residual of one size and alternating sign would be no surprise."""
+    out = like().sim.run(model(2.0))
+    right = like().loss(like().of_readings(out))
+    for begin in (0, len(out) // 2):
+        lost = out.copy()
+        lost[begin:] = np.nan
+        assert like().loss(like().of_readings(lost)) > right + 1000.0
