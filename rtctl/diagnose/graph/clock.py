@@ -21,7 +21,7 @@ from rtctl.diagnose.graph.joint import Joint
 from rtctl.diagnose.graph.kernel import TRACK
 from rtctl.diagnose.graph.likelihood import COUNTED, Likelihood, coarsened
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.graph.noise import levels
+from rtctl.diagnose.graph.noise import levels, surprise
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
@@ -31,7 +31,7 @@ GRID = 60  # standard deviations that are tried, alike in their logarithm
 CHANCE = 0.3  # of the power of a residual, which must be chance where it tells of time
 OTHER = 3.0  # nats: prior odds against a noise of one sensor that grows with its rate for a reason of its own
 SLOW, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which a force is averaged
-TAIL = 0.05
+TAIL = 0.05  # of probability, beyond each end of a 90 % interval
 UNSTEADY = next((t.name, t.stands[0].element, *t.typical) for t in TERMS.values() if t.clock)  # term, node, size
 
 
@@ -76,43 +76,36 @@ def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray, chance: float) -
     residual that its past foretells is motion that the model lacks, and what grows there is its own.
     """
     sensors = part.sim.case.machine.sensors
-    shown = [
-        c
-        for c, name in enumerate(part.sim.channels)
-        if name in sensors and sensors[name].measures == "position" and _chance(part, e, c) > chance
-    ]
-    out = np.zeros((len(shown), len(sizes)))
-    for row, c in enumerate(shown):
-        noise, rows, growth, least = part.noise[c], part.present[c], part.growth[c], part.least[c]
-        rest, grows = noise.filtered(e[rows, c]), growth[noise.order :]
+    out = [np.zeros((0, len(sizes)))]
+    for c, name in enumerate(part.sim.channels):
+        if name not in sensors or sensors[name].measures != "position":
+            continue
+        noise, own = part.noise[c], e[part.present[c], c]
+        rest, grows = noise.filtered(own), part.growth[c][noise.order :]
+        if np.mean(rest**2) <= chance * np.var(own):
+            continue
         rate = grows[:, -1] / (part.mean * part.sim.record.dt) ** 2
         late = rate * float(noise.a @ noise.a) / part.mean
-        for k, size in enumerate(sizes):
-            level = levels(rest, grows[:, :-1], least, size**2 * late)
-            out[row, k] = -float(np.sum(np.log(level) + 0.5 * (rest / level) ** 2))
-    return out
-
-
-def _chance(part: Likelihood, e: np.ndarray, c: int) -> float:
-    """Share of the power of a sensor's residual that its past does not foretell."""
-    own = e[part.present[c], c]
-    return float(np.mean(part.noise[c].filtered(own) ** 2) / max(np.var(own), 1e-300))
+        each = [levels(rest, grows[:, :-1], float(part.least[c]), size**2 * late) for size in sizes]
+        out.append(-np.array([[float(np.sum(surprise(rest / level, level))) for level in each]]))
+    return np.concatenate(out)
 
 
 def timed(fit: Fitted, found: Clock) -> Likelihood:
     """The likelihood of a fit whose commands are held for as long as they were, on average over PUSH ticks."""
     parts = [copy(part) for part in fit.like.parts]
     for part in parts:
-        part.sim = _timed(part.sim, part.sim.own(fit.model), part, found.sigma)
+        part.sim = _timed(part, fit.model, found.sigma)
     return parts[0] if len(parts) == 1 else Joint(parts)
 
 
-def _timed(sim: Simulator, model: GraphModel, part: Likelihood, sigma: float) -> Simulator:
+def _timed(part: Likelihood, model: GraphModel, sigma: float) -> Simulator:
     """The simulator of one recording with the commands as long as they were held, where a position tells of it."""
+    sim = part.sim
     if sim.shows_speed:
         return sim
     other, dt = copy(sim), sim.record.dt
-    y = sim.run(model)[:, sim.layout.sensors[sim.main]]
+    y = sim.run(sim.own(model))[:, sim.layout.sensors[sim.main]]
     e, rate = sim.seen - y, np.gradient(y, dt)
     noise = float(np.min(part.noise[part.channels.index(sim.column(sim.main))].sigma)) * part.mean**0.5  # at rest
     late = (e - uniform_filter1d(e, SLOW)) * rate * sigma**2 / ((sigma * rate) ** 2 + noise**2)

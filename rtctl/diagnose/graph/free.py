@@ -111,8 +111,8 @@ def _fitted(
     apart = np.abs(np.subtract.outer(*[np.arange(len(knots)) / (len(knots) - 1)] * 2))
     root = np.linalg.cholesky(np.exp(-apart / SMOOTH))  # of the prior's covariance (Ornstein and Uhlenbeck, 1930)
 
-    def pushed(part: Likelihood, values: np.ndarray, hat: np.ndarray, whole: GraphModel) -> np.ndarray:
-        sim, model = part.sim, part.sim.own(whole)
+    def pushed(part: Likelihood, values: np.ndarray, hat: np.ndarray, model: GraphModel) -> np.ndarray:
+        sim, model = part.sim, part.sim.own(model)
         forces = np.zeros((len(values), sim.layout.nq))
         own = sim.layout.ratio(node, model.base)
         forces[:, sim.layout.coordinate(node)] = own * unit * np.interp(values, knots, hat)
@@ -165,6 +165,7 @@ def _simulated(base: Fitted, solved: _Solved, change: Callable[[np.ndarray, np.n
 
 
 def _judged(base: Fitted, e: np.ndarray, dx: np.ndarray, z: np.ndarray, volume: float) -> _Solved:
+    """What a step of the parameters and a free force gain, that leave the residuals e (blocks, sensors)."""
     weight = prior(base.space)
     odds = 0.5 * float(weight @ ((base.x + dx) ** 2 - base.x**2) + z @ z)
     gain = base.loss - base.like.loss(e)

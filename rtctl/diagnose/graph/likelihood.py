@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 from rtctl.diagnose.edges import Edges
 from rtctl.diagnose.graph.kernel import HELD
 from rtctl.diagnose.graph.model import GraphModel
-from rtctl.diagnose.graph.noise import Noise, noises_of, whitened
+from rtctl.diagnose.graph.noise import Noise, noises_of, surprise, whitened
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.slack import Slack
 
@@ -76,8 +76,8 @@ class Likelihood:
             if name in self.sim.edges:
                 e[:, c] = self._by_edges(name, out, len(e))
         wild = WILD * self.least
-        if not (np.abs(e) < wild).all():  # ran away: no noise explains it
-            gone = ~(np.abs(e) < wild).all(axis=1)
+        gone = ~(np.abs(e) < wild).all(axis=1)
+        if gone.any():  # ran away: no noise explains it
             e[gone] = wild * np.random.default_rng(0).choice((-1.0, 1.0), (int(gone.sum()), e.shape[1]))
         beside = np.array([self._floats(name) for name in self.sim.channels])
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
@@ -210,7 +210,7 @@ class Likelihood:
         out = np.zeros(count)
         for rows, own, r in zip(self.present, *noises_of(e, self.present, ORDER, self.least, self.growth), strict=True):
             segment = rows[own.order :] * count // len(e)
-            out += np.bincount(segment, np.log(own.sigma) + 0.5 * r**2, count)
+            out += np.bincount(segment, surprise(r, own.sigma), count)
         return out
 
     def foretold(self, e: np.ndarray, other: "Likelihood") -> float:
@@ -219,7 +219,7 @@ class Likelihood:
         for (part, own), before in zip(self.cut(e), other.parts, strict=True):
             noises = [noise.averaged() for noise in before.noise]
             white = whitened(noises, own, part.present)
-            out += sum(len(r) * float(np.log(n.sigma)) + 0.5 * float(r @ r) for n, r in zip(noises, white, strict=True))
+            out += sum(float(np.sum(surprise(r, n.sigma))) for n, r in zip(noises, white, strict=True))
         return out
 
     @property

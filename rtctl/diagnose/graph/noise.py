@@ -62,6 +62,11 @@ def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
     return Noise(a, max(float(np.sqrt(np.mean(innovation**2))), least))
 
 
+def surprise(white: np.ndarray, sigma: float | np.ndarray) -> np.ndarray:
+    """Negative logarithm of the density of each innovation (n,), by its standard deviation sigma, up to a constant."""
+    return np.asarray(np.log(sigma) + 0.5 * white**2)
+
+
 def levels(rest: np.ndarray, growth: np.ndarray, least: float, known: np.ndarray | float = 0.0) -> np.ndarray:
     """Standard deviation (n,) of each of the innovations (n,), whose variance is what is `known` of it (n,), a constant
     and a share of each column of `growth` (n, columns), none of them negative; it is not below `least`.

@@ -6,6 +6,8 @@ from rtctl.diagnose.graph.model import rigid
 from rtctl.diagnose.graph.record import GraphRecord
 
 FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
+DAMPED = 1.4  # twice its damping ratio
+SMOOTHED = 10.0  # bandwidths of the observer: that of the rate of its error
 FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
 
 

@@ -9,7 +9,7 @@ from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, rigid
-from rtctl.diagnose.graph.observer import Followed
+from rtctl.diagnose.graph.observer import DAMPED, SMOOTHED, Followed
 from rtctl.diagnose.kernel import SLOTS
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.element import Element
@@ -21,8 +21,6 @@ from rtctl.plants.physics import TERMS, ordered
 if TYPE_CHECKING:
     from rtctl.diagnose.graph.simulate import Simulator
 
-DAMPED = 1.4  # twice the damping ratio of the observer
-SMOOTHED = 10.0  # bandwidths of the observer: that of the rate of its error
 COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
 RUBS = "dry"  # trait of a body with dry friction
 ABSENT = np.zeros((1, 1))
@@ -160,7 +158,7 @@ def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: 
         for at, ratio in moved.items():
             j["way"][number, at] = ratio
         inertia = moved_inertia(params.inertia, moved)
-        follow = sim.follow * one.bandwidth / sim.followed[0].bandwidth
+        follow = sim.bandwidth(one)
         j["P"][number], j["D"][number] = follow**2 * inertia, DAMPED * follow * inertia
         j["K"][number], j["L"][number] = (
             (0.0, DAMPED * follow * dt) if one.shows_speed else (DAMPED * follow * dt, follow**2 * dt)

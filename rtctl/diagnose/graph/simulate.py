@@ -1,7 +1,7 @@
 """Simulator of a recording: any model of its machine, under the recorded commands and a tracking observer.
 
-track   the recorded command, and a correction that makes the model follow the main sensor. It pushes every body as
-        its inertia asks for, so that the rigid motion is corrected and no joint is stretched by the correction.
+track   the recorded command, and a correction that makes the model follow the main sensor. It moves positions and
+        speeds of all bodies along their rigid motion, so that it stretches no joint and breaks no held body loose.
 open    the recorded command alone: a free run
 held    the main sensor's coordinate moves as it was recorded, and the force that it takes is what the model predicts:
         of a static problem, where forces were measured, and of a kinematic one, where other positions follow
@@ -18,7 +18,7 @@ from rtctl.diagnose.graph.case import HELD_PROBLEMS
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths
-from rtctl.diagnose.graph.observer import followed
+from rtctl.diagnose.graph.observer import Followed, followed
 from rtctl.diagnose.graph.prepare import ABSENT, path_of, places, pushing, ready, stiff_ends
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.plants.graph.layout import NOWHERE
@@ -66,6 +66,10 @@ class Simulator:
         self.release = NEVER
         self.ratios = self.moves(record.case.values)
         self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
+
+    def bandwidth(self, one: Followed) -> float:
+        """Bandwidth, rad/s, with which a sensor is followed."""
+        return self.follow * one.bandwidth / self.followed[0].bandwidth
 
     def _rest(self) -> float:
         """Time in s at the first row in which what swings comes to rest."""

@@ -8,6 +8,7 @@ Source: disturbance observer (Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mech
 """
 
 from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from rtctl.diagnose.graph.free import SIZE, Free
 from rtctl.diagnose.graph.kernel import TRACK
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.measures import Measures
-from rtctl.diagnose.graph.prepare import DAMPED, SMOOTHED
+from rtctl.diagnose.graph.observer import DAMPED, SMOOTHED
 
 SLOW = 3.0  # time constants of the observer, over which it is averaged
 LONG = 20_000  # ticks of noise, by which its part is measured
@@ -69,15 +70,21 @@ def heard(part: Likelihood, number: int, width: int, inertia: float) -> float:
     if one.shows_speed or sim.column(one.sensor) not in part.channels:
         return 0.0
     noise = part.noise[part.channels.index(sim.column(one.sensor))].averaged()
-    follow = sim.follow * one.bandwidth / sim.followed[0].bandwidth
-    w = follow * sim.record.dt
+    return float(noise.sigma) * np.sqrt(part.mean) * inertia * answer(sim.bandwidth(one), sim.record.dt, width)
+
+
+@cache
+def answer(follow: float, dt: float, width: int) -> float:
+    """Standard deviation of the mean over `width` ticks of dt s of what an observer of bandwidth `follow`, rad/s, makes
+    of white noise of standard deviation one, for a unit of inertia."""
+    w = follow * dt
     white = np.random.default_rng(0).standard_normal(LONG)
     e = lfilter([1.0, -2.0, 1.0], [1.0, DAMPED * w - 2.0, 1.0 - DAMPED * w + w**2], white)
     a = -np.expm1(-SMOOTHED * w)
-    rate = lfilter([a], [1.0, a - 1.0], np.diff(e, prepend=e[0])) / sim.record.dt
-    push = inertia * (follow**2 * e + DAMPED * follow * rate)
+    rate = lfilter([a], [1.0, a - 1.0], np.diff(e, prepend=e[0])) / dt
+    push = follow**2 * e + DAMPED * follow * rate
     slow = push[: LONG // width * width].reshape(-1, width).mean(axis=1)
-    return float(noise.sigma) * np.sqrt(part.mean) * float(np.std(slow))
+    return float(np.std(slow))
 
 
 def log_density(share: float, spread: float) -> float:
