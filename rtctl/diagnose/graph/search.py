@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.graph.bandwidth import quicker
 from rtctl.diagnose.graph.clock import clock, timed
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
@@ -54,7 +55,15 @@ class Found(NamedTuple):
 
 
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
-    """Fit the base, then what is missing beside it."""
+    """Fit the base, then what is missing beside it, under the observer that suits the best model."""
+    found = under(like, space, progress)
+    progress("telling how quickly the observer follows")
+    times = quicker(found.best)
+    return under(like.following(times), space, progress) if times > 1.0 else found
+
+
+def under(like: Likelihood, space: Space, progress: Progress) -> Found:
+    """The same under one observer."""
     base, grown, looked, odds = begun(like, space, progress)
     like = base.like  # with the times of the ticks
     merit = partial(merit_of, odds=odds)

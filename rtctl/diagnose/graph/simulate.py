@@ -49,7 +49,8 @@ class Simulator:
         self.body = sensor.body
         self.followed = followed(record)
         usual = self.followed[0].bandwidth
-        self.follow = min(usual if follow is None else follow, QUICKEST / record.dt)
+        self.quickest = QUICKEST / record.dt  # rad/s
+        self.follow = min(usual if follow is None else follow, self.quickest)
         self.substeps = max(1, int(np.ceil(record.dt / SUBSTEP - 1e-9)))
         if self.case.problem == "kinematic":
             self.substeps = max(self.substeps, int(np.ceil(record.dt * self._ring() / STEADY)))
@@ -163,6 +164,12 @@ class Simulator:
             if place.coordinate != NOWHERE:
                 out[:, place.coordinate] += self.layout.ratio(name, self.case.values) * by_body[:, i]
         return out
+
+    def following(self, times: float) -> "Simulator":
+        """The same with an observer that is so many `times` as quick, as far as ticks allow."""
+        other = copy(self)
+        other.follow = min(times * self.follow, self.quickest)
+        return other
 
     def released(self, row: int) -> "Simulator":
         """The same whose correction ends at `row`: a free run from there, from the state that the observer reached."""
