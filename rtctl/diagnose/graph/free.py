@@ -1,8 +1,9 @@
 """Free functions: what any force at a body, over speed, position, angle, command or time, would explain.
 
 An effect without a name in the library is a function that nobody has written down. At each body, along each axis, a
-force of a few hats over the recorded values is fitted beside a model. It competes with the names for the evidence, and
-what it still explains beside a name says that the law of that name is not the machine's.
+force of a few hats is fitted beside a model. It competes with the names for the evidence, and what it still explains
+beside a name says that the law of that name is not the machine's. Position and speed are those of the model, as its
+observer has them: the speed of a recording that counts knows of a step before it comes, and a force by it pushes ahead.
 
 Source: Robinson, Root-N-consistent semiparametric regression, Econometrica 56 (1988).
 """
@@ -17,7 +18,7 @@ from rtctl.diagnose.fit import bounded_step, parallel
 from rtctl.diagnose.graph.fits import Fitted, prior
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.linear import DAMPING, Linear
-from rtctl.diagnose.graph.measures import Measures, speed
+from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.missing import spaced
 
@@ -50,6 +51,7 @@ def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
     sim, own = base.like.sim, Linear(base)
     about = own, own.under(base.like.flat(base.e))  # the parameters are filtered once for all places
     every = [Measures(part.sim, base.model.base, {}) for part in base.like.parts]
+    told = [Measures(part.sim.seen_by(base.model), base.model.base, {}) for part in base.like.parts]
     places: dict[tuple[str, str], list[np.ndarray]] = {}
     taken: set[int] = set()
     for node, ratio in sim.ratios.items():
@@ -57,7 +59,7 @@ def free_forces(base: Fitted, shares: Sequence[float] = (SIZE,)) -> list[Free]:
         if ratio == 0.0 or at in taken:  # bodies that move as one feel one force
             continue
         taken.add(at)
-        found = [axes(measures, node) for measures in every]
+        found = [axes(measures, node) for measures in told]
         for axis in found[0]:
             if all(axis in values for values in found):
                 places[node, axis] = after(axis, [values[axis] for values in found])
@@ -74,7 +76,7 @@ def axes(m: Measures, node: str) -> dict[str, np.ndarray]:
     sim = m.sim
     x = m.way(node)
     out = {
-        "velocity": speed(x, sim.record.dt),
+        "velocity": np.diff(x, prepend=x[:1]) / sim.record.dt,
         "position": x,
         "time": sim.record.t - sim.record.t[0],
     }

@@ -183,6 +183,14 @@ class Simulator:
         other.forces = np.ascontiguousarray(forces if len(self.forces) < 2 else self.forces + forces)
         return other
 
+    def seen_by(self, model: GraphModel) -> "Simulator":
+        """The same whose followed sensors show what a model reads that follows them."""
+        other = copy(self)
+        if self.mode == TRACK:
+            out = self.run(self.own(model))[:, [self.layout.sensors[one.sensor] for one in self.followed]]
+            other.watched = np.where(np.isfinite(out), out, self.watched)
+        return other
+
     def finer(self, times: int) -> "Simulator":
         """The same with steps that are so many `times` shorter."""
         other = copy(self)
