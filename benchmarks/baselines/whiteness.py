@@ -3,8 +3,16 @@
 Source: Ljung & Box, Biometrika 65 (1978), as in the validation of system identification toolboxes.
 """
 
+from typing import Any
+
 import numpy as np
+from baselines.form import diagnosis
 from scipy.stats import chi2
+
+from rtctl.diagnose.graph.fits import refit
+from rtctl.diagnose.graph.joint import together
+from rtctl.diagnose.graph.known import graph_record
+from rtctl.diagnose.record import Record
 
 LAGS = 25
 LEVEL = 0.01
@@ -20,3 +28,10 @@ def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
     r = np.array([float(e[k:] @ e[:-k]) / power for k in range(1, lags + 1)])
     q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
     return float(chi2.sf(q, lags))
+
+
+def diagnose(record: Record) -> dict[str, Any]:
+    """`unnamed` where the error is not white; never a name."""
+    error = refit(*together([graph_record(record)])).e
+    worst = min(ljung_box(error[:, c]) for c in range(error.shape[1]))
+    return diagnosis(record.plant, [], unnamed=worst < LEVEL)

@@ -16,6 +16,7 @@ import numpy as np
 from rtctl.config.errors import UserError
 from rtctl.diagnose import kernel
 from rtctl.diagnose.case import Case
+from rtctl.diagnose.hold import half_a_tick_on
 from rtctl.diagnose.kernel import CLOSED, TRACK
 from rtctl.diagnose.law_params import began, law_params, law_state, per_unit
 from rtctl.diagnose.model import Model, plant_params
@@ -27,7 +28,6 @@ from rtctl.plants.physics import TERMS, only, ordered
 from rtctl.plants.physics.place import PLANTS
 
 NEVER = np.iinfo(np.int64).max  # row
-FASTEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
 SUBSTEP = {"ivu": 1e-3, "ldu": 100e-6, "axis": 0.25e-3}  # s, at most: the linear part is exact at any
 COARSE = 0.2e-3  # s, ticks shorter than this are taken two at a time
 FINER = {"ivu": 2, "ldu": 2, "axis": 2}
@@ -198,18 +198,6 @@ class Simulator:
         j["P"], j["D"] = follow**2 / rigid, 1.4 * follow / rigid
         j["a"] = -np.expm1(-10 * follow * stride * self.record.dt)
         return job
-
-
-def half_a_tick_on(volts: np.ndarray) -> np.ndarray:
-    """The command (n, drives) that, held over each tick, moves a mass at the ticks as the smooth one does.
-
-    A command that was sampled, and not written by a DAC that holds it, goes on changing in between. With f in cycles
-    a tick, 1 / (j w)^2 over the double integrator with a hold is sinc(f)^2 / cos(pi f) and half a tick of lead. Source:
-    Astrom, Hagander & Sternby, Zeros of sampled systems, Automatica 20 (1984).
-    """
-    f = np.fft.rfftfreq(len(volts))
-    turn = np.sinc(f) ** 2 / np.maximum(np.cos(np.pi * f), FASTEST) * np.exp(1j * np.pi * f)
-    return np.fft.irfft(np.fft.rfft(volts, axis=0) * turn[:, None], len(volts), axis=0)
 
 
 _dtypes: dict[type, np.dtype] = {}

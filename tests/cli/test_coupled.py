@@ -101,7 +101,7 @@ def test_no_code_is_taken_from_a_bundle(rtctl, mine, tmp_path, monkeypatch):
         case = read_case(json.loads((folder / "case.json").read_text()), folder)
         raise UserError(f"{case.layout.nq} coordinates")
 
-    monkeypatch.setattr("rtctl.diagnose.engines.diagnose_into", reached)
+    monkeypatch.setattr("rtctl.diagnose.bundles.diagnose_into", reached)
     for option, value in (("--mechanics", mine.parent / "furuta.py"), ("--machine", mine)):
         code, _, err = rtctl("diagnose", bundle, option, value)
         assert code == 2 and "2 coordinates" in err

@@ -13,9 +13,9 @@ from rtctl.diagnose.graph.joint import Joint
 from rtctl.diagnose.graph.kernel import TRACK
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.hold import half_a_tick_on
 from rtctl.diagnose.space import Space
 
-SLOWEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
 CLEARLY = 5.0  # nats
 
 
@@ -51,14 +51,3 @@ def suits(best: Fitted) -> Likelihood | None:
     if other is None:
         return None
     return other if refit(other, best.space, best.x).log_evidence > best.log_evidence + CLEARLY else None
-
-
-def half_a_tick_on(volts: np.ndarray) -> np.ndarray:
-    """The command (n, drives) that, held over each tick, moves a mass at the ticks as the smooth one does.
-
-    With f in cycles a tick, 1 / (j w)^2 over the double integrator with a hold is sinc(f)^2 / cos(pi f) and half a tick
-    of lead. Source: Astrom, Hagander & Sternby, Zeros of sampled systems, Automatica 20 (1984).
-    """
-    f = np.fft.rfftfreq(len(volts))
-    turn = np.sinc(f) ** 2 / np.maximum(np.cos(np.pi * f), SLOWEST) * np.exp(1j * np.pi * f)
-    return np.fft.irfft(np.fft.rfft(volts, axis=0) * turn[:, None], len(volts), axis=0)

@@ -52,13 +52,13 @@ def command(amplitude, seconds=SECONDS, seed=1):
 
 def blank(case, u):
     """A record of a case with a command (n,) and sensors that show nothing yet."""
-    n = len(u)
+    n, rate = len(u), case["sample_rate"]
     read = read_case(case, "bundle")
     sensors = read.machine.sensors
     y = {name: np.zeros(n) for name in sensors}
     grain = {name: abs(s.grain / s.scale) for name, s in sensors.items()}
     return GraphRecord(
-        read, np.arange(n) / RATE, 1.0 / RATE, np.full(n, np.nan), np.zeros(n), u[:, None], y, grain, None
+        read, np.arange(n) / rate, 1.0 / rate, np.full(n, np.nan), np.zeros(n), u[:, None], y, grain, None
     )
 
 
