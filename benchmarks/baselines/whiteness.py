@@ -6,9 +6,9 @@ Source: Ljung & Box, Biometrika 65 (1978), as in the validation of system identi
 from typing import Any
 
 import numpy as np
-from baselines.form import diagnosis
 from scipy.stats import chi2
 
+from baselines.form import diagnosis
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.known import graph_record

@@ -125,9 +125,7 @@ def load_case(folder: Path) -> dict[str, Any]:
         case = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         if not Path(folder).is_dir():
-            raise UserError(
-                f"{folder} is not a folder; a bundle is one, with recording.parquet and case.json"
-            ) from None
+            raise UserError(f"{folder} is not a folder; a bundle holds recording.parquet and case.json") from None
         raise UserError(f"{path} is missing; it says what the owner believes of the machine") from None
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}") from error  # which may pass
