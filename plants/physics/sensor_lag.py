@@ -2,8 +2,9 @@
 
     tau y' = x - y
 
-What it shows is off by d = y - x with  d' = -d / tau - x',  stepped by its exponential: exact for a speed that is held
-over a substep, any tau. The memory is kept at the site of the forces, since a reading may be asked for at any time.
+What it shows is off by d = y - x with  d' = -d / tau - x',  stepped by its exponential from one reading to the next:
+exact for a reading that changes evenly in between, whatever it is of, any tau. A reading that is asked for twice at one
+time is the same.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3; Harris & Piersol, Shock and Vibration Handbook
 (2002), ch. 13 for the filters of sensors.
@@ -29,22 +30,31 @@ class SensorLagSettings(Settings):
 
 class SensorLagParams(NamedTuple):
     tau: float
-    keep: float  # share of the error that is left after a substep
 
 
-SENSOR_LAG_STATE = state(d=float)
+SENSOR_LAG_STATE = state(
+    d=float,
+    x=float,  # the reading before, and when it was
+    t=float,
+    begun=int,
+)
 
 
 def build_sensor_lag(settings: SensorLagSettings, h: float) -> SensorLagParams:
-    """Exact step of the filter over `h` s."""
-    tau = max(settings.tau, 0.0)
-    return SensorLagParams(tau, math.exp(-h / tau) if tau > 0.0 else 0.0)
+    """Nothing to discretise: the time between two readings is theirs."""
+    return SensorLagParams(max(settings.tau, 0.0))
 
 
 @tick
-def follow(p, s, v):
-    """Let the filter follow a body of speed `v` for a substep."""
-    s.d = s.d * p.keep - p.tau * (1.0 - p.keep) * v
+def show(p, s, x, t):
+    """What the filter shows of a reading `x` at time t; where the clock begins anew, it goes on from there."""
+    dt = t - s.t
+    if s.begun == 1 and dt > 0.0:
+        keep = math.exp(-dt / p.tau) if p.tau > 0.0 else 0.0
+        s.d = s.d * keep - p.tau * (1.0 - keep) * (x - s.x) / dt
+    if s.begun == 0 or dt != 0.0:
+        s.begun, s.x, s.t = 1, x, t
+    return x + s.d
 
 
 SENSOR_LAG = Term(
@@ -54,11 +64,8 @@ SENSOR_LAG = Term(
     source="Astrom & Wittenmark 1997, 2.3",
     settings=SensorLagSettings,
     build=build_sensor_lag,
-    act={
-        "force": "sensor_lag.follow({p}, {s}, {r} * {m}.vm[{i}])",
-        "reading": "{m}.y[{c}] += {s}.d",
-    },
-    stands=(stand("sensor", "general position"),),
+    act={"reading": "{m}.y[{c}] = sensor_lag.show({p}, {s}, {m}.y[{c}], {m}.t)"},
+    stands=(stand("sensor", "general position"), stand("sensor", "general speed")),
     look_alikes={
         "timing.delay": "two sensors on one body: a delay of the loop is late on both, a lag of one sensor on that one",
         "drive.lag": "move it by hand with the power off: a sensor that lags still stays behind",

@@ -6,6 +6,7 @@ The axis runs uncompiled, substep by substep, with the lines of the term in thei
 import importlib
 import math
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 from rtctl.idiom import interpreted
 from rtctl.plants import axis, linear
 from rtctl.plants.graph import plant as graph
-from rtctl.plants.physics import TERMS, anywhere, by_kind
+from rtctl.plants.physics import TERMS, anywhere, by_kind, sensor_lag
 from rtctl.plants.physics.term import SITES
 
 M, K, F_C, SPRING = 2.0, 5.0, 0.4, 300.0
@@ -187,6 +188,19 @@ def test_a_filtered_reading_stays_behind_by_its_time_constant():
     steady = 0.2 / w * np.imag(z * np.exp(1j * w * t))
     assert r.y[50:] == pytest.approx(steady[50:], abs=2e-6)
     assert r.x == pytest.approx(0.2 / w * np.sin(w * t), abs=1e-9)
+
+
+def test_a_filter_is_the_same_however_often_it_is_read():
+    with interpreted():
+        p = sensor_lag.build_sensor_lag(SimpleNamespace(tau=5e-3), 1e-3)
+        for steps in (1, 3, 10):
+            s = SimpleNamespace(d=0.0, x=0.0, t=0.0, begun=0)
+            sensor_lag.show(p, s, 0.0, 0.0)
+            for t in np.arange(1, steps + 1) * 0.02 / steps:
+                shown = sensor_lag.show(p, s, 3.0 * t, t)
+                assert sensor_lag.show(p, s, 3.0 * t, t) == shown  # asked again at one time
+            assert shown == pytest.approx(3.0 * (0.02 - 5e-3 * (1 - math.exp(-4.0))))
+        assert sensor_lag.show(p, s, 1.0, 0.0) == pytest.approx(1.0 + s.d)  # a clock that begins anew
 
 
 def test_gravity_has_the_period_of_a_turn_and_pulls_a_slide_one_way():
