@@ -1,5 +1,6 @@
 """`rtctl simulate MODEL BUNDLE`: run any model against any recording and say how far apart they are."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -55,27 +56,45 @@ def simulate(
 
       rtctl simulate case emps --closed-loop --skip 20 --json
     """
-    from rtctl.diagnose.kernel import CLOSED, OPEN
-    from rtctl.diagnose.measure import compare, default_mode
-    from rtctl.diagnose.record import INPUT, record_of
     from rtctl.own.files import give
-    from rtctl.trace.bundle import load_bundle
+    from rtctl.trace.bundle import load_case
 
     give(own or ())
-    whole = load_bundle(bundle)
-    record = record_of(whole)
-    mode = default_mode(record, whole) if closed is None else (CLOSED if closed else OPEN)
+    described = load_case(bundle).get("plant") is None
+    result, warnings = (_described if described else _known)(model, bundle, closed, skip)
     if not json:
-        for warning in record.case.warnings:
-            if mode == OPEN or INPUT not in warning:
-                typer.echo(f"note: {warning}", err=True)
-    result = compare(record, _model(model, record), mode, skip, whole)
+        for warning in warnings:
+            typer.echo(f"note: {warning}", err=True)
     if plot is not None:
         _draw(result, plot)
     if json:
         common.print_json(result.as_json())
     else:
         typer.echo("\n".join(_table(result)))
+
+
+def _described(model: str, bundle: Path, closed: bool | None, skip: int) -> "tuple[Comparison, Sequence[str]]":
+    """The free run of a described machine, and what its case is warned of."""
+    from rtctl.diagnose.graph.freerun import believing, compare
+    from rtctl.diagnose.graph.record import load_record
+
+    record = load_record(bundle)
+    warnings = record.case.warnings
+    return compare(record if model == OWNER else believing(record, model), closed, skip), warnings
+
+
+def _known(model: str, bundle: Path, closed: bool | None, skip: int) -> "tuple[Comparison, Sequence[str]]":
+    """The same of a machine of exchange format 1."""
+    from rtctl.diagnose.kernel import CLOSED, OPEN
+    from rtctl.diagnose.measure import compare, default_mode
+    from rtctl.diagnose.record import INPUT, record_of
+    from rtctl.trace.bundle import load_bundle
+
+    whole = load_bundle(bundle)
+    record = record_of(whole)
+    mode = default_mode(record, whole) if closed is None else (CLOSED if closed else OPEN)
+    warnings = [warning for warning in record.case.warnings if mode == OPEN or INPUT not in warning]
+    return compare(record, _model(model, record), mode, skip, whole), warnings
 
 
 def _model(name: str, record: Any) -> Any:

@@ -31,17 +31,30 @@ def parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
 
 
 def quotients(
-    residual: Callable[[Any], np.ndarray], space: Space, x: np.ndarray, start: np.ndarray, columns: Sequence[int]
+    residual: Callable[[Any], np.ndarray],
+    space: Space,
+    x: np.ndarray,
+    start: np.ndarray,
+    columns: Sequence[int],
+    gone: Callable[[np.ndarray], bool] = lambda e: False,
 ) -> list[np.ndarray]:
     """Difference quotients of a model's residual by the unknowns of some columns, each in the shape of the residual
-    `start` at x. A step goes up, or down where up would pass the upper bound."""
+    `start` at x. A step goes up, or down where up would pass the upper bound.
+
+    A model may run away a step from where it does not, which `gone` tells by its residual: the step goes the other way
+    then, and where it runs away there too, nothing is known of the column: it is 0.
+    """
     high, steps = space.bounds()[1], space.steps()
 
     def column(i: int) -> np.ndarray:
-        step = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
-        moved = x.copy()
-        moved[i] += step
-        return np.asarray((residual(space.model(moved)) - start) / step)
+        up = steps[i] if x[i] + steps[i] <= high[i] else -steps[i]
+        for step in (up, -up):
+            moved = x.copy()
+            moved[i] += step
+            e = residual(space.model(moved))
+            if not gone(e):
+                return np.asarray((e - start) / step)
+        return np.zeros_like(start)
 
     return parallel([partial(column, i) for i in columns])
 

@@ -206,3 +206,29 @@ def test_the_loop_is_closed_by_an_own_law_where_its_file_is_given(rtctl, tmp_pat
     code, out, err = rtctl("simulate", "case", tmp_path / "run", "--own", tmp_path / "my_law.py")
     assert code == 0 and "is taken as the input" not in err
     assert re.match(r"closed loop, .*\n.*\nx +0 m +0\nu +0 V +0\n", out)
+
+
+def test_a_described_machine(rtctl, tmp_path):
+    """A rotor that turns as its description says, and one with twice the inertia."""
+    t = np.arange(2000) * 1e-3
+    u = np.sin(2 * np.pi * t)
+    x = np.concatenate([[0.0], np.cumsum(1e-3 * np.cumsum(1e-3 * u / 0.01))[:-1]])  # held commands move it a tick later
+    machine = {
+        "bodies": {"rotor": {"inertia": 0.01}},
+        "drives": {"motor": {"body": "rotor", "column": "u", "kind": "force", "gain": 1.0}},
+        "sensors": {"encoder": {"body": "rotor", "measures": "position", "column": "x", "counts_per_unit": 1e5}},
+    }
+    case = {"format": 2, "sample_rate": 1000.0, "machine": machine, "delay_samples": 0.0}
+    pq.write_table(pa.table({"t": t, "u": u, "x": np.floor(1e5 * x)}), tmp_path / "recording.parquet")
+    save_case(tmp_path, case)
+    heavy = {**machine, "bodies": {"rotor": {"inertia": 0.02}}}
+    (tmp_path / "heavy.yaml").write_text(yaml.safe_dump({"machine": heavy}))
+    found = []
+    for model in ("case", tmp_path / "heavy.yaml"):
+        code, out, _ = rtctl("simulate", model, tmp_path, "--json")
+        assert code == 0
+        found.append(json.loads(out))
+    assert found[0]["unit"] == {"encoder": "rad"} and found[0]["skipped"] > 0
+    assert found[0]["nrmse"]["encoder"] < 0.01 < 0.1 < found[1]["nrmse"]["encoder"]
+    code, _, err = rtctl("simulate", "case", tmp_path, "--closed-loop")
+    assert code == 2 and "law is not known" in err

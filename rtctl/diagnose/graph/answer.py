@@ -25,6 +25,7 @@ from rtctl.diagnose.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import load_case
 
+WORSE = 1.0  # nats by which rows that no fit saw must be predicted worse, until a name is withdrawn: less is chance
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
 
 
@@ -176,7 +177,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
 
 def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
     """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
-    if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > 0.0:
+    if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > -WORSE:
         return decided
     names = ", ".join(decided.best.names)
     why = f"with {names} the last rows are predicted worse than without, by {-heldout.gain:.3g} nats"

@@ -49,7 +49,7 @@ def derivatives(
         return into
     start = like.raw(space.model(x), True)
     J = np.zeros((*start.shape, len(x)), np.float32) if into is None else into
-    found = quotients(lambda model: like.raw(model, True), space, x, start, columns)
+    found = quotients(lambda model: like.raw(model, True), space, x, start, columns, like.ran_away)
     for i, values in zip(columns, found, strict=True):
         J[..., i] = values
     return J

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rtctl.diagnose.graph.likelihood import WILD, Likelihood
+from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.measures import Measures, speed
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.slack import columns
@@ -14,7 +14,7 @@ def errors(like: Likelihood, space: Space, x: np.ndarray, e: np.ndarray) -> np.n
     out = []
     for index, h in enumerate(space.hypotheses):
         without = like.raw(space.without(index).model(np.delete(x, space.columns(index))))
-        if (np.abs(without) < WILD * like.least).all():
+        if not like.ran_away(without):
             out.append(columns(without - e, pace(like, space.model(x), h.node)))
     return np.concatenate(out, axis=2) if out else None
 

@@ -212,7 +212,7 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
                 out[k, c] = m.y[c]
             if k == 0:
                 shaper.reset(laws[0].shaper, loop.shaper, ref[0])
-            shaped = shaper.step(laws[0].shaper, loop.shaper, ref[k])
+            shaped = ref[k] if loop.shaped != 0 else shaper.step(laws[0].shaper, loop.shaper, ref[k])
             law.step(laws[0], law_states[0], shaped, w[k], loop.scale * m.y[loop.sensor])
             for c in range(drives):
                 own = loop.give[c, 0] * law_states[0].u1 + loop.give[c, 1] * law_states[0].u2
@@ -235,6 +235,7 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
 
 CLOSED = state(  # of a closed loop
     shaper=shaper.SHAPER_STATE,
+    shaped=int,  # 1: the reference is as the law got it
     sensor=int,  # whose reading the law gets
     scale=float,  # that reading for one SI unit
     give=(float, (MOST_DRIVES, 2)),  # command of each drive for one unit of either output of the law

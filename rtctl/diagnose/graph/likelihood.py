@@ -82,6 +82,10 @@ class Likelihood:
         beside = np.array([self._floats(name) for name in self.sim.channels])
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
 
+    def ran_away(self, e: np.ndarray) -> bool:
+        """Whether residuals (blocks, sensors) are of a model that ran away."""
+        return not bool((np.abs(e) < 0.5 * WILD * self.least).all())
+
     def _floats(self, name: str) -> bool:
         """Whether the constant of a channel says nothing and is still in its residuals."""
         if name in self.sim.edges:

@@ -63,16 +63,19 @@ def loop_of(record: GraphRecord) -> Loop:
     return own if own is not None else stand_in(record)
 
 
-def run(sim: Simulator, loop: Loop, model: GraphModel, ref: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def run(
+    sim: Simulator, loop: Loop, model: GraphModel, ref: np.ndarray, w: np.ndarray, shaped: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
     """Readings (n, sensors), SI, and commands (n, drives) of a model in closed loop, from the first row of `sim` on.
 
-    `ref` and `w` (n,) are the reference before shaping and the excitation. Readings are nan from the tick on at which
-    the model ran away.
+    `ref` and `w` (n,) are the reference, before shaping or as recordings have it (`shaped`), and the excitation.
+    Readings are nan from the tick on at which the model ran away.
     """
     start = ready(sim, model, TRACK)
     n, drives = len(ref), sim.volts.shape[1]
     laws, wired = np.zeros(1, record_dtype(loop.law)), np.zeros(1, kernel.CLOSED)
     fill_record(laws[0], loop.law)
+    wired["shaped"] = shaped
     wired["sensor"], wired["scale"] = start.model.layout.sensors[loop.sensor], loop.scale
     wired["give"][0, :drives], wired["beside"][0, :drives] = loop.give, loop.beside
     job = start.job

@@ -17,7 +17,8 @@ from scipy.signal import lfilter
 
 SPAN = 3  # innovations before and after, of each earlier sensor, that foretell one of a later sensor
 ROWS = 20  # innovations for each coefficient, without which nothing is foretold
-VARIANCES = 5  # rounds of a variance function, each weighed by the one before
+VARIANCES = 5  # rounds of a variance function, at most, each weighed by the one before
+SETTLED = 1e-3  # of the least variance: a round that changes less is the last
 
 
 class Noise(NamedTuple):
@@ -83,7 +84,9 @@ def levels(rest: np.ndarray, growth: np.ndarray, least: float, known: np.ndarray
         H[np.diag_indices_from(H)] *= 1.0 + 1e-9
         L = np.linalg.cholesky(H)
         found, _ = nnls(L.T, np.linalg.solve(L, weighed.T @ ((power - known) / variance)))
-        variance = np.maximum(B @ found + known, least**2)
+        before, variance = variance, np.maximum(B @ found + known, least**2)
+        if np.abs(variance - before).max() < SETTLED * before.min():
+            break
     return np.sqrt(variance)
 
 

@@ -20,6 +20,7 @@ from rtctl.diagnose.space import INVERSE, SIZE, Hypothesis
 TRIES = 3
 TOO_FAR = 3.0  # times the residual: a step that changes more says little about what is missing
 RIDGE = 1e-6
+ASKED = 40  # hypotheses that take off most, of which the gain under a noise of their own is asked
 FACTORS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of the size that a secant promises
 
 
@@ -27,7 +28,7 @@ class Score(NamedTuple):
     """What a hypothesis promises."""
 
     hypothesis: Hypothesis
-    gain: float  # nats, under the noise that it leaves
+    gain: float  # nats, under the noise that it leaves; -inf where it takes off too little for that to be asked
     power: float  # half the sum of squares that least squares takes off, in variances of the residual
     x: tuple[np.ndarray, ...]  # of the hypothesis, by the noise under which it was solved for
     norm: float  # of a typical size beside the base, in standard deviations: below 3 or so nothing is seen
@@ -76,15 +77,27 @@ def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     def scores(about: Linear) -> list[Score]:
         r = about.like.white(base.e)
         slope = about.slope(r)
-        return parallel(
-            [partial(_score, about, h, change, r, slope) for h, change in zip(candidates, changes, strict=True)]
-        )
+        columns = [np.stack([change / step for change, step in found], axis=2) for found in changes]
+        solved = parallel([partial(_solved, about, h, C, r, slope) for h, C in zip(candidates, columns, strict=True)])
+        asked = _first(candidates, [score.power for score, _ in solved])
+        left = parallel([partial(about.left, solved[k][1], columns[k]) for k in asked])
+        gains = dict(zip(asked, parallel([partial(base.like.loss, e) for e in left]), strict=True))
+        return [score._replace(gain=base.loss - gains.get(k, np.inf)) for k, (score, _) in enumerate(solved)]
 
     both = [
         one._replace(gain=max(one.gain, other.gain), power=other.power, x=(*one.x, *other.x))
         for one, other in zip(scores(about), scores(flat), strict=True)
     ]
     return Screened(sorted(both, key=lambda s: -s.gain), (about, flat))
+
+
+def _first(candidates: list[Hypothesis], powers: list[float]) -> list[int]:
+    """Numbers of the candidates that take off most, and of the best of each term."""
+    order = sorted(range(len(candidates)), key=lambda k: -powers[k])
+    best: dict[str, int] = {}
+    for k in order:
+        best.setdefault(candidates[k].term, k)
+    return list(dict.fromkeys([*order[:ASKED], *best.values()]))
 
 
 def floor_noise(about: Linear, changes: list[np.ndarray]) -> Likelihood:
@@ -128,13 +141,11 @@ def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.nda
     return out
 
 
-def _score(
-    about: Linear, h: Hypothesis, changes: list[tuple[np.ndarray, float]], r: np.ndarray, slope: np.ndarray
-) -> Score:
-    """Score of a hypothesis, solved for beside the parameters; r are the innovations of the base, `slope` is theirs."""
+def _solved(about: Linear, h: Hypothesis, C: np.ndarray, r: np.ndarray, slope: np.ndarray) -> tuple[Score, np.ndarray]:
+    """Score of a hypothesis, solved for beside the parameters, and the step of both; C (blocks, sensors, sizes) is what
+    its sizes do, r are the innovations of the base, `slope` is theirs."""
     base, like = about.base, about.like
-    n, k = len(base.x), len(changes)
-    C = np.stack([change / step for change, step in changes], axis=2)
+    n, k = len(base.x), C.shape[2]
     white = like.white(C)
     cross = about.white.T @ white
     own = white.T @ white
@@ -157,4 +168,4 @@ def _score(
     A = about.H
     alone = np.linalg.solve(A + 1e-9 * np.diag(np.diag(A)) + 1e-300 * np.eye(n), cross) if n else cross[:0]
     norm = float(np.sqrt(max(own[0, 0] - (cross[:, 0] @ alone[:, 0] if n else 0.0), 0.0)))
-    return Score(h, base.loss - base.like.loss(about.left(dx, C)), float(power), (at,), norm)
+    return Score(h, -np.inf, float(power), (at,), norm), dx

@@ -36,6 +36,23 @@ class Flat:
     def filtered(self, columns):
         return columns[:, 0]
 
+    def ran_away(self, e):
+        return False
+
+
+class Cliff(Flat):
+    """The same, and beyond `edge` of an unknown either way, where one is given, the model runs away."""
+
+    def __init__(self, A, b, up, down):
+        super().__init__(A, b)
+        self.up, self.down = up, down
+
+    def raw(self, x, coarse=False):
+        return np.full((len(self.b), 1), 1e9) if (x > self.up).any() or (x < self.down).any() else super().raw(x)
+
+    def ran_away(self, e):
+        return bool((np.abs(e) > 1e8).any())
+
 
 class Unknowns:
     """Unknowns without a prior whose model is x itself."""
@@ -131,3 +148,11 @@ def test_derivatives_of_a_fit_are_those_of_where_it_is():
     size = np.linalg.norm(there, axis=(0, 1))
     apart = np.linalg.norm(f.J - there, axis=(0, 1))
     assert (apart < 0.05 * size + 1e-3 * size.max()).all()
+
+
+@pytest.mark.parametrize(("up", "down", "known"), [(1e-9, -1.0, True), (1.0, -1e-9, True), (1e-9, -1e-9, False)])
+def test_no_derivative_is_taken_to_where_a_model_runs_away(up, down, known):
+    A = np.arange(6.0).reshape(3, 2) + 1.0
+    like = Cliff(A, np.zeros(3), up, down)
+    J = derivatives(like, Unknowns(2), np.zeros(2), range(2))
+    assert J[:, 0, :] == pytest.approx(A if known else 0.0 * A, rel=1e-5)
