@@ -6,7 +6,9 @@ next reading best. One that is too slow lets a model turn at another moment than
 Source: innovation form of a state space model, Ljung, System Identification (1999), ch. 4.3.
 """
 
-from rtctl.diagnose.graph.fits import Fitted, refit
+import numpy as np
+
+from rtctl.diagnose.graph.fits import FLOOR, Fitted, refit
 from rtctl.diagnose.graph.kernel import TRACK
 
 STEP = 2.0  # from one bandwidth to the next
@@ -16,11 +18,17 @@ WORTH = 30.0  # nats that another bandwidth must bring: below, all names gain al
 def quicker(fit: Fitted) -> float:
     """Times the usual bandwidth at which a model foretells its recording best; 1 where that brings little."""
     best, times = fit, 1.0
-    if fit.like.parts[0].sim.mode != TRACK:
-        return times
-    while best.like.parts[0].sim.follow < best.like.parts[0].sim.quickest:
+    while best.like.parts[0].sim.follow < best.like.parts[0].sim.quickest and lags(best):
         again = refit(fit.like.following(times * STEP), fit.space, best.x)
         if again.log_evidence <= best.log_evidence:
             break
         best, times = again, times * STEP
     return times if best.log_evidence > fit.log_evidence + WORTH else 1.0
+
+
+def lags(fit: Fitted) -> bool:
+    """Whether a model lags behind a sensor that it follows by more than the sensor's noise. Below that an observer that
+    is quicker follows single counts, and whatever has their pattern is held for an effect."""
+    like, sim = fit.like, fit.like.parts[0].sim
+    rms = dict(zip(like.channels, np.std(fit.e, axis=0) / like.least, strict=True))
+    return sim.mode == TRACK and any(rms.get(sim.column(one.sensor), 0.0) > FLOOR for one in sim.followed)

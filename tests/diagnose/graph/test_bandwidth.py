@@ -1,10 +1,11 @@
+from copy import copy
 from functools import cache
 
 import numpy as np
 import pytest
 from graph_cases import PENDULUM, case_of, command, nothing, record
 
-from rtctl.diagnose.graph.bandwidth import quicker
+from rtctl.diagnose.graph.bandwidth import lags, quicker
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.search import search
@@ -23,6 +24,14 @@ def pushed(machine_is_fine):
 
 def test_a_fine_sensor_beside_a_force_that_wanders_is_followed_more_quickly():
     assert quicker(pushed(True)) >= 2.0
+
+
+def test_what_only_counts_is_not_followed_more_quickly():
+    assert lags(pushed(True)) and not lags(nothing().found.best)
+    fit = pushed(True)
+    coarse = fit._replace(like=copy(fit.like))
+    coarse.like.least = fit.like.least * 1e6
+    assert quicker(coarse) == 1.0
 
 
 def test_a_machine_as_described_is_followed_as_usual():
