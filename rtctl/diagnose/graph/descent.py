@@ -47,9 +47,9 @@ def derivatives(
     of `into`, or 0."""
     if into is not None and not columns:
         return into
-    start = like.raw(space.model(x), True)
+    start, coarse = like.rough(space.model(x))
     J = np.zeros((*start.shape, len(x)), np.float32) if into is None else into
-    found = quotients(lambda model: like.raw(model, True), space, x, start, columns, like.ran_away)
+    found = quotients(lambda model: like.raw(model, coarse), space, x, start, columns, like.ran_away)
     for i, values in zip(columns, found, strict=True):
         J[..., i] = values
     return J

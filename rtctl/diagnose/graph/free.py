@@ -118,7 +118,7 @@ def _fitted(
         forces = np.zeros((len(values), sim.layout.nq))
         own = sim.layout.ratio(node, model.base)
         forces[:, sim.layout.coordinate(node)] = own * unit * np.interp(values, knots, hat)
-        return part.of_readings(sim.pushed(forces).run(model, n=part.rows[1], coarse=True))
+        return part.of_readings(sim.pushed(forces).run(model, n=part.rows[1], coarse=abouts[0].coarse))
 
     def change(hat: np.ndarray, model: GraphModel) -> np.ndarray:
         """What a force by hats does to the residuals (blocks, sensors) of coarse simulations."""

@@ -66,6 +66,12 @@ class Likelihood:
         out = self.sim.run(model, n=self.rows[1], coarse=coarse)
         return self.of_readings(out)
 
+    def rough(self, model: GraphModel) -> tuple[np.ndarray, bool]:
+        """Residuals (blocks, sensors) of coarse simulations, from which differences are taken, and whether they are
+        coarse: where a model runs away in twice the step, they are fine."""
+        e = self.raw(model, True)
+        return (self.raw(model), False) if self.ran_away(e) else (e, True)
+
     def of_readings(self, out: np.ndarray) -> np.ndarray:
         """The same of simulated readings (n, sensors of the machine)."""
         begin, end = self.rows

@@ -20,7 +20,7 @@ class Linear:
 
     def __init__(self, base: Fitted):
         self.base, self.like = base, base.like
-        self.start: np.ndarray = base.like.raw(base.model, True)  # residuals of coarse simulations
+        self.start, self.coarse = base.like.rough(base.model)  # residuals that differences are taken from
         self.raw = np.asarray(base.J, float)
         self.weight = prior(base.space)
 

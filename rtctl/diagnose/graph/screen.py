@@ -58,7 +58,7 @@ class Screened(NamedTuple):
 
         def placed(x: np.ndarray) -> list[tuple[float, np.ndarray]]:
             at = np.clip(np.concatenate([base.x, x]), low, high)
-            e = base.e + base.like.raw(space.model(at), True) - self.about[0].start
+            e = base.e + base.like.raw(space.model(at), self.about[0].coarse) - self.about[0].start
             steps = [about.step(e) for about in self.about]
             losses = [base.like.loss(e + np.tensordot(self.about[0].raw, dx, axes=1)) for dx in steps]
             return [(loss, np.concatenate([base.x + dx, at[n:]])) for loss, dx in zip(losses, steps, strict=True)]
@@ -70,7 +70,7 @@ class Screened(NamedTuple):
 def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     """Scores of all candidates."""
     own = Linear(base)
-    changes = parallel([partial(_change, base, own.start, h) for h in candidates])
+    changes = parallel([partial(_change, own, h) for h in candidates])
     about = own.under(floor_noise(own, [change for found in changes for change, _ in found]))
     flat = own.under(base.like.flat(base.e))
 
@@ -121,10 +121,11 @@ def floor_noise(about: Linear, changes: list[np.ndarray]) -> Likelihood:
     return base.like.told(left)
 
 
-def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.ndarray, float]]:
+def _change(about: Linear, h: Hypothesis) -> list[tuple[np.ndarray, float]]:
     """Change of the residual for a step of each size, about as large as the residual itself, and that step."""
+    base = about.base
     like, space = base.like, base.space.add(h)
-    own = float(np.linalg.norm(like.white(start)))
+    own = float(np.linalg.norm(like.white(about.start)))
     out = []
     for i in h.sizes or [-1]:
         step = 1.0 if i < 0 or h.coordinates[i].high >= 1.0 else -1.0
@@ -132,7 +133,7 @@ def _change(base: Fitted, start: np.ndarray, h: Hypothesis) -> list[tuple[np.nda
             at = h.start()
             if i >= 0:
                 at[i] += step
-            change = like.raw(space.model(np.concatenate([base.x, at])), True) - start
+            change = like.raw(space.model(np.concatenate([base.x, at])), about.coarse) - about.start
             size = float(np.linalg.norm(like.white(change)))
             if size <= TOO_FAR * own or i < 0 or h.coordinates[i].kind == INVERSE:
                 break

@@ -194,6 +194,8 @@ def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
 def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
     """Whether every effect of a combination has a size, and adds to the combination without it, as far as that was
     fitted."""
+    if not np.isfinite(f.log_evidence):
+        return False
     if not f.names:
         return True
     if faint(f):

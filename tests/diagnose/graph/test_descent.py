@@ -8,6 +8,7 @@ from rtctl.diagnose.graph import fits
 from rtctl.diagnose.graph.descent import ALL, Point, derivatives, descend
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.joint import together
+from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
 
 DRY = Hypothesis(RUB["term"], RUB["node"], (Coordinate("F_C", SIZE, 1.0, low=0.0),))
@@ -39,6 +40,9 @@ class Flat:
     def ran_away(self, e):
         return False
 
+    def rough(self, x):
+        return self.raw(x), True
+
 
 class Cliff(Flat):
     """The same, and beyond `edge` of an unknown either way, where one is given, the model runs away."""
@@ -47,7 +51,13 @@ class Cliff(Flat):
         super().__init__(A, b)
         self.up, self.down = up, down
 
+    coarsely = True  # whether a coarse simulation stays
+
+    rough = Likelihood.rough
+
     def raw(self, x, coarse=False):
+        if coarse and not self.coarsely:
+            return np.full((len(self.b), 1), 1e9)
         return np.full((len(self.b), 1), 1e9) if (x > self.up).any() or (x < self.down).any() else super().raw(x)
 
     def ran_away(self, e):
@@ -156,3 +166,10 @@ def test_no_derivative_is_taken_to_where_a_model_runs_away(up, down, known):
     like = Cliff(A, np.zeros(3), up, down)
     J = derivatives(like, Unknowns(2), np.zeros(2), range(2))
     assert J[:, 0, :] == pytest.approx(A if known else 0.0 * A, rel=1e-5)
+
+
+def test_derivatives_are_fine_where_coarse_simulations_run_away():
+    A = np.arange(6.0).reshape(3, 2) + 1.0
+    like = Cliff(A, np.zeros(3), 1.0, -1.0)
+    like.coarsely = False
+    assert derivatives(like, Unknowns(2), np.zeros(2), range(2))[:, 0, :] == pytest.approx(A, rel=1e-5)
