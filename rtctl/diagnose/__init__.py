@@ -1,8 +1,10 @@
 """Finds the physics that a simulation lacks: from a recording and the owner's model to names, nodes and sizes.
 
-`graph` is the whole of it, for any machine that is bodies and joints. What the files beside it are for:
+Any machine that is bodies and joints is diagnosed by what is in `graph`. What the files beside it are for:
 
-    the recording     record, columns, case, quantities (units, nouns), edges, tacho
+    any machine       graph
+    the recording     record, columns, case, quantities (units, nouns), edges, tacho,
+                      hold (commands between samples)
     its law           law (the compiled step), law_params, config_law (of our own recordings), unsaid (not in it)
                       replayed (the recording's tick on its readings), emulate (the tick with a model as its plant)
     the simulation    model, kernel, simulate, measure (how far is it off?)

@@ -110,7 +110,7 @@ def test_the_reel_unit_prints_what_the_page_says(reel_unit, number):
 def test_the_recording_does_not_know_what_is_hidden(reel_unit):
     reel_unit.through(3)
     case = json.loads((reel_unit.folder / "runs/monday/case.json").read_text())
-    assert "backlash" not in json.dumps(case["config"]["plant"])
+    assert "asymmetry" not in json.dumps(case["config"]["plant"])
     page = (ROOT / "docs" / "tutorial_ivu.md").read_text()
     half, full = (float(x) for x in re.search(r"final error, ([\d.]+) mm instead of ([\d.]+)", page).groups())
     steps = [re.findall(r"^ *1\.40 .*$", reel_unit.through(n), re.M)[0].split() for n in (1, 2)]
@@ -121,9 +121,9 @@ def test_the_reel_unit_is_diagnosed(reel_unit):
     said = words(reel_unit.through(DIAGNOSED))
     answer, seal = (words(text) for text in reel_unit.told(DIAGNOSED))
     assert seal in said
-    assert "named Motor 1 has play" in said and "named Motor 1 has play" in answer
-    assert "play (transmission.backlash) motor 1" in said
-    found = [float(re.search(r"gap = ([\d.]+) mrad", text)[1]) for text in (said, answer)]
+    assert all("named Drive 1 is stronger one way: 18 %" in text for text in (said, answer))
+    assert "unequal gain (drive.gain_asymmetry) drive 1" in said
+    found = [float(re.search(r"a = ([\d.]+)", text)[1]) for text in (said, answer)]
     assert found[0] == pytest.approx(found[1], rel=0.1)
     folder = reel_unit.folder / "runs/monday/diagnosis"
     assert {"report.html", "model.yaml"} <= {path.name for path in folder.iterdir()}
@@ -139,7 +139,7 @@ def test_the_model_that_was_found_is_better_by_as_much_as_the_page_says(reel_uni
     assert found == pytest.approx(told, rel=0.2, abs=0.1)
     assert all((reel_unit.folder / name).stat().st_size > 10_000 for name in ("before.png", "after.png"))
     model = yaml.safe_load((reel_unit.folder / "runs/monday/diagnosis/model.yaml").read_text())
-    assert "transmission.backlash" in json.dumps(model["plant"]["physics"])
+    assert "drive.gain_asymmetry" in json.dumps(model["plant"]["physics"])
     assert (reel_unit.folder / "runs/twin/case.json").exists()
 
 

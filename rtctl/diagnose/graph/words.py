@@ -1,6 +1,7 @@
 """Words of a diagnosis: each effect as its term tells it, with the names, units and sizes of the described machine."""
 
 import math
+import re
 from typing import Any
 
 from rtctl.diagnose.diagnosis import Effect
@@ -17,8 +18,10 @@ from rtctl.plants.physics import TERMS
 
 
 def here(machine: Description, node: str) -> str:
-    """A node as part of a sentence: "the carriage"."""
-    return "the loop" if node == "loop" else f"the {node.replace('_', ' ').replace('-', ' ')}"
+    """A node as part of a sentence: "the carriage", "motor 2"."""
+    words = node.replace("_", " ").replace("-", " ")
+    numbered = re.fullmatch(r"(.*[^\W\d]) ?(\d+)", words)
+    return f"{numbered[1]} {numbered[2]}" if numbered else f"the {words}"
 
 
 def body_of(machine: Description, node: str) -> str:
