@@ -119,8 +119,7 @@ def plant_back(stand: Stand, folder: Path, link: str = "shm") -> Survived:
         until(lambda: status["trip"] and supervisor.plant is not first, turns)
         until(lambda: supervisor.last_row["link_age"] == 0.0, turns)  # the new one answers
         came = int(status["tick"])
-        supervisor.order(again)
-        until(lambda: status["state"] == safety.RUNNING, turns)
+        until(taken_up(supervisor, stand.ticks(1.0)), turns)
         moving = int(status["tick"]) + stand.ticks(1.0)
         until(lambda: int(status["tick"]) > moving or status["state"] == safety.TRIPPED, turns)
         supervisor.stop()
@@ -196,6 +195,22 @@ def _left(config: Any) -> Any:
 def config(stand: Stand, faults: list[dict[str, Any]], **changes: Any) -> Any:
     name = f"faults-{stand.name}-{time.monotonic_ns() % 10**9}"
     return stand.config(faults, **{"name": name, "loop__mode": "lockstep", "record__seconds": 20.0, **changes})
+
+
+def taken_up(supervisor: Supervisor, patience: int) -> Callable[[], bool]:
+    """Whether the loop runs again. It is told to reset and arm, and again wherever it has been tripped for `patience`
+    ticks since: a busy machine may lose the link once more before it moves."""
+    status, asked = supervisor.status, -patience
+
+    def running() -> bool:
+        nonlocal asked
+        tick = int(status["tick"])
+        if status["state"] == safety.TRIPPED and tick - asked >= patience:
+            supervisor.order(again)
+            asked = tick
+        return bool(status["state"] == safety.RUNNING)
+
+    return running
 
 
 def until(what: Callable[[], Any], turns: Iterator[None]) -> None:
