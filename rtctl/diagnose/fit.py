@@ -36,7 +36,7 @@ def quotients(
     x: np.ndarray,
     start: np.ndarray,
     columns: Sequence[int],
-    gone: Callable[[np.ndarray], bool] = lambda e: False,
+    gone: Callable[[np.ndarray], bool],
 ) -> list[np.ndarray]:
     """Difference quotients of a model's residual by the unknowns of some columns, each in the shape of the residual
     `start` at x. A step goes up, or down where up would pass the upper bound.

@@ -39,7 +39,7 @@ def load_bundle(folder: Path | str) -> Bundle:
     """Read a finished bundle, all parts as one. Raises UserError that names the file and says what would be right."""
     folder = Path(folder)
     if not folder.is_dir():
-        raise UserError(f"{folder} is not a folder; a bundle is a folder with {PARQUET} and {CASE}")
+        raise no_folder(folder)
     paths = recordings(folder)
     case = load_case(folder)
     path = paths[0]
@@ -118,6 +118,11 @@ def _table(paths: list[Path]) -> pa.Table:
     return pa.concat_tables(tables)
 
 
+def no_folder(folder: Path | str) -> UserError:
+    """What is said of a bundle that is not a folder."""
+    return UserError(f"{folder} is not a folder; a bundle is a folder with {PARQUET} and {CASE}")
+
+
 def load_case(folder: Path) -> dict[str, Any]:
     """Read case.json. Raises UserError where it is missing, is not JSON or is of a later format."""
     path = files.inside(folder / CASE, folder)
@@ -125,7 +130,7 @@ def load_case(folder: Path) -> dict[str, Any]:
         case = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         if not Path(folder).is_dir():
-            raise UserError(f"{folder} is not a folder; a bundle holds recording.parquet and case.json") from None
+            raise no_folder(folder) from None
         raise UserError(f"{path} is missing; it says what the owner believes of the machine") from None
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}") from error  # which may pass

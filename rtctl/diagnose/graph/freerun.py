@@ -18,6 +18,7 @@ from rtctl.diagnose.graph.likelihood import settled
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.graph.words import body_of
 from rtctl.diagnose.kernel import CLOSED, OPEN
 from rtctl.diagnose.measure import NAMES, Channel, Comparison
 from rtctl.plants.graph.file import read_machine
@@ -77,11 +78,7 @@ def _channel(sim: Simulator, name: str, out: np.ndarray, skip: int) -> Channel:
     machine = sim.case.machine
     seen, made = sim.record.y[name][skip:], out[skip:, sim.column(name)]
     sensor = machine.sensors.get(name)
-    if sensor is None:  # the force of a drive
-        drive = machine.drives[name]
-        body = str(drive.body or machine.joints[str(drive.joint)].to)
-        return Channel(seen, made, measured_unit("force", machine.turns(body)))
-    if sensor.measures == "position" and name != sim.main:
+    measures = "force" if sensor is None else sensor.measures  # what is no sensor is the force of a drive
+    if measures == "position" and name != sim.main:
         made = made + np.mean(seen - made)
-    turns = sensor.body is not None and machine.turns(str(sensor.body))
-    return Channel(seen, made, measured_unit(sensor.measures, turns))
+    return Channel(seen, made, measured_unit(measures, machine.turns(body_of(machine, name))))

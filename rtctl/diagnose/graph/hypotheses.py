@@ -199,6 +199,4 @@ def gauged(model: GraphModel) -> GraphModel:
 
 def faster(sim: Simulator) -> Simulator:
     """The observer that shows missing forces over a wider band."""
-    other = sim.finer(1)
-    other.follow = min(3.0 * sim.follow, 0.25 / sim.record.dt)
-    return other
+    return sim.following(3.0)

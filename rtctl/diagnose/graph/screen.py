@@ -73,16 +73,18 @@ def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     changes = parallel([partial(_change, own, h) for h in candidates])
     about = own.under(floor_noise(own, [change for found in changes for change, _ in found]))
     flat = own.under(base.like.flat(base.e))
+    columns = [np.stack([change / step for change, step in found], axis=2) for found in changes]
+
+    def gain(about: Linear, dx: np.ndarray, C: np.ndarray) -> float:
+        return base.loss - base.like.loss(about.left(dx, C))
 
     def scores(about: Linear) -> list[Score]:
         r = about.like.white(base.e)
         slope = about.slope(r)
-        columns = [np.stack([change / step for change, step in found], axis=2) for found in changes]
         solved = parallel([partial(_solved, about, h, C, r, slope) for h, C in zip(candidates, columns, strict=True)])
         asked = _first(candidates, [score.power for score, _ in solved])
-        left = parallel([partial(about.left, solved[k][1], columns[k]) for k in asked])
-        gains = dict(zip(asked, parallel([partial(base.like.loss, e) for e in left]), strict=True))
-        return [score._replace(gain=base.loss - gains.get(k, np.inf)) for k, (score, _) in enumerate(solved)]
+        gains = dict(zip(asked, parallel([partial(gain, about, solved[k][1], columns[k]) for k in asked]), strict=True))
+        return [score._replace(gain=gains.get(k, score.gain)) for k, (score, _) in enumerate(solved)]
 
     both = [
         one._replace(gain=max(one.gain, other.gain), power=other.power, x=(*one.x, *other.x))

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from rtctl.config.errors import UserError, nearest
-from rtctl.trace.bundle import ROW_GROUP, load_case, recordings
+from rtctl.trace.bundle import ROW_GROUP, load_case, no_folder, recordings
 from rtctl.trace.columns import Column, columns_of
 
 
@@ -37,7 +37,7 @@ class Source:
     def __init__(self, folder: Path | str, selection: Selection = ALL):
         self.folder = Path(folder)
         if not self.folder.is_dir():
-            raise UserError(f"{self.folder} is not a folder; a bundle is a folder with recording.parquet and case.json")
+            raise no_folder(self.folder)
         self.paths = recordings(self.folder)
         self.case = load_case(self.folder)
         self._selection = selection
