@@ -18,7 +18,7 @@ from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.free import SIZE, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.search import Found
-from rtctl.diagnose.graph.wander import LITTLE, log_density, pushes, wandering
+from rtctl.diagnose.graph.wander import LITTLE, apart, averaged, log_density, pushes, wandering
 
 SEGMENTS = 32
 DRAWS = 300
@@ -48,11 +48,12 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
     sim = base.like.parts[0].sim
     unit, before = Measures(sim, base.model.base, {}).of("force", str(sim.body)), pushes(base)
+    width = apart(sim)
 
     def wrong(fit: Fitted, pushed: list[np.ndarray]) -> float:
         """What the laws of a fit may be wrong by, in forces that move the machine: the correction at the followed body
         has less of what the effects are, also of those in a sensor or a drive."""
-        change = float(np.sqrt(np.mean((before[0] - pushed[0])[:, 0] ** 2))) if fit.names else 0.0
+        change = float(np.sqrt(np.mean(averaged(before[0] - pushed[0], width)[:, 0] ** 2))) if fit.names else 0.0
         return DISCREPANCY * change / unit if np.isfinite(change) else 0.0
 
     best = set(found.best.names)  # and whether a small error of fewer laws does as well

@@ -53,7 +53,7 @@ def test_density_of_a_share():
 def test_noise_of_a_sensor_is_no_force():
     u = command(4.0)
     made = record(case_of(PENDULUM), u)
-    noisy = made._replace(y={"encoder": made.y["encoder"] + 2e-3 * np.random.default_rng(4).standard_normal(len(u))})
+    noisy = made._replace(y={"encoder": made.y["encoder"] + 4e-3 * np.random.default_rng(4).standard_normal(len(u))})
     like, space = together([noisy])
     fit = refit(like, space)
     found = wandering(fit, pushes(fit))
