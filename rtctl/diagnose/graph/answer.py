@@ -18,6 +18,7 @@ from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.likelihood import COUNTED, coarsened
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
+from rtctl.diagnose.graph.predictive import predictive
 from rtctl.diagnose.graph.record import GraphRecord, load_record
 from rtctl.diagnose.graph.search import Found, Progress, search
 from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
@@ -157,6 +158,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         progress("predicting rows that were not fitted")
         heldout = predict(found.base, decided.best)
         decided = borne_out(decided, heldout)
+        decided = decided._replace(best=predictive(decided.best, heldout))
         effects = _effects(decided)
         if len(left(decided)) > 1:
             progress("planning an experiment")

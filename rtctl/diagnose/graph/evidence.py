@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.graph.fits import Fitted
+from rtctl.diagnose.graph.fits import DISCREPANCY, Fitted, amplitude
 from rtctl.diagnose.graph.free import SIZE, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.search import Found
@@ -22,7 +22,6 @@ from rtctl.diagnose.graph.wander import LITTLE, apart, averaged, log_density, pu
 
 SEGMENTS = 32
 DRAWS = 300
-DISCREPANCY = 0.1  # of the missing force: standard deviation of what the law of a name may be wrong by
 UNLISTED = 3.0  # nats: prior odds against a force that has no name
 BESIDE = 3  # combinations beside which free forces are asked for
 LEAST = 1e-4  # of the force that moves a node: a discrepancy that is smaller is none
@@ -83,14 +82,6 @@ def rivals(found: Found) -> tuple[Rival, ...]:
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:
     """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
     return amplitude(base.e, fit.e, free.e) > DISCREPANCY
-
-
-def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
-    """What a further effect takes off the residual (blocks, sensors) over what all take off, rms, of the sensor that
-    shows most of it."""
-    further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
-    whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
-    return float(np.max(further / np.maximum(whole, 1e-300)))
 
 
 def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:

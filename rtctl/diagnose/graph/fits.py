@@ -25,6 +25,7 @@ LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a re
 MATTERS = 0.5  # nats of the prior that going back must gain
 FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
 RESTLESS = 1.2  # times what differs from block to block, the same
+DISCREPANCY = 0.1  # of the missing force: standard deviation of what the law of a name may be wrong by
 Z90 = 1.645  # standard deviations of a 90 % interval, each way
 
 
@@ -142,7 +143,7 @@ def refit(
             break
     at = best[1]
     like = like.slackened(errors(like, space, at.x, at.e))
-    model = _fitted(like.told(at.e), space, at)
+    model = fitted_at(like.told(at.e), space, at)
     return relaxed(model) if relax else model
 
 
@@ -167,13 +168,14 @@ def relaxed(f: Fitted) -> Fitted:
         e = f.like.raw(f.space.model(x))
         exact = f.like.slackened(None)
         at = descend(exact.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
-        trial = _fitted(f.like.told(at.e), f.space, at)
+        trial = fitted_at(f.like.told(at.e), f.space, at)
         if trial.log_evidence > f.log_evidence:
             return trial
     return f
 
 
-def _fitted(own: Likelihood, space: Space, at: Point) -> Fitted:
+def fitted_at(own: Likelihood, space: Space, at: Point) -> Fitted:
+    """A model where its fit came to, under a noise."""
     white = own.white(at.J)
     return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e))
 
@@ -215,3 +217,11 @@ def explained(base: Fitted, best: Fitted) -> float:
     if excess <= 0.0 or after[c] <= least[c]:
         return 1.0
     return float((before[c] ** 2 - after[c] ** 2) / excess)
+
+
+def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
+    """What a further effect takes off the residual (blocks, sensors) over what all take off, rms, of the sensor that
+    shows most of it."""
+    further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
+    whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
+    return float(np.max(further / np.maximum(whole, 1e-300)))

@@ -19,8 +19,13 @@ class Heldout(NamedTuple):
     floor: float
     gain: float  # nats by which the best predicts them better, each under the noise of the rows before
     rows: tuple[int, int]
-    models: tuple[GraphModel, GraphModel]  # base and best, as the rows before were fitted
+    fits: tuple[Fitted, Fitted]  # base and best, as the rows before were fitted
     late: Likelihood  # of the held-out rows
+
+    @property
+    def models(self) -> tuple[GraphModel, GraphModel]:
+        """The models of both."""
+        return self.fits[0].model, self.fits[1].model
 
 
 def predict(base: Fitted, best: Fitted) -> Heldout:
@@ -33,9 +38,9 @@ def predict(base: Fitted, best: Fitted) -> Heldout:
 
 def judged(whole: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted], rows: tuple[int, int]) -> Heldout:
     """Errors of the base and the best model on the rows of `late`, by the spread of each sensor on those of `whole`."""
-    spread, models = whole.spread, (fits[0].model, fits[1].model)
-    residuals = [late.raw(m) for m in models]
+    spread = whole.spread
+    residuals = [late.raw(f.model) for f in fits]
     before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)
     floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
     one, two = (late.foretold(e, f.like) for e, f in zip(residuals, fits, strict=True))
-    return Heldout(before, after, min(floor, after), one - two, rows, models, late)
+    return Heldout(before, after, min(floor, after), one - two, rows, fits, late)

@@ -1,4 +1,4 @@
-"""Search: combinations of up to three effects, each refitted under a noise of its own, by evidence.
+"""Search: combinations of a few effects, each refitted under a noise of its own, by evidence.
 
 Source: beam search over forward steps, with removal and exchange of each effect at the end.
 """
@@ -13,15 +13,15 @@ from rtctl.diagnose.graph.bandwidth import quicker
 from rtctl.diagnose.graph.clock import clock, timed
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
-from rtctl.diagnose.graph.fits import Fitted, explained, faint, refit, without
+from rtctl.diagnose.graph.fits import DISCREPANCY, Fitted, amplitude, explained, faint, refit, without
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened
 from rtctl.diagnose.space import Space
 
-MOST = 3  # effects
+MOST = 4  # effects
 REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
 MORE = 1.0  # nats that this must bring
-NAMES = (8, 8, 8)  # terms that are refitted in each step, beside one model or another
+NAMES = (8, 8, 8, 8)  # terms that are refitted in each step, beside one model or another
 OTHERS = 3  # of them beside what is left in an exchange
 BEAM = 4  # models that are extended
 ALIKE = 0.995  # cosine from which two models do the same
@@ -178,12 +178,13 @@ def merit_of(f: Fitted, odds: float) -> float:
 
 
 def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
-    """Whether a further effect is worth its numbers, and brings more than what the laws of the others may be wrong by:
-    a share of the evidence of all, and of the power that the others leave."""
+    """Whether a further effect is worth its numbers, and takes off more than what the laws of the others may be wrong
+    by: of the residual, or a share of the evidence of all, and of the power that the others leave."""
     gained = merit(more) - merit(fewer)
-    if gained < max(WORTH, SHARE * (merit(more) - merit(base))):
-        return False
-    return not fewer.names or explained(fewer, more) > PART
+    if gained < WORTH or not fewer.names:
+        return gained >= WORTH
+    large = amplitude(base.e, fewer.e, more.e) > DISCREPANCY or gained > SHARE * (merit(more) - merit(base))
+    return large and explained(fewer, more) > PART
 
 
 def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:

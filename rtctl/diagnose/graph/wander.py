@@ -90,8 +90,8 @@ def heard(part: Likelihood, number: int, width: int, inertia: float) -> float:
 
 @cache
 def answer(follow: float, dt: float, width: int) -> float:
-    """Standard deviation of the mean over windows `width` ticks of dt s apart of what an observer of bandwidth `follow`,
-    rad/s, makes of white noise of standard deviation one, for a unit of inertia."""
+    """Standard deviation of the mean over windows, `width` ticks of dt s apart, of what an observer of bandwidth
+    `follow`, rad/s, makes of white noise of standard deviation one, for a unit of inertia."""
     w = follow * dt
     white = np.random.default_rng(0).standard_normal(LONG * width)
     e = lfilter([1.0, -2.0, 1.0], [1.0, DAMPED * w - 2.0, 1.0 - DAMPED * w + w**2], white)
