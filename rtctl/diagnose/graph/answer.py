@@ -17,16 +17,15 @@ from rtctl.diagnose.graph.held import likelier, suits
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.likelihood import COUNTED, coarsened
 from rtctl.diagnose.graph.model import RECORDING
-from rtctl.diagnose.graph.prediction import Heldout, predict
+from rtctl.diagnose.graph.prediction import WORSE, Heldout, predict
 from rtctl.diagnose.graph.predictive import predictive
 from rtctl.diagnose.graph.record import GraphRecord, load_record
 from rtctl.diagnose.graph.search import Found, Progress, search
-from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
+from rtctl.diagnose.graph.verdict import SURE, Verdict, fewer, verdict
 from rtctl.diagnose.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import load_case
 
-WORSE = 1.0  # nats by which rows that no fit saw must be predicted worse, until a name is withdrawn: less is chance
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
 
 
@@ -156,8 +155,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         progress("weighing names against forces without one")
         decided = verdict(found)
         progress("predicting rows that were not fitted")
-        heldout = predict(found.base, decided.best)
-        decided = borne_out(decided, heldout)
+        heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
+        decided = borne_out(fewer(decided, best), heldout)
         decided = decided._replace(best=predictive(decided.best, heldout))
         effects = _effects(decided)
         if len(left(decided)) > 1:

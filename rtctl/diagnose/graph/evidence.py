@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.graph.fits import DISCREPANCY, Fitted, amplitude
+from rtctl.diagnose.graph.fits import DISCREPANCY, Fitted, share_of
 from rtctl.diagnose.graph.free import SIZE, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.search import Found
-from rtctl.diagnose.graph.wander import LITTLE, apart, averaged, log_density, pushes, wandering
+from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
 
 SEGMENTS = 32
 DRAWS = 300
@@ -46,21 +46,21 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     base = found.base
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
     sim = base.like.parts[0].sim
-    unit, before = Measures(sim, base.model.base, {}).of("force", str(sim.body)), pushes(base)
-    width = apart(sim)
+    unit = Measures(sim, base.model.base, {}).of("force", str(sim.body))
 
-    def wrong(fit: Fitted, pushed: list[np.ndarray]) -> float:
+    def wrong(fit: Fitted) -> float:
         """What the laws of a fit may be wrong by, in forces that move the machine: the correction at the followed body
         has less of what the effects are, also of those in a sensor or a drive."""
-        change = float(np.sqrt(np.mean(averaged(before[0] - pushed[0], width)[:, 0] ** 2))) if fit.names else 0.0
+        if not fit.names or not len(fit.pushes[0]):
+            return 0.0
+        change = float(np.sqrt(np.mean((base.pushes[0] - fit.pushes[0])[:, 0] ** 2)))
         return DISCREPANCY * change / unit if np.isfinite(change) else 0.0
 
     best = set(found.best.names)  # and whether a small error of fewer laws does as well
     entries: list[tuple[Fitted, Free | None, float]] = []
     for rank, fit in enumerate(fits):
-        pushed = pushes(fit)
-        off = wrong(fit, pushed)
-        wander = wandering(fit, pushed)
+        off = wrong(fit)
+        wander = wandering(fit)
         usual = float(np.linalg.norm([LITTLE, off, wander.noise]))
         listed = found.merit(fit) + log_density(wander.share, usual)
         entries.append((fit, None, listed))
@@ -81,7 +81,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
 
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:
     """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
-    return amplitude(base.e, fit.e, free.e) > DISCREPANCY
+    return share_of(base.e, fit.e, free.e) > DISCREPANCY
 
 
 def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from rtctl.diagnose.graph.descent import ALL, EFFECTS, Point, derivatives, desce
 from rtctl.diagnose.graph.inexact import errors
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
+from rtctl.diagnose.graph.pushes import pushes
 from rtctl.diagnose.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
@@ -39,6 +40,7 @@ class Fitted(NamedTuple):
     A: np.ndarray  # (unknowns, unknowns) their inner products, as innovations
     like: Likelihood  # with its own noise
     loss: float  # negative logarithm of the likelihood, nats
+    pushes: tuple[np.ndarray, ...]  # (windows, followed) corrections of the observer in each recording, N or Nm
 
     @property
     def model(self):
@@ -177,7 +179,7 @@ def relaxed(f: Fitted) -> Fitted:
 def fitted_at(own: Likelihood, space: Space, at: Point) -> Fitted:
     """A model where its fit came to, under a noise."""
     white = own.white(at.J)
-    return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e))
+    return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e), pushes(own, space.model(at.x)))
 
 
 def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
@@ -219,9 +221,27 @@ def explained(base: Fitted, best: Fitted) -> float:
     return float((before[c] ** 2 - after[c] ** 2) / excess)
 
 
-def amplitude(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
-    """What a further effect takes off the residual (blocks, sensors) over what all take off, rms, of the sensor that
-    shows most of it."""
+def explained_force(base: Fitted, best: Fitted) -> float:
+    """Share of the power of what the observer had to push with that the best model takes off, of the followed body
+    where most is missing; 0 where no observer follows the machine."""
+    before, after = (np.concatenate([np.mean(slow**2, axis=0) for slow in f.pushes if len(slow)] or [np.zeros(1)])
+                     for f in (base, best))  # fmt: skip
+    c = int(np.argmax(before))
+    return float(1.0 - after[c] / before[c]) if np.isfinite(after[c]) and 0.0 < before[c] < np.inf else 0.0
+
+
+def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
+    """What a further effect takes off over what all take off, rms, of the residual or of the observer's pushes, and of
+    the sensor that shows most of it."""
+    found = share_of(base.e, fewer.e, more.e)
+    for slow in zip(base.pushes, fewer.pushes, more.pushes, strict=True):
+        if len(slow[0]) and all(np.isfinite(part).all() for part in slow):
+            found = max(found, share_of(*slow))
+    return found
+
+
+def share_of(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
+    """The same of values (rows, k) under the three models."""
     further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
     whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
     return float(np.max(further / np.maximum(whole, 1e-300)))

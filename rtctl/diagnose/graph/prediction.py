@@ -4,11 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.graph.fits import Fitted, refit
+from rtctl.diagnose.graph.fits import Fitted, refit, without
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
 
 HELD = 0.25  # share of the record
+WORSE = 1.0  # nats by which rows that no fit saw must be predicted worse, until a name is withdrawn: less is chance
 
 
 class Heldout(NamedTuple):
@@ -28,12 +29,26 @@ class Heldout(NamedTuple):
         return self.fits[0].model, self.fits[1].model
 
 
-def predict(base: Fitted, best: Fitted) -> Heldout:
-    """Held-out error of the base and of the best model, each fitted to the rows before."""
-    like = base.like
-    first, late = like.split(HELD)
-    fits = [refit(first, f.space, f.x, rounds=6) if f.space.names or f.space.hypotheses else f for f in (base, best)]
-    return judged(like, late, (fits[0], fits[1]), first.rows)
+def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, Fitted]:
+    """Held-out error of the base and of the best model, each fitted to the rows before, and the best model, without
+    the effects (`fewer`) without which the held-out rows are predicted better."""
+    first, late = base.like.split(HELD)
+
+    def early(f: Fitted) -> Fitted:
+        return refit(first, f.space, f.x, rounds=6) if f.space.names or f.space.hypotheses else f
+
+    def foretold(f: Fitted) -> float:
+        return late.foretold(late.raw(f.model), f.like)
+
+    own = early(best)
+    while fewer and len(best.names) > 1:
+        less = [refit(first, *without(own, index), rounds=6) for index in range(len(best.names))]
+        losses = [foretold(f) for f in less]
+        index = int(np.argmin(losses))
+        if losses[index] > foretold(own) - WORSE:
+            break
+        own, best = less[index], refit(best.like, *without(best, index))
+    return judged(base.like, late, (early(base), own), first.rows), best
 
 
 def judged(whole: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted], rows: tuple[int, int]) -> Heldout:

@@ -49,7 +49,7 @@ def least_squares(like: Likelihood, f: Fitted) -> np.ndarray:
 
 
 def free_error(like: Likelihood, model: GraphModel) -> float:
-    """Error of a free run over the rows of `like`, rms over its sensors, by the spread of each; inf of a model that runs
+    """Error of a free run over the rows of `like`, rms over its sensors, by the spread of each; inf where it runs
     away."""
     found = []
     for part in like.parts:

@@ -13,9 +13,10 @@ from rtctl.diagnose.graph.bandwidth import quicker
 from rtctl.diagnose.graph.clock import clock, timed
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
-from rtctl.diagnose.graph.fits import DISCREPANCY, Fitted, amplitude, explained, faint, refit, without
+from rtctl.diagnose.graph.fits import Fitted, amplitude, explained, explained_force, faint, refit, without
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened
+from rtctl.diagnose.graph.slack import OFF
 from rtctl.diagnose.space import Space
 
 MOST = 4  # effects
@@ -179,12 +180,12 @@ def merit_of(f: Fitted, odds: float) -> float:
 
 def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
     """Whether a further effect is worth its numbers, and takes off more than what the laws of the others may be wrong
-    by: of the residual, or a share of the evidence of all, and of the power that the others leave."""
+    by, in size or in evidence, and a part of the power that the others leave, of the residual or of the force."""
     gained = merit(more) - merit(fewer)
     if gained < WORTH or not fewer.names:
         return gained >= WORTH
-    large = amplitude(base.e, fewer.e, more.e) > DISCREPANCY or gained > SHARE * (merit(more) - merit(base))
-    return large and explained(fewer, more) > PART
+    large = amplitude(base, fewer, more) > OFF or gained > SHARE * (merit(more) - merit(base))
+    return large and max(explained(fewer, more), explained_force(fewer, more)) > PART
 
 
 def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:

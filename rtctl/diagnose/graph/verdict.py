@@ -70,10 +70,25 @@ def of_motion(found: Found) -> Verdict:
         if bare.unlisted:
             return answer(UNNAMED, best, why)
         return answer(NOTHING, found.base, f"{why}, and the rest is as noise of the sensors leaves it")
+    return of_names(answer(NAMED, best, ""))
+
+
+def of_names(decided: Verdict) -> Verdict:
+    """The verdict with the confidence in each effect of its best model, and its rivals."""
+    ranked, best = decided.probabilities, decided.best
     confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
-    return answer(kind, best, "")._replace(confidence=confidence, rivals=others)
+    return decided._replace(verdict=kind, confidence=confidence, rivals=others)
+
+
+def fewer(decided: Verdict, best: Fitted) -> Verdict:
+    """The verdict with a model that lacks some of the effects, without which rows that no fit saw are predicted
+    better."""
+    if best.names == decided.best.names or decided.verdict not in (NAMED, AMBIGUOUS):
+        return decided
+    gone = ", ".join(name for name in decided.best.names if name not in best.names)
+    return of_names(decided._replace(best=best, why=f"without {gone} the last rows are predicted better"))
 
 
 def certain(ranked: tuple[tuple[tuple[str, ...], float], ...]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from graph_cases import PENDULUM, RATE, case_of, command, nothing, record
 from rtctl.diagnose.graph.answer import diagnose_record
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.joint import together
-from rtctl.diagnose.graph.wander import LITTLE, log_density, pushes, wandering
+from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
 
 FORCE = 0.4  # Nm, rms of the drive
 
@@ -19,7 +19,7 @@ def random_force(n, rms, seed=3):
 
 def test_a_machine_as_described_leaves_little():
     base = nothing().found.base
-    found = wandering(base, pushes(base))
+    found = wandering(base)
     assert found.share < 3 * LITTLE
     assert 0.0 < found.noise < LITTLE
 
@@ -29,7 +29,7 @@ def test_a_random_force_is_measured():
     push = random_force(len(u), 0.1 * FORCE)
     like, space = together([record(case_of(PENDULUM), u, push=push)])
     fit = refit(like, space)
-    free = wandering(fit, pushes(fit)).free
+    free = wandering(fit).free
     assert free is not None
     assert (free.node, free.axis) == ("rod", "time")
     there = np.interp(free.knots, np.arange(len(u)) / RATE, push)
@@ -56,7 +56,7 @@ def test_noise_of_a_sensor_is_no_force():
     noisy = made._replace(y={"encoder": made.y["encoder"] + 4e-3 * np.random.default_rng(4).standard_normal(len(u))})
     like, space = together([noisy])
     fit = refit(like, space)
-    found = wandering(fit, pushes(fit))
+    found = wandering(fit)
     assert found.share > 2 * LITTLE
     assert found.noise == pytest.approx(found.share, rel=0.4)
     assert diagnose_record(noisy).verdict == "nothing"
