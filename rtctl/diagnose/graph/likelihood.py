@@ -20,6 +20,7 @@ from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.noise import Noise, noises_of, surprise, whitened
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.slack import Slack
+from rtctl.diagnose.graph.slow import slow
 
 RATE = 500.0  # 1/s, of the averaged residuals
 ORDER = 20  # of the autoregression
@@ -56,6 +57,7 @@ class Likelihood:
         self.noise: list[Noise] = list(noise) if noise is not None else [
             Noise(np.ones(1), float(max(least, 1e-300))) for least in self.least
         ]  # fmt: skip
+        self.slow = slow(sim, self.channels, self.mean)
 
     def raw(self, model: GraphModel, coarse: bool = False) -> np.ndarray:
         """Residuals (blocks, sensors), SI, averaged over `mean` ticks.
@@ -151,6 +153,7 @@ class Likelihood:
         """The same rows with an observer that is so many `times` as quick, and laws that are exact."""
         other = self.slackened(None)
         other.sim = self.sim.following(times)
+        other.slow = slow(other.sim, self.channels, self.mean)
         return other
 
     def white(self, e: np.ndarray) -> np.ndarray:
@@ -158,8 +161,8 @@ class Likelihood:
         return self.plain(e) if self.slack is None else self.slack.stacked(self.plain(e))
 
     def plain(self, e: np.ndarray) -> np.ndarray:
-        """The same where the laws are exact."""
-        return np.concatenate(whitened(self.noise, e, self.present))
+        """The same where the laws are exact; after them the slow residuals by their standard deviation."""
+        return np.concatenate([*whitened(self.noise, e, self.present), *(one.of(e) / one.sigma for one in self.slow)])
 
     @property
     def slack(self) -> Slack | None:
@@ -194,6 +197,7 @@ class Likelihood:
         other = copy(self)
         other._slack = None
         other.noise, _ = noises_of(e, self.present, ORDER, self.least, self.growth)
+        other.slow = [one.told(e) for one in self.slow]
         return other
 
     def flat(self, e: np.ndarray) -> "Likelihood":
@@ -207,6 +211,7 @@ class Likelihood:
             Noise(np.ones(1), max(float(np.std(e[rows, c])), float(self.least[c])))
             for c, rows in enumerate(self.present)
         ]
+        other.slow = [one.told(e) for one in self.slow]
         return other
 
     def loss(self, e: np.ndarray) -> float:
@@ -227,7 +232,7 @@ class Likelihood:
         for rows, own, r in zip(self.present, *noises_of(e, self.present, ORDER, self.least, self.growth), strict=True):
             segment = rows[own.order :] * count // len(e)
             out += np.bincount(segment, surprise(r, own.sigma), count)
-        return out
+        return np.asarray(out + sum(one.losses(e, count) for one in self.slow))
 
     def foretold(self, e: np.ndarray, other: "Likelihood") -> float:
         """Negative logarithm of the likelihood of residuals under the noise that `other` rows showed, nats."""

@@ -16,9 +16,7 @@ from rtctl.diagnose.graph.kernel import TRACK
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.observer import DAMPED, SMOOTHED
-from rtctl.diagnose.graph.simulate import Simulator
 
-SLOW = 3.0  # time constants of a usual observer: distance of the windows
 LONG = 100  # windows of noise, by which its part is measured
 
 
@@ -29,15 +27,10 @@ def pushes(like: Likelihood, model: GraphModel) -> tuple[np.ndarray, ...]:
     for part in like.parts:
         if part.sim.mode == TRACK:
             push = part.sim.everything(part.sim.own(model), n=part.rows[1])[1][part.rows[0] :]
-            out.append(averaged(push, apart(part.sim)))
+            out.append(averaged(push, part.sim.window))
         else:
             out.append(np.zeros((0, len(part.sim.followed))))
     return tuple(out)
-
-
-def apart(sim: Simulator) -> int:
-    """Ticks from one window to the next."""
-    return max(1, round(SLOW / min(sim.followed[0].bandwidth, sim.follow) / sim.record.dt))
 
 
 def averaged(push: np.ndarray, width: int) -> np.ndarray:

@@ -30,6 +30,7 @@ QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be qu
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
 LEAD = 1.0  # s at the first row, at most, in which springs come to rest
 FORGOTTEN = 5.0  # time constants of what swings longest, after which it does so no more
+SLOW = 3.0  # time constants of a usual observer: window over which what is slow is averaged
 STEADY = 0.4  # rad a substep, of the quickest ring in which lost motion is crossed
 NEVER = np.iinfo(np.int64).max  # row
 
@@ -67,6 +68,11 @@ class Simulator:
         self.release = NEVER
         self.ratios = self.moves(record.case.values)
         self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
+
+    @property
+    def window(self) -> int:
+        """Ticks over which what is slow is averaged."""
+        return max(1, round(SLOW / min(self.followed[0].bandwidth, self.follow) / self.record.dt))
 
     def bandwidth(self, one: Followed) -> float:
         """Bandwidth, rad/s, with which a sensor is followed."""

@@ -12,7 +12,7 @@ from rtctl.diagnose.graph.fits import Fitted
 from rtctl.diagnose.graph.free import SIZE, Free
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.measures import Measures
-from rtctl.diagnose.graph.pushes import answer, apart, averaged
+from rtctl.diagnose.graph.pushes import answer, averaged
 
 LITTLE = 0.004  # of the force that moves the machine: standard deviation of what a description that is right leaves
 
@@ -32,7 +32,7 @@ def wandering(fit: Fitted) -> Wander:
         sim = part.sim
         if len(slow) < 2 or not np.isfinite(slow).all():
             continue
-        measures, width = Measures(sim, sim.own(fit.model).base, {}), apart(sim)
+        measures, width = Measures(sim, sim.own(fit.model).base, {}), sim.window
         t = averaged(sim.record.t[slice(*part.rows)][:, None], width)[:, 0] - sim.record.t[0]
         for number, one in enumerate(sim.followed):
             whole = measures.of("force", one.body)
