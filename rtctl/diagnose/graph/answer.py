@@ -40,6 +40,7 @@ class GraphDiagnosis(NamedTuple):
     parameters: dict[str, Interval]
     heldout: Heldout
     cannot_test: tuple[str, ...]
+    predictor: Fitted  # the model that predicts best, which may have effects of which the verdict is not sure
     seconds: float
     records: tuple[GraphRecord, ...]
     planned: Planned = Planned()
@@ -157,8 +158,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         progress("predicting rows that were not fitted")
         heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
         decided = borne_out(fewer(decided, best), heldout)
-        decided = decided._replace(best=predictive(decided.best, heldout))
-        effects = _effects(decided)
+        predictor = predictive(decided, heldout)
+        effects = _effects(decided, predictor)
         if len(left(decided)) > 1:
             progress("planning an experiment")
         return GraphDiagnosis(
@@ -167,7 +168,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             decided=decided,
             effects=effects,
             located=_located(found, decided, effects),
-            parameters=_parameters(decided.best, like.sim.record),
+            parameters=_parameters(predictor, like.sim.record),
+            predictor=predictor,
             heldout=heldout,
             planned=planned(like.sim.record, decided),
             cannot_test=tuple(sorted(_cannot(found))),
@@ -185,11 +187,11 @@ def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
     return decided._replace(verdict=UNNAMED, confidence=(), rivals=(), why=why)
 
 
-def _effects(decided: Verdict) -> tuple[Effect, ...]:
+def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
+    """Effects of the verdict, with sizes of a model that has all of them."""
     if decided.verdict not in (NAMED, AMBIGUOUS):
         return ()
-    best = decided.best
-    spread = _spread(best)
+    best, spread = decided.best, _spread(numbers)
     out = []
     for i, h in enumerate(best.space.hypotheses):
         looks = tuple(
@@ -197,7 +199,15 @@ def _effects(decided: Verdict) -> tuple[Effect, ...]:
             for name, p in decided.rivals[i]
             if not name.startswith(f"{h.term}:")
         )
-        out.append(Effect(h.term, h.node, min(decided.confidence[i], 0.99), _sizes(best, i, spread), looks))
+        out.append(
+            Effect(
+                h.term,
+                h.node,
+                min(decided.confidence[i], 0.99),
+                _sizes(numbers, numbers.names.index(h.name), spread),
+                looks,
+            )
+        )
     ticks = decided.ticks
     if ticks is not None:
         name, node, parameter = UNSTEADY

@@ -212,7 +212,7 @@ def path_of(d: GraphDiagnosis, name: str) -> str:
 
 def untold(d: GraphDiagnosis, name: str) -> bool:
     """Whether the interval of a fitted number is that of the owner's tolerance: the recording says nothing of it."""
-    space = d.decided.best.space
+    space = d.predictor.space
     weight = float(space.prior()[space.names.index(path_of(d, name))])
     v = d.parameters[name]
     if weight <= 0.0 or v.value == 0.0:

@@ -57,7 +57,7 @@ def write(d: GraphDiagnosis, folder: Path, report: bool = True, base: Path | Non
 
 def after(d: GraphDiagnosis) -> GraphModel:
     """The model that was found; the nominal one where nothing was, which would take up what is missing."""
-    return d.decided.best.model if d.verdict in (NAMED, AMBIGUOUS) else nominal(d.record.case)
+    return d.predictor.model if d.verdict in (NAMED, AMBIGUOUS) else nominal(d.record.case)
 
 
 def write_model(d: GraphDiagnosis, path: Path) -> Path:
@@ -65,7 +65,7 @@ def write_model(d: GraphDiagnosis, path: Path) -> Path:
 
     Raises UserError where the machine would not be read again, or the file cannot be written.
     """
-    record, model = d.record, d.decided.best.model
+    record, model = d.record, d.predictor.model
     if record.source is not None:
         return export.write_model(known_model(model, record), record.source, path, own_config(d))
     return config.write_model(model, record, path, own_config(d))
@@ -96,7 +96,7 @@ def own_config(d: GraphDiagnosis) -> dict[str, Any] | None:
 
 def changes(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
     """(key, nominal value, new value) of each key of the config that the model changes, the terms last."""
-    record, model = d.record, d.decided.best.model
+    record, model = d.record, d.predictor.model
     if record.source is not None:
         return repair.between(known_model(nominal(record.case), record), known_model(model, record))
     rows = [

@@ -21,6 +21,7 @@ class Heldout(NamedTuple):
     gain: float  # nats by which the best predicts them better, each under the noise of the rows before
     rows: tuple[int, int]
     fits: tuple[Fitted, Fitted]  # base and best, as the rows before were fitted
+    early: Likelihood  # of the rows before
     late: Likelihood  # of the held-out rows
 
     @property
@@ -48,14 +49,14 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
         if losses[index] > foretold(own) - WORSE:
             break
         own, best = less[index], refit(best.like, *without(best, index))
-    return judged(base.like, late, (early(base), own), first.rows), best
+    return judged(base.like, first, late, (early(base), own)), best
 
 
-def judged(whole: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted], rows: tuple[int, int]) -> Heldout:
+def judged(whole: Likelihood, early: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted]) -> Heldout:
     """Errors of the base and the best model on the rows of `late`, by the spread of each sensor on those of `whole`."""
     spread = whole.spread
     residuals = [late.raw(f.model) for f in fits]
     before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)
     floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
     one, two = (late.foretold(e, f.like) for e, f in zip(residuals, fits, strict=True))
-    return Heldout(before, after, min(floor, after), one - two, rows, fits, late)
+    return Heldout(before, after, min(floor, after), one - two, early.rows, fits, early, late)

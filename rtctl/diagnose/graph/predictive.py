@@ -9,33 +9,53 @@ Source: Ljung, System Identification (1999), ch. 8.5 (the prefilter decides wher
 
 import numpy as np
 
+from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED
 from rtctl.diagnose.graph.descent import ALL, Point, derivatives, descend
-from rtctl.diagnose.graph.fits import Fitted, fitted_at
+from rtctl.diagnose.graph.fits import Fitted, fitted_at, refit
 from rtctl.diagnose.graph.kernel import TRACK
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.prediction import Heldout
+from rtctl.diagnose.graph.verdict import SURE, Verdict
 
 ROUNDS = 20  # steps of least squares
 WEIGHED = 2  # rounds, as the weights of several sensors are those of their residuals
+MOST = 2  # models with further effects that are tried
 ENOUGH = 1e-3  # of the cost, that a step must gain
 
 
-def predictive(best: Fitted, heldout: Heldout) -> Fitted:
-    """The best model with the numbers that predict a free run over the held-out rows better; as it is where no observer
-    follows the machine, and where both run away."""
+def predictive(decided: Verdict, heldout: Heldout) -> Fitted:
+    """The model that predicts a free run over the held-out rows best: that of the verdict, or one with further effects
+    that are probable and not sure, each with the numbers of the likelihood or of least squares.
+
+    It is that of the verdict where nothing is named, and where no observer follows the machine.
+    """
+    best = decided.best
     like = best.like
-    if any(part.sim.mode != TRACK for part in like.parts) or not len(best.x) or not best.names:
+    if decided.verdict not in (NAMED, AMBIGUOUS) or any(part.sim.mode != TRACK for part in like.parts):
         return best
-    early = heldout.fits[1]
-    usual = like.following(min(1.0, like.sim.followed[0].bandwidth / like.sim.follow))
-    plain = best.space.model(least_squares(early.like.following(usual.sim.follow / like.sim.follow), early))
-    if not free_error(heldout.late, plain) < free_error(heldout.late, early.model):
-        return best
-    x = least_squares(usual, best)
-    e = like.raw(best.space.model(x))
-    at = Point(x, e, derivatives(like, best.space, x, range(len(x))))
-    return fitted_at(like.told(e), best.space, at)
+    more = {f.names: f for f in probable(decided)}
+    tried: list[tuple[float, Fitted, bool]] = []
+    usual = min(1.0, like.sim.followed[0].bandwidth / like.sim.follow)
+    for f in (best, *more.values()):
+        early = heldout.fits[1] if f is best else refit(heldout.early, f.space, f.x, rounds=6)
+        plain = f.space.model(least_squares(early.like.following(usual), early))
+        tried += [(free_error(heldout.late, early.model), f, False), (free_error(heldout.late, plain), f, True)]
+    _, f, by_squares = min(tried, key=lambda one: one[0])
+    if not by_squares:
+        return f
+    x = least_squares(like.following(usual), f)
+    e = like.raw(f.space.model(x))
+    at = Point(x, e, derivatives(like, f.space, x, range(len(x))))
+    return fitted_at(like.told(e), f.space, at)
+
+
+def probable(decided: Verdict) -> list[Fitted]:
+    """Models with all effects of the verdict and others, likeliest first, that are not improbable."""
+    best, chances = decided.best, dict(decided.probabilities)
+    found = {r.fit.names: r.fit for r in decided.table if set(r.fit.names) > set(best.names)}
+    likely = sorted(found, key=lambda names: -chances.get(names, 0.0))
+    return [found[names] for names in likely[:MOST] if chances.get(names, 0.0) > 1.0 - SURE]
 
 
 def least_squares(like: Likelihood, f: Fitted) -> np.ndarray:

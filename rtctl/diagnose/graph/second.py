@@ -25,4 +25,4 @@ def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
     check_same(d.record, sim.record)
     like = Likelihood(sim)
     with threadpool_limits(1):
-        return d._replace(heldout=judged(like, like, (d.found.base, d.decided.best), like.rows))
+        return d._replace(heldout=judged(like, like, like, (d.found.base, d.decided.best)))
