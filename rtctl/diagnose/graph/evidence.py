@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.fits import DISCREPANCY, Fitted, share_of
-from rtctl.diagnose.graph.free import SIZE, Free, free_forces
+from rtctl.diagnose.graph.free import SIZE, TIME, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.search import Found
 from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
@@ -71,7 +71,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
             free = free_forces(fit, shares)
             large = [f for f in free if f.share == SIZE and (not fit.names or exceeds(base, fit, f))]
             entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
-            small = [f for f in free if f.share < SIZE]
+            small = [f for f in free if f.share < SIZE and f.axis != TIME]  # no law has an argument of time
             entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
     losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))

@@ -28,6 +28,7 @@ SECOND = 2  # axes that are looked at again
 SMOOTH = 0.25  # of the range: distance over which a free force is alike, by its prior
 SIZE = 0.3  # of the force that moves a node: standard deviation of a free force, by its prior
 PARTS = (1.0, 0.5, 0.25)  # of the step of the linear model, at which it is simulated
+TIME = "time"  # axis along which a force comes and goes
 TURNS = 1.5  # turns from which on an angle is another axis than the position
 
 
@@ -78,7 +79,7 @@ def axes(m: Measures, node: str) -> dict[str, np.ndarray]:
     out = {
         "velocity": np.diff(x, prepend=x[:1]) / sim.record.dt,
         "position": x,
-        "time": sim.record.t - sim.record.t[0],
+        TIME: sim.record.t - sim.record.t[0],
     }
     if m.turns(node) and np.ptp(x) > TURNS * 2 * np.pi:
         out["angle"] = np.mod(x, 2 * np.pi)
@@ -89,7 +90,7 @@ def axes(m: Measures, node: str) -> dict[str, np.ndarray]:
 
 def after(axis: str, values: list[np.ndarray]) -> list[np.ndarray]:
     """Values of an axis in each recording; the time of each begins where that of the one before ends."""
-    if axis != "time":
+    if axis != TIME:
         return values
     ends = np.cumsum([0.0, *(v[-1] for v in values)])
     return [v + end for v, end in zip(values, ends, strict=False)]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.fits import Fitted
-from rtctl.diagnose.graph.free import SIZE, Free
+from rtctl.diagnose.graph.free import SIZE, TIME, Free
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.pushes import answer, averaged
@@ -38,7 +38,7 @@ def wandering(fit: Fitted) -> Wander:
             whole = measures.of("force", one.body)
             rms = float(np.std(slow[:, number])) / whole
             if rms > worst.share:
-                free = Free(one.body, "time", SIZE, 0.0, fit.e, 0.0, t, slow[:, number], rms)
+                free = Free(one.body, TIME, SIZE, 0.0, fit.e, 0.0, t, slow[:, number], rms)
                 worst = Wander(rms, heard(part, number, width, measures.inertia(one.body)) / whole, free)
     return worst
 
