@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.diagnose.graph.fits import DISCREPANCY, Fitted, share_of
-from rtctl.diagnose.graph.free import SIZE, TIME, Free, free_forces
+from rtctl.diagnose.graph.free import AXES, SIZE, TIME, Free, free_forces
 from rtctl.diagnose.graph.measures import Measures
 from rtctl.diagnose.graph.search import Found
 from rtctl.diagnose.graph.wander import LITTLE, log_density, wandering
+from rtctl.plants.physics import TERMS
 
 SEGMENTS = 32
 DRAWS = 300
@@ -71,12 +72,23 @@ def rivals(found: Found) -> tuple[Rival, ...]:
             free = free_forces(fit, shares)
             large = [f for f in free if f.share == SIZE and (not fit.names or exceeds(base, fit, f))]
             entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
-            small = [f for f in free if f.share < SIZE and f.axis != TIME]  # no law has an argument of time
+            small = [f for f in free if f.share < SIZE and f.axis in arguments(fit)]
             entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
     losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
     return tuple(sorted(out, key=lambda r: -r.probability))
+
+
+def arguments(fit: Fitted) -> set[str]:
+    """Axes along which the laws of a fit may be wrong: an error of a law is a function of its own argument. One that
+    shows by frequency or tension has no axis here, and may be wrong along any but time."""
+    out: set[str] = set()
+    for h in fit.space.hypotheses:
+        axis = TERMS[h.term].axis
+        out |= {axis} if axis in AXES else set(AXES) - {TIME}
+        out |= {"position"} if axis == "angle" else set()  # of less than a turn
+    return out
 
 
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:

@@ -29,6 +29,7 @@ SMOOTH = 0.25  # of the range: distance over which a free force is alike, by its
 SIZE = 0.3  # of the force that moves a node: standard deviation of a free force, by its prior
 PARTS = (1.0, 0.5, 0.25)  # of the step of the linear model, at which it is simulated
 TIME = "time"  # axis along which a force comes and goes
+AXES = ("velocity", "position", TIME, "angle", "command")
 TURNS = 1.5  # turns from which on an angle is another axis than the position
 
 
