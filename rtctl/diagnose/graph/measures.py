@@ -16,6 +16,7 @@ from rtctl.plants.physics import TERMS
 
 SMOOTH = 5e-3  # s, over which a speed is taken
 USUAL_RATE = 500.0  # 1/s, of a machine whose parts ring at 3 to 225 Hz
+ONE_WAY = 0.02  # of what a quantity does with one sign: what it does with the other, at least, to have both
 LITTLE = 1e-12
 
 
@@ -115,6 +116,12 @@ class Measures:
     def way(self, body: str) -> np.ndarray:
         """Position (n,) of a body as the followed sensor that joints connect it with saw it."""
         return np.asarray(self.ways[self.leaders.get(body, 0)] * self.ratios.get(body, 0.0))
+
+    def both_signs(self, of: str, node: str) -> bool:
+        """Whether the "command" of a drive, or the "speed" of a node, has either sign for a part of the recording."""
+        values = self.u[:, self.layout.drives[node]] if of == "command" else np.diff(self.way(self.lever(node)[0]))
+        parts = np.sum(np.maximum(values, 0.0)), np.sum(np.maximum(-values, 0.0))
+        return bool(min(parts) > ONE_WAY * max(*parts, LITTLE))
 
     def turns(self, node: str) -> bool:
         """Whether what a node belongs to turns."""
