@@ -119,7 +119,9 @@ class Measures:
 
     def both_signs(self, of: str, node: str) -> bool:
         """Whether the "command" of a drive, or the "speed" of a node, has either sign for a part of the recording."""
-        values = self.u[:, self.layout.drives[node]] if of == "command" else np.diff(self.way(self.lever(node)[0]))
+        values = (
+            self.sim.volts[:, self.layout.drives[node]] if of == "command" else np.diff(self.way(self.lever(node)[0]))
+        )
         parts = np.sum(np.maximum(values, 0.0)), np.sum(np.maximum(-values, 0.0))
         return bool(min(parts) > ONE_WAY * max(*parts, LITTLE))
 

@@ -1,7 +1,9 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from rtctl.diagnose.graph.evidence import SEGMENTS, bagged
+from rtctl.diagnose.graph.evidence import SEGMENTS, arguments, bagged
 
 
 def test_what_every_segment_says_stays_sure():
@@ -24,3 +26,19 @@ def test_segments_alike_leave_the_posterior_of_the_whole():
     merits = np.array([0.0, -1.0, -2.0])
     odds = np.exp(merits)
     np.testing.assert_allclose(bagged(merits, np.ones((3, SEGMENTS))), odds / odds.sum())
+
+
+@pytest.mark.parametrize(
+    ("terms", "axes"),
+    [(["friction.coulomb"], {"velocity"}), (["load.gravity"], {"angle", "position"}),
+     (["load.spring", "drive.deadband"], {"position", "command"}), ([], set())],
+)  # fmt: skip
+def test_a_law_is_wrong_along_its_own_argument(terms, axes):
+    assert (
+        arguments(SimpleNamespace(space=SimpleNamespace(hypotheses=[SimpleNamespace(term=t) for t in terms]))) == axes
+    )
+
+
+def test_no_law_of_a_motion_is_wrong_along_time():
+    spring = SimpleNamespace(space=SimpleNamespace(hypotheses=[SimpleNamespace(term="structure.resonance")]))
+    assert "time" not in arguments(spring)

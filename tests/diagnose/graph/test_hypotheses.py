@@ -105,3 +105,12 @@ def test_an_error_of_another_sensor_shows_its_own_order():
     sim = Simulator(record(case_of(pendulum), command(4.0), [ripple]))
     found = hints(sim, nominal(sim.case), 100)["order:second"]
     assert np.isclose(found[0], 5.0, atol=0.3)
+
+
+def test_an_asymmetry_needs_both_signs():
+    one_way = Simulator(record(case_of(BELT), np.abs(command(0.6))))
+    names = {h.name for h in hypotheses(one_way, nominal(one_way.case))}
+    assert "drive.gain_asymmetry:amplifier" not in names
+    assert "friction.coulomb:carriage" in names
+    assert "drive.gain_asymmetry:amplifier" in of("belt")[1]
+    assert "friction.asymmetry:carriage" in of("belt")[1]

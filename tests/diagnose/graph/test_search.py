@@ -36,3 +36,15 @@ def test_a_further_effect_brings_a_share_of_all_evidence():
     assert adds(base, base, best, merit(0.0))
     assert not adds(base, best, more, merit(5.0))
     assert adds(base, best, more, merit(6.0))  # it leaves no more than noise, as the one effect does
+
+
+def test_a_further_effect_may_be_large_instead():
+    found = named().found
+    base, best = found.base, found.best
+    fewer, more = best._replace(e=0.5 * base.e), best._replace(e=0.1 * base.e)
+
+    def merit(brought):
+        return lambda f: {id(base): 0.0, id(fewer): 100.0, id(more): 100.0 + brought}[id(f)]
+
+    assert adds(base, fewer, more, merit(4.0))
+    assert not adds(base, fewer, more, merit(2.0))  # by chance
