@@ -204,6 +204,12 @@ def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:
     return f.like.least * np.sqrt(f.like.mean), restless
 
 
+def silent(f: Fitted) -> bool:
+    """Whether a model leaves no more than noise in any sensor."""
+    level, restless = quiet(f)
+    return bool((np.sqrt(np.mean(f.e**2, axis=0)) <= np.maximum(FLOOR * level, RESTLESS * restless)).all())
+
+
 def explained(base: Fitted, best: Fitted) -> float:
     """Share of the power of the residual, above the noise of the sensor, that the best model takes off.
 

@@ -13,7 +13,7 @@ from rtctl.diagnose.graph.bandwidth import quicker
 from rtctl.diagnose.graph.clock import clock, timed
 from rtctl.diagnose.graph.enrich import enriched, restarted
 from rtctl.diagnose.graph.extend import Known, Merit, extended, key, screened
-from rtctl.diagnose.graph.fits import Fitted, amplitude, explained, explained_force, faint, refit, without
+from rtctl.diagnose.graph.fits import Fitted, amplitude, explained, explained_force, faint, refit, silent, without
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.screen import Score, Screened
 from rtctl.diagnose.graph.slack import OFF
@@ -80,7 +80,7 @@ def under(like: Likelihood, space: Space, progress: Progress) -> Found:
             known.setdefault(key(rest.names), rest)
         if level == MOST:
             break
-        parents = apart(base, better)
+        parents = apart(base, better)[: 1 if silent(better[0]) else BEAM]  # of noise alone no rival explains more
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
         grown = extended(like, parents, known, NAMES[level], merit)
     for _ in range(EXCHANGES):
