@@ -235,12 +235,17 @@ class Likelihood:
         return np.asarray(out + sum(one.losses(e, count) for one in self.slow))
 
     def foretold(self, e: np.ndarray, other: "Likelihood") -> float:
-        """Negative logarithm of the likelihood of residuals under the noise that `other` rows showed, nats."""
+        """Negative logarithm of the likelihood of residuals under the noise that `other` rows showed, nats.
+
+        Its size is that of these rows where they are louder: a model that followed the other rows to the noise of the
+        sensor would else lose by each small error more than one that never came near.
+        """
         out = 0.0
         for (part, own), before in zip(self.cut(e), other.parts, strict=True):
             noises = [noise.averaged() for noise in before.noise]
-            white = whitened(noises, own, part.present)
-            out += sum(float(np.sum(surprise(r, n.sigma))) for n, r in zip(noises, white, strict=True))
+            for r, noise in zip(whitened(noises, own, part.present), noises, strict=True):
+                louder = max(float(np.sqrt(np.mean(r**2))), 1.0) if len(r) else 1.0
+                out += float(np.sum(surprise(r / louder, louder * noise.sigma * np.ones(len(r)))))
         return out
 
     @property

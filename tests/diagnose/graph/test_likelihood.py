@@ -2,7 +2,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from graph_cases import BELT, case_of, command, record
+from graph_cases import BELT, case_of, command, nothing, record
 
 from rtctl.diagnose.graph.likelihood import QUANTISED, RATE, Likelihood
 from rtctl.diagnose.graph.model import nominal, settings_of
@@ -88,3 +88,13 @@ def test_a_model_that_runs_away_is_explained_by_no_noise():
         lost = out.copy()
         lost[begin:] = np.nan
         assert like().loss(like().of_readings(lost)) > right + 1000.0
+
+
+def test_louder_rows_are_judged_by_their_own_size():
+    base = nothing().found.base
+    first, late = base.like.split(0.25)
+    before = first.noisy(first.raw(base.model))
+    e = late.raw(base.model)
+    one, ten = late.foretold(10.0 * e, before), late.foretold(100.0 * e, before)
+    assert ten - one == pytest.approx(late.noisy(e).size * np.log(10.0), rel=0.1)
+    assert late.foretold(e, before) < one
