@@ -12,15 +12,15 @@ from rtctl.config.fields import Shape, fill, put, written
 from rtctl.config.load import load_settings
 from rtctl.config.yaml_file import find
 from rtctl.diagnose.case import DAMPING, CascadeLaw, Case, NoLaw, PdLaw, SectionsLaw, believed
-from rtctl.diagnose.model import DIRECT, Model
+from rtctl.diagnose.model import Model
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import SUBSTEP
 
 FASTEST = 50e3  # Hz, of our loop
 MOST_SECTIONS = 4
 SENSING_OHM = 0.24  # of the ivu's driver, whose gain is ratio / R_S
 LDU_GAIN = 0.1  # A/V, of the ldu's amplifier
 MOST_BRIDGE_AMPERE = 2.5
+DIRECT = 20e3  # Hz, bandwidth of a drive of which the owner says nothing
 CAUTIOUS = 20.0  # ticks a radian of the loop that stands in for a law that nobody knows
 
 
@@ -111,7 +111,7 @@ def _ldu(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]
 def _axis(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]]:
     sensors, left = case.sensors, []
     pitch = 2 * np.pi / sensors.x_counts_per_rev if sensors.x_counts_per_rev else sensors.x_resolution_m
-    changes: dict[str, Any] = {"plant.substep": SUBSTEP["axis"]}
+    changes: dict[str, Any] = {}
     if pitch:
         changes["encoder.pitch"] = digits(pitch)
     if sensors.unit not in (None, "m"):

@@ -128,6 +128,24 @@ def read_model(path: Path | str, record: Record) -> Model:
     return Model(kind, base, tuple(plant.physics), of_case(record.case))
 
 
+def plant_section(model: Model) -> dict[str, Any]:
+    """Keys `parameters` and `physics` of a config's `plant`, plain data in SI, with every digit."""
+    base = _geared(model)
+    names = [name for name in PARAMETERS[model.kind].model_fields if name in base]
+    return {
+        "parameters": {name: base[name] for name in names},
+        "physics": [term.model_dump(mode="json") for term in model.terms],
+    }
+
+
+def _geared(model: Model) -> dict[str, float]:
+    """Parameters of a model, with the radii that make its gear ratio: the ratio is what the equations use."""
+    base = dict(model.base)
+    if model.kind == "ldu" and "N" in base and abs(base["R_t"] / base["R_s"] / base["N"] - 1.0) > 1e-9:
+        base["R_s"] = base["R_t"] / base["N"]
+    return base
+
+
 def _numbers(parameters: Settings) -> dict[str, float]:
     return {name: float(value) for name, value in parameters.model_dump().items()}
 
@@ -145,9 +163,7 @@ def _settings_data(model: Model, record: Record, config: dict[str, Any] | None) 
 
 def _parameters(model: Model) -> dict[str, float]:
     """All of them, so that no named set and no default of a later version speaks with them."""
-    base = dict(model.base)
-    if model.kind == "ldu" and "N" in base and abs(base["R_t"] / base["R_s"] / base["N"] - 1.0) > 1e-9:
-        base["R_s"] = base["R_t"] / base["N"]  # the gear ratio is what the equations use
+    base = _geared(model)
     fields = PARAMETERS[model.kind]
     absent = [name for name, field in fields.model_fields.items() if name not in base and _wanted(model.kind, name)]
     if absent:

@@ -4,17 +4,16 @@ import copy
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from known_records import SENSORS, at_rest, of_closed
 from threadpoolctl import threadpool_limits
 
 from rtctl.diagnose.case import read_case
-from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.record import Record, check
-from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -56,11 +55,6 @@ LDU_CASE: dict[str, Any] = {
     "reaches": {"parameter_tolerance": 0.15},
 }
 CASES = {"axis": CASE, "ivu": IVU_CASE, "ldu": LDU_CASE}
-SENSORS = {
-    "axis": ("x",),
-    "ivu": ("capstan_counts", "reel1_counts", "reel2_counts"),
-    "ldu": ("encoder_counts", "scale_counts"),
-}
 
 
 def command(n: int) -> np.ndarray:
@@ -72,27 +66,24 @@ def command(n: int) -> np.ndarray:
     return np.clip(0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t), 0.01, 0.09) - 0.01
 
 
-class Axis:
+class Axis(NamedTuple):
     """A recording of the axis, and the model that it was made with."""
 
-    def __init__(self, record: Record, model: Model, uncut: np.ndarray, sim: Simulator):
-        self.record, self.model, self.uncut, self.sim = record, model, uncut, sim
+    record: Record
+    model: Model
 
 
 def record_axis(*physics: dict[str, Any], seconds: float = SECONDS, step: float = STEP, **true: float) -> Axis:
-    """What the axis with `physics` in it does; `true` parameters differ from the owner's. `step` 0: it is not cut.
+    """What the axis with `physics` in it does; `true` parameters differ from the owner's.
 
     The law saw the reading before it was cut, so that the recorded command is taken as the input.
     """
     case, n = read_case(CASE, "."), round(RATE * seconds)
-    t, ref, zero = np.arange(n) / RATE, command(n), np.zeros(n)
-    empty = Record("axis", case, t, 1 / RATE, ref, zero, zero[:, None], {"x": zero}, {})
     model = owner_model(case).change(**true).add(*(TERMS[p["term"]].settings(**p) for p in physics))
-    out, volts, _ = Simulator(empty).everything(model, CLOSED)
-    x = np.round(out[:, 0] / step) * step if step else out[:, 0].copy()
-    columns = {"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": x}
-    record = check(columns, case._replace(controller_known=False))
-    return Axis(record, model, out[:, 0], Simulator(record))
+    made = of_closed(at_rest(case, n, command(n)), model)
+    x = np.round(made.y["x"] / step) * step
+    columns = {"t": made.t, "ref": made.ref, "w": made.w, "u": made.u[:, 0], "x": x}
+    return Axis(check(columns, case._replace(controller_known=False)), model)
 
 
 @pytest.fixture(scope="session")
@@ -134,19 +125,6 @@ def make_axis() -> Callable[..., Axis]:
 def plain(make_axis: Callable[..., Axis]) -> Axis:
     """An axis with nothing in it beyond the owner's equations, whose numbers the owner has wrong."""
     return make_axis(M=100.0, F_v=180.0, F_c=22.0)
-
-
-ASYMMETRY = {"term": "friction.asymmetry", "node": "carriage", "a": 0.25}
-RIVALS = (
-    "friction.asymmetry", "friction.coulomb", "friction.viscous", "friction.stribeck", "friction.load", "load.spring",
-    "drive.offset", "drive.deadband", "drive.gain_asymmetry", "timing.delay",
-)  # fmt: skip
-
-
-@pytest.fixture(scope="session")
-def tilted(make_axis: Callable[..., Axis]) -> Axis:
-    """An axis whose dry friction is larger one way than the other."""
-    return make_axis(ASYMMETRY, M=100.0, F_v=190.0)
 
 
 @pytest.fixture(scope="session")
@@ -219,20 +197,5 @@ def case_of():
                 place = place.setdefault(part, {})
             place[last] = value
         return case
-
-    return make
-
-
-@pytest.fixture(scope="module")
-def moved(blank):
-    """A record of each plant that moves to and fro, with the model of its owner."""
-
-    def make(kind):
-        rate = {"axis": 1000, "ivu": 500, "ldu": 10000}[kind]
-        t = np.arange(2 * rate) / rate
-        u = np.sin(2 * np.pi * t)
-        counts = {"axis": 0.05, "ivu": 5000.0, "ldu": 20000.0}[kind] * (1 - np.cos(2 * np.pi * t))
-        record = blank(kind, np.stack([u, 0.5 - u], axis=1) if kind == "ivu" else u, counts)
-        return record, owner_model(record.case).base
 
     return make

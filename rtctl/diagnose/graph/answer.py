@@ -16,14 +16,14 @@ from rtctl.diagnose.graph.fits import Fitted, curvature, half_widths, refit
 from rtctl.diagnose.graph.held import likelier, suits
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.likelihood import COUNTED, coarsened
+from rtctl.diagnose.graph.load import load
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import Heldout, predict
-from rtctl.diagnose.graph.record import GraphRecord, load_record
+from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.search import Found, Progress, search
 from rtctl.diagnose.graph.verdict import SURE, Verdict, verdict
 from rtctl.diagnose.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.plants.physics import TERMS
-from rtctl.trace.bundle import load_case
 
 WORSE = 1.0  # nats by which rows that no fit saw must be predicted worse, until a name is withdrawn: less is chance
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
@@ -127,16 +127,6 @@ def diagnose(*folders: Path | str, progress: Progress = lambda _: None) -> Graph
     Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
     """
     return diagnose_record(*map(load, folders), progress=progress)
-
-
-def load(folder: Path | str) -> GraphRecord:
-    """The record of a bundle of either exchange format. Raises as `diagnose`."""
-    if load_case(Path(folder)).get("plant") is None:
-        return load_record(folder)
-    from rtctl.diagnose.graph.known import graph_record
-    from rtctl.diagnose.record import load_record as load_known
-
-    return graph_record(load_known(folder))
 
 
 def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:

@@ -65,6 +65,7 @@ class Simulator:
             self.channels.remove(self.main)
         self.lead = round(self._rest() / record.dt)
         self.release = NEVER
+        self.begins: tuple[float, float] | None = None  # first position and speed of the main body in a free run
         self.ratios = self.moves(record.case.values)
         self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
 
@@ -175,6 +176,12 @@ class Simulator:
         """The same whose correction ends at `row`: a free run from there, from the state that the observer reached."""
         other = copy(self)
         other.release = row
+        return other
+
+    def beginning(self, position: float, speed: float) -> "Simulator":
+        """The same whose main body begins at a position, as its column shows it, and at a speed, SI."""
+        other = copy(self)
+        other.begins = (position, speed)
         return other
 
     def pushed(self, forces: np.ndarray) -> "Simulator":
