@@ -28,7 +28,7 @@ from rtctl.trace.bundle import Bundle
 
 FIRST = 20  # rows that the first position and speed are taken from
 ROUNDS = 3  # of that: the error of so few rows is all but linear in them
-STILL = 1.0  # steps of the main sensor by which a machine at rest may seem to move
+STILL = 5.0  # steps of the main sensor, of noise and vibration at rest
 COUNTS = "counts"  # unit of a counter's column
 
 
