@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from rtctl.diagnose.case import Case
+from rtctl.case.format1 import Case
 from rtctl.diagnose.graph import loop
 from rtctl.diagnose.graph.kernel import OPEN
 from rtctl.diagnose.graph.known import graph_record
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.record import COMMANDS, Record
+from rtctl.diagnose.record import Record, commands_of
 
 SENSORS = {
     "axis": ("x",),
@@ -21,7 +21,7 @@ SENSORS = {
 def at_rest(case: Case, n: int, ref: np.ndarray | None = None, u: np.ndarray | None = None, sensors=()) -> Record:
     """A record of n rows whose sensors stand still, with a reference (n,) and commands u (n, drives)."""
     dt, zero = 1.0 / float(case.sample_rate or 1.0), np.zeros(n)
-    volts = np.zeros((n, len(COMMANDS[case.plant]))) if u is None else u
+    volts = np.zeros((n, len(commands_of(case.plant)))) if u is None else u
     y = dict.fromkeys(sensors or SENSORS[case.plant], zero)
     return Record(case.plant, case, np.arange(n) * dt, dt, zero if ref is None else ref, zero, volts, y, {})
 

@@ -4,11 +4,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rtctl.case.format1 import Case, believed
+from rtctl.case.quantities import Quantities, of_case, quantities
 from rtctl.config.errors import UserError
-from rtctl.diagnose.case import Case, believed
-from rtctl.diagnose.quantities import Quantities, of_case, quantities
 from rtctl.diagnose.tacho import signed
 from rtctl.idiom import Settings
+from rtctl.machines.profile import FREE_UNITS
+from rtctl.machines.profiles import profile_of
 
 if TYPE_CHECKING:
     from rtctl.diagnose.record import Record
@@ -41,7 +43,7 @@ def owner_model(case: Case, record: "Record | None" = None) -> Model:
     Raises UserError where the record is to give both M and K of an axis: it shows only their ratio.
     """
     base = {k: v for k, v in believed(case).items() if v is not None}
-    if case.plant == "axis" and record is not None and not {"M", "K"} & set(base):
+    if profile_of(case.plant).has(FREE_UNITS) and record is not None and not {"M", "K"} & set(base):
         words = of_case(case).needed()
         raise UserError(
             f"{case.file}: neither parameters.M nor parameters.K is there, {words['M']} and {words['K']}; a recording "

@@ -16,9 +16,9 @@ from known_records import at_rest, closed
 from narrowed import only
 from rich.console import Console
 
+from rtctl.case.format1 import read_case
 from rtctl.cli import diagnose_console
 from rtctl.cli.main import main
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.folder import Outcome
 from rtctl.diagnose.model import owner_model
 from rtctl.plants.physics import TERMS

@@ -13,7 +13,7 @@ import yaml
 from known_records import at_rest, of_closed
 
 from rtctl import api
-from rtctl.diagnose.case import read_case
+from rtctl.case.format1 import read_case
 from rtctl.diagnose.export import write_model
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import load_record

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from known_records import at_rest, driven
 
+from rtctl.case.format1 import read_case
 from rtctl.config.errors import UserError
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.record import check
 from rtctl.plants.physics import TERMS

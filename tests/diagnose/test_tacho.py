@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from known_records import at_rest, driven
 
-from rtctl.diagnose.case import read_case
+from rtctl.case.format1 import read_case
 from rtctl.diagnose.graph.known import resolution
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.tacho import folded, noise, signed

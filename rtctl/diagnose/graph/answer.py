@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from rtctl.case.format2 import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
-from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.graph.clock import UNSTEADY
 from rtctl.diagnose.graph.experiment import Planned, left, planned
 from rtctl.diagnose.graph.fits import Fitted, curvature, half_widths, refit

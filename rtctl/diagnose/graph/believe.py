@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from rtctl.case.format2 import read_case
+from rtctl.case.quantities import of_case
 from rtctl.config.errors import UserError
 from rtctl.config.yaml_file import find
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.joint import check_same
 from rtctl.diagnose.graph.record import GraphRecord
-from rtctl.diagnose.quantities import of_case
 from rtctl.plants.graph.file import read_machine
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from rtctl import machines
+from rtctl.case.unsaid import measured_amplifier
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_paths
-from rtctl.diagnose.columns import measured_amplifier, through_amplifier
+from rtctl.diagnose.columns import through_amplifier
 from rtctl.diagnose.export import plant_section
 from rtctl.diagnose.graph.known import known_model
 from rtctl.diagnose.graph.model import nominal

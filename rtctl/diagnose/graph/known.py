@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.diagnose.case import Case
-from rtctl.diagnose.graph.case import OPEN_LOOP, GraphCase
+from rtctl.case.format1 import Case
+from rtctl.case.format2 import OPEN_LOOP, GraphCase
+from rtctl.case.quantities import of_case
 from rtctl.diagnose.graph.model import GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.law_params import per_unit
 from rtctl.diagnose.model import Model, owner_model
-from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.tacho import noise
 from rtctl.plants.graph.description import Description

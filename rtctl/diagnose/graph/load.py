@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+from rtctl.case.format1 import Case
+from rtctl.case.load import read_case
 from rtctl.diagnose import record as known
 from rtctl.diagnose.export import read_model
 from rtctl.diagnose.graph.believe import believing
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.known import graph_record
 from rtctl.diagnose.graph.record import GraphRecord, record_of
 from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
@@ -25,8 +26,9 @@ def of_bundle(bundle: Bundle, model: Path | str | None = None) -> GraphRecord:
 
     Raises as `load`, and UserError where the model is of another machine.
     """
-    if bundle.case.get("plant") is not None:
-        source = known.record_of(bundle)
+    case = read_case(bundle.case, bundle.folder)
+    if isinstance(case, Case):
+        source = known.record_of(bundle, case)
         return graph_record(source, None if model is None else read_model(model, source))
-    record = record_of(bundle.columns, read_case(bundle.case, bundle.folder), bundle.folder / PARQUET)
+    record = record_of(bundle.columns, case, bundle.folder / PARQUET)
     return record if model is None else believing(record, model)

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rtctl.case.format2 import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, rigid
 from rtctl.diagnose.graph.observer import DAMPED, SMOOTHED, Followed

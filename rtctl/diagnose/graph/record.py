@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rtctl.case.format2 import HELD_PROBLEMS, GraphCase
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.columns import unwrap
-from rtctl.diagnose.graph.case import HELD_PROBLEMS, GraphCase
 from rtctl.diagnose.graph.kinematic import followed
 from rtctl.diagnose.graph.model import GraphModel, rigid
 from rtctl.diagnose.record import Record

@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
+from rtctl.case.format2 import HELD_PROBLEMS
 from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import HELD_PROBLEMS
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths

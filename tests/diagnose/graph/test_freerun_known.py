@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from known_records import at_rest, closed, driven, of_closed
 
+from rtctl.case.format1 import read_case
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.graph import freerun
 from rtctl.diagnose.graph.believe import check_believed
 from rtctl.diagnose.graph.freerun import begin

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from graph_cases import BELT, PENDULUM, RATE, case_of, write_bundle
 
+from rtctl.case.format2 import read_case
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.load import load
 from rtctl.diagnose.graph.record import record_of
 
