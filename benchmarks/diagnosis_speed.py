@@ -20,9 +20,9 @@ from typing import Any
 
 from lateness import rtctl_command
 
-from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import load_record
-from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.graph.load import load
+from rtctl.diagnose.graph.model import nominal
+from rtctl.diagnose.graph.simulate import Simulator
 
 MACHINES = {
     "ivu": (60, 1.0, "rad", 3.0, "{term: friction.stribeck, node: motor1, F_s: 4.0e-3, v_s: 0.3}"),
@@ -54,7 +54,7 @@ def record(machine: str, plain: bool, folder: Path) -> Path:
 
 def one_simulation(sim: Simulator) -> float:
     """Seconds of the quickest of some simulations by the owner's model."""
-    model, times = owner_model(sim.case), []
+    model, times = nominal(sim.case), []
     for _ in range(TRIES):
         before = time.perf_counter()
         sim.run(model)
@@ -66,8 +66,8 @@ def diagnosed(machine: str, plain: bool) -> dict[str, Any]:
     """What it took, and what it found."""
     with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as name:
         bundle, out = record(machine, plain, Path(name)), Path(name) / "out"
-        sim = Simulator(load_record(bundle))
-        sim.run(owner_model(sim.case))  # compiles where needed
+        sim = Simulator(load(bundle))
+        sim.run(nominal(sim.case))  # compiles where needed
         quickest = one_simulation(sim)
         before = time.monotonic()
         command = (*rtctl_command(), "diagnose", str(bundle), "--no-report", "--out", str(out))

@@ -7,11 +7,8 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 FLOORS = (
     "cli", "scope", "terminal", "foxglove", "machine_report", "reproduce", "identify", "design", "diagnose", "daemon",
-    "trace", "loop", "machines", "own", "laws", "tick", "plants", "drivers", "config",
+    "trace", "case", "loop", "machines", "own", "laws", "tick", "plants", "drivers", "config",
 )  # fmt: skip
-UPWARDS = {  # module -> floor above it that it imports from: none may be added
-    "rtctl/trace/imports/case.py": {"diagnose"},  # names of exchange format 1, until its judge is gone
-}
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
@@ -41,4 +38,4 @@ def test_imports_point_down():
                 other = floor_of(tuple(module.split("."))) if module.startswith("rtctl.") else None
                 if other is not None and FLOORS.index(other) < FLOORS.index(own):
                     found.setdefault(path.relative_to(ROOT).as_posix(), set()).add(other)
-    assert found == UPWARDS
+    assert found == {}

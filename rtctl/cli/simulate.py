@@ -1,8 +1,7 @@
 """`rtctl simulate MODEL BUNDLE`: run any model against any recording and say how far apart they are."""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,7 +9,7 @@ from rtctl.cli import common
 from rtctl.cli.common import JsonOption
 
 if TYPE_CHECKING:
-    from rtctl.diagnose.measure import Comparison
+    from rtctl.diagnose.comparison import Comparison
 
 app = typer.Typer(add_completion=False)
 OWNER = "case"
@@ -56,15 +55,23 @@ def simulate(
 
       rtctl simulate case emps --closed-loop --skip 20 --json
     """
+    from rtctl.diagnose.graph.believe import check_believed
+    from rtctl.diagnose.graph.freerun import compare
+    from rtctl.diagnose.graph.load import of_bundle
+    from rtctl.diagnose.record import INPUT
     from rtctl.own.files import give
-    from rtctl.trace.bundle import load_case
+    from rtctl.trace.bundle import load_bundle
 
     give(own or ())
-    described = load_case(bundle).get("plant") is None
-    result, warnings = (_described if described else _known)(model, bundle, closed, skip)
+    whole = load_bundle(bundle)
+    record = of_bundle(whole, None if model == OWNER else model)
+    if model == OWNER:
+        check_believed(record)
+    result = compare(record, closed, skip, whole)
     if not json:
-        for warning in warnings:
-            typer.echo(f"note: {warning}", err=True)
+        for warning in record.case.warnings:
+            if not (result.closed and INPUT in warning):
+                typer.echo(f"note: {warning}", err=True)
     if plot is not None:
         _draw(result, plot)
     if json:
@@ -73,45 +80,10 @@ def simulate(
         typer.echo("\n".join(_table(result)))
 
 
-def _described(model: str, bundle: Path, closed: bool | None, skip: int) -> "tuple[Comparison, Sequence[str]]":
-    """The free run of a described machine, and what its case is warned of."""
-    from rtctl.diagnose.graph.freerun import believing, compare
-    from rtctl.diagnose.graph.record import load_record
-
-    record = load_record(bundle)
-    warnings = record.case.warnings
-    return compare(record if model == OWNER else believing(record, model), closed, skip), warnings
-
-
-def _known(model: str, bundle: Path, closed: bool | None, skip: int) -> "tuple[Comparison, Sequence[str]]":
-    """The same of a machine of exchange format 1."""
-    from rtctl.diagnose.kernel import CLOSED, OPEN
-    from rtctl.diagnose.measure import compare, default_mode
-    from rtctl.diagnose.record import INPUT, record_of
-    from rtctl.trace.bundle import load_bundle
-
-    whole = load_bundle(bundle)
-    record = record_of(whole)
-    mode = default_mode(record, whole) if closed is None else (CLOSED if closed else OPEN)
-    warnings = [warning for warning in record.case.warnings if mode == OPEN or INPUT not in warning]
-    return compare(record, _model(model, record), mode, skip, whole), warnings
-
-
-def _model(name: str, record: Any) -> Any:
-    from rtctl.diagnose.export import read_model
-    from rtctl.diagnose.model import owner_model
-
-    if name != OWNER:
-        return read_model(name, record)
-    return owner_model(record.case)
-
-
 def _table(result: "Comparison") -> list[str]:
-    from rtctl.diagnose.measure import NAMES
-
     width = max(map(len, result.channels)) + 2
     rows = len(result.t)
-    lines = [f"{NAMES[result.mode]}, {rows} rows" + (f", the first {result.skipped} skipped" if result.skipped else "")]
+    lines = [f"{result.mode}, {rows} rows" + (f", the first {result.skipped} skipped" if result.skipped else "")]
     lines.append(f"{'':{width}}{'rmse':>12} {'':8}{'nrmse':>10}")
     for name, channel in result.channels.items():
         lines.append(f"{name:{width}}{channel.rmse:12.6g} {channel.unit:8}{channel.nrmse:10.4g}")
@@ -122,7 +94,6 @@ def _draw(result: "Comparison", path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from rtctl.diagnose.measure import NAMES
     from rtctl.trace.plot import save
 
     count = len(result.channels)
@@ -143,6 +114,6 @@ def _draw(result: "Comparison", path: Path) -> None:
         for axes in (above, below):
             axes.grid(alpha=0.3)
     panels[0].legend(loc="upper left", fontsize=9, ncols=2)
-    panels[0].set_title(f"Free run, {NAMES[result.mode]}", loc="left", fontsize=12, fontweight="bold")
+    panels[0].set_title(f"Free run, {result.mode}", loc="left", fontsize=12, fontweight="bold")
     panels[-1].set_xlabel("time [s]")
     save(figure, path)

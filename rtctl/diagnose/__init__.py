@@ -3,11 +3,11 @@
 Any machine that is bodies and joints is diagnosed by what is in `graph`. What the files beside it are for:
 
     any machine       graph
-    the recording     record, columns, case, quantities (units, nouns), edges, tacho,
+    the recording     record, columns, edges, tacho,
                       hold (commands between samples)
-    its law           law (the compiled step), law_params, config_law (of our own recordings), unsaid (not in it)
-                      replayed (the recording's tick on its readings), emulate (the tick with a model as its plant)
-    the simulation    model, kernel, simulate, measure (how far is it off?)
+    its law           law (the compiled step), law_params
+                      replayed (the recording's tick on its readings)
+    the simulation    model, comparison (how far is it off?)
     a fit             space (what may move), fit
     what is asked     hints, forms (richer ones), turn
     the answer        diagnosis, words, numbers, figures, report, missing

@@ -35,13 +35,6 @@ def through_amplifier(u: np.ndarray) -> np.ndarray:
     return np.copysign(offset + np.maximum(np.abs(u) - knee, 0.0), u)
 
 
-def measured_amplifier(config: dict) -> bool:
-    """Whether the plant of our own `config` has the amplifier of 12.3."""
-    plant = config.get("plant")
-    amplifier = plant.get("amplifier") if isinstance(plant, dict) else None
-    return isinstance(amplifier, dict) and amplifier.get("kind") == "measured"
-
-
 def even_clock(t: np.ndarray, dt: float) -> np.ndarray:
     """Times (m,) s, `dt` apart, from the first to the last of the uneven times `t` (n,)."""
     return t[0] + dt * np.arange(int((t[-1] - t[0]) / dt + 1e-9) + 1)

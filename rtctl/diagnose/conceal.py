@@ -15,7 +15,9 @@ from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.config.load import set_path
 from rtctl.diagnose.ordinary import measure, use
-from rtctl.plants import ldu, physics
+from rtctl.machines.profile import SCALE
+from rtctl.machines.profiles import profile_of
+from rtctl.plants import physics
 from rtctl.plants.physics import TERMS, Draw
 
 TRIES = 100
@@ -79,6 +81,7 @@ def sized(name: str, node: str, config: Any, rng: np.random.Generator) -> dict[s
         entry[key] = words[rng.integers(len(words))]
     if "seed" in term.settings.model_fields:
         entry["seed"] = int(rng.integers(1, 1_000_000))
-    if "R_c" in term.settings.model_fields and config.kind == "ldu":
-        entry["R_c"] = ldu.parameters(config.plant).R_c
+    profile = profile_of(config.kind)
+    if "R_c" in term.settings.model_fields and profile.has(SCALE):
+        entry["R_c"] = profile.plant.parameters(config.plant).R_c
     return entry

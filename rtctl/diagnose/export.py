@@ -12,23 +12,23 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from rtctl.case.format1 import exchange_of
+from rtctl.case.quantities import of_case
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError
 from rtctl.config.fields import Shape, fill
 from rtctl.config.files import write_text
 from rtctl.config.load import load_settings, to_yaml
 from rtctl.config.yaml_file import find, load_yaml
-from rtctl.diagnose.carry import carried, digits
-from rtctl.diagnose.case import PARAMETERS
+from rtctl.diagnose.carry import carried
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 from rtctl.diagnose.turn import Turn
 from rtctl.idiom import Settings
+from rtctl.machines.exchange import digits
 from rtctl.own.files import ForeignError, OwnError, is_own, refuse_plant
 from rtctl.own.model import without_code
 from rtctl.own.term import texts
-from rtctl.plants import ivu, ldu
 from rtctl.plants.physics import TERMS
 
 WIDTH = 110
@@ -116,20 +116,18 @@ def read_model(path: Path | str, record: Record) -> Model:
         raise UserError(f"{path}: machine is {kind}, and the bundle was recorded on the {record.plant}")
     refuse_plant(data, f"{path}: ")
     plant = load_settings(file, machines.CONFIGS[kind], widen=machines.OWN_PLANT).plant
-    if kind == "ivu":
-        base = _numbers(ivu.parameters(plant))
-        if not plant.follow_tape:
-            base["d_tape"] = 0.0
-    elif kind == "ldu":
-        base = _numbers(ldu.parameters(plant))
-        base["N"] = base["R_t"] / base["R_s"]
-    else:
-        base = _numbers(plant.parameters)
+    base = exchange_of(kind).symbols(plant)
     return Model(kind, base, tuple(plant.physics), of_case(record.case))
 
 
-def _numbers(parameters: Settings) -> dict[str, float]:
-    return {name: float(value) for name, value in parameters.model_dump().items()}
+def plant_section(model: Model) -> dict[str, Any]:
+    """Keys `parameters` and `physics` of a config's `plant`, plain data in SI, with every digit."""
+    exchange = exchange_of(model.kind)
+    base = exchange.settings(model.base)
+    return {
+        "parameters": {name: base[name] for name in exchange.parameters.model_fields if name in base},
+        "physics": [term.model_dump(mode="json") for term in model.terms],
+    }
 
 
 def _settings_data(model: Model, record: Record, config: dict[str, Any] | None) -> tuple[dict[str, Any], list[str]]:
@@ -145,20 +143,14 @@ def _settings_data(model: Model, record: Record, config: dict[str, Any] | None) 
 
 def _parameters(model: Model) -> dict[str, float]:
     """All of them, so that no named set and no default of a later version speaks with them."""
-    base = dict(model.base)
-    if model.kind == "ldu" and "N" in base and abs(base["R_t"] / base["R_s"] / base["N"] - 1.0) > 1e-9:
-        base["R_s"] = base["R_t"] / base["N"]  # the gear ratio is what the equations use
-    fields = PARAMETERS[model.kind]
-    absent = [name for name, field in fields.model_fields.items() if name not in base and _wanted(model.kind, name)]
+    exchange = exchange_of(model.kind)
+    base, fields = exchange.settings(model.base), exchange.parameters
+    absent = [name for name, field in fields.model_fields.items() if name not in base and field.default]
     if absent:
         raise UserError(f"the model of the {model.kind} lacks {', '.join(absent)}; a fit or case.json should say it")
     values = {name: digits(base[name]) for name in fields.model_fields if name in base}
     _checked(values, fields, "parameters")
     return values
-
-
-def _wanted(kind: str, name: str) -> bool:
-    return (kind, name) not in (("ivu", "J_1"), ("ivu", "J_2"), ("axis", "k"))
 
 
 def entry_of(term: Settings) -> dict[str, Any]:

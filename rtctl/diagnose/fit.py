@@ -1,11 +1,6 @@
-"""Fits a model to a recording by the error of a simulation that follows it, within what the owner's values may miss.
+"""Steps of a fit by least squares: difference quotients, damped Gauss-Newton inside bounds, simulations side by side.
 
-The unknowns are x: the logarithm of each plant parameter over the owner's value, and each term's parameter by its own
-scale. Gauss-Newton with Levenberg damping inside bounds; a weak prior of the owner's tolerance keeps what the record
-does not show where the owner put it.
-
-Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10; Ljung, System Identification (1999), ch. 7 for the
-prediction error in closed loop.
+Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10.
 """
 
 from collections.abc import Callable, Sequence

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.case import MAX_SECTIONS
+from rtctl.case.laws import MAX_SECTIONS
 from rtctl.drivers import at_mio_16de, ldu_amplifier
 from rtctl.drivers.at_mio_16de import AnalogOutputParams
 from rtctl.drivers.ldu_amplifier import LduAmplifierParams

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rtctl.case.config_law import ConfigLaw
+from rtctl.case.format1 import Case, believed, exchange_of, machine_of
+from rtctl.case.laws import CascadeLaw, PdLaw, SectionsLaw
 from rtctl.diagnose import law
-from rtctl.diagnose.case import CascadeLaw, Case, PdLaw, SectionsLaw, believed
-from rtctl.diagnose.config_law import ConfigLaw
 from rtctl.diagnose.law import LawParams
 from rtctl.drivers import at_mio_16de, ldu_amplifier
 from rtctl.drivers.at_mio_16de import AnalogOutputParams
@@ -38,23 +39,27 @@ from rtctl.laws.reel_growth import ReelGrowthParams
 from rtctl.laws.shaper import ShaperParams
 from rtctl.laws.tension import TensionParams
 from rtctl.laws.velocity import VelocityParams, VelocitySettings
+from rtctl.machines.profile import AMPLIFIER, REELS
+from rtctl.machines.profiles import profile_of
 
 if TYPE_CHECKING:
     from rtctl.diagnose.record import Record
 
+TURN = 2 * np.pi  # rad
 LARGE = 1e9  # V, limit of a drive of which the owner says none
 
 
-def per_unit(case: Case) -> Any:
-    """Counts of each sensor a rad or m."""
-    s = case.sensors
-    turn = 2 * np.pi
-    if case.plant == "ivu":
-        reel = (s.reel_counts_per_rev or 209) / turn
-        return [(s.capstan_counts_per_rev or 10000) / turn, reel, reel]
-    if case.plant == "ldu":
-        return [(s.encoder_counts_per_rev or 20000) / turn, 1.0 / (s.scale_m_per_count or 0.5e-6)]
-    return [1.0]
+def per_unit(case: Case) -> list[float]:
+    """Counts of each counter a rad or m, those of the description where the case does not say them; 1 for a machine
+    without a counter."""
+    out = []
+    sensors = {sensor.column: sensor for sensor in machine_of(case.plant).sensors.values()}
+    for column, scale in exchange_of(case.plant).scales.items():
+        said = getattr(case.sensors, scale.key)
+        per_unit = sensors[column].counts_per_unit if said is None else said / TURN if scale.per_turn else 1.0 / said
+        assert per_unit is not None  # what counts has a scale in its description
+        out.append(float(per_unit))
+    return out or [1.0]
 
 
 def law_params(record: "Record") -> LawParams:
@@ -159,8 +164,8 @@ def _of_format(c: Any, case: Case, dt: float) -> LawParams:
             allocation=allocation.build(AllocationSettings(kind=c.allocation), dt),
         )  # fmt: skip
     if isinstance(c, SectionsLaw):
-        radius = believed(case)["R_c"] if case.plant == "ldu" else 1.0
-        return _with_sections(p._replace(to_unit=p.to_unit * radius), c.sections)
+        radius = exchange_of(case.plant).radius
+        return _with_sections(p._replace(to_unit=p.to_unit * (believed(case)[radius] if radius else 1.0)), c.sections)
     if isinstance(c, CascadeLaw):
         return p._replace(kind=law.PI_VELOCITY, two_tap=1, pi_velocity=PiVelocityParams(c.kp * c.kv, 0.0, c.kv, 0.0))
     return p
@@ -177,7 +182,10 @@ def _of_config(config: Any, record: "Record") -> LawParams:
     """The law of one of our own machines."""
     case, dt = record.case, record.dt
     p = of_settings(plain(case, dt), config.law, dt)._replace(rounds=law.BOARD)
-    return {"ivu": _ivu, "ldu": _ldu, "axis": _axis}[config.machine](p, config, record)
+    profile = profile_of(config.kind)
+    if profile.has(REELS):
+        return _with_tape(p, config, record)
+    return _amplified(p, config, dt) if profile.has(AMPLIFIER) else _plain(p, config, dt)
 
 
 def of_settings(p: LawParams, settings: Any, dt: float) -> LawParams:
@@ -198,12 +206,14 @@ def _position(p: LawParams, settings: Any, dt: float) -> LawParams:
     return p._replace(kind=law.PD, pd=pd.build(position, dt))
 
 
-def _axis(p: LawParams, config: Any, record: "Record") -> LawParams:
-    return p._replace(resolution=config.encoder.pitch, output=at_mio_16de.build_output(config.output, record.dt))
+def _plain(p: LawParams, config: Any, dt: float) -> LawParams:
+    """Of one drive that takes volts."""
+    return p._replace(resolution=config.encoder.pitch, output=at_mio_16de.build_output(config.output, dt))
 
 
-def _ldu(p: LawParams, config: Any, record: "Record") -> LawParams:
-    output, friction = at_mio_16de.build_output(config.board.output, record.dt), config.law.friction
+def _amplified(p: LawParams, config: Any, dt: float) -> LawParams:
+    """Of one drive behind an amplifier with a direction bit."""
+    output, friction = at_mio_16de.build_output(config.board.output, dt), config.law.friction
     return p._replace(
         to_unit=p.to_unit * config.sensors.R_c,
         resolution=1.0,
@@ -211,12 +221,13 @@ def _ldu(p: LawParams, config: Any, record: "Record") -> LawParams:
         friction1=FrictionFeedforwardParams(friction.F_c / friction.newton_per_volt),
         computed_torque=config.law.inertia.volts,
         output=output,
-        amplifier=ldu_amplifier.build(config.amplifier, record.dt, output.volts_per_code),
+        amplifier=ldu_amplifier.build(config.amplifier, dt, output.volts_per_code),
         rounds=law.AMPLIFIER,
     )
 
 
-def _ivu(p: LawParams, config: Any, record: "Record") -> LawParams:
+def _with_tape(p: LawParams, config: Any, record: "Record") -> LawParams:
+    """Of two motors that pull at a tape."""
     settings, dt, radius = config.law, record.dt, config.radius
     R1, R2 = (float(record.columns[n][0]) if n in record.columns else getattr(radius, n) for n in ("R1", "R2"))
     return p._replace(

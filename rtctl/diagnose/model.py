@@ -1,26 +1,19 @@
 """A machine as somebody believes it: parameters of the plant's equations, and terms of physics on top of them."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rtctl.case.format1 import Case, believed
+from rtctl.case.quantities import Quantities, of_case, quantities
 from rtctl.config.errors import UserError
-from rtctl.diagnose.case import DAMPING, Case, believed
-from rtctl.diagnose.quantities import Quantities, of_case, quantities
 from rtctl.diagnose.tacho import signed
 from rtctl.idiom import Settings
-from rtctl.plants import axis, ivu, ldu
+from rtctl.machines.profile import FREE_UNITS
+from rtctl.machines.profiles import profile_of
 
 if TYPE_CHECKING:
     from rtctl.diagnose.record import Record
-
-DIRECT = 20e3  # Hz: bandwidth of a drive of which the owner says nothing
-
-DRY = {  # parameter that the dry friction of a node is, or comes from
-    "ivu": {"motor1": "tau_F1", "motor2": "tau_F2", "capstan": "tau_Fc"},
-    "ldu": {"capstan": "F_c", "carriage": "F_c"},
-    "axis": {"carriage": "F_c"},
-}
 
 
 class Model(NamedTuple):
@@ -50,7 +43,7 @@ def owner_model(case: Case, record: "Record | None" = None) -> Model:
     Raises UserError where the record is to give both M and K of an axis: it shows only their ratio.
     """
     base = {k: v for k, v in believed(case).items() if v is not None}
-    if case.plant == "axis" and record is not None and not {"M", "K"} & set(base):
+    if profile_of(case.plant).has(FREE_UNITS) and record is not None and not {"M", "K"} & set(base):
         words = of_case(case).needed()
         raise UserError(
             f"{case.file}: neither parameters.M nor parameters.K is there, {words['M']} and {words['K']}; a recording "
@@ -86,30 +79,3 @@ def guess(record: "Record", base: dict[str, float]) -> dict[str, float]:
     A, b = np.concatenate([A.real, A.imag]) / size, np.concatenate([u.real, u.imag])
     k, F_v, M = np.linalg.lstsq(A, b, rcond=None)[0] / size
     return {"M": abs(M), "F_v": max(F_v, 1e-3 * abs(M) * np.sqrt(abs(k / M))), "k": max(k, 0.0)}
-
-
-def dry_friction(kind: str, base: dict[str, float], node: str) -> float:
-    """Dry friction that a plant's parameters give a node, Nm or N; 0 where its equations have none."""
-    dry = base.get(DRY[kind].get(node, ""), 0.0)
-    return dry * base.get("R_c", 1.0) if (kind, node) == ("ldu", "capstan") else dry
-
-
-def plant_params(model: Model, case: Case, h: float) -> Any:
-    """The plant's params for substeps of `h` s, as its `build` would make them but without checking settings anew.
-
-    Raises UserError where an axis has no mass, or no force for its command.
-    """
-    base = model.base
-    if model.kind == "axis":
-        for name, words in model.units.needed().items():
-            if not base.get(name):
-                raise UserError(
-                    f"{case.file}: parameters.{name} is missing, {words}; without it there is no belief to simulate, "
-                    "only a model that was fitted"
-                )
-        return axis.params(base, h)
-    w = 2 * np.pi * (case.drive.bandwidth_hz or DIRECT)
-    zeta = case.drive.damping or DAMPING
-    if model.kind == "ldu":
-        return ldu.params(base, h, (w, zeta))
-    return ivu.params(base, h, [(gain, w, zeta, 0.0) for gain in case.drive.amp_per_volt])

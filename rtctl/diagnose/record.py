@@ -9,29 +9,30 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.case.config_law import ConfigLaw
+from rtctl.case.format1 import Case, exchange_of, machine_of, read_case
+from rtctl.case.laws import KNOWN_LAWS
+from rtctl.case.quantities import of_case
+from rtctl.case.unsaid import measured_amplifier
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose import law
-from rtctl.diagnose.case import KNOWN_LAWS, Case, read_case
 from rtctl.diagnose.columns import (
     armed,
     even_clock,
     is_counter,
     laid,
-    measured_amplifier,
     running,
     through_amplifier,
     unwrap,
     unwrap_turns,
 )
-from rtctl.diagnose.config_law import ConfigLaw
 from rtctl.diagnose.law_params import law_params, law_state, written
-from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.replayed import LawReplay, replayed_law
+from rtctl.machines.profile import FREE_UNITS
+from rtctl.machines.profiles import profile_of
 from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
-COMMANDS = {"ivu": ("u1", "u2"), "ldu": ("u",), "axis": ("u",)}
-READINGS = {"ivu": ("capstan_counts", "reel1_counts", "reel2_counts"), "ldu": ("encoder_counts",), "axis": ()}
 COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
 INPUT = "the recorded command is taken as the input"
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
@@ -65,7 +66,12 @@ class Record(NamedTuple):
     @property
     def commands(self) -> tuple[str, ...]:
         """Names of the columns of u."""
-        return COMMANDS[self.plant]
+        return commands_of(self.plant)
+
+
+def commands_of(plant: str) -> tuple[str, ...]:
+    """Columns of the commands of a kind of machine, in the order of its drives."""
+    return tuple(drive.column for drive in machine_of(plant).drives.values())
 
 
 class Agreement(NamedTuple):
@@ -92,12 +98,12 @@ def load_record(folder: Path | str) -> Record:
     Raises UserError (exit 2) that names file, column and row and says what would be right, NoAnswer (exit 3) where
     the recording supports no verdict.
     """
-    return record_of(load_bundle(folder))
+    bundle = load_bundle(folder)
+    return record_of(bundle, read_case(bundle.case, bundle.folder))
 
 
-def record_of(bundle: Bundle) -> Record:
+def record_of(bundle: Bundle, case: Case) -> Record:
     """Check a bundle that is read already, as `load_record` does."""
-    case = read_case(bundle.case, bundle.folder)
     columns, earlier = bundle.columns, None
     if isinstance(bundle.case.get("config"), dict) and "state" in columns:
         rows = running(columns["state"])
@@ -107,8 +113,8 @@ def record_of(bundle: Bundle) -> Record:
         before = armed(columns["state"], rows.start)
         earlier = {name: values[before] for name, values in columns.items()}
         columns = {name: values[rows] for name, values in columns.items()}
-        if case.plant == "ldu" and "u" in columns and measured_amplifier(bundle.case["config"]):
-            columns["u"] = through_amplifier(columns["u"])
+        if measured_amplifier(bundle.case["config"]):
+            columns |= {name: through_amplifier(columns[name]) for name in commands_of(case.plant) if name in columns}
     return check(columns, case, bundle.folder, bundle, earlier)
 
 
@@ -130,7 +136,7 @@ def check(
             "recording, without a tolerance"
         )
     t = _column(path, columns, "t", "s, clock at the tick")
-    u = np.column_stack([_command(path, columns, case, name) for name in COMMANDS[case.plant]])
+    u = np.column_stack([_command(path, columns, case, name) for name in commands_of(case.plant)])
     ref = _column(path, columns, "ref", "position reference", missing=not case.controller_known)
     w = _column(path, columns, "w", "V, excitation, 0 where there is none")
     raw = _readings(path, columns, case, warnings)
@@ -225,30 +231,36 @@ def _command(path: Path, columns: dict, case: Case, name: str) -> np.ndarray:
 
 
 def _readings(path: Path, columns: dict, case: Case, warnings: list[str]) -> dict[str, np.ndarray]:
-    raw = {name: _column(path, columns, name, "counts") for name in READINGS[case.plant]}
-    if case.plant == "ldu":
-        if "scale_counts" in columns:
-            raw["scale_counts"] = _column(path, columns, "scale_counts", "counts")
-            if case.sensors.scale_m_per_count is None:
-                raise UserError(
-                    f"{path.parent / 'case.json'}: sensors.scale_m_per_count is missing where the recording has "
-                    "scale_counts; it should say the metres for a count, such as 5e-07"
-                )
-        elif case.sensors.scale_m_per_count is not None:
-            warnings.append(f"{path} has no column 'scale_counts', which sensors.scale_m_per_count speaks of")
-    if case.plant == "axis":
-        names = [name for name in (case.sensors.column, "x", "speed") if name is not None and name in columns]
-        if not names:
-            raise UserError(f"{path} has no column 'x' (m, measured position) and no column 'speed'")
-        key = "speed" if names[0] == "speed" else "x"
-        raw[key] = _column(path, columns, names[0], "measured position")
-        if key == "x" and COUNTED in columns and case.sensors.x_resolution_m:
-            raw[key] = raw[key] + 0.5 * case.sensors.x_resolution_m  # a count stands for all that lies up to the next
-    wanted = {"ivu": ("capstan_counts_per_rev", "reel_counts_per_rev"), "ldu": ("encoder_counts_per_rev",), "axis": ()}
-    for key in wanted[case.plant]:
-        if getattr(case.sensors, key) is None:
-            raise UserError(f"{path.parent / 'case.json'}: sensors.{key} is missing; it turns counts into an angle")
+    """Columns (n,) of the sensors: counters that the case scales, or the one position or speed of a machine that has
+    none."""
+    if profile_of(case.plant).has(FREE_UNITS):
+        return _measured(path, columns, case)
+    raw = {}
+    for name, scale in exchange_of(case.plant).scales.items():
+        said = getattr(case.sensors, scale.key)
+        if name not in columns and scale.optional:
+            warnings += [f"{path} has no column '{name}', which sensors.{scale.key} speaks of"] if said else []
+            continue
+        raw[name] = _column(path, columns, name, "counts")
+        if said is None:
+            what = (
+                "is missing; it turns counts into an angle" if scale.per_turn
+                else f"is missing where the recording has {name}; it should say the metres for a count, such as 5e-07"
+            )  # fmt: skip
+            raise UserError(f"{path.parent / 'case.json'}: sensors.{scale.key} {what}")
     return raw
+
+
+def _measured(path: Path, columns: dict, case: Case) -> dict[str, np.ndarray]:
+    """The position, of a counter the middle of a count, or the speed."""
+    names = [name for name in (case.sensors.column, "x", "speed") if name is not None and name in columns]
+    if not names:
+        raise UserError(f"{path} has no column 'x' (m, measured position) and no column 'speed'")
+    key = "speed" if names[0] == "speed" else "x"
+    values = _column(path, columns, names[0], "measured position")
+    if key == "x" and COUNTED in columns and case.sensors.x_resolution_m:
+        values = values + 0.5 * case.sensors.x_resolution_m  # a count stands for all that lies up to the next
+    return {key: values}
 
 
 def _clock(path: Path, t: np.ndarray, case: Case, warnings: list[str]) -> tuple[np.ndarray, float]:
@@ -276,7 +288,7 @@ def _supports(
     if seconds < 0.999 * LEAST_SECONDS:
         raise NoAnswer(f"{path} lasts {seconds:.3g} s; it supports no verdict, which needs {LEAST_SECONDS:g} s")
     if not np.ptp(u, axis=0).any():
-        names = " and ".join(f"'{name}'" for name in COMMANDS[case.plant])
+        names = " and ".join(f"'{name}'" for name in commands_of(case.plant))
         raise NoAnswer(f"{path}: {names} never changes; the machine was not driven, so it supports no verdict")
     for k, (name, values) in enumerate(y.items()):
         if np.ptp(values) == 0.0:

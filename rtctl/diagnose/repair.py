@@ -14,10 +14,11 @@ from rtctl.config.load import set_path
 from rtctl.diagnose import played
 from rtctl.diagnose.graph.answer import GraphDiagnosis, diagnose
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.ordinary import USE
+from rtctl.diagnose.ordinary import duty_of
+from rtctl.machines.duty import Duty
+from rtctl.machines.profiles import profile_of
 
-LENGTH = {"ivu": 25.0, "ldu": 10.0, "axis": 25.0}  # s, of a recording
-OTHERS = 25.0  # s, of a recording of any other machine
+LENGTH = 25.0  # s, of a recording of a machine that declares none
 RECORDING, SECOND = "recording", "experiment"  # bundles in the folder of a repair
 NEGLIGIBLE = 1e-4  # share of a value below which it has not changed
 LEGS = (  # (share of the travel, share of the speed): far and fast, and at a crawl where friction shows itself
@@ -60,21 +61,21 @@ def ready(config: Any, mode: str | None = None) -> Any:
             f"{config.name}: it has no reference, and how far a machine may be moved is its owner's to say; "
             "name one with --reference FILE"
         )
-    if config.kind not in USE:
+    if profile_of(config.kind).duty is None:
         raise UserError(
             f"{config.name}: it has no reference, and a description does not say how far its machine moves; name one "
             "with --reference FILE, or write `reference:` into the config"
         )
-    return set_path(config, "reference", ordinary_reference(config.kind))
+    return set_path(config, "reference", ordinary_reference(duty_of(config)))
 
 
-def ordinary_reference(kind: str) -> dict[str, Any]:
+def ordinary_reference(duty: Duty) -> dict[str, Any]:
     """To and fro at several speeds with rests in between, within what the machine is used to and the usual recording;
     rad or m, and s."""
-    speed, travel, _ = USE[kind]
+    speed, travel = duty.speed, duty.travel
     shares = [0.0, *(share for share, _ in LEGS)]
     moving = sum(abs(b - a) / pace for (a, b), (_, pace) in zip(pairwise(shares), LEGS, strict=True)) * travel / speed
-    travel *= min(1.0, (LENGTH[kind] - DWELL * (len(LEGS) + 1)) / moving)
+    travel *= min(1.0, (duty.recording - DWELL * (len(LEGS) + 1)) / moving)
     steps, t, at = [], DWELL, 0.0
     for share, pace in LEGS:
         to, rate = share * travel, pace * speed
@@ -82,6 +83,12 @@ def ordinary_reference(kind: str) -> dict[str, Any]:
         t += abs(to - at) / rate + DWELL
         at = to
     return {"steps": steps, "repeat": round(t, 3)}
+
+
+def length_of(config: Any) -> float:
+    """Usual length of a recording, s."""
+    duty = profile_of(config.kind).duty
+    return LENGTH if duty is None else duty.recording
 
 
 def repair(
@@ -99,7 +106,7 @@ def repair(
     diagnosis.
     """
     run_ = record or run
-    seconds = LENGTH.get(config.kind, OTHERS) if length is None else length
+    seconds = length_of(config) if length is None else length
     bundle = out / RECORDING
     progress(f"recording {seconds:g} s")
     trips = [run_(config, bundle, seconds)["tripped"] or ""]

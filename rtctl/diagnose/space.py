@@ -11,14 +11,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import qmc
 
 from rtctl.idiom import Settings
 from rtctl.plants.physics import TERMS
 
 PRIOR = 0.7  # of the tolerance: standard deviation of the owner's error, between uniform and certain
 WIDE = 7.0  # in logarithm, of a parameter of which the owner knows nothing
-INSIDE = 0.9  # of the bounds: places to start from
 SIZE, INVERSE, SHAPE, COSINE, SINE, PLACE = "size", "inverse", "shape", "cosine", "sine", "place"
 REST = "rest"
 SOFTEST = 1e-6  # of its typical size: least stiffness by which a place of rest is told
@@ -105,7 +103,7 @@ def _defaults(term: str) -> dict[str, Any]:
 class Space(NamedTuple):
     """A model with all that may move in it."""
 
-    owner: Any  # the nominal model: of a plant (model.py) or of a described machine (graph/model.py)
+    owner: Any  # the nominal model (graph/model.py)
     names: tuple[str, ...]  # plant parameters
     tolerance: Callable[[str], float]
     hypotheses: tuple[Hypothesis, ...] = ()
@@ -139,10 +137,6 @@ class Space(NamedTuple):
         at = self.nb + sum(len(h.coordinates) for h in self.hypotheses[:index])
         return np.arange(at, at + len(self.hypotheses[index].coordinates))
 
-    def labels(self) -> list[str]:
-        """A name for each coordinate."""
-        return [*self.names, *(f"{h.name}.{c.name}" for h in self.hypotheses for c in h.coordinates)]
-
     def start(self) -> np.ndarray:
         """The owner's values, and nothing of any effect."""
         return np.concatenate([np.zeros(self.nb), *(h.start() for h in self.hypotheses)])
@@ -158,18 +152,6 @@ class Space(NamedTuple):
             low += [c.low for c in h.coordinates]
             high += [c.high for c in h.coordinates]
         return np.array(low, float), np.array(high, float)
-
-    def spread(self, count: int) -> np.ndarray:
-        """Places (count, unknowns) all over the bounds, which are finite; the same every time.
-
-        Source: Sobol, USSR Computational Mathematics and Mathematical Physics 7 (1967).
-        """
-        low, high = self.bounds()
-        return INSIDE * (low + (high - low) * qmc.Sobol(len(low), seed=0).random(count))
-
-    def reach(self) -> np.ndarray:
-        """How far each plant parameter may go, in logarithm."""
-        return np.array([min(self.tolerance(name), WIDE) for name in self.names])
 
     def prior(self) -> np.ndarray:
         """Weight of x^2 in the cost: the owner's values count for what they are worth, an effect is free."""

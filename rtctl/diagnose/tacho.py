@@ -10,13 +10,8 @@ Source: Ljung, System Identification (1999), 10.3 for high-order ARX models; Hol
 iteratively reweighted least-squares, Communications in Statistics A6 (1977), for the weights.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.signal import lfilter
-
-if TYPE_CHECKING:
-    pass
 
 ORDER = 8  # rows of the past
 ROUNDS = 15

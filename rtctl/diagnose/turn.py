@@ -19,9 +19,9 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.stats import t as student
 
+from rtctl.case.quantities import of_case
 from rtctl.diagnose.hints import peaks, spectrum
 from rtctl.diagnose.model import Model
-from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
 
 PLACES = 360  # over the turn
@@ -83,7 +83,7 @@ def over_turn(record: Record, model: Model) -> Turn | None:
 
 def turns(record: Record) -> bool:
     """Whether it is of an axis that turns and shows its angle."""
-    return record.plant == "axis" and of_case(record.case).rotary and "x" in record.y
+    return of_case(record.case).rotary and "x" in record.y
 
 
 def missing(record: Record, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -5,6 +5,8 @@ from typing import Any
 from rtctl.drivers import at_mio_16de, daq_stc, linear_scale
 from rtctl.drivers.board import Wiring
 from rtctl.machines import axis
+from rtctl.machines.axis_duty import DUTY
+from rtctl.machines.axis_exchange import EXCHANGE
 from rtctl.machines.base import Block
 from rtctl.machines.profile import FREE_UNITS, Columns, Model, OwnBlocks, Profile, Range, Terminal, Terminals
 from rtctl.machines.told import given, position, unit_row
@@ -69,4 +71,6 @@ PROFILE = Profile(
     wiring=lambda config: Wiring((config.output,), (), counters=1),
     own=own,
     case=case,
+    exchange=EXCHANGE,
+    duty=DUTY,
 )  # fmt: skip

@@ -10,6 +10,8 @@ from rtctl.drivers.board import Wiring
 from rtctl.laws import allocation
 from rtctl.machines import ivu, ivu_plant
 from rtctl.machines.base import Block
+from rtctl.machines.ivu_duty import DUTY
+from rtctl.machines.ivu_exchange import EXCHANGE
 from rtctl.machines.profile import (
     REELS,
     Columns,
@@ -207,4 +209,6 @@ PROFILE = Profile(
     wiring=wiring,
     own=own,
     case=case,
+    exchange=EXCHANGE,
+    duty=DUTY,
 )  # fmt: skip

@@ -8,6 +8,8 @@ from rtctl.drivers import at_mio_16de, daq_stc, ldu_amplifier, linear_scale, ls7
 from rtctl.drivers.board import Wiring
 from rtctl.machines import ldu, ldu_plant
 from rtctl.machines.base import Block
+from rtctl.machines.ldu_duty import DUTY
+from rtctl.machines.ldu_exchange import EXCHANGE
 from rtctl.machines.profile import (
     AMPLIFIER,
     SCALE,
@@ -160,4 +162,6 @@ PROFILE = Profile(
     wiring=lambda config: Wiring((config.board.output,), (), counters=2, lines=(config.board.direction_line,)),
     own=own,
     case=case,
+    exchange=EXCHANGE,
+    duty=DUTY,
 )  # fmt: skip

@@ -12,6 +12,8 @@ import numpy as np
 
 from rtctl.drivers.board import Wiring
 from rtctl.machines.base import Block, Column
+from rtctl.machines.duty import Duty
+from rtctl.machines.exchange import Exchange
 
 REELS = "reels"  # a motor at either end winds tape on a reel; the tape turns a capstan with an encoder
 SCALE = "scale"  # a carriage has a linear scale beside the encoder of what drives it
@@ -149,6 +151,8 @@ class Profile(NamedTuple):
     wiring: Callable[[Any], Wiring] | None = None
     own: Callable[[Any, float, int], OwnBlocks] | None = None  # config, substep in s, seed
     case: Callable[[Any], dict[str, Any]] | None = None  # config -> keys of case.json
+    exchange: Exchange | None = None  # of recordings of exchange format 1
+    duty: Duty | None = None  # in ordinary use
 
     def has(self, trait: str) -> bool:
         """Whether the machine has a trait."""

@@ -96,7 +96,7 @@ def test_no_code_is_taken_from_a_bundle(rtctl, mine, tmp_path, monkeypatch):
     assert code == 2 and "no such file" in err
 
     def reached(folder, *_):
-        from rtctl.diagnose.graph.case import read_case
+        from rtctl.case.format2 import read_case
 
         case = read_case(json.loads((folder / "case.json").read_text()), folder)
         raise UserError(f"{case.layout.nq} coordinates")

@@ -12,17 +12,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from known_records import at_rest, closed
 from narrowed import only
 from rich.console import Console
 
+from rtctl.case.format1 import read_case
 from rtctl.cli import diagnose_console
 from rtctl.cli.main import main
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.folder import Outcome
-from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import save_case
 
@@ -48,9 +46,8 @@ def record_into(folder, n=5000):
     case = read_case(CASE, folder)
     t, zero = np.arange(n) * 1e-3, np.zeros(n)
     ref = 0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t)
-    empty = Record("axis", case, t, 1e-3, ref, zero, zero[:, None], {"x": zero}, {})
-    out, volts, _ = Simulator(empty).everything(owner_model(case).add(SPRING), CLOSED)
-    x = np.round(out[:, 0] / STEP) * STEP
+    y, volts = closed(at_rest(case, n, ref), owner_model(case).add(SPRING))
+    x = np.round(y["x"] / STEP) * STEP
     pq.write_table(pa.table({"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": x}), folder / "recording.parquet")
     save_case(folder, {**CASE, "controller_known": False})
     return folder

@@ -10,14 +10,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from known_records import at_rest, of_closed
 
 from rtctl import api
-from rtctl.diagnose.case import read_case
+from rtctl.case.format1 import read_case
 from rtctl.diagnose.export import write_model
-from rtctl.diagnose.kernel import CLOSED
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import Record, load_record
-from rtctl.diagnose.simulate import Simulator
+from rtctl.diagnose.record import load_record
 from rtctl.own import files
 from rtctl.own import model as own_model
 from rtctl.plants.physics import TERMS
@@ -45,11 +44,9 @@ def bundle(tmp_path_factory):
     """A machine with a spring that its owner does not know of."""
     folder = tmp_path_factory.mktemp("bundle")
     case, n = read_case(CASE, folder), 4000
-    t, zero = np.arange(n) * 1e-3, np.zeros(n)
-    ref = 0.1 * (1 - np.cos(2 * np.pi * t))
-    empty = Record("axis", case, t, 1e-3, ref, zero, zero[:, None], {"x": zero}, {})
-    out, volts, _ = Simulator(empty).everything(owner_model(case).add(SPRING), CLOSED)
-    columns = {"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": out[:, 0]}
+    ref = 0.1 * (1 - np.cos(2 * np.pi * np.arange(n) * 1e-3))
+    made = of_closed(at_rest(case, n, ref), owner_model(case).add(SPRING))
+    columns = {"t": made.t, "ref": ref, "w": made.w, "u": made.u[:, 0], "x": made.y["x"]}
     pq.write_table(pa.table(columns), folder / "recording.parquet")
     save_case(folder, CASE)
     return folder
@@ -228,7 +225,7 @@ def test_a_described_machine(rtctl, tmp_path):
         code, out, _ = rtctl("simulate", model, tmp_path, "--json")
         assert code == 0
         found.append(json.loads(out))
-    assert found[0]["unit"] == {"encoder": "rad"} and found[0]["skipped"] > 0
+    assert found[0]["unit"] == {"encoder": "rad"} and found[0]["skipped"] == 0
     assert found[0]["nrmse"]["encoder"] < 0.01 < 0.1 < found[1]["nrmse"]["encoder"]
     code, _, err = rtctl("simulate", "case", tmp_path, "--closed-loop")
     assert code == 2 and "law is not known" in err

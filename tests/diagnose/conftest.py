@@ -1,20 +1,18 @@
 """What tests of the diagnosis share: recordings of an axis, made by the simulator itself and cut into its steps."""
 
-import copy
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from known_records import SENSORS, at_rest, of_closed
 from threadpoolctl import threadpool_limits
 
-from rtctl.diagnose.case import read_case
-from rtctl.diagnose.kernel import CLOSED
+from rtctl.case.format1 import read_case
 from rtctl.diagnose.model import Model, owner_model
 from rtctl.diagnose.record import Record, check
-from rtctl.diagnose.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -56,11 +54,6 @@ LDU_CASE: dict[str, Any] = {
     "reaches": {"parameter_tolerance": 0.15},
 }
 CASES = {"axis": CASE, "ivu": IVU_CASE, "ldu": LDU_CASE}
-SENSORS = {
-    "axis": ("x",),
-    "ivu": ("capstan_counts", "reel1_counts", "reel2_counts"),
-    "ldu": ("encoder_counts", "scale_counts"),
-}
 
 
 def command(n: int) -> np.ndarray:
@@ -72,27 +65,24 @@ def command(n: int) -> np.ndarray:
     return np.clip(0.05 * (1 - np.cos(2 * np.pi * 0.4 * t)) + 0.01 * np.sin(2 * np.pi * 1.3 * t), 0.01, 0.09) - 0.01
 
 
-class Axis:
+class Axis(NamedTuple):
     """A recording of the axis, and the model that it was made with."""
 
-    def __init__(self, record: Record, model: Model, uncut: np.ndarray, sim: Simulator):
-        self.record, self.model, self.uncut, self.sim = record, model, uncut, sim
+    record: Record
+    model: Model
 
 
 def record_axis(*physics: dict[str, Any], seconds: float = SECONDS, step: float = STEP, **true: float) -> Axis:
-    """What the axis with `physics` in it does; `true` parameters differ from the owner's. `step` 0: it is not cut.
+    """What the axis with `physics` in it does; `true` parameters differ from the owner's.
 
     The law saw the reading before it was cut, so that the recorded command is taken as the input.
     """
     case, n = read_case(CASE, "."), round(RATE * seconds)
-    t, ref, zero = np.arange(n) / RATE, command(n), np.zeros(n)
-    empty = Record("axis", case, t, 1 / RATE, ref, zero, zero[:, None], {"x": zero}, {})
     model = owner_model(case).change(**true).add(*(TERMS[p["term"]].settings(**p) for p in physics))
-    out, volts, _ = Simulator(empty).everything(model, CLOSED)
-    x = np.round(out[:, 0] / step) * step if step else out[:, 0].copy()
-    columns = {"t": t, "ref": ref, "w": zero, "u": volts[:, 0], "x": x}
-    record = check(columns, case._replace(controller_known=False))
-    return Axis(record, model, out[:, 0], Simulator(record))
+    made = of_closed(at_rest(case, n, command(n)), model)
+    x = np.round(made.y["x"] / step) * step
+    columns = {"t": made.t, "ref": made.ref, "w": made.w, "u": made.u[:, 0], "x": x}
+    return Axis(check(columns, case._replace(controller_known=False)), model)
 
 
 @pytest.fixture(scope="session")
@@ -136,19 +126,6 @@ def plain(make_axis: Callable[..., Axis]) -> Axis:
     return make_axis(M=100.0, F_v=180.0, F_c=22.0)
 
 
-ASYMMETRY = {"term": "friction.asymmetry", "node": "carriage", "a": 0.25}
-RIVALS = (
-    "friction.asymmetry", "friction.coulomb", "friction.viscous", "friction.stribeck", "friction.load", "load.spring",
-    "drive.offset", "drive.deadband", "drive.gain_asymmetry", "timing.delay",
-)  # fmt: skip
-
-
-@pytest.fixture(scope="session")
-def tilted(make_axis: Callable[..., Axis]) -> Axis:
-    """An axis whose dry friction is larger one way than the other."""
-    return make_axis(ASYMMETRY, M=100.0, F_v=190.0)
-
-
 @pytest.fixture(scope="session")
 def practice() -> Path:
     """Folder of the practice bundles, which lies beside the project where it is there at all."""
@@ -165,74 +142,3 @@ def real_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"{folder} is not here")
     return folder
-
-
-IVU = {
-    "format": 1,
-    "plant": "ivu",
-    "sample_rate": 500.0,
-    "parameters": {"R1": 0.038, "R2": 0.022, "J_m1": 0.0015, "K_m1": 0.06, "K_m2": 0.05, "tau_F1": 0.0024},
-    "sensors": {"capstan_counts_per_rev": 10000, "reel_counts_per_rev": 209},
-    "drive": {"amp_per_volt": [0.2, 0.2], "limit_volt": 10.0, "dac_bits": 12},
-    "delay_samples": 1.0,
-    "controller": {"kind": "pd", "P": 6.2, "D": 1.0, "derivative_filter_hz": 80.0, "tension_N": 0.1},
-    "controller_known": True,
-    "reaches": {"parameter_tolerance": 0.15, "radius_tolerance": 0.02},
-    "notes": "free text",
-}
-LDU = {
-    "format": 1,
-    "plant": "ldu",
-    "sample_rate": 1000.0,
-    "parameters": {"R_c": 0.003, "M": 1.25, "N": 20.0},
-    "sensors": {"encoder_counts_per_rev": 20000, "scale_m_per_count": 5e-7},
-    "drive": {"amp_per_volt": [0.1], "limit_volt": 3.0, "dac_bits": 12},
-    "delay_samples": 1.0,
-    "controller": {"kind": "lead_lag", "sections": [[2000.0, -1900.0, 0.0, -0.5, 0.0], [0.5, 0.25, 0.0, -0.2, 0.1]]},
-    "controller_known": True,
-}
-AXIS = {
-    "format": 1,
-    "plant": "axis",
-    "sample_rate": 1000.0,
-    "parameters": {"M": 95.0},
-    "drive": {"newton_per_volt": 35.0, "limit_volt": 10.0},
-    "sensors": {"x_resolution_m": 5e-8},
-    "delay_samples": 0.0,
-    "controller": {"kind": "cascade_p_v", "kp": 160.0, "kv": 243.0},
-    "controller_known": True,
-    "reaches": {"parameter_tolerance": 0.15},
-}
-WRITTEN = {"ivu": IVU, "ldu": LDU, "axis": AXIS}  # cases as json has them
-
-
-@pytest.fixture(scope="session")
-def case_of():
-    """`case_of("ivu", **keys)`: a case as json has it; `parameters__R1=1` goes one level down."""
-
-    def make(kind, **changes):
-        case = copy.deepcopy(WRITTEN[kind])
-        for key, value in changes.items():
-            *path, last = key.split("__")
-            place = case
-            for part in path:
-                place = place.setdefault(part, {})
-            place[last] = value
-        return case
-
-    return make
-
-
-@pytest.fixture(scope="module")
-def moved(blank):
-    """A record of each plant that moves to and fro, with the model of its owner."""
-
-    def make(kind):
-        rate = {"axis": 1000, "ivu": 500, "ldu": 10000}[kind]
-        t = np.arange(2 * rate) / rate
-        u = np.sin(2 * np.pi * t)
-        counts = {"axis": 0.05, "ivu": 5000.0, "ldu": 20000.0}[kind] * (1 - np.cos(2 * np.pi * t))
-        record = blank(kind, np.stack([u, 0.5 - u], axis=1) if kind == "ivu" else u, counts)
-        return record, owner_model(record.case).base
-
-    return make

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from rtctl.case.format1 import read_case
 from rtctl.diagnose.carry import carried, digits
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import Record
 

@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.edges import directions, edges
-from rtctl.diagnose.kernel import CLOSED
-from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import Simulator
-from rtctl.plants.physics import TERMS
 
 T = 2e-3 * np.arange(15000)
 WAY = 40 * np.sin(2 * np.pi * 0.11 * T) + 7 * np.sin(2 * np.pi * 0.53 * T)  # counts of a reel, there and back
@@ -75,20 +69,3 @@ def test_of_all_directions_those_that_fit_as_a_whole():
     forward, steps = directions(np.array([1.0, 0.9, 0.1, -1.1, -0.6, 0.2, 1.0]))
     assert steps.tolist() == [1, 1, 0, -1, -1, 0, 1]
     assert forward.tolist() == [True, True, True, False, False, False, True, True]
-
-
-RIPPLE = {"term": "ripple.reel", "node": "reel1", "e": 8e-5, "phi": 0.4}  # an eccentricity of 0.08 mm
-
-
-@pytest.fixture(scope="module")
-def reels(case_of):
-    """A record of two reels, one of which is a little off centre, and the model that it was made with."""
-    case, n = read_case(case_of("ivu"), "."), 10000
-    t = 2e-3 * np.arange(n)
-    ref, zero = 12 * (1 - np.cos(2 * np.pi * 0.13 * t)) + 1.5 * np.sin(2 * np.pi * 0.9 * t), np.zeros(n)
-    names = ("capstan_counts", "reel1_counts", "reel2_counts")
-    empty = Record("ivu", case, t, 2e-3, ref, zero, np.zeros((n, 2)), dict.fromkeys(names, zero), {})
-    model = owner_model(case).add(TERMS["ripple.reel"].settings(**RIPPLE))
-    out, volts, _ = Simulator(empty).everything(model, CLOSED, directed=True)
-    y = {names[0]: np.floor(out[:, 0]), **{name: counter(out[:, c]) for c, name in enumerate(names) if c}}
-    return Simulator(empty._replace(u=volts, y=y)), model

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtctl import machines
+from rtctl.case.format1 import read_case
 from rtctl.config.errors import UserError
 from rtctl.config.load import load_settings
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.export import read_model, to_config, write_model, write_turn
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import Record, load_record

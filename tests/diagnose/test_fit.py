@@ -1,4 +1,4 @@
-"""Fits of recordings whose parameters are known, and the bounded step against one of scipy's own."""
+"""Steps of a fit: the bounded one against scipy's own, and work side by side."""
 
 import numpy as np
 import pytest
@@ -7,17 +7,6 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from rtctl.diagnose.fit import bounded_step, parallel, trust
-from rtctl.diagnose.space import SIZE, Coordinate, Hypothesis
-
-TRUE = {"M": 100.0, "F_v": 180.0, "F_c": 22.0}
-VISCOUS = Hypothesis("friction.viscous", "carriage", (Coordinate("B", SIZE, 20.0),))
-SPRING = Hypothesis("load.spring", "carriage", (Coordinate("k", SIZE, 100.0),))
-
-
-@pytest.fixture(scope="module")
-def exact(make_axis):
-    """A recording that is not cut into steps, so that its own model leaves nothing."""
-    return make_axis(step=0.0, **TRUE)
 
 
 @st.composite

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rtctl.case.format1 import read_case
 from rtctl.diagnose import law, law_params
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.record import load_record
 from rtctl.drivers.at_mio_16de import AnalogOutputParams
 from rtctl.laws import allocation

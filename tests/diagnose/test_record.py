@@ -5,9 +5,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from known_cases import case_of
 
+from rtctl.case.format1 import read_case
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.record import check, law_agreement, load_record, recompute_law
 from rtctl.trace.bundle import load_case, save_case
 
@@ -82,7 +83,7 @@ RATES = {"ivu": 500.0, "ldu": 1000.0, "axis": 1000.0}
 
 
 @pytest.fixture
-def good(bundle_of, columns_of, case_of):
+def good(bundle_of, columns_of):
     def make(kind, **changes):
         return bundle_of(columns_of(kind, 3000, RATES[kind]), case_of(kind, **changes), kind + str(len(changes)))
 
@@ -126,7 +127,7 @@ def test_the_law_of_the_two_reels_row_by_row(good, allocation):
     assert np.all(u / (20 / 4096) == np.round(u / (20 / 4096)))
 
 
-def test_a_voltage_half_way_between_two_steps_goes_up(good, case_of):
+def test_a_voltage_half_way_between_two_steps_goes_up(good):
     folder = good("ldu", controller__sections=[[0.0, 0.0, 0.0, 0.0, 0.0]])
     record = load_record(folder)
     step = 20 / 4096
@@ -156,7 +157,7 @@ def test_a_start_that_nobody_saw_does_not_spoil_a_law(good):
     assert law_agreement(again).worst_row == 0
 
 
-def test_a_reference_that_nobody_knows(bundle_of, columns_of, case_of):
+def test_a_reference_that_nobody_knows(bundle_of, columns_of):
     columns = {**columns_of("axis", 3000, 1000.0), "ref": np.full(3000, np.nan)}
     case = case_of("axis", controller={"kind": "unknown"}, controller_known=False)
     record = load_record(bundle_of(columns, case))
@@ -166,7 +167,7 @@ def test_a_reference_that_nobody_knows(bundle_of, columns_of, case_of):
         load_record(bundle_of(columns, case_of("axis"), "known"))
 
 
-def test_open_loop_has_its_command_as_input(bundle_of, columns_of, case_of):
+def test_open_loop_has_its_command_as_input(bundle_of, columns_of):
     record = load_record(bundle_of(columns_of("axis", 3000, 1000.0), case_of("axis", controller={"kind": "none"})))
     assert recompute_law(record) is None
     assert not record.closed_loop
@@ -208,7 +209,7 @@ def rename(old, new):
         ("axis", lambda c: c.__setitem__("t", c["t"] * 1.02), "980.392 rows a second where sample_rate .* is 1000 Hz"),
     ],
 )
-def test_bad_columns_are_refused_with_what_would_be_right(bundle_of, columns_of, case_of, kind, edit, said):
+def test_bad_columns_are_refused_with_what_would_be_right(bundle_of, columns_of, kind, edit, said):
     columns = columns_of(kind, 3000, RATES[kind])
     edit(columns)
     with pytest.raises(UserError, match=said) as error:
@@ -229,14 +230,14 @@ def test_bad_columns_are_refused_with_what_would_be_right(bundle_of, columns_of,
         ("axis", lambda c: c.update({k: v[:1] for k, v in c.items()}), "holds 1 rows"),
     ],
 )
-def test_a_record_that_supports_no_verdict(bundle_of, columns_of, case_of, kind, edit, said):
+def test_a_record_that_supports_no_verdict(bundle_of, columns_of, kind, edit, said):
     columns = columns_of(kind, 3000, RATES[kind])
     edit(columns)
     with pytest.raises(NoAnswer, match=said):
         load_record(bundle_of(columns, case_of(kind)))
 
 
-def test_sensors_that_the_case_forgot(bundle_of, columns_of, case_of):
+def test_sensors_that_the_case_forgot(bundle_of, columns_of):
     columns = columns_of("ldu", 3000, 1000.0)
     with pytest.raises(UserError, match=r"case\.json: sensors\.scale_m_per_count is missing"):
         load_record(bundle_of(columns, case_of("ldu", sensors__scale_m_per_count=None)))
@@ -244,13 +245,13 @@ def test_sensors_that_the_case_forgot(bundle_of, columns_of, case_of):
         load_record(bundle_of(columns, case_of("ldu", sensors__encoder_counts_per_rev=None), "b"))
 
 
-def test_one_drive_or_one_reel_may_rest(bundle_of, columns_of, case_of):
+def test_one_drive_or_one_reel_may_rest(bundle_of, columns_of):
     columns = {**columns_of("ivu", 3000), "u2": np.full(3000, 0.4), "reel1_counts": np.zeros(3000)}
     record = load_record(bundle_of(columns, case_of("ivu")))
     assert any("reel1_counts" in text for text in record.case.warnings)
 
 
-def test_y_holds_the_counters_unwrapped(bundle_of, columns_of, case_of):
+def test_y_holds_the_counters_unwrapped(bundle_of, columns_of):
     columns = columns_of("ldu", 3000, 1000.0)
     true = columns["encoder_counts"]
     columns["encoder_counts"] = true % 65536
@@ -259,7 +260,7 @@ def test_y_holds_the_counters_unwrapped(bundle_of, columns_of, case_of):
     assert np.array_equal(record.columns["encoder_counts"], true % 65536)
 
 
-def test_an_angle_that_starts_anew_each_turn(bundle_of, columns_of, case_of):
+def test_an_angle_that_starts_anew_each_turn(bundle_of, columns_of):
     columns = columns_of("axis", 3000, 1000.0)
     true = np.linspace(0.1, 30.0, 3000)
     columns["x"] = true % (2 * np.pi)
@@ -305,7 +306,7 @@ def test_a_copy_with_another_rate_is_refused(shared, tmp_path):
         load_record(folder)
 
 
-def test_rows_at_uneven_times_are_laid_onto_an_even_clock(bundle_of, columns_of, case_of):
+def test_rows_at_uneven_times_are_laid_onto_an_even_clock(bundle_of, columns_of):
     t = np.cumsum(np.random.default_rng(2).uniform(0.8e-3, 1.2e-3, 4000))
     columns = {**columns_of("axis", 4000, 1000.0), "t": t, "x": np.sin(3 * t), "u": np.cos(2 * t)}
     columns["ref"] = np.full(4000, np.nan)
@@ -321,7 +322,7 @@ def test_rows_at_uneven_times_are_laid_onto_an_even_clock(bundle_of, columns_of,
     assert (record.columns["t"] == t).all()
 
 
-def test_counters_stay_whole_on_an_even_clock(bundle_of, columns_of, case_of):
+def test_counters_stay_whole_on_an_even_clock(bundle_of, columns_of):
     t = np.cumsum(np.random.default_rng(2).uniform(0.8e-3, 1.2e-3, 4000))
     case = case_of("ldu", sample_rate=None, controller={"kind": "unknown"}, controller_known=False)
     record = load_record(bundle_of({**columns_of("ldu", 4000, 1000.0), "t": t}, case))

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from narrowed import only
 
+from rtctl.case.format1 import read_case
 from rtctl.cli.common import load_config
 from rtctl.cli.main import main
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_path
 from rtctl.diagnose import played, repair
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.export import to_config
 from rtctl.diagnose.graph.files import write
 from rtctl.diagnose.model import Model, owner_model
@@ -24,6 +24,7 @@ from rtctl.diagnose.motions import MENU, Limits
 from rtctl.diagnose.record import Record, load_record
 from rtctl.laws import reference
 from rtctl.machines import CONFIGS
+from rtctl.machines.profiles import PROFILES
 from rtctl.plants.physics import TERMS
 
 STEP = {"at": 0.5, "to": 0.02}
@@ -73,7 +74,7 @@ def test_one_recording_where_it_is_clear(axis, tmp_path):
     bench = Bench(found("named"))
     made = bench.repair(axis, tmp_path)
     assert [name for _, name, _ in bench.played] == ["recording"]
-    assert bench.played[0][2] == repair.LENGTH["axis"]
+    assert bench.played[0][2] == PROFILES["axis"].duty.recording
     assert made.last.verdict == "named" and made.bundle == tmp_path / "recording"
 
 
@@ -119,7 +120,7 @@ def test_a_first_recording_that_supports_no_verdict(axis, tmp_path):
 def test_an_emulated_machine_has_something_to_do(config, kind):
     ready = repair.ready(config(kind, mode="real"))
     assert ready.loop.mode == "fused"
-    assert ready.reference.repeat <= repair.LENGTH[kind] + 0.001
+    assert ready.reference.repeat <= PROFILES[kind].duty.recording + 0.001
     steps = ready.reference.steps
     assert steps[-1].to == 0.0 and all(a.at < b.at for a, b in pairwise(steps))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.case import read_case
+from rtctl.case.format1 import read_case
 from rtctl.diagnose.model import owner_model
 from rtctl.diagnose.record import check
 from rtctl.diagnose.turn import PLACES, over_turn
@@ -70,4 +70,4 @@ def test_an_axis_that_slides_or_stands_has_none():
     assert over_turn(record._replace(case=sliding), model) is None
     still = record._replace(y={"x": np.zeros_like(record.t)})
     assert over_turn(still, model) is None
-    assert over_turn(record._replace(plant="ivu"), model) is None
+    assert over_turn(record._replace(y={"speed": record.y["x"]}), model) is None

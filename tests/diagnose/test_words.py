@@ -1,7 +1,7 @@
 import numpy as np
 
+from rtctl.case.quantities import quantities
 from rtctl.diagnose.diagnosis import Effect, Interval
-from rtctl.diagnose.quantities import quantities
 from rtctl.plants.physics import TERMS
 
 SLIDES = quantities(None)

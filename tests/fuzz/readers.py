@@ -13,12 +13,12 @@ import yaml
 from target import CONFIGS, Target, as_json, of_bytes, of_json, of_text
 
 from rtctl import machines
+from rtctl.case.format1 import read_case
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import load_settings, set_path
 from rtctl.config.units import to_si
 from rtctl.config.yaml_file import parse
 from rtctl.daemon import keys
-from rtctl.diagnose.case import read_case
 from rtctl.loop.mailbox import COMMAND
 from rtctl.trace.bundle import ARROWS, PARQUET, load_bundle, load_case, save_case
 from rtctl.trace.columns import Column

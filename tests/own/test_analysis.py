@@ -9,10 +9,10 @@ import pytest
 import yaml
 from rtctl_config import TEMPLATES, loaded
 
+from rtctl.case.format1 import read_case
 from rtctl.cli import identify_source
 from rtctl.config.errors import UserError
 from rtctl.design import response
-from rtctl.diagnose.case import read_case
 from rtctl.diagnose.export import read_model
 from rtctl.identify import records
 from rtctl.own.files import refuse_plant

@@ -6,7 +6,7 @@ import pytest
 from rtctl_config import TEMPLATES
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose import kernel
+from rtctl.diagnose.graph import kernel
 from rtctl.diagnose.graph.starts import Size, parts_of
 from rtctl.own.files import OwnError, Source, trust
 from rtctl.own.term import own_term, register, register_file, sizes, texts
@@ -39,9 +39,9 @@ def test_what_it_calls_typical_is_what_a_fit_begins_with():
 
 
 def test_the_kernel_of_the_fits_holds_it():
-    before = kernel.source("axis")
+    before = kernel.source()
     register([source()])
-    after = kernel.source("axis")
+    after = kernel.source()
     module = source().module
     assert module not in before
     assert f"import {module}" in after.splitlines()

@@ -7,24 +7,24 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from rtctl.case.format2 import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.graph import words
-from rtctl.diagnose.graph.case import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.graph.clock import UNSTEADY
 from rtctl.diagnose.graph.experiment import Planned, left, planned
 from rtctl.diagnose.graph.fits import Fitted, curvature, half_widths, refit
 from rtctl.diagnose.graph.held import likelier, suits
 from rtctl.diagnose.graph.joint import together
 from rtctl.diagnose.graph.likelihood import COUNTED, coarsened
+from rtctl.diagnose.graph.load import load
 from rtctl.diagnose.graph.model import RECORDING
 from rtctl.diagnose.graph.prediction import WORSE, Heldout, predict
 from rtctl.diagnose.graph.predictive import predictive
-from rtctl.diagnose.graph.record import GraphRecord, load_record
+from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.search import Found, Progress, search
 from rtctl.diagnose.graph.verdict import SURE, Verdict, fewer, verdict
 from rtctl.diagnose.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.plants.physics import TERMS
-from rtctl.trace.bundle import load_case
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
 
@@ -128,16 +128,6 @@ def diagnose(*folders: Path | str, progress: Progress = lambda _: None) -> Graph
     Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
     """
     return diagnose_record(*map(load, folders), progress=progress)
-
-
-def load(folder: Path | str) -> GraphRecord:
-    """The record of a bundle of either exchange format. Raises as `diagnose`."""
-    if load_case(Path(folder)).get("plant") is None:
-        return load_record(folder)
-    from rtctl.diagnose.graph.known import graph_record
-    from rtctl.diagnose.record import load_record as load_known
-
-    return graph_record(load_known(folder))
 
 
 def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:

@@ -11,13 +11,13 @@ from typing import Any
 
 import yaml
 
+from rtctl.case.format2 import is_start
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
 from rtctl.config.load import Dumper
 from rtctl.config.units import to_si
 from rtctl.config.yaml_file import Document
 from rtctl.diagnose.export import entry_of
-from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.model import PHYSICS, GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.words import value_unit

@@ -4,10 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import welch
 
+from rtctl.case.format2 import is_start
 from rtctl.diagnose.diagnosis import NOTHING
 from rtctl.diagnose.figures import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.fits import Z90
 from rtctl.diagnose.graph.missing import Missing, subjects
 from rtctl.diagnose.graph.posterior import rivals

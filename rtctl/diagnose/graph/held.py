@@ -21,16 +21,20 @@ CLEARLY = 5.0  # nats
 
 def other_way(like: Likelihood) -> Likelihood | None:
     """The likelihood with the commands taken the other way between their samples; None where a controller held them."""
-    known = not all(part.sim.case.open_loop for part in like.parts)
-    if known or like.sim.mode != TRACK or not like.sim.volts.size:
-        return None
-    parts = [copy(part) for part in like.parts]
-    for part in parts:
-        part.sim = _other(part.sim)
+    parts = []
+    for part in like.parts:
+        other = other_commands(part.sim)
+        if other is None:
+            return None
+        parts.append(copy(part))
+        parts[-1].sim = other
     return parts[0] if len(parts) == 1 else Joint(parts)
 
 
-def _other(sim: Simulator) -> Simulator:
+def other_commands(sim: Simulator) -> Simulator | None:
+    """The simulator with the commands taken the other way between their samples; None where a controller held them."""
+    if not sim.case.open_loop or sim.mode != TRACK or not sim.volts.size:
+        return None
     out = copy(sim)
     held = np.ascontiguousarray(sim.record.u)
     out.volts = np.ascontiguousarray(half_a_tick_on(held)) if np.array_equal(sim.volts, held) else held

@@ -12,8 +12,8 @@ from copy import copy
 
 import numpy as np
 
+from rtctl.case.format2 import is_start
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.likelihood import Likelihood
 from rtctl.diagnose.graph.model import RECORDING, GraphModel, nominal
 from rtctl.diagnose.graph.noise import Noise

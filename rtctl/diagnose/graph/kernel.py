@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.kernel import SLOTS, at_site, field, sample
+from rtctl.diagnose.graph.slots import SLOTS, at_site, field, sample
 from rtctl.idiom import fill_record, record_dtype, state
 from rtctl.laws import shaper
 from rtctl.loop import generate

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from rtctl.diagnose.case import Case
-from rtctl.diagnose.graph.case import OPEN_LOOP, GraphCase
+from rtctl.case.format1 import Case
+from rtctl.case.format2 import OPEN_LOOP, GraphCase
+from rtctl.case.quantities import of_case
 from rtctl.diagnose.graph.model import GraphModel, own
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.law_params import per_unit
 from rtctl.diagnose.model import Model, owner_model
-from rtctl.diagnose.quantities import of_case
 from rtctl.diagnose.record import Record
-from rtctl.diagnose.simulate import resolution
+from rtctl.diagnose.tacho import noise
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import layout
 from rtctl.plants.physics.place import PLANTS
@@ -29,9 +29,10 @@ SAME = 1e-12  # relative, of two values that differ by rounding alone
 MIDDLE = 0.5  # counts from what a counter shows to where it is on average
 
 
-def graph_record(record: Record) -> GraphRecord:
-    """The record of a format 1 bundle as one of a described machine."""
-    case = graph_case(record)
+def graph_record(record: Record, model: Model | None = None) -> GraphRecord:
+    """The record of a format 1 bundle as one of a described machine, whose nominal model is `model` where one is given,
+    else what the owner says."""
+    case = graph_case(record, model)
     sensors = {sensor.column: name for name, sensor in case.machine.sensors.items()}
     y: dict[str, np.ndarray] = {}
     grain: dict[str, float] = {}
@@ -60,11 +61,11 @@ def known_model(model: GraphModel, record: GraphRecord) -> Model:
     return owner.change(**kept).add(*model._replace(base=values).resolved().terms)
 
 
-def graph_case(record: Record) -> GraphCase:
-    """The case of a format 1 bundle as one of a described machine."""
+def graph_case(record: Record, model: Model | None = None) -> GraphCase:
+    """The case of a format 1 bundle as one of a described machine; `model` as for `graph_record`."""
     case = record.case
-    base = owner_model(case, record).base
-    machine = described(record, base)
+    model = owner_model(case, record) if model is None else model
+    machine = described(record, model.base)
     called = {path: symbol for symbol, paths in machine.symbols.items() for path in paths}
     tolerances = {path: _tolerance(case, symbol) for path, symbol in called.items()}
     delay = case.delay_samples
@@ -74,7 +75,7 @@ def graph_case(record: Record) -> GraphCase:
         values=dict(machine.paths()),
         tolerances=tolerances,
         default_tolerance=0.0,
-        physics=(),
+        physics=tuple(term.model_dump(mode="json") for term in model.terms),
         inputs={},
         problem="driven",
         delay_samples=delay,
@@ -142,6 +143,20 @@ def _sensors(data: dict[str, Any], record: Record) -> None:
             sensor["measures"] = "speed"
         else:
             sensor["resolution"] = float(resolution(record))
+
+
+def resolution(record: Record) -> float:
+    """Step of a main sensor that does not count, m or rad: one that the owner says, or the smallest step that occurs.
+    Of a sensor of speed its noise, per s."""
+    sensors = record.case.sensors
+    if sensors.x_counts_per_rev:
+        return float(2 * np.pi / sensors.x_counts_per_rev)
+    if sensors.x_resolution_m:
+        return float(sensors.x_resolution_m)
+    values = next(iter(record.y.values()))
+    steps = np.abs(np.diff(values))
+    smallest = float(np.quantile(steps[steps > 0], 0.01)) if (steps > 0).any() else 1e-12
+    return max(smallest, noise(values, record.u)) if record.shows_speed else smallest
 
 
 def _turn(data: dict[str, Any]) -> None:

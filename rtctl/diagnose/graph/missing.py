@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.case.quantities import DIMENSIONS
 from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.hypotheses import faster
 from rtctl.diagnose.graph.likelihood import settled
@@ -16,7 +17,6 @@ from rtctl.diagnose.graph.measures import speed, way
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
 from rtctl.diagnose.graph.words import body_of, channel_unit, here
-from rtctl.diagnose.quantities import DIMENSIONS
 from rtctl.plants.graph.description import Description
 from rtctl.plants.physics import TERMS
 

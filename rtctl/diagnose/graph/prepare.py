@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rtctl.case.format2 import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.config.errors import UserError
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, rigid
 from rtctl.diagnose.graph.observer import DAMPED, SMOOTHED, Followed
-from rtctl.diagnose.kernel import SLOTS
+from rtctl.diagnose.graph.slots import SLOTS
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.element import Element
 from rtctl.plants.graph.elements import elements, spot
@@ -127,19 +127,19 @@ def _begin(sim: "Simulator", states: np.ndarray, model: GraphModel, first: np.nd
         rate = sim.record.scales[2] + sim.record.scales[1] * float(np.log(model.base[FIRST_SPEED]))
     for number in range(len(sim.followed) - 1, -1, -1):
         one = sim.followed[number]
+        position, speed = (0.0, first[number]) if one.shows_speed else (first[number], 0.0)
+        if number == 0:
+            speed = rate or speed
+            if sim.begins is not None:
+                position, speed = sim.begins[0] + start_of(sim, one, model.base), sim.begins[1]
         for name, ratio in rigid(sim.layout, sim.case.values, one.body).items():
             if ratio == 0.0:
                 continue
-            value = ratio * first[number] / model.layout.ratio(name, model.base)
-            at = model.layout.coordinate(name)
-            if one.shows_speed:
-                x[model.layout.nq + at] = value
-                states["m"]["v_before"][0, at] = value
-            else:
-                x[at] = value
-            if rate and number == 0:
-                speed = ratio * rate / model.layout.ratio(name, model.base)
-                x[model.layout.nq + at] = states["m"]["v_before"][0, at] = speed
+            at, own = model.layout.coordinate(name), model.layout.ratio(name, model.base)
+            if position or not one.shows_speed:
+                x[at] = ratio * position / own
+            if speed:
+                x[model.layout.nq + at] = states["m"]["v_before"][0, at] = ratio * speed / own
 
 
 def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: int, stride: int) -> np.ndarray:
@@ -149,7 +149,7 @@ def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: 
     dt = sim.record.dt * stride
     j["stride"] = stride
     j["mode"], j["substeps"], j["rate"], j["release"] = mode, substeps, 1.0 / dt, sim.release
-    j["lead"] = sim.lead if mode == TRACK else 0
+    j["lead"] = sim.lead if mode == TRACK and sim.begins is None else 0
     j["part"], j["delay"] = np.modf(sim.case.delay_samples * substeps)
     j["follows"] = len(sim.followed)
     for number, one in enumerate(sim.followed):

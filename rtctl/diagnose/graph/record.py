@@ -5,14 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rtctl.case.format2 import HELD_PROBLEMS, GraphCase
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.columns import unwrap
-from rtctl.diagnose.graph.case import HELD_PROBLEMS, GraphCase, read_case
 from rtctl.diagnose.graph.kinematic import followed
 from rtctl.diagnose.graph.model import GraphModel, rigid
 from rtctl.diagnose.record import Record
 from rtctl.plants.graph.params import drive_gain
-from rtctl.trace.bundle import PARQUET, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
 BEYOND = 10  # rows that a recording has to have beside one for each unknown: its noise is estimated as well
@@ -48,19 +47,12 @@ class GraphRecord(NamedTuple):
         return next(iter(self.y))
 
 
-def load_record(folder: Path | str) -> GraphRecord:
-    """Read and check a bundle of exchange format 2.
+def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> GraphRecord:
+    """The record of these columns, checked; `path` is told in messages.
 
     Raises UserError that names file, column and row and says what would be right, NoAnswer where the recording
     supports no verdict.
     """
-    bundle = load_bundle(folder)
-    case = read_case(bundle.case, bundle.folder)
-    return record_of(bundle.columns, case, bundle.folder / PARQUET)
-
-
-def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> GraphRecord:
-    """The record of these columns; `path` is told in messages."""
     t = _column(path, columns, "t", "s, clock at the tick")
     unknowns = len(case.fitted)
     if len(t) < unknowns + BEYOND:

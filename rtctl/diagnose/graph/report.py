@@ -9,11 +9,11 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from rtctl.case.format2 import is_start
 from rtctl.diagnose import numbers, played
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Interval
 from rtctl.diagnose.graph import figures, words
 from rtctl.diagnose.graph.answer import GraphDiagnosis
-from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.missing import machine_words
 from rtctl.diagnose.report import COLOR, Picture, interval, svg
 from rtctl.diagnose.words import need, noun, phrase_of

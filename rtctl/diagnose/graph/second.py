@@ -5,9 +5,10 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph.answer import GraphDiagnosis, load
+from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.joint import check_same
 from rtctl.diagnose.graph.likelihood import Likelihood
+from rtctl.diagnose.graph.load import load
 from rtctl.diagnose.graph.prediction import judged
 from rtctl.diagnose.graph.simulate import Simulator
 

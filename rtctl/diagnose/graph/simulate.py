@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
+from rtctl.case.format2 import HELD_PROBLEMS
 from rtctl.diagnose.edges import Edges, edges
 from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.case import HELD_PROBLEMS
 from rtctl.diagnose.graph.kernel import HELD, TRACK
 from rtctl.diagnose.graph.model import GraphModel, own, rigid
 from rtctl.diagnose.graph.motion import Path, main_path, paths
@@ -66,6 +66,7 @@ class Simulator:
             self.channels.remove(self.main)
         self.lead = round(self._rest() / record.dt)
         self.release = NEVER
+        self.begins: tuple[float, float] | None = None  # first position and speed of the main body in a free run
         self.ratios = self.moves(record.case.values)
         self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
 
@@ -181,6 +182,12 @@ class Simulator:
         """The same whose correction ends at `row`: a free run from there, from the state that the observer reached."""
         other = copy(self)
         other.release = row
+        return other
+
+    def beginning(self, position: float, speed: float) -> "Simulator":
+        """The same whose main body begins at a position, as its column shows it, and at a speed, SI."""
+        other = copy(self)
+        other.begins = (position, speed)
         return other
 
     def pushed(self, forces: np.ndarray) -> "Simulator":

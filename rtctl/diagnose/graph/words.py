@@ -4,12 +4,12 @@ import math
 import re
 from typing import Any
 
+from rtctl.case.format2 import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
+from rtctl.case.quantities import DIMENSIONS
 from rtctl.diagnose.diagnosis import Effect
-from rtctl.diagnose.graph.case import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
 from rtctl.diagnose.graph.model import PHYSICS, RECORDING, GraphModel
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.numbers import both, nice
-from rtctl.diagnose.quantities import DIMENSIONS
 from rtctl.diagnose.words import BY_NODE, Slots, harmonics, noun, phrase_of
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.mechanics import code_of

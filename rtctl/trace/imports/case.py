@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+from rtctl.case.load import read_case
+from rtctl.case.quantities import Quantities, quantities
 from rtctl.config.errors import UserError
 from rtctl.config.units import to_si
-from rtctl.diagnose.case import OTHER_NAMES, PARAMETERS, read_case
-from rtctl.diagnose.quantities import Quantities, quantities
 from rtctl.machines.profile import FREE_UNITS
 from rtctl.machines.profiles import profile_of
 from rtctl.trace.bundle import CASE, FORMAT, as_json
@@ -64,11 +64,13 @@ def checked(case: dict[str, Any], folder: Path) -> list[str]:
 
 def _parameter(plant: str, name: str, value: float | str, axis: Quantities) -> float:
     """A parameter in SI. A name that the model does not have is told of by the case's own check."""
-    field = PARAMETERS[plant].model_fields.get(name)
+    exchange = profile_of(plant).exchange
+    assert exchange is not None  # the plan has checked it
+    field = exchange.parameters.model_fields.get(name)
     extra = field.json_schema_extra if field else None
     unit = extra.get("unit") if isinstance(extra, dict) else ""
     if profile_of(plant).has(FREE_UNITS):
-        unit = axis.of(OTHER_NAMES[plant].get(name, name))
+        unit = axis.of(exchange.aliases.get(name, name))
     try:
         return float(to_si(value, str(unit or "")))
     except (TypeError, ValueError) as error:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rtctl.diagnose.graph.case import read_case
+from rtctl.case.format2 import read_case
 from rtctl.diagnose.graph.record import record_of
 
 FINER = 20  # steps of the integration a row

@@ -1,8 +1,8 @@
 import pytest
 from graph_cases import named, nothing, unnamed
 
+from rtctl.case.format2 import START
 from rtctl.diagnose.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
-from rtctl.diagnose.graph.case import START
 
 
 def test_nothing():

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from graph_cases import PENDULUM, RATE, case_of, columns_of, command, nothing
 
+from rtctl.case.format2 import read_case
 from rtctl.diagnose.graph.answer import diagnose_record
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.clock import clock, timed
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.joint import together

@@ -2,8 +2,8 @@ import pytest
 import yaml
 from graph_cases import BELT, RUB, blank, case_of, command, named
 
+from rtctl.case.format2 import is_start
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph.case import is_start
 from rtctl.diagnose.graph.config import to_config, write_model
 from rtctl.diagnose.graph.model import nominal, settings_of
 from rtctl.plants.graph.file import read_machine

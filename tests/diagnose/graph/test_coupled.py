@@ -9,8 +9,8 @@ from coupled_machines import data_of
 from graph_cases import case_of, command
 from scipy.integrate import solve_ivp
 
+from rtctl.case.format2 import read_case
 from rtctl.diagnose.graph.answer import diagnose_record
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.record import record_of
 from rtctl.diagnose.graph.simulate import Simulator

@@ -10,10 +10,10 @@ import yaml
 from machines import ROTOR, case_of
 
 from rtctl import machines
+from rtctl.case.format2 import read_case
 from rtctl.diagnose.diagnosis import NAMED
 from rtctl.diagnose.graph import experiment, files, loop
 from rtctl.diagnose.graph.answer import diagnose_record
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.evidence import Rival
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.hypotheses import hypotheses

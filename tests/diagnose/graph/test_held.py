@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from graph_cases import RATE, case_of, columns_of, record
 
-from rtctl.diagnose.graph.case import OPEN_LOOP, read_case
+from rtctl.case.format2 import OPEN_LOOP, read_case
 from rtctl.diagnose.graph.fits import refit
 from rtctl.diagnose.graph.held import likelier, other_way, suits
 from rtctl.diagnose.graph.joint import together

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.case import read_case
+from rtctl.case.format1 import read_case
 from rtctl.diagnose.export import read_model, write_model
 from rtctl.diagnose.graph.known import graph_record, known_model
 from rtctl.diagnose.graph.loop import loop_of

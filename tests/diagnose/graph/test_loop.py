@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from rtctl.case.format2 import read_case
 from rtctl.cli.common import load_config
 from rtctl.config.load import set_path
 from rtctl.diagnose.graph import loop
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.simulate import Simulator

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from graph_cases import BELT, case_of
 
-from rtctl.diagnose.graph.case import read_case
+from rtctl.case.format2 import read_case
 from rtctl.diagnose.graph.loop import lowest_mode
 from rtctl.diagnose.graph.model import carried, moved_inertia, nominal, rigid
 

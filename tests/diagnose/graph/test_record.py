@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from graph_cases import BELT, PENDULUM, RATE, case_of, write_bundle
 
+from rtctl.case.format2 import read_case
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.diagnose.graph.case import read_case
-from rtctl.diagnose.graph.record import load_record, record_of
+from rtctl.diagnose.graph.load import load
+from rtctl.diagnose.graph.record import record_of
 
 N = 200
 COUNTS = np.round(3000 * np.sin(np.arange(N) / 20))
@@ -18,7 +19,7 @@ def of(columns, case=None):
 
 
 def test_bundle_in_si(tmp_path):
-    record = load_record(write_bundle(tmp_path / "bench", case_of(PENDULUM), COLUMNS))
+    record = load(write_bundle(tmp_path / "bench", case_of(PENDULUM), COLUMNS))
     assert record.dt == 1 / RATE
     assert record.u.shape == (N, 1)
     np.testing.assert_allclose(record.y["encoder"], (COUNTS + 0.5) / 5000.0)  # the middle of a count

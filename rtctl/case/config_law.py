@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from rtctl.diagnose.unsaid import unsaid
+from rtctl.case.unsaid import unsaid
 from rtctl.own.files import OwnError
 
 

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from rtctl.diagnose.columns import measured_amplifier
 from rtctl.own.files import is_own
 
 
@@ -19,3 +18,10 @@ def unsaid(settings: Any, kind: str, config: dict[str, Any]) -> tuple[str, ...]:
     if measured_amplifier(config):
         has.append("an amplifier whose measured curve bends the command")
     return tuple(has)
+
+
+def measured_amplifier(config: dict) -> bool:
+    """Whether the plant of our own `config` has the amplifier of 12.3."""
+    plant = config.get("plant")
+    amplifier = plant.get("amplifier") if isinstance(plant, dict) else None
+    return isinstance(amplifier, dict) and amplifier.get("kind") == "measured"

@@ -11,13 +11,15 @@ import numpy as np
 from pydantic import ValidationError
 
 from rtctl import machines
+from rtctl.case.unsaid import measured_amplifier
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import set_paths
-from rtctl.diagnose.case import PARAMETERS
-from rtctl.diagnose.columns import measured_amplifier, through_amplifier
-from rtctl.diagnose.model import Model
-from rtctl.diagnose.record import Record
+from rtctl.diagnose.columns import through_amplifier
+from rtctl.diagnose.export import plant_section
+from rtctl.diagnose.graph.known import known_model
+from rtctl.diagnose.graph.model import nominal
+from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.loop import fused, generate
 from rtctl.loop.loop import Loop
 from rtctl.machines import Machine
@@ -37,13 +39,15 @@ def can_emulate(bundle: Bundle) -> bool:
     return bool(ticks[0] == 0 and (np.diff(ticks) == 1).all())
 
 
-def emulate(bundle: Bundle, record: Record, model: Model) -> dict[str, np.ndarray]:
-    """Readings and commands (n,) by the names of their columns, at the rows of `record`, the loop closed by the config.
+def emulate(bundle: Bundle, record: GraphRecord) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Readings (n,) by sensor, SI, and commands (n, drives) at the rows of `record`, the loop closed by the config
+    around the nominal model of the record's case.
 
-    Readings are as `record.y` has them, commands in the unit of `record.u`. Raises UserError where the config cannot
-    be built, as where an own file was not given, and NoAnswer where the emulated machine trips.
+    Raises UserError where the config cannot be built, as where an own file was not given, and NoAnswer where the
+    emulated machine trips.
     """
-    machine = _machine(bundle, model)
+    config = config_of(bundle, record)
+    machine = _machine(bundle, config)
     told = orders(bundle.folder)
     made = generate.generate(machine, "shm")
     arrays = fused.segment(made, len(bundle.columns["t"]))
@@ -52,7 +56,7 @@ def emulate(bundle: Bundle, record: Record, model: Model) -> dict[str, np.ndarra
     loop = Loop(machine, made, arrays, arrays["outputs"], arrays["inputs"])
     at, number = 0, bundle.columns["order"]
     for end in (*np.flatnonzero(np.diff(number)) + 1, len(number)):
-        _obey(loop, bundle, model, told, int(number[at]))
+        _obey(loop, bundle, config, told, int(number[at]))
         loop.stretch(at, int(end) - at)
         at = int(end)
     rows = arrays["rows"]
@@ -60,33 +64,43 @@ def emulate(bundle: Bundle, record: Record, model: Model) -> dict[str, np.ndarra
     if len(tripped):
         k = int(tripped[0])
         raise NoAnswer(f"the model trips the machine at tick {k} ({bundle.columns['t'][k]:.6g} s) in closed loop")
-    return _columns(rows[record.columns["tick"].astype(np.int64)], bundle, record)
+    return _columns(rows, bundle, record)
 
 
-def _columns(rows: np.ndarray, bundle: Bundle, record: Record) -> dict[str, np.ndarray]:
-    """The rows' readings with the shift that the record gives its own, and the commands."""
-    found = {name: rows[name] + (values[0] - record.columns[name][0]) for name, values in record.y.items()}
-    for name in record.commands:
-        bent = record.plant == "ldu" and measured_amplifier(bundle.case["config"])
-        found[name] = through_amplifier(rows[name]) if bent else rows[name]
-    return found
-
-
-def _machine(bundle: Bundle, model: Model, changed: dict[str, Any] | None = None) -> Machine:
-    """The machine of the bundle's config, in fused mode, with the model as its plant."""
-    config = dict(bundle.case["config"])
-    base = dict(model.base)
-    if model.kind == "ldu" and "N" in base:
-        base["R_s"] = base["R_t"] / base["N"]  # the gear ratio is what the equations use
-    plant = dict(config.get("plant") or {})
-    plant["parameters"] = {name: base[name] for name in PARAMETERS[model.kind].model_fields if name in base}
-    plant["physics"] = [term.model_dump(mode="json") for term in model.terms]
-    plant.pop("fmu", None)
+def config_of(bundle: Bundle, record: GraphRecord) -> dict[str, Any]:
+    """Plain data of the bundle's config, in fused mode, with the nominal model of the record's case as its plant."""
+    config, case = dict(bundle.case["config"]), record.case
+    plant = {key: value for key, value in dict(config.get("plant") or {}).items() if key != "fmu"}
+    if record.source is not None:
+        plant |= plant_section(known_model(nominal(case), record))
+    else:
+        config["machine"] = case.machine.model_dump(mode="json", exclude_unset=True)
+        plant["physics"] = list(case.physics)
     loop = {**(config.get("loop") or {}), "mode": "fused"}
-    data: Any = {**config, "plant": plant, "loop": loop, "driver": {"kind": "emulated"}}
-    kind = machines.CONFIGS[model.kind]
+    return {**config, "plant": plant, "loop": loop, "driver": {"kind": "emulated"}}
+
+
+def _columns(rows: np.ndarray, bundle: Bundle, record: GraphRecord) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The recorded readings plus what the emulated columns differ from the recorded ones, and the commands."""
+    source, machine = record.source, record.case.machine
+    columns = bundle.columns if source is None else source.columns
+    ticks = columns["tick"].astype(np.int64)
+    readings = {}
+    for name, seen in {**record.y, **record.edges}.items():
+        sensor = machine.sensors[name]
+        scale = 1.0 if name in record.y else sensor.scale
+        readings[name] = seen / scale + (rows[sensor.column][ticks] - columns[sensor.column]) / sensor.scale
+    bent = measured_amplifier(bundle.case["config"])
+    commands = [rows[drive.column][ticks] for drive in machine.drives.values()]
+    volts = np.column_stack([through_amplifier(u) if bent else u for u in commands])
+    return readings, volts
+
+
+def _machine(bundle: Bundle, config: dict[str, Any], changed: dict[str, Any] | None = None) -> Machine:
+    """The machine of a config with other values by dotted path."""
+    kind: Any = None
     try:
-        kind, data = machines.widened(data)
+        kind, data = machines.widened(config)
         settings = kind.model_validate(data)
         return machines.build(set_paths(settings, changed or {}))
     except ValidationError as error:
@@ -95,7 +109,7 @@ def _machine(bundle: Bundle, model: Model, changed: dict[str, Any] | None = None
         raise UserError(f"{bundle.folder}/case.json, config: {error}") from None
 
 
-def _obey(loop: Loop, bundle: Bundle, model: Model, told: dict[int, Order], number: int) -> None:
+def _obey(loop: Loop, bundle: Bundle, config: dict[str, Any], told: dict[int, Order], number: int) -> None:
     """Give the loop an order of the journal, and the settings changed by then."""
     if not number:
         return
@@ -103,5 +117,5 @@ def _obey(loop: Loop, bundle: Bundle, model: Model, told: dict[int, Order], numb
         raise NoAnswer(f"order {number} is not in the journal: the loop cannot be closed as the recording's was")
     changed = {path: value for n in range(1, number + 1) if n in told for path, value in told[n].changed.items()}
     if changed:
-        generate.fill(loop.p[0], _machine(bundle, model, changed).diagram.blocks)
+        generate.fill(loop.p[0], _machine(bundle, config, changed).diagram.blocks)
     restore(loop.c[0], told[number].command)

@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from rtctl.case.format2 import read_case
 from rtctl.diagnose.graph.answer import diagnose_record
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.kernel import OPEN
 from rtctl.diagnose.graph.model import nominal, settings_of
 from rtctl.diagnose.graph.record import GraphRecord, record_of

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from rtctl.case.quantities import quantities
 from rtctl.diagnose.diagnosis import Effect, Interval, Rival
-from rtctl.diagnose.quantities import quantities
 from rtctl.plants.physics import TERMS, nodes
 
 PLACES = [(name, node) for name, term in TERMS.items() for node in nodes(term, "axis")]

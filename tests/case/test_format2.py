@@ -3,8 +3,8 @@ import math
 import pytest
 from graph_cases import BELT, PENDULUM, case_of
 
+from rtctl.case.format2 import read_case
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph.case import read_case
 from rtctl.diagnose.graph.model import nominal
 
 

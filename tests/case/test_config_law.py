@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from rtctl.diagnose.config_law import ConfigLaw, UnsaidLaw, config_law
+from rtctl.case.config_law import ConfigLaw, UnsaidLaw, config_law
 from rtctl.machines.axis import AxisConfig
 
 PI = {"kind": "pi_velocity", "gain": 6400.0}

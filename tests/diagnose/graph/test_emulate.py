@@ -8,16 +8,17 @@ import yaml
 
 from rtctl import api
 from rtctl.config.errors import NoAnswer, UserError
-from rtctl.diagnose.emulate import can_emulate, emulate
-from rtctl.diagnose.kernel import CLOSED, OPEN
-from rtctl.diagnose.measure import compare, default_mode
+from rtctl.diagnose.graph.emulate import can_emulate, emulate
+from rtctl.diagnose.graph.freerun import compare
+from rtctl.diagnose.graph.known import graph_record
+from rtctl.diagnose.graph.load import of_bundle
 from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import INPUT, load_record
+from rtctl.diagnose.record import INPUT
 from rtctl.own import files, model
 from rtctl.own.files import give
 from rtctl.trace.bundle import load_bundle
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 STEPS = [{"at": 0.2, "to": 0.02, "ramp": 0.2}, {"at": 1.6, "to": 0.0, "ramp": 0.2}]
 
 
@@ -43,42 +44,69 @@ def foreign(monkeypatch):
 
 
 def test_without_the_file_the_recorded_command_is_the_input(own, foreign):
-    bundle, record = load_bundle(own / "run"), load_record(own / "run")
-    assert default_mode(record, bundle) == OPEN
+    bundle = load_bundle(own / "run")
+    record = of_bundle(bundle)
+    assert not compare(record, bundle=bundle).closed
     said = next(warning for warning in record.case.warnings if INPUT in warning)
     assert "a position law of an own file, ./my_law.py:MyLaw" in said and "--own ./my_law.py" in said
     with pytest.raises(UserError, match="own file"):
-        compare(record, owner_model(record.case), CLOSED, 0, bundle)
+        compare(record, True, 0, bundle)
     with pytest.raises(UserError, match="--own"):
-        emulate(bundle, record, owner_model(record.case))
+        emulate(bundle, record)
 
 
 def test_with_the_file_the_loop_is_closed_to_the_bit(own, foreign):
     give([own / "my_law.py"])
-    bundle, record = load_bundle(own / "run"), load_record(own / "run")
-    assert not record.closed_loop and default_mode(record, bundle) == CLOSED
-    found = compare(record, owner_model(record.case), None, 0, bundle)
-    assert found.mode == CLOSED and set(found.channels) == {"x", "u"}
+    bundle = load_bundle(own / "run")
+    record = of_bundle(bundle)
+    assert not record.source.closed_loop
+    found = compare(record, bundle=bundle)
+    assert found.closed and set(found.channels) == {"x", "u"}
     for channel in found.channels.values():
         np.testing.assert_array_equal(channel.simulated, channel.recorded)
     assert np.ptp(found.channels["u"].recorded) > 0.5
 
 
+def with_values(record, **changes):
+    """The record under other parameters than its owner says."""
+    return graph_record(record.source, owner_model(record.source.case).change(**changes))
+
+
 def test_another_plant_gives_another_command(own, foreign):
     give([own / "my_law.py"])
-    bundle, record = load_bundle(own / "run"), load_record(own / "run")
-    nominal = owner_model(record.case)
-    heavier = compare(record, nominal.change(M=1.2 * nominal.base["M"]), CLOSED, 0, bundle)
+    bundle = load_bundle(own / "run")
+    record = of_bundle(bundle)
+    heavier = compare(with_values(record, M=1.2 * record.case.values["bodies.carriage.mass"]), True, 0, bundle)
     assert 1e-4 < heavier.channels["x"].nrmse < 0.1
     assert heavier.channels["u"].nrmse > 0.01
 
 
 def test_a_model_that_trips_the_machine_is_no_answer(own, foreign):
     give([own / "my_law.py"])
-    bundle, record = load_bundle(own / "run"), load_record(own / "run")
-    nominal = owner_model(record.case)
+    bundle = load_bundle(own / "run")
     with pytest.raises(NoAnswer, match="trips the machine at tick"):
-        emulate(bundle, record, nominal.change(K=1e-3))
+        emulate(bundle, with_values(of_bundle(bundle), K=1e-3))
+
+
+def test_a_described_machine_runs_its_own_tick(config, tmp_path):
+    changes = {"name": config("axis").name, "loop.mode": "fused"}
+    bundle = api.record(api.load_config("machines/belt", changes), 1.5, tmp_path / "run")
+    record = of_bundle(bundle)
+    found = compare(record, bundle=bundle)
+    assert found.closed and set(found.channels) == {*record.y, *record.case.machine.drives}
+    for channel in found.channels.values():
+        np.testing.assert_array_equal(channel.simulated, channel.recorded)
+    machine = record.case.machine.model_dump(mode="json", exclude_unset=True)
+    (tmp_path / "heavy.yaml").write_text(yaml.safe_dump({"machine": heavier(machine)}))
+    other = compare(of_bundle(bundle, tmp_path / "heavy.yaml"), bundle=bundle)
+    assert other.closed and 1e-6 < other.channels["encoder"].nrmse < 0.5
+
+
+def heavier(machine):
+    """The description with one body of twice the mass or inertia."""
+    name, body = next((n, b) for n, b in machine["bodies"].items() if "mass" in b or "inertia" in b)
+    key = "mass" if "mass" in body else "inertia"
+    return {**machine, "bodies": {**machine["bodies"], name: {**body, key: 2.0 * body[key]}}}
 
 
 def test_only_a_whole_recording_of_our_own_is_emulated(own):

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
+from rtctl.case.checks import FROM_ELSEWHERE, number, strange
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
 from rtctl.plants.graph.coupled import felt
@@ -104,7 +105,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
     given = case.get("machine")
     if not isinstance(given, dict):
         raise UserError(f"{where}: machine is {type(given).__name__}; it should be an object with bodies and sensors")
-    warnings = [_strange(where, key) for key in case if key not in KEYS and key not in _foreign()]
+    warnings = [strange(where, key, "", KEYS) for key in case if key not in KEYS and key not in FROM_ELSEWHERE]
     try:
         machine = Description.model_validate(given)
     except ValidationError as error:
@@ -128,10 +129,10 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         values |= dict.fromkeys(_own_starts(machine, placed), 1.0)
     tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
     differ = _differ(where, case.get("per_recording"), values)
-    rate = _number(where, "sample_rate", case.get("sample_rate"))
+    rate = number(where, "sample_rate", case.get("sample_rate"))
     if rate is not None and rate <= 0.0:
         raise UserError(f"{where}: sample_rate is {rate:g}; it should be above 0 Hz, or null where the clock is uneven")
-    delay = _number(where, "delay_samples", case.get("delay_samples"))
+    delay = number(where, "delay_samples", case.get("delay_samples"))
     if delay is None:
         delay = 0.0
         if machine.drives and problem == "driven":
@@ -164,12 +165,6 @@ def _own_config(case: dict[str, Any]) -> dict[str, Any] | None:
     return config if isinstance(config, dict) and isinstance(config.get("machine"), dict) else None
 
 
-def _foreign() -> tuple[str, ...]:
-    from rtctl.diagnose.case import FROM_ELSEWHERE
-
-    return FROM_ELSEWHERE
-
-
 def _tolerances(
     where: Path, given: Any, values: dict[str, float], warnings: list[str]
 ) -> tuple[dict[str, float | None], float | None]:
@@ -180,10 +175,10 @@ def _tolerances(
         raise UserError(f"{where}: tolerance is a {type(given).__name__}; it should be an object of paths and shares")
     out: dict[str, float | None] = {}
     for path, share in given.items():
-        number = _number(where, f"tolerance.{path}", share)
-        if number is not None and number < 0.0:
-            raise UserError(f"{where}: tolerance.{path} is {number:g}; it should be 0 or more, or null")
-        out[path] = number
+        found = number(where, f"tolerance.{path}", share)
+        if found is not None and found < 0.0:
+            raise UserError(f"{where}: tolerance.{path} is {found:g}; it should be 0 or more, or null")
+        out[path] = found
         known = any(one == path or one.startswith(f"{path}.") for one in values)
         if path != "default" and not known and not path.startswith("physics."):
             hint = nearest(path, values)
@@ -285,18 +280,3 @@ def _inputs(where: Path, machine: Description, given: Any) -> dict[str, Input]:
                 + (f"; did you mean '{hint}'?" if hint else "")
             )
     return out
-
-
-def _number(where: Path, key: str, value: Any) -> float | None:
-    if value is None:
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise UserError(f"{where}: {key} is {value!r}; it should be a finite number in SI units")
-    return float(value)
-
-
-def _strange(where: Path, name: str) -> str:
-    hint = nearest(name, KEYS)
-    return f"{where}: {name} is not a key that this program knows; it is left out" + (
-        f" (is it '{hint}'?)" if hint else ""
-    )

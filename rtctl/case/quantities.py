@@ -14,7 +14,6 @@ from pydantic import create_model
 from rtctl.config.units import ANGLES
 from rtctl.idiom import Settings
 
-EFFORT = ("N", "Nm")  # units of u that are the force or torque itself: the gain K is 1
 VOLT = "V"  # unit of a command, where nothing else is said
 DIMENSIONS = {  # unit of a quantity where a node turns, and where it slides
     "position": ("rad", "m"), "speed": ("rad/s", "m/s"), "force": ("Nm", "N"), "inertia": ("kg m^2", "kg"),
@@ -91,5 +90,5 @@ def settings_in(model: type[Settings], units: Quantities) -> type[Settings]:
 
 
 def of_case(case: Any) -> Quantities:
-    """Of a case (rtctl.diagnose.case.Case)."""
+    """Of a case of exchange format 1 (rtctl.case.format1.Case)."""
     return quantities(case.sensors.unit, case.drive.unit)

@@ -1,0 +1,13 @@
+"""What the owner of a machine believes of it: case.json of a bundle, checked.
+
+    format1     Case of the three machines that exchange format 1 knows by name
+    parts       its sensors, drive and tolerances
+    laws        its controller
+    config_law  the law by the config of our own recordings; unsaid: parts that no simulation computes
+    quantities  units and nouns of an axis
+    format2     GraphCase of a described machine, exchange format 2
+    checks      numbers, objects, unknown keys
+    load        a case of either format
+
+A case knows no recording: what is read of columns stands in rtctl/trace and rtctl/diagnose.
+"""

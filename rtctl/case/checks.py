@@ -1,0 +1,62 @@
+"""Checks of the values in a case: numbers, objects, and keys that nobody knows."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from rtctl.config.complaints import sentences
+from rtctl.config.errors import UserError, nearest
+
+FROM_ELSEWHERE = ("config", "seed", "versions", "run", "timing", "changes", "rows", "losses", "complete",
+                  "recorded_at", "part", "parts", "repaired", "discarded_bytes", "recording_error")  # fmt: skip
+
+
+class Part(BaseModel):
+    """An object of a case; keys that it does not know are left out."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+
+
+def part(where: Path, name: str, model: type, given: Any, warnings: list[str]) -> Any:
+    """The checked object under a key. Raises UserError that names the key."""
+    if given is None:
+        given = {}
+    if not isinstance(given, dict):
+        raise UserError(f"{where}: {name} is a {type(given).__name__}; it should be an object {{...}}")
+    warnings += [strange(where, k, name + ".", model.model_fields) for k in given if k not in model.model_fields]  # type: ignore[attr-defined]
+    if name == "reaches":
+        for key, value in given.items():
+            number(where, f"reaches.{key}", value)
+    try:
+        return model(**given)
+    except ValidationError as error:
+        raise UserError(sentences(error, model, given, lambda path: f"{where}: {name}").splitlines()[0]) from None
+
+
+def number(where: Path, key: str, value: Any) -> float | None:
+    """A finite number under a key, None where there is none. Raises UserError."""
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise UserError(f"{where}: {key} is {value!r}; it should be a finite number in SI units")
+    try:
+        found = float(value)
+    except OverflowError:
+        found = math.inf
+    if not math.isfinite(found):
+        raise UserError(f"{where}: {key} is {value}; it should be a finite number")
+    return found
+
+
+def strange(where: Path, name: str, before: str, known: Any) -> str:
+    """Warning of a key that nobody knows."""
+    return f"{where}: {before}{name} is not a key that this program knows; it is left out" + perhaps(
+        nearest(name, known)
+    )
+
+
+def perhaps(hint: str | None) -> str:
+    """The hint at what may have been meant."""
+    return f" (is it '{hint}'?)" if hint else ""

@@ -1,0 +1,64 @@
+"""Records of exchange format 1 that a simulation makes."""
+
+import numpy as np
+
+from rtctl.case.format1 import Case
+from rtctl.diagnose.graph import loop
+from rtctl.diagnose.graph.kernel import OPEN
+from rtctl.diagnose.graph.known import graph_record
+from rtctl.diagnose.graph.model import nominal
+from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.model import Model
+from rtctl.diagnose.record import Record, commands_of
+
+SENSORS = {
+    "axis": ("x",),
+    "ivu": ("capstan_counts", "reel1_counts", "reel2_counts"),
+    "ldu": ("encoder_counts", "scale_counts"),
+}
+
+
+def at_rest(case: Case, n: int, ref: np.ndarray | None = None, u: np.ndarray | None = None, sensors=()) -> Record:
+    """A record of n rows whose sensors stand still, with a reference (n,) and commands u (n, drives)."""
+    dt, zero = 1.0 / float(case.sample_rate or 1.0), np.zeros(n)
+    volts = np.zeros((n, len(commands_of(case.plant)))) if u is None else u
+    y = dict.fromkeys(sensors or SENSORS[case.plant], zero)
+    return Record(case.plant, case, np.arange(n) * dt, dt, zero if ref is None else ref, zero, volts, y, {})
+
+
+def driven(record: Record, model: Model) -> dict[str, np.ndarray]:
+    """Readings (n,) by column of a model under the commands of a record, from rest on; counters are not cut."""
+    sim, model = _ready(record, model)
+    sim = sim.beginning(0.0, 0.0)
+    return _columns(sim, sim.run(model, OPEN))
+
+
+def closed(record: Record, model: Model) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The same under the known law for the reference of a record, and the commands (n, drives)."""
+    sim, model = _ready(record, model)
+    if sim.layout.nq == 1:
+        sim = sim.beginning(0.0, 0.0)
+    out, volts = loop.run(sim, loop.loop_of(sim.record), model, record.ref, record.w, shaped=True)
+    return _columns(sim, out), volts
+
+
+def of_closed(record: Record, model: Model) -> Record:
+    """The record of what `closed` gives."""
+    y, volts = closed(record, model)
+    return record._replace(y=y, u=volts)
+
+
+def _ready(record: Record, model: Model):
+    """A simulator, and the model with its terms as they are: a fit may try sizes beyond the bounds of a config."""
+    sim = Simulator(graph_record(record, model._replace(terms=())))
+    return sim, nominal(sim.case).add(*model.terms)
+
+
+def _columns(sim: Simulator, out: np.ndarray) -> dict[str, np.ndarray]:
+    found = {}
+    for name, sensor in sim.case.machine.sensors.items():
+        values = sensor.scale * out[:, sim.column(name)]
+        if not sensor.direction:
+            values = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(values)))])
+        found[sensor.column] = values - (0.5 if sensor.counts_per_unit is not None and sensor.direction else 0.0)
+    return found
