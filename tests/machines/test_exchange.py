@@ -1,4 +1,4 @@
-"""Exchange format 1 as each machine declares it: symbols there and back, columns, and the description that they fill."""
+"""Exchange format 1 as each machine declares it: symbols there and back, columns, the description that they fill."""
 
 import pytest
 
