@@ -149,3 +149,9 @@ def test_command(bench, tmp_path):
     told = json.loads(done.stdout)
     assert told["rows"] == 100
     assert told["lacks"] is None
+
+
+def test_an_assumed_unit_is_told_of_what_has_one(bench):
+    text = BELT.replace("column: u, ", "column: u, enabled: power, ")
+    made, _ = bench(columns(power=np.ones(100)), MAPS, text)
+    assert next(note for note in made.notes if "assumed" in note).startswith("no unit is given: u in V assumed")

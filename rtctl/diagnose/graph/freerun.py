@@ -18,10 +18,10 @@ from rtctl.diagnose.graph.likelihood import settled
 from rtctl.diagnose.graph.model import nominal
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.graph.words import body_of
 from rtctl.diagnose.kernel import CLOSED, OPEN
 from rtctl.diagnose.measure import NAMES, Channel, Comparison
 from rtctl.plants.graph.file import read_machine
+from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.graph.units import measured_unit
 
 

@@ -182,8 +182,8 @@ def _signals(
                 whole(table, given.column, values)
                 values, wrapped = unwrapped(name, values)
                 notes += [wrapped] if wrapped else []
-            else:
-                assumed.append(f"{name} in {_shown(want)}")
+            elif unit := _shown(want):
+                assumed.append(f"{name} in {unit}")
         else:
             values = _converted(table, given.column, values, theirs, want, notes)
         columns[name] = values

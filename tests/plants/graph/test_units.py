@@ -60,3 +60,11 @@ def test_units_by_kind():
     assert drive_units("force", "%", True)["gain"] == "Nm/percent"
     assert drive_units("voltage", "V", False)["torque_constant"] == "N/A"
     assert (measured_unit("speed", True), measured_unit("force", False)) == ("rad/s", "N")
+
+
+@pytest.mark.parametrize(("per_unit", "step"), [(1, "2 mm"), (-1, "2 mm"), (1000.0, 2.0)])
+def test_a_step_has_a_unit_where_the_column_is_in_si(per_unit, step):
+    data = copy.deepcopy(TAPE)
+    data["sensors"]["scale"] = {"body": "table", "column": "s", "per_unit": per_unit, "resolution": step}
+    sensor = Description.model_validate(data).sensors["scale"]
+    assert sensor.grain / abs(sensor.scale) == pytest.approx(2e-3)
