@@ -155,3 +155,8 @@ def test_an_assumed_unit_is_told_of_what_has_one(bench):
     text = BELT.replace("column: u, ", "column: u, enabled: power, ")
     made, _ = bench(columns(power=np.ones(100)), MAPS, text)
     assert next(note for note in made.notes if "assumed" in note).startswith("no unit is given: u in V assumed")
+
+
+def test_an_empty_reference_is_none(bench):
+    _, bundle = bench(columns(ref=np.full(100, np.nan), w=np.zeros(100)), MAPS)
+    assert set(bundle.columns) == {"t", "u", "encoder_counts", "w"}

@@ -118,7 +118,7 @@ def _column_of(name: str, known: Mapping[str, Wanted]) -> str:
 
 
 def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believed) -> dict[str, ColumnPlan]:
-    """Our columns and theirs: as --map says, else those of the same name."""
+    """Our columns and theirs: as --map says, else those of the same name. An empty reference or excitation is none."""
     named: dict[str, ColumnPlan] = {}
     for name, given in plan.columns.items():
         ours = _column_of(name, known)
@@ -135,7 +135,7 @@ def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believ
         ours: given if given.column else given.model_copy(update={"column": ours}) for ours, given in named.items()
     }
     for ours in (*known, *BESIDE, "t"):
-        if ours not in named and ours in table.columns:
+        if ours not in named and ours in table.columns and not (ours in BESIDE and table.empty(ours)):
             named[ours] = ColumnPlan(column=ours)
     if "t" not in named and table.clock and plan.rate is None:
         named["t"] = ColumnPlan(column=table.clock)
