@@ -160,3 +160,8 @@ def test_an_assumed_unit_is_told_of_what_has_one(bench):
 def test_an_empty_reference_is_none(bench):
     _, bundle = bench(columns(ref=np.full(100, np.nan), w=np.zeros(100)), MAPS)
     assert set(bundle.columns) == {"t", "u", "encoder_counts", "w"}
+
+
+def test_a_minus_is_no_part_of_a_unit(bench):
+    made, _ = bench(columns(way=-12.7 * TURN), [*MAPS, "scale_mm=way"], BELT.replace("1000,", "-1000,"))
+    assert made.columns["scale_mm"] == "mm"

@@ -194,18 +194,19 @@ def _signals(
 
 
 def _shown(want: Wanted | None) -> str:
-    """Unit of a column as the description has it."""
+    """Unit of a column as the description has it; a minus that turns its direction round is no unit."""
     if want is None:
         return ""
     if want.counts:
         return "counts"
+    scale = abs(want.scale)
     for unit in (want.unit, *(f"{prefix}{want.unit}" for prefix in PREFIXES), *OTHERS):
         try:
-            if abs(convert(1.0, want.unit, unit) / want.scale - 1.0) < 1e-6:
+            if abs(convert(1.0, want.unit, unit) / scale - 1.0) < 1e-6:
                 return unit
         except ValueError:
             continue
-    return f"{want.unit}/{want.scale:g}"
+    return f"{want.unit}/{scale:g}"
 
 
 def _ask_unit(table: Table, column: str, want: Wanted) -> None:
