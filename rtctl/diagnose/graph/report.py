@@ -257,9 +257,9 @@ def terminal(d: GraphDiagnosis) -> RenderableType:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for name in ("effect", "at", "size", "90 % interval", "confidence"):
             right = name in ("90 % interval", "confidence")
-            table.add_column(name, justify="right" if right else "left", overflow="fold")
-        for row in effect_rows(d):
-            table.add_row(*map(Text, row))
+            table.add_column(name, justify="right" if right else "left", overflow="fold", no_wrap=name == "effect")
+        for first, *others in effect_rows(d):  # the name of an effect stays whole
+            table.add_row(*map(Text, (first.replace(" (", "\n("), *others)))
         parts += [Text(), table]
     alike = [f"{look} ({p})" for _, look, p, _ in rival_rows(d)[:MOST_RIVALS] if not p.startswith("<")]
     if alike and d.verdict in (NAMED, AMBIGUOUS):
