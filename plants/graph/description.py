@@ -199,6 +199,8 @@ class Sensor(Settings):
         check_place("", where, self.measures)
         if self.scale == 0.0:
             raise ValueError("counts_per_unit or per_unit: 0 shows nothing; give column units for one SI unit")
+        if not self.direction and (self.measures != "position" or self.counts_per_unit is None):
+            raise ValueError("direction: false is for a counter of edges; give measures: position and counts_per_unit")
         return self
 
 

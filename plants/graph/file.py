@@ -13,9 +13,10 @@ from rtctl.config.errors import UserError, nearest
 from rtctl.config.yaml_file import Document, find, load_yaml
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import layout
+from rtctl.plants.graph.term_units import entry_in_si
 from rtctl.plants.physics import TERMS
 
-PARTS = ("bodies", "joints", "drives", "sensors")
+PARTS = ("bodies", "joints", "drives", "sensors", "mechanics")
 CARRIED = ("delay_samples", "inputs", "problem", "group", "per_recording", "notes")  # keys that case.json has too
 WRITES = {"next_tick": 1.0, "same_tick": 0.0}  # loop.write -> samples from a command until it acts
 
@@ -39,13 +40,19 @@ def read_machine(path: Path | str) -> Believed:
     return checked(document.data, document)
 
 
+def is_bare(data: Any) -> bool:
+    """Whether plain data are a description alone, without the other keys of a config."""
+    return isinstance(data, dict) and "machine" not in data and any(part in data for part in PARTS)
+
+
 def checked(data: Any, document: Document) -> Believed:
     """What plain data believe of a machine. Raises UserError as `read_machine`."""
     if not isinstance(data, dict):
         raise UserError(f"{document.path} holds no keys; a description has bodies, joints, drives and sensors")
-    bare = "machine" not in data and any(part in data for part in PARTS)
     given, at = (
-        ({part: data[part] for part in PARTS if part in data}, ()) if bare else (data.get("machine"), ("machine",))
+        ({part: data[part] for part in PARTS if part in data}, ())
+        if is_bare(data)
+        else (data.get("machine"), ("machine",))
     )
     if not isinstance(given, dict):
         said = f"machine is {given!r}" if "machine" in data else "machine is missing"
@@ -67,7 +74,7 @@ def checked(data: Any, document: Document) -> Believed:
         tolerance = {"default": tolerance}
     return Believed(
         machine,
-        _physics(physics, document),
+        _physics(physics, document, machine),
         dict(tolerance or {}),
         _carried(data),
     )
@@ -83,7 +90,7 @@ def _carried(data: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
-def _physics(given: Any, document: Document) -> tuple[dict[str, Any], ...]:
+def _physics(given: Any, document: Document, machine: Description) -> tuple[dict[str, Any], ...]:
     if given is None:
         return ()
     at = ("physics",) if ("physics",) in document.lines else ("plant", "physics")
@@ -99,10 +106,12 @@ def _physics(given: Any, document: Document) -> tuple[dict[str, Any], ...]:
             raise UserError(f"{_where(document, here)}: physics.{i}.term: there is no term {name!r}{hint}")
         settings = TERMS[name].settings
         try:
-            found = settings.model_validate(entry)
+            found = settings.model_validate(entry_in_si(machine, entry))
         except ValidationError as error:
             where = lambda path, here=here: f"{_where(document, (*here, *path))}: {'.'.join(map(str, here))}"  # noqa: E731
             raise UserError(sentences(error, settings, entry, where, document.texts)) from None
+        except ValueError as error:
+            raise UserError(f"{_where(document, here)}: physics.{i}.{error}") from None
         out.append({"term": name, **found.model_dump(mode="json", exclude_defaults=True)})
     return tuple(out)
 

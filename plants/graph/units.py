@@ -123,7 +123,8 @@ def _sensor_units(path: str, sensor: Mapping[str, Any], turns: bool) -> dict[str
     if measures not in ("position", "speed", "acceleration", "force", "current"):
         return {}
     unit = measured_unit(measures, turns)
-    column = {} if "per_unit" in sensor or "counts_per_unit" in sensor else {"resolution": unit, "noise": unit}
+    si = "counts_per_unit" not in sensor and sensor.get("per_unit", 1) in (1, -1)  # a minus turns the direction round
+    column = {"resolution": unit, "noise": unit} if si else {}
     return {"counts_per_unit": _per(unit), **column}
 
 

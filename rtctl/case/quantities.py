@@ -13,14 +13,9 @@ from pydantic import create_model
 
 from rtctl.config.units import ANGLES
 from rtctl.idiom import Settings
+from rtctl.plants.physics.dimensions import DIMENSIONS
 
 VOLT = "V"  # unit of a command, where nothing else is said
-DIMENSIONS = {  # unit of a quantity where a node turns, and where it slides
-    "position": ("rad", "m"), "speed": ("rad/s", "m/s"), "force": ("Nm", "N"), "inertia": ("kg m^2", "kg"),
-    "stiffness": ("Nm/rad", "N/m"), "square": ("Nm/rad^2", "N/m^2"), "cubic": ("Nm/rad^3", "N/m^3"),
-    "drag": ("Nms/rad", "Ns/m"), "square_drag": ("Nms^2/rad^2", "Ns^2/m^2"), "per_force": ("1/Nm", "1/N"),
-    "yield": ("rad/(s Nm)", "m/(s N)"),
-}  # fmt: skip
 TURNED = {slides: turns for turns, slides in DIMENSIONS.values()}  # unit on a sliding axis -> on a rotary one
 NAMES = {"V": "volt", "A": "ampere", "N": "newton", "Nm": "newton metre"}  # of a command's unit
 

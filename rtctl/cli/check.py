@@ -7,6 +7,7 @@ import typer
 
 from rtctl.cli import common
 from rtctl.cli.common import ConfigArgument, LinkOption, ModeOption, ReferenceOption, SetOption
+from rtctl.config.errors import UserError
 
 app = typer.Typer(add_completion=False)
 
@@ -25,7 +26,8 @@ def check(
     """Check a config and say what it would run. Exit code 2 with every mistake, where it is wrong.
 
     Of a machine that the config describes it also says what was described, in words and as a drawing, the modes that
-    follow, and which parameters a recording by these sensors could tell apart.
+    follow, and which parameters a recording by these sensors could tell apart. A file with the description alone, as
+    `rtctl import --machine` takes it, is checked without what a run would be.
 
     A law or plant of your own, `kind: ./my_law.py:MyLaw`, is compiled by itself, looked through for what allocates, and
     timed on this machine.
@@ -38,9 +40,14 @@ def check(
 
       rtctl check ldu --reference print_steps --set loop.rate='5 kHz'
     """
+    if _description(config):
+        for option, value in (("--reference", reference), ("--mode", mode), ("--link", link), ("--set", set_)):
+            if value:
+                raise UserError(f"{option}: {config} is a description alone; {option} goes with a config")
+        _alone(config, svg)
+        return
     settings = common.with_loop(common.load_config(config, set_), mode, link)
     machine = common.machine_of(common.with_reference(settings, reference))
-    from rtctl.config.errors import UserError
     from rtctl.machines import fmu_of
     from rtctl.machines.base import DESCRIBED
 
@@ -54,30 +61,55 @@ def check(
     for name, value in [*_summary(machine), *found]:
         typer.echo(f"  {name:10}{value}")
     if machine.kind == DESCRIBED:
-        _report(machine.config, svg)
+        from rtctl.machine_report import sensitivity
+
+        tells = sensitivity.sentences(sensitivity.sensitivity(machine.config))
+        _report(machine.config.machine, machine.config.name, tells, svg)
     elif svg is not None:
         raise UserError(f"--svg: the drawing is of a described machine; {machine.kind} comes with the program")
 
 
-def _report(config: Any, svg: Path | None) -> None:
-    """What the description says."""
-    from rtctl.config.errors import UserError
+def _description(path: str) -> bool:
+    """Whether a file holds a description alone."""
+    from rtctl.config.yaml_file import find, load_yaml
+    from rtctl.plants.graph.file import is_bare
+
+    return is_bare(load_yaml(find(path)).data)
+
+
+def _alone(path: str, svg: Path | None) -> None:
+    """What a file with the description alone says."""
+    from rtctl.own.mechanics import give_machine
+    from rtctl.plants.graph.file import read_machine
+
+    give_machine(Path(path))
+    believed = read_machine(path)
+    typer.echo("ok")
+    problem = believed.case.get("problem", "driven")
+    typer.echo(f"  {'problem':10}{problem}")
+    _report(believed.machine, Path(path).stem, [], svg)
+    terms = [f"{entry['term']} at {entry['node']}" for entry in believed.physics]
+    if terms:
+        typer.echo(f"\n  known     {', '.join(terms)}")
+
+
+def _report(machine: Any, name: str, tells: list[str], svg: Path | None) -> None:
+    """What a description says; `tells` are sentences on the parameters that its sensors tell apart."""
     from rtctl.config.files import write_text
-    from rtctl.machine_report import modes, sensitivity, terminal, words
+    from rtctl.machine_report import modes, terminal, words
     from rtctl.machine_report.svg import svg as picture
 
-    for group, line in words.sentences(config.machine):
+    for group, line in words.sentences(machine):
         typer.echo(f"  {group:10}{line}")
-    for n, line in enumerate(modes.sentences(config.machine)):
-        typer.echo(f"  {'' if n else 'modes':10}{line}")
-    for n, line in enumerate(sensitivity.sentences(sensitivity.sensitivity(config))):
-        typer.echo(f"  {'' if n else 'tells':10}{line}")
+    for head, lines in (("modes", modes.sentences(machine)), ("tells", tells)):
+        for n, line in enumerate(lines):
+            typer.echo(f"  {'' if n else head:10}{line}")
     typer.echo("")
-    for line in terminal.drawing(config.machine):
+    for line in terminal.drawing(machine):
         typer.echo(f"  {line}")
     if svg is not None:
         try:
-            write_text(svg, picture(config.machine, config.name))
+            write_text(svg, picture(machine, name))
         except OSError as error:
             raise UserError(f"--svg {svg}: cannot be written: {error.strerror}") from None
         typer.echo(f"\n  drawing in {svg}")

@@ -21,6 +21,7 @@ LONGEST = 64  # characters of a unit
 SPELLINGS = {
     **{f"{prefix}Nm": f"({prefix}N*m)" for prefix in ("", "u", "m", "k")},
     **{f"{prefix}Nms": f"({prefix}N*m*s)" for prefix in ("", "u", "m", "k")},
+    **{f"{prefix}Ns": f"({prefix}N*s)" for prefix in ("", "u", "m", "k")},
     "%": "percent",
     "\u00b0": "degree",
 }

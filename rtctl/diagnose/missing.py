@@ -18,8 +18,10 @@ def binned(
 
     Neighbouring samples are not independent: the band comes from the scatter of the means of `block` rows, visit by
     visit. Each bin has the same sum of its shares of the way along x and of the samples; a gap in x leaves a column of
-    nan.
+    nan. No samples give no bins.
     """
+    if not len(x):
+        return np.empty((4, 0))
     lo, hi = np.quantile(x, (0.002, 0.998))
     edges = spaced(np.sort(x[(x >= lo) & (x <= hi)]), lo, hi, count + 1)
     index = np.searchsorted(edges, x) - 1

@@ -9,14 +9,6 @@ from rtctl.diagnose.numbers import prefix as prefix
 from rtctl.plants.physics import TERMS, Phrase
 from rtctl.plants.physics.search import Turn
 
-BY_NODE = {  # dimension of a parameter by its name, where its term does not say
-    "F_C": "force", "F_added": "force", "F_s": "force", "F": "force", "F_h": "force", "B": "drag", "B_a": "drag",
-    "v_s": "speed",
-    "z_s": "position", "z_h": "position", "gap": "position", "size": "position", "each": "position", "mark": "position",
-    "at": "position", "width": "position", "x0": "position", "turn": "position", "mass": "inertia", "k": "stiffness",
-    "c2": "square", "c3": "cubic", "Q": "square_drag",
-}  # fmt: skip
-
 
 class Sized(Protocol):
     """What a phrase asks of an effect: the node in words, and value, unit or words of a parameter by its name."""

@@ -64,3 +64,33 @@ def test_settings_that_contradict_each_other(rtctl, tmp_path):
     code, out, err = rtctl("check", "ivu", "--reference", file)
     assert (code, out) == (2, "")
     assert "step 2 at 1 s comes before" in err
+
+
+ARM = """\
+bodies:
+  arm: {inertia: 0.03 kg*m^2, gravity: {mass: 1 kg, arm: 150 mm}}
+sensors:
+  encoder: {body: arm, column: x, resolution: 1 mrad, per_unit: -1}
+physics:
+  - {term: friction.coulomb, node: arm, F_C: 20 mNm}
+problem: free
+"""
+
+
+def test_a_description_alone_is_checked_as_import_takes_it(rtctl, tmp_path):
+    file = tmp_path / "arm.yaml"
+    file.write_text(ARM)
+    code, out, err = rtctl("check", file, "--svg", tmp_path / "arm.svg")
+    assert (code, err) == (0, "")
+    for text in ("ok", "free", "1 kg at 150 mm", "one step is 1 mrad", "1.1", "friction.coulomb at arm"):
+        assert text in out
+    assert (tmp_path / "arm.svg").is_file()
+    code, _, err = rtctl("check", file, "--mode", "fused")
+    assert code == 2 and "--mode" in err and "goes with a config" in err
+
+
+def test_a_mistake_in_a_description_alone_has_its_line(rtctl, tmp_path):
+    file = tmp_path / "arm.yaml"
+    file.write_text(ARM.replace("0.03 kg*m^2", "0.03 kg"))
+    code, out, err = rtctl("check", file)
+    assert (code, out) == (2, "") and "arm.yaml:2: " in err

@@ -149,3 +149,19 @@ def test_command(bench, tmp_path):
     told = json.loads(done.stdout)
     assert told["rows"] == 100
     assert told["lacks"] is None
+
+
+def test_an_assumed_unit_is_told_of_what_has_one(bench):
+    text = BELT.replace("column: u, ", "column: u, enabled: power, ")
+    made, _ = bench(columns(power=np.ones(100)), MAPS, text)
+    assert next(note for note in made.notes if "assumed" in note).startswith("no unit is given: u in V assumed")
+
+
+def test_an_empty_reference_is_none(bench):
+    _, bundle = bench(columns(ref=np.full(100, np.nan), w=np.zeros(100)), MAPS)
+    assert set(bundle.columns) == {"t", "u", "encoder_counts", "w"}
+
+
+def test_a_minus_is_no_part_of_a_unit(bench):
+    made, _ = bench(columns(way=-12.7 * TURN), [*MAPS, "scale_mm=way"], BELT.replace("1000,", "-1000,"))
+    assert made.columns["scale_mm"] == "mm"

@@ -20,9 +20,9 @@ from rtctl.diagnose.graph.likelihood import settled
 from rtctl.diagnose.graph.model import GraphModel, nominal
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.graph.words import body_of
 from rtctl.diagnose.record import INPUT
 from rtctl.diagnose.replayed import replayed_law
+from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.graph.units import measured_unit
 from rtctl.trace.bundle import Bundle
 

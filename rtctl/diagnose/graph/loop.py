@@ -18,7 +18,6 @@ from rtctl.diagnose.graph.model import GraphModel, carried, moved_inertia, nomin
 from rtctl.diagnose.graph.prepare import path_of, pushing, ready
 from rtctl.diagnose.graph.record import GraphRecord, levers
 from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.graph.words import body_of
 from rtctl.diagnose.law import LawParams
 from rtctl.diagnose.law_params import LARGE, began, law_params, law_state, neutral, of_settings
 from rtctl.idiom import fill_record, record_dtype
@@ -28,6 +27,7 @@ from rtctl.own.files import OwnError
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.linearised import ringing
 from rtctl.plants.graph.params import GraphParams
+from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.graph.units import measured_unit
 
 SLOWER = 0.2  # of the lowest natural frequency: bandwidth of a stand-in, at most

@@ -16,9 +16,11 @@ from rtctl.diagnose.graph.likelihood import settled
 from rtctl.diagnose.graph.measures import speed, way
 from rtctl.diagnose.graph.model import GraphModel
 from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.graph.words import body_of, channel_unit, here
+from rtctl.diagnose.graph.words import channel_unit, here
 from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.physics import TERMS
+from rtctl.plants.physics.dimensions import DIMENSIONS
 
 CLEARER = 3.0  # times more than the followed sensor, from which on another sensor's reading shows an effect
 

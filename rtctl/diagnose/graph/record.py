@@ -94,6 +94,8 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     if u.size and not np.ptp(u, axis=0).any() and case.problem == "driven":
         names = " and ".join(f"'{d.column}'" for d in driven)
         raise NoAnswer(f"{path}: {names} never changes; the machine was not driven, so it supports no verdict")
+    if not y:
+        raise NoAnswer(f"{path}: no sensor tells a direction; a diagnosis needs one position or speed that does")
     first = next(iter(y))
     if np.ptp(y[first]) == 0.0:
         raise NoAnswer(f"{path}: column '{machine.sensors[first].column}' never changes; nothing moved")

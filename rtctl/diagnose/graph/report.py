@@ -20,6 +20,7 @@ from rtctl.diagnose.words import need, noun, phrase_of
 from rtctl.plants.physics import TERMS
 
 LEAST = 1e-3  # probability of a look-alike that is told where nothing is known to tell it apart
+ONE_LINE = 36  # characters of an effect with its name that fit on one line of a console of 80
 MOST_RIVALS = 4  # look-alikes of one effect in the table
 PICTURES = {
     "missing": (figures.missing_force, {
@@ -257,9 +258,9 @@ def terminal(d: GraphDiagnosis) -> RenderableType:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for name in ("effect", "at", "size", "90 % interval", "confidence"):
             right = name in ("90 % interval", "confidence")
-            table.add_column(name, justify="right" if right else "left", overflow="fold")
-        for row in effect_rows(d):
-            table.add_row(*map(Text, row))
+            table.add_column(name, justify="right" if right else "left", overflow="fold", no_wrap=name == "effect")
+        for first, *others in effect_rows(d):  # the name of an effect stays whole
+            table.add_row(*map(Text, (first.replace(" (", "\n(") if len(first) > ONE_LINE else first, *others)))
         parts += [Text(), table]
     alike = [f"{look} ({p})" for _, look, p, _ in rival_rows(d)[:MOST_RIVALS] if not p.startswith("<")]
     if alike and d.verdict in (NAMED, AMBIGUOUS):

@@ -10,11 +10,12 @@ from rtctl.diagnose.diagnosis import Effect
 from rtctl.diagnose.graph.model import PHYSICS, RECORDING, GraphModel
 from rtctl.diagnose.graph.record import GraphRecord
 from rtctl.diagnose.numbers import both, nice
-from rtctl.diagnose.words import BY_NODE, Slots, harmonics, noun, phrase_of
+from rtctl.diagnose.words import Slots, harmonics, noun, phrase_of
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.mechanics import code_of
+from rtctl.plants.graph.term_units import body_of, unit_at
 from rtctl.plants.graph.units import measured_unit
-from rtctl.plants.physics import TERMS
+from rtctl.plants.physics.dimensions import DIMENSIONS
 
 
 def here(machine: Description, node: str) -> str:
@@ -22,35 +23,6 @@ def here(machine: Description, node: str) -> str:
     words = node.replace("_", " ").replace("-", " ")
     numbered = re.fullmatch(r"(.*[^\W\d]) ?(\d+)", words)
     return f"{numbered[1]} {numbered[2]}" if numbered else f"the {words}"
-
-
-def body_of(machine: Description, node: str) -> str:
-    """The body whose unit a node has; "" for none."""
-    if node in machine.bodies:
-        return node
-    if node in machine.joints:
-        return str(machine.joints[node].to)
-    for group in (machine.drives, machine.sensors):
-        element: Any = group.get(node)
-        if element is not None:
-            if element.body is not None:
-                return str(element.body)
-            return body_of(machine, str(element.joint or element.drive))
-    return ""
-
-
-def unit_at(machine: Description, term: str, node: str, parameter: str) -> str:
-    """Unit of a term's parameter at a node; "" for a bare number."""
-    known = TERMS[term]
-    field = known.settings.model_fields.get(parameter)
-    extra = field.json_schema_extra if field is not None else None
-    unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
-    unit = known.units.get(parameter, "") or unit or BY_NODE.get(parameter, "")
-    if unit in DIMENSIONS:
-        return DIMENSIONS[unit][not machine.turns(body_of(machine, node))]
-    if unit == "V" and node in machine.drives:
-        return machine.drives[node].unit
-    return unit
 
 
 def unit_in(record: GraphRecord, path: str) -> str:

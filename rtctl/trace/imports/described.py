@@ -118,7 +118,7 @@ def _column_of(name: str, known: Mapping[str, Wanted]) -> str:
 
 
 def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believed) -> dict[str, ColumnPlan]:
-    """Our columns and theirs: as --map says, else those of the same name."""
+    """Our columns and theirs: as --map says, else those of the same name. An empty reference or excitation is none."""
     named: dict[str, ColumnPlan] = {}
     for name, given in plan.columns.items():
         ours = _column_of(name, known)
@@ -135,7 +135,7 @@ def _chosen(table: Table, plan: Plan, known: dict[str, Wanted], believed: Believ
         ours: given if given.column else given.model_copy(update={"column": ours}) for ours, given in named.items()
     }
     for ours in (*known, *BESIDE, "t"):
-        if ours not in named and ours in table.columns:
+        if ours not in named and ours in table.columns and not (ours in BESIDE and table.empty(ours)):
             named[ours] = ColumnPlan(column=ours)
     if "t" not in named and table.clock and plan.rate is None:
         named["t"] = ColumnPlan(column=table.clock)
@@ -182,8 +182,8 @@ def _signals(
                 whole(table, given.column, values)
                 values, wrapped = unwrapped(name, values)
                 notes += [wrapped] if wrapped else []
-            else:
-                assumed.append(f"{name} in {_shown(want)}")
+            elif unit := _shown(want):
+                assumed.append(f"{name} in {unit}")
         else:
             values = _converted(table, given.column, values, theirs, want, notes)
         columns[name] = values
@@ -194,18 +194,19 @@ def _signals(
 
 
 def _shown(want: Wanted | None) -> str:
-    """Unit of a column as the description has it."""
+    """Unit of a column as the description has it; a minus that turns its direction round is no unit."""
     if want is None:
         return ""
     if want.counts:
         return "counts"
+    scale = abs(want.scale)
     for unit in (want.unit, *(f"{prefix}{want.unit}" for prefix in PREFIXES), *OTHERS):
         try:
-            if abs(convert(1.0, want.unit, unit) / want.scale - 1.0) < 1e-6:
+            if abs(convert(1.0, want.unit, unit) / scale - 1.0) < 1e-6:
                 return unit
         except ValueError:
             continue
-    return f"{want.unit}/{want.scale:g}"
+    return f"{want.unit}/{scale:g}"
 
 
 def _ask_unit(table: Table, column: str, want: Wanted) -> None:

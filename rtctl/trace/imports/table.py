@@ -55,6 +55,11 @@ class Table(NamedTuple):
             values = self.numbers(name, "t")
         return seconds(values, factor)
 
+    def empty(self, name: str) -> bool:
+        """Whether a column of numbers holds none: each of its rows is nan."""
+        values = self.columns[name]
+        return values.dtype.kind == "f" and bool(np.isnan(values).all())
+
     def numbers(self, name: str, use: str) -> np.ndarray:
         """The column as doubles (n,), each finite. Raises UserError that names the first row that is not."""
         values = self.has(name, use)

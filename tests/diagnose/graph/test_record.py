@@ -87,3 +87,10 @@ def test_a_drive_acts_where_it_is_on():
     np.testing.assert_array_equal(of({**COLUMNS, "torque_on": on}, case).u[:, 0], COLUMNS["u"] * on)
     with pytest.raises(UserError, match=r"column 'torque_on', row 120: 0\.5; it should be 0"):
         of({**COLUMNS, "torque_on": np.where(on > 0, 1.0, 0.5)}, case)
+
+
+def test_edges_alone_are_refused():
+    case = case_of(PENDULUM)
+    case["machine"]["sensors"] = {"encoder": {**case["machine"]["sensors"]["encoder"], "direction": False}}
+    with pytest.raises(NoAnswer, match="no sensor tells a direction"):
+        of(COLUMNS, case)

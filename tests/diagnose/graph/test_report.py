@@ -11,8 +11,8 @@ from rtctl.diagnose.graph.missing import Missing, subjects
 from rtctl.diagnose.graph.posterior import rivals
 
 
-def said(d):
-    console = Console(width=110, record=True, file=io.StringIO())
+def said(d, width=110):
+    console = Console(width=width, record=True, file=io.StringIO())
     console.print(report.terminal(d))
     return console.export_text()
 
@@ -69,3 +69,7 @@ def test_terminal():
     assert "F_C" in text
     assert "Error on the part that was not fitted" in text
     assert "The verdict is unnamed" in said(unnamed())
+
+
+def test_the_name_of_an_effect_stays_whole():
+    assert "(friction.coulomb)" in said(named(), 80)

@@ -60,3 +60,19 @@ def test_units_by_kind():
     assert drive_units("force", "%", True)["gain"] == "Nm/percent"
     assert drive_units("voltage", "V", False)["torque_constant"] == "N/A"
     assert (measured_unit("speed", True), measured_unit("force", False)) == ("rad/s", "N")
+
+
+@pytest.mark.parametrize(("per_unit", "step"), [(1, "2 mm"), (-1, "2 mm"), (1000.0, 2.0)])
+def test_a_step_has_a_unit_where_the_column_is_in_si(per_unit, step):
+    data = copy.deepcopy(TAPE)
+    data["sensors"]["scale"] = {"body": "table", "column": "s", "per_unit": per_unit, "resolution": step}
+    sensor = Description.model_validate(data).sensors["scale"]
+    assert sensor.grain / abs(sensor.scale) == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize("change", [{"measures": "speed", "counts_per_unit": 100.0}, {"counts_per_unit": None}])
+def test_only_a_counter_may_lack_a_direction(change):
+    data = copy.deepcopy(TAPE)
+    data["sensors"]["encoder"] |= {"direction": False, **change}
+    with pytest.raises(ValidationError, match="direction: false is for a counter of edges"):
+        Description.model_validate(data)

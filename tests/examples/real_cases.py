@@ -1,0 +1,56 @@
+"""Cases of examples/real/cases.yaml as command lines."""
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "examples" / "real"
+DATA = ROOT.parent / "shared" / "data"
+
+
+def cases() -> dict[str, dict[str, Any]]:
+    """Every case by its name."""
+    return yaml.safe_load((FOLDER / "cases.yaml").read_text())
+
+
+def imports(case: dict[str, Any], out: Path) -> list[list[str]]:
+    """Words of `rtctl import` for each recording with a description; the bundles go into `out`."""
+    lines = []
+    for recording in case["recordings"]:
+        machine = machine_of(case, recording)
+        if machine is None:
+            continue
+        source = DATA / recording
+        file = source / "recording.parquet" if source.is_dir() else source
+        words = ["import", str(file), "--machine", str(FOLDER / machine), "-o", str(bundle(case, recording, out))]
+        if case.get("map"):
+            words += ["--map", ",".join(f"{ours}={theirs}" for ours, theirs in case["map"].items())]
+        for ours, unit in case.get("unit", {}).items():
+            words += ["--unit", f"{ours}={unit}"]
+        lines.append([*words, *case.get("import", [])])
+    return lines
+
+
+def diagnosis(case: dict[str, Any], out: Path) -> list[str]:
+    """Words of `rtctl diagnose`, run in FOLDER; the results go into `out`/diagnosis."""
+    bundles = [str(bundle(case, recording, out)) for recording in case["recordings"]]
+    together = ["--together"] if len(bundles) > 1 else []
+    return ["diagnose", *bundles, *together, "-o", str(out / "diagnosis"), *case.get("options", [])]
+
+
+def machine_of(case: dict[str, Any], recording: str) -> str | None:
+    """Description of a recording; None of a bundle that has its own."""
+    machine = case.get("machine")
+    return machine[stem(recording)] if isinstance(machine, dict) else machine
+
+
+def bundle(case: dict[str, Any], recording: str, out: Path) -> Path:
+    """Where the bundle of a recording lies, or is made."""
+    return DATA / recording if machine_of(case, recording) is None else out / stem(recording)
+
+
+def stem(recording: str) -> str:
+    """Name of a recording without folder and ending."""
+    return Path(recording).name.partition(".")[0]
