@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.case.quantities import DIMENSIONS
 from rtctl.diagnose.graph.answer import GraphDiagnosis
 from rtctl.diagnose.graph.hypotheses import faster
 from rtctl.diagnose.graph.likelihood import settled

@@ -5,7 +5,6 @@ import re
 from typing import Any
 
 from rtctl.case.format2 import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
-from rtctl.case.quantities import DIMENSIONS
 from rtctl.diagnose.diagnosis import Effect
 from rtctl.diagnose.graph.model import PHYSICS, RECORDING, GraphModel
 from rtctl.diagnose.graph.record import GraphRecord
