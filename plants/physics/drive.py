@@ -14,7 +14,7 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Limit, Shape, Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 DEADBAND_FORMS = ("shift", "cut", "floor")
@@ -315,7 +315,6 @@ GAIN_ASYMMETRY = Term(
         need="commands of both signs",
     ),
     check=("Command the same size with either sign and measure both outputs; look for a weak half of the bridge."),
-    needs=Needs(signs="command"),
     search=(Size("a", "one", 0.1, signed=True),),
     static=True,
     draws={"a": Draw(0.03, 0.2, signed=True)},

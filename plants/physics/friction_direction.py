@@ -75,7 +75,7 @@ ASYMMETRY = Term(
     check=(
         "Pull slowly with a spring balance in one direction and then in the other; look at wipers, and at the level."
     ),
-    needs=Needs(dry=True, signs="speed"),
+    needs=Needs(dry=True, both_ways=True),
     search=(Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9), Size("B_a", "drag", 0.05, signed=True)),
     static=True,
     draws={"a": Draw(0.1, 0.3, signed=True), "B_a": Draw(0.0, 0.0)},

@@ -34,7 +34,7 @@ class Needs(NamedTuple):
     alone: str = ""  # what a lone sensor shows it by all the same: "slides" its node, "unsigned" the reading
     stiffness: bool = False  # a spring at its node
     dry: bool = False  # dry friction at its node, which it alters
-    signs: str = ""  # either sign of the "command" or of the "speed", between which it differs
+    both_ways: bool = False  # motion of its node in both directions, between which it differs
 
 
 NOTHING = Needs()

@@ -63,7 +63,7 @@ def hypotheses(
                 or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
                 or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, False))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
-                or (term.needs.signs and not measures.both_signs(term.needs.signs, node))
+                or (term.needs.both_ways and not measures.both_ways(node))
             ):
                 continue
             for parts in stand.ways or ((term.sliding if slides else ()) or parts_of(name),):

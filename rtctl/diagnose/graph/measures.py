@@ -16,7 +16,7 @@ from rtctl.plants.physics import TERMS
 
 SMOOTH = 5e-3  # s, over which a speed is taken
 USUAL_RATE = 500.0  # 1/s, of a machine whose parts ring at 3 to 225 Hz
-ONE_WAY = 0.02  # of what a quantity does with one sign: what it does with the other, at least, to have both
+ONE_WAY = 0.02  # of the way in one direction: least way in the other, for a motion in both
 LITTLE = 1e-12
 
 
@@ -117,12 +117,10 @@ class Measures:
         """Position (n,) of a body as the followed sensor that joints connect it with saw it."""
         return np.asarray(self.ways[self.leaders.get(body, 0)] * self.ratios.get(body, 0.0))
 
-    def both_signs(self, of: str, node: str) -> bool:
-        """Whether the "command" of a drive, or the "speed" of a node, has either sign for a part of the recording."""
-        values = (
-            self.sim.volts[:, self.layout.drives[node]] if of == "command" else np.diff(self.way(self.lever(node)[0]))
-        )
-        parts = np.sum(np.maximum(values, 0.0)), np.sum(np.maximum(-values, 0.0))
+    def both_ways(self, node: str) -> bool:
+        """Whether a node moves in both directions."""
+        moved = np.diff(self.way(self.lever(node)[0]))
+        parts = np.sum(np.maximum(moved, 0.0)), np.sum(np.maximum(-moved, 0.0))
         return bool(min(parts) > ONE_WAY * max(*parts, LITTLE))
 
     def turns(self, node: str) -> bool:
