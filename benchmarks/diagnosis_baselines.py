@@ -23,7 +23,7 @@ from baselines import inverse_dynamics, sparse, whiteness  # noqa: E402
 from baselines.form import diagnosis  # noqa: E402
 
 from rtctl.config.errors import NoAnswer, UserError  # noqa: E402
-from rtctl.diagnose.record import Record, load_record  # noqa: E402
+from rtctl.diagnose.record.format1 import Record, load_record  # noqa: E402
 from rtctl.proof.score import score  # noqa: E402
 from rtctl.proof.seal import ANSWERS, SEAL, open_seal  # noqa: E402
 

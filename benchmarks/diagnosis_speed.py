@@ -20,9 +20,9 @@ from typing import Any
 
 from lateness import rtctl_command
 
-from rtctl.diagnose.graph.load import load
-from rtctl.diagnose.graph.model import nominal
-from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.answer.load import load
+from rtctl.diagnose.model.model import nominal
+from rtctl.diagnose.model.simulate import Simulator
 
 MACHINES = {
     "ivu": (60, 1.0, "rad", 3.0, "{term: friction.stribeck, node: motor1, F_s: 4.0e-3, v_s: 0.3}"),

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rtctl.api import change, connect, load_config, record, run, run_campaign, steps
     from rtctl.config.errors import NoAnswer, RunFailed, UserError
     from rtctl.daemon.client import Client
-    from rtctl.diagnose.graph.answer import GraphDiagnosis as Diagnosis
-    from rtctl.diagnose.graph.answer import diagnose as diagnosis
+    from rtctl.diagnose.answer.answer import GraphDiagnosis as Diagnosis
+    from rtctl.diagnose.answer.answer import diagnose as diagnosis
     from rtctl.loop.fused import Run
     from rtctl.trace.bundle import Bundle, load_bundle
     from rtctl.trace.compare import compare
@@ -38,7 +38,7 @@ __all__ = [
 _WHERE = {  # name -> module and name there
     "Bundle": "rtctl.trace.bundle:Bundle",
     "Client": "rtctl.daemon.client:Client",
-    "Diagnosis": "rtctl.diagnose.graph.answer:GraphDiagnosis",
+    "Diagnosis": "rtctl.diagnose.answer.answer:GraphDiagnosis",
     "NoAnswer": "rtctl.config.errors:NoAnswer",
     "Run": "rtctl.loop.fused:Run",
     "RunFailed": "rtctl.config.errors:RunFailed",
@@ -46,7 +46,7 @@ _WHERE = {  # name -> module and name there
     "change": "rtctl.api:change",
     "compare": "rtctl.trace.compare:compare",
     "connect": "rtctl.api:connect",
-    "diagnosis": "rtctl.diagnose.graph.answer:diagnose",
+    "diagnosis": "rtctl.diagnose.answer.answer:diagnose",
     "load_bundle": "rtctl.trace.bundle:load_bundle",
     "load_config": "rtctl.api:load_config",
     "record": "rtctl.api:record",

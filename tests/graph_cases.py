@@ -9,11 +9,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from rtctl.case.format2 import read_case
-from rtctl.diagnose.graph.answer import diagnose_record
-from rtctl.diagnose.graph.kernel import OPEN
-from rtctl.diagnose.graph.model import nominal, settings_of
-from rtctl.diagnose.graph.record import GraphRecord, record_of
-from rtctl.diagnose.graph.simulate import Simulator
+from rtctl.diagnose.answer.answer import diagnose_record
+from rtctl.diagnose.model.kernel import OPEN
+from rtctl.diagnose.model.model import nominal, settings_of
+from rtctl.diagnose.model.recording import GraphRecord, record_of
+from rtctl.diagnose.model.simulate import Simulator
 
 RATE, SECONDS = 500.0, 4.0
 PENDULUM = {

@@ -3,13 +3,13 @@
 import numpy as np
 
 from rtctl.case.format1 import Case
-from rtctl.diagnose.graph import loop
-from rtctl.diagnose.graph.kernel import OPEN
-from rtctl.diagnose.graph.known import graph_record
-from rtctl.diagnose.graph.model import nominal
-from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.model import Model
-from rtctl.diagnose.record import Record, commands_of
+from rtctl.diagnose.model import loop
+from rtctl.diagnose.model.by_symbol import Model
+from rtctl.diagnose.model.format1 import graph_record
+from rtctl.diagnose.model.kernel import OPEN
+from rtctl.diagnose.model.model import nominal
+from rtctl.diagnose.model.simulate import Simulator
+from rtctl.diagnose.record.format1 import Record, commands_of
 
 SENSORS = {
     "axis": ("x",),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rtctl.diagnose.graph import extend
+from rtctl.diagnose.search import extend
 
 
 def only(patch: pytest.MonkeyPatch, *terms: str) -> None:

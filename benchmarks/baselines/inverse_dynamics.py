@@ -15,7 +15,7 @@ import numpy as np
 
 from baselines.form import diagnosis
 from baselines.states import States, states
-from rtctl.diagnose.record import Record
+from rtctl.diagnose.record.format1 import Record
 
 MOST = 3  # effects
 GAIN = 10.0  # of BIC: very strong evidence (Kass & Raftery 1995)

@@ -14,7 +14,7 @@ import numpy as np
 
 from baselines.form import diagnosis
 from baselines.states import States, states
-from rtctl.diagnose.record import Record
+from rtctl.diagnose.record.format1 import Record
 
 THRESHOLD = 0.02  # of a coefficient, all columns and the acceleration scaled to unit rms
 NAMES = {

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from rtctl.case.format1 import believed
-from rtctl.diagnose.law_params import per_unit
-from rtctl.diagnose.record import Record
+from rtctl.diagnose.record.format1 import Record
+from rtctl.diagnose.record.law_params import per_unit
 
 WINDOW = {"ivu": 31, "ldu": 101, "axis": 41}  # rows
 ORDER = 3

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from baselines.form import diagnosis
-from rtctl.diagnose.graph.fits import refit
-from rtctl.diagnose.graph.joint import together
-from rtctl.diagnose.graph.known import graph_record
-from rtctl.diagnose.record import Record
+from rtctl.diagnose.likelihood.fits import refit
+from rtctl.diagnose.likelihood.joint import together
+from rtctl.diagnose.model.format1 import graph_record
+from rtctl.diagnose.record.format1 import Record
 
 LAGS = 25
 LEVEL = 0.01

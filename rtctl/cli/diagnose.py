@@ -10,7 +10,7 @@ from rtctl.cli import common
 from rtctl.cli.common import JsonOption, ModeOption, ReferenceOption, SetOption
 
 if TYPE_CHECKING:
-    from rtctl.diagnose.repair import Repair
+    from rtctl.diagnose.answer.repair import Repair
 
 app = typer.Typer(add_completion=False)
 
@@ -185,8 +185,8 @@ def _bundle(
     json: bool,
     more: Sequence[Path] = (),
 ) -> None:
+    from rtctl.diagnose.answer.results import FOLDER
     from rtctl.diagnose.bundles import diagnose_into
-    from rtctl.diagnose.results import FOLDER
 
     folder = out if out is not None else bundle / FOLDER
     with console.stages() as stage:
@@ -239,9 +239,9 @@ def _machine(
     report: bool,
     json: bool,
 ) -> None:
-    from rtctl.diagnose import repair
-    from rtctl.diagnose.graph import files as results
-    from rtctl.diagnose.results import finite
+    from rtctl.diagnose.answer import files as results
+    from rtctl.diagnose.answer import repair
+    from rtctl.diagnose.answer.results import finite
     from rtctl.own import files
 
     config = common.with_loop(common.with_reference(common.load_config(what, set_), reference), mode, None)

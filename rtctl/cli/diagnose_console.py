@@ -79,14 +79,14 @@ class DiagnoseConsole:
 
     def result(self, d: Any, folder: Path) -> None:
         """Verdict, effects, look-alikes, and where the rest is."""
-        from rtctl.diagnose.graph.report import terminal
+        from rtctl.diagnose.answer.report import terminal
 
         self.out.print(terminal(d), soft_wrap=not self.out.is_terminal)
         self.files(folder)
 
     def files(self, folder: Path) -> None:
         """What was written."""
-        from rtctl.diagnose.results import EXPERIMENT, MODEL, REPORT
+        from rtctl.diagnose.answer.results import EXPERIMENT, MODEL, REPORT
 
         for word, name in (("report", REPORT), ("model", MODEL), ("experiment", EXPERIMENT)):
             if (folder / name).is_file():

@@ -115,7 +115,7 @@ def import_(
 def _diagnosable(folder: Path) -> Any:
     """What `rtctl diagnose` would refuse it for; None where it would not."""
     from rtctl.config.errors import NoAnswer, UserError
-    from rtctl.diagnose.graph.load import load
+    from rtctl.diagnose.answer.load import load
 
     try:
         load(folder)

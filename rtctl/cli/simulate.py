@@ -9,7 +9,7 @@ from rtctl.cli import common
 from rtctl.cli.common import JsonOption
 
 if TYPE_CHECKING:
-    from rtctl.diagnose.comparison import Comparison
+    from rtctl.diagnose.answer.comparison import Comparison
 
 app = typer.Typer(add_completion=False)
 OWNER = "case"
@@ -55,10 +55,10 @@ def simulate(
 
       rtctl simulate case emps --closed-loop --skip 20 --json
     """
-    from rtctl.diagnose.graph.believe import check_believed
-    from rtctl.diagnose.graph.freerun import compare
-    from rtctl.diagnose.graph.load import of_bundle
-    from rtctl.diagnose.record import INPUT
+    from rtctl.diagnose.answer.believe import check_believed
+    from rtctl.diagnose.answer.freerun import compare
+    from rtctl.diagnose.answer.load import of_bundle
+    from rtctl.diagnose.record.format1 import INPUT
     from rtctl.own.files import give
     from rtctl.trace.bundle import load_bundle
 

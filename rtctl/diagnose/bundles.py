@@ -50,9 +50,9 @@ def diagnose_into(
     may lead out of it. Raises UserError for a bundle that cannot be read and for a disk that does not take the results,
     NoAnswer for a bundle that supports no verdict.
     """
-    from rtctl.diagnose.graph import answer, files
-    from rtctl.diagnose.graph.second import predicted
-    from rtctl.diagnose.results import finite
+    from rtctl.diagnose.answer import answer, files
+    from rtctl.diagnose.answer.results import finite
+    from rtctl.diagnose.answer.second import predicted
 
     found = answer.diagnose(bundle, *more, progress=progress)
     if other is not None:

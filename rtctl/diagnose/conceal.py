@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from rtctl import machines
 from rtctl.config.errors import UserError
 from rtctl.config.load import set_path
-from rtctl.diagnose.ordinary import measure, use
+from rtctl.diagnose.answer.nominal_duty import measure, use
 from rtctl.machines.profile import SCALE
 from rtctl.machines.profiles import profile_of
 from rtctl.plants import physics

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.failures import told
-from rtctl.diagnose.results import FOLDER, RESULT
+from rtctl.diagnose.answer.results import FOLDER, RESULT
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET
 
 SECOND = "-heldout"  # a bundle of this name beside another is a second recording of the same machine
@@ -193,7 +193,7 @@ def _serve(pipe: Connection, jobs: int, report: bool, work: Work) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     warnings.simplefilter("ignore", RuntimeWarning)  # a model that runs away overflows; the outcome says so
     if jobs > 1:
-        from rtctl.diagnose import fit
+        from rtctl.diagnose.likelihood import solver as fit
 
         fit.THREADS = 1
     while True:

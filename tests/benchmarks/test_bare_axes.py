@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from rtctl.diagnose.record import load_record
+from rtctl.diagnose.record.format1 import load_record
 
 
 @pytest.fixture(scope="module")

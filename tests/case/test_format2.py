@@ -5,7 +5,7 @@ from graph_cases import BELT, PENDULUM, case_of
 
 from rtctl.case.format2 import read_case
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph.model import nominal
+from rtctl.diagnose.model.model import nominal
 
 
 def test_paths_and_tolerances_of_a_description():

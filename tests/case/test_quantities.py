@@ -5,7 +5,7 @@ import re
 import pytest
 
 from rtctl.case.quantities import quantities
-from rtctl.diagnose.diagnosis import Effect, Interval, Rival
+from rtctl.diagnose.evidence.diagnosis import Effect, Interval, Rival
 from rtctl.plants.physics import TERMS, nodes
 
 PLACES = [(name, node) for name, term in TERMS.items() for node in nodes(term, "axis")]

@@ -7,13 +7,13 @@ import signal
 import numpy as np
 from narrowed import only
 
-from rtctl.diagnose.export import read_model
-from rtctl.diagnose.graph import answer, files
-from rtctl.diagnose.graph.known import graph_record
-from rtctl.diagnose.graph.model import nominal
-from rtctl.diagnose.graph.simulate import Simulator
-from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import load_record
+from rtctl.diagnose.answer import answer, files
+from rtctl.diagnose.answer.format1_config import read_model
+from rtctl.diagnose.model.by_symbol import owner_model
+from rtctl.diagnose.model.format1 import graph_record
+from rtctl.diagnose.model.model import nominal
+from rtctl.diagnose.model.simulate import Simulator
+from rtctl.diagnose.record.format1 import load_record
 from rtctl.diagnose.seal import open_seal
 
 AMONG = (  # the library in full takes a minute on the LDU

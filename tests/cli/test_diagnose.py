@@ -20,7 +20,7 @@ from rtctl.case.format1 import read_case
 from rtctl.cli import diagnose_console
 from rtctl.cli.main import main
 from rtctl.diagnose.folder import Outcome
-from rtctl.diagnose.model import owner_model
+from rtctl.diagnose.model.by_symbol import owner_model
 from rtctl.plants.physics import TERMS
 from rtctl.trace.bundle import save_case
 
@@ -142,8 +142,7 @@ def test_mistakes(rtctl, tmp_path, monkeypatch, words, message):
 
 def test_a_machine_that_is_recorded_and_diagnosed(rtctl, tmp_path, monkeypatch):
     """What is shown of it; what is done is the business of `repair`."""
-    from rtctl.diagnose import repair
-    from rtctl.diagnose.graph import files
+    from rtctl.diagnose.answer import files, repair
 
     seen = {}
 

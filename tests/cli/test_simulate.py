@@ -14,9 +14,9 @@ from known_records import at_rest, of_closed
 
 from rtctl import api
 from rtctl.case.format1 import read_case
-from rtctl.diagnose.export import write_model
-from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import load_record
+from rtctl.diagnose.answer.format1_config import write_model
+from rtctl.diagnose.model.by_symbol import owner_model
+from rtctl.diagnose.record.format1 import load_record
 from rtctl.own import files
 from rtctl.own import model as own_model
 from rtctl.plants.physics import TERMS

@@ -11,8 +11,8 @@ from known_records import SENSORS, at_rest, of_closed
 from threadpoolctl import threadpool_limits
 
 from rtctl.case.format1 import read_case
-from rtctl.diagnose.model import Model, owner_model
-from rtctl.diagnose.record import Record, check
+from rtctl.diagnose.model.by_symbol import Model, owner_model
+from rtctl.diagnose.record.format1 import Record, check
 from rtctl.plants.physics import TERMS
 
 SHARED = Path(__file__).parents[3] / "shared"

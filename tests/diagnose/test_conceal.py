@@ -4,8 +4,8 @@ import pytest
 from rtctl import machines
 from rtctl.config.load import load_settings, set_path
 from rtctl.config.yaml_file import find
+from rtctl.diagnose.answer.nominal_duty import measure
 from rtctl.diagnose.conceal import TYPICAL, conceal, nodes, sized
-from rtctl.diagnose.ordinary import measure
 from rtctl.plants.physics import TERMS, anywhere, having
 from rtctl.plants.physics import nodes as where
 

@@ -29,7 +29,7 @@ def work(task, report):
         time.sleep(600)
     if task.name == "dies":
         os._exit(7)
-    from rtctl.diagnose import fit
+    from rtctl.diagnose.likelihood import solver as fit
     alone = os.environ.get("OPENBLAS_NUM_THREADS")
     return Outcome(task.name, 0, 0.1, {"threads": fit.THREADS, "blas": alone, "report": report, "pid": os.getpid()})
 '''
@@ -83,7 +83,7 @@ def test_what_gets_stuck_is_ended_and_the_next_begins(work):
 
 
 def test_one_process_has_the_cores_to_itself(work, monkeypatch):
-    from rtctl.diagnose import fit
+    from rtctl.diagnose.likelihood import solver as fit
 
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     outcomes = list(diagnose_all(named("a", "b"), jobs=1, report=False, work=work))
@@ -168,7 +168,7 @@ def test_a_bad_bundle_is_told_in_one_line(tmp_path):
 
 
 def test_our_own_fault_is_told_as_ours(tmp_path, monkeypatch):
-    from rtctl.diagnose.graph import answer
+    from rtctl.diagnose.answer import answer
 
     def broken(*_, **__):
         raise ZeroDivisionError("oh")

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from rtctl.diagnose.graph.answer import GraphDiagnosis, diagnose, diagnose_record
-from rtctl.diagnose.graph.known import graph_record
-from rtctl.diagnose.graph.record import GraphRecord
-from rtctl.diagnose.record import load_record
-from rtctl.diagnose.results import finite
+from rtctl.diagnose.answer.answer import GraphDiagnosis, diagnose, diagnose_record
+from rtctl.diagnose.answer.results import finite
+from rtctl.diagnose.model.format1 import graph_record
+from rtctl.diagnose.model.recording import GraphRecord
+from rtctl.diagnose.record.format1 import load_record
 from rtctl.proof.score import score
 
 FULL = os.environ.get("RTCTL_PROOF") == "full"

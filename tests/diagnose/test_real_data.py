@@ -8,9 +8,9 @@ analysis/cogging_torque, for the brushless motor.
 import numpy as np
 import pytest
 
-from rtctl.diagnose.model import owner_model
-from rtctl.diagnose.record import load_record
-from rtctl.diagnose.turn import over_turn
+from rtctl.diagnose.answer.torque_ripple_map import over_turn
+from rtctl.diagnose.model.by_symbol import owner_model
+from rtctl.diagnose.record.format1 import load_record
 
 
 @pytest.fixture(scope="module")

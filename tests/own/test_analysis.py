@@ -13,7 +13,7 @@ from rtctl.case.format1 import read_case
 from rtctl.cli import identify_source
 from rtctl.config.errors import UserError
 from rtctl.design import response
-from rtctl.diagnose.export import read_model
+from rtctl.diagnose.answer.format1_config import read_model
 from rtctl.identify import records
 from rtctl.own.files import refuse_plant
 from rtctl.trace.bundle import Bundle

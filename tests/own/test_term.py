@@ -6,8 +6,8 @@ import pytest
 from rtctl_config import TEMPLATES
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose.graph import kernel
-from rtctl.diagnose.graph.starts import Size, parts_of
+from rtctl.diagnose.model import kernel
+from rtctl.diagnose.search.grid_starts import Size, parts_of
 from rtctl.own.files import OwnError, Source, trust
 from rtctl.own.term import own_term, register, register_file, sizes, texts
 from rtctl.plants.physics import TERMS

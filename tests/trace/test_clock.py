@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose.record import load_record
+from rtctl.diagnose.record.format1 import load_record
 from rtctl.trace.clock import even_rows, usual_step
 from rtctl.trace.imports.make import make_bundle
 from rtctl.trace.imports.plan import Plan

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from rtctl.config.errors import UserError
-from rtctl.diagnose.record import load_record
+from rtctl.diagnose.record.format1 import load_record
 from rtctl.trace.bundle import load_bundle, save_case
 from rtctl.trace.compare import compare
 from rtctl.trace.export import export

@@ -1,0 +1,292 @@
+"""Answer of a diagnosis: verdict, effects with sizes, where it lives, held-out errors, what cannot be told."""
+
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from rtctl.case.format2 import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
+from rtctl.diagnose.answer import words
+from rtctl.diagnose.answer.experiment import Planned, left, planned
+from rtctl.diagnose.answer.load import load
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
+from rtctl.diagnose.evidence.prediction import WORSE, Heldout, predict
+from rtctl.diagnose.evidence.predictive import predictive
+from rtctl.diagnose.evidence.verdict import SURE, Verdict, fewer, verdict
+from rtctl.diagnose.likelihood.clock import UNSTEADY
+from rtctl.diagnose.likelihood.fits import Fitted, curvature, half_widths, refit
+from rtctl.diagnose.likelihood.held import likelier, suits
+from rtctl.diagnose.likelihood.joint import together
+from rtctl.diagnose.likelihood.likelihood import COUNTED, coarsened
+from rtctl.diagnose.model.model import RECORDING
+from rtctl.diagnose.model.recording import GraphRecord
+from rtctl.diagnose.model.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
+from rtctl.diagnose.search.search import Found, Progress, search
+from rtctl.plants.physics import TERMS
+
+SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
+
+
+class GraphDiagnosis(NamedTuple):
+    """What a recording of a described machine says."""
+
+    record: GraphRecord  # of several that of the longest way, which the figures show
+    found: Found
+    decided: Verdict
+    effects: tuple[Effect, ...]
+    located: Located | None
+    parameters: dict[str, Interval]
+    heldout: Heldout
+    cannot_test: tuple[str, ...]
+    predictor: Fitted  # the model that predicts best, which may have effects of which the verdict is not sure
+    seconds: float
+    records: tuple[GraphRecord, ...]
+    planned: Planned = Planned()
+
+    @property
+    def experiment(self) -> dict[str, Any] | None:
+        """The separating experiment as in diagnosis.json; None where there is none."""
+        found = self.planned.experiment
+        return None if found is None else found.as_dict()
+
+    @property
+    def nominal(self) -> dict[str, float]:
+        """The owner's values by path and by symbol, those of one recording by path and recording."""
+        values, called = dict(self.found.base.space.owner.base), self.record.case.called
+        return values | {called[path]: value for path, value in values.items() if path in called}
+
+    @property
+    def verdict(self) -> str:
+        """named, ambiguous, unnamed or nothing."""
+        return self.decided.verdict
+
+    @property
+    def headline(self) -> str:
+        """The verdict in one sentence or two."""
+        machine, model = self.record.case.machine, self.decided.best.model
+        if self.verdict == NOTHING:
+            return "Nothing is missing that this recording shows: the description follows it down to the noise."
+        if self.verdict == UNNAMED:
+            at = self.located
+            where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
+            return f"Something is missing{where}, and no name of the library explains it."
+        sure = [words.clause(machine, e, model) for e in self.effects if e.confidence >= SURE]
+        if self.verdict == NAMED:
+            text = "; ".join(sure)
+            return f"{text[:1].upper()}{text[1:]}."
+        open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
+        first = "; ".join(sure)
+        text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
+        if len(open_) == 1:
+            p = min(e.confidence for e in self.effects)
+            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name."
+        return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
+
+    def as_json(self) -> dict[str, Any]:
+        """diagnosis.json in the form of the exchange format."""
+        return {
+            "verdict": self.verdict,
+            "headline": self.headline,
+            "effects": [
+                {
+                    "name": e.name,
+                    "node": e.node,
+                    "confidence": round(e.confidence, 4),
+                    "parameters": {k: v.as_json() for k, v in e.parameters.items()},
+                    "look_alikes": [{"name": r.name, "node": r.node, "probability": r.p_value} for r in e.look_alikes],
+                    "check": TERMS[e.name].check,
+                }
+                for e in self.effects
+            ],
+            "located": None if self.located is None else self.located._asdict(),
+            "why": self.decided.why,
+            "parameters": {k: v.as_json() for k, v in self.parameters.items()},
+            "fit": {
+                "heldout_nrmse_before": self.heldout.before,
+                "heldout_nrmse_after": self.heldout.after,
+                "noise_floor": self.heldout.floor,
+            },
+            "probabilities": [
+                {"effects": list(names), "probability": round(p, 4)}
+                for names, p in self.decided.probabilities[:8]
+                if p > 1e-4
+            ],
+            "cannot_test": list(self.cannot_test),
+            "separating_experiment": self.experiment,
+            "no_experiment": self.planned.untold,
+            "recordings": [r.case.file.parent.name for r in self.records],
+            "warnings": list(dict.fromkeys(line for r in self.records for line in r.case.warnings)),
+            "seconds": round(self.seconds, 2),
+        }
+
+
+def diagnose(*folders: Path | str, progress: Progress = lambda _: None) -> GraphDiagnosis:
+    """Diagnose the bundle of a described machine, or several of one machine together.
+
+    Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
+    """
+    return diagnose_record(*map(load, folders), progress=progress)
+
+
+def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:
+    """As `diagnose`, for records in memory."""
+    began = time.monotonic()
+    with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
+        like, space = together(records)
+        if any(part.sim.record.edges for part in like.parts):  # a model that follows the others tells their directions
+            progress("telling the directions of edges")
+            like = like.directed(refit(like, space).model)
+        found = search(likelier(like, space), space, progress)
+        other = suits(found.best)
+        if other is not None:
+            progress("taking the commands the other way between their samples")
+            found = search(other, space, progress)
+        progress("weighing names against forces without one")
+        decided = verdict(found)
+        progress("predicting rows that were not fitted")
+        heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
+        decided = borne_out(fewer(decided, best), heldout)
+        predictor = predictive(decided, heldout)
+        effects = _effects(decided, predictor)
+        if len(left(decided)) > 1:
+            progress("planning an experiment")
+        return GraphDiagnosis(
+            record=like.sim.record,
+            found=found,
+            decided=decided,
+            effects=effects,
+            located=_located(found, decided, effects),
+            parameters=_parameters(predictor, like.sim.record),
+            predictor=predictor,
+            heldout=heldout,
+            planned=planned(like.sim.record, decided),
+            cannot_test=tuple(sorted(_cannot(found))),
+            seconds=time.monotonic() - began,
+            records=tuple(part.sim.record for part in like.parts),
+        )
+
+
+def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
+    """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
+    if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > -WORSE:
+        return decided
+    names = ", ".join(decided.best.names)
+    why = f"with {names} the last rows are predicted worse than without, by {-heldout.gain:.3g} nats"
+    return decided._replace(verdict=UNNAMED, confidence=(), rivals=(), why=why)
+
+
+def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
+    """Effects of the verdict, with sizes of a model that has all of them."""
+    if decided.verdict not in (NAMED, AMBIGUOUS):
+        return ()
+    best, spread = decided.best, _spread(numbers)
+    out = []
+    for i, h in enumerate(best.space.hypotheses):
+        looks = tuple(
+            Rival(name.partition(":")[0], name.partition(":")[2], round(p, 4), float("nan"))
+            for name, p in decided.rivals[i]
+            if not name.startswith(f"{h.term}:")
+        )
+        out.append(
+            Effect(
+                h.term,
+                h.node,
+                min(decided.confidence[i], 0.99),
+                _sizes(numbers, numbers.names.index(h.name), spread),
+                looks,
+            )
+        )
+    ticks = decided.ticks
+    if ticks is not None:
+        name, node, parameter = UNSTEADY
+        size = Interval(
+            ticks.sigma, ticks.low, ticks.high, words.unit_at(best.like.sim.case.machine, name, node, parameter)
+        )
+        out.append(Effect(name, node, min(ticks.probability, 0.99), {parameter: size}, ()))
+    if decided.verdict == AMBIGUOUS and len(best.names) == 1:
+        others = [r for r in out[0].look_alikes if r.p_value > (1.0 - SURE) / 2][:2]
+        out += [Effect(r.name, r.node, r.p_value, {}, (), f"{out[0].name}:{out[0].node}") for r in others]
+    return tuple(out)
+
+
+def _spread(f: Fitted) -> np.ndarray:
+    """Half width of the 90 % interval of each unknown."""
+    return half_widths(curvature(f, coarsened(f.like.size, COUNTED)))
+
+
+def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
+    h, columns = f.space.hypotheses[index], f.space.columns(index)
+    x, half = f.x[columns], spread[columns]
+    values, machine = h.values(x), f.like.sim.case.machine
+    out: dict[str, Interval] = {}
+    for i, c in enumerate(h.coordinates):
+        if c.kind == SINE:
+            continue
+        name = c.name.partition("|")[0]
+        value, unit = values[name], words.unit_at(machine, h.term, h.node, name)
+        if c.kind == SHAPE:
+            low, high = value * float(np.exp(-half[i])), value * float(np.exp(half[i]))
+        elif c.kind in (SIZE, PLACE, COSINE):
+            low, high = value - c.scale * half[i], value + c.scale * half[i]
+        elif c.kind == REST:  # of a push, by the stiffness before it
+            reach = abs(c.scale * half[i] / values[h.coordinates[i - 1].name])
+            low, high = value - reach, value + reach
+        else:
+            low = high = value
+        out[name] = Interval(value, float(low), float(high), unit)
+    return out
+
+
+def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
+    out, spread = {}, _spread(f)
+    lowest, highest = f.space.bounds()  # what the owner says that it can be
+    for i, path in enumerate(f.space.names):
+        if path.startswith(OWN_START):
+            continue
+        value, nominal = f.model.base[path], f.space.owner.base[path]
+        ends = np.clip((f.x[i] - spread[i], f.x[i] + spread[i]), lowest[i], highest[i])
+        low, high = sorted(nominal * float(np.exp(end)) for end in ends)
+        plain, _, name = path.partition(RECORDING)
+        if is_start(plain) and plain not in (FIRST_POSITION, FIRST_SPEED):  # kept as its exponential
+            value, low, high = (float(np.log(v)) for v in (value, low, high))
+        elif is_start(plain):
+            first = next(p.sim.record for p in f.like.parts if p.sim.record.name == name)
+            value, low, high = first_of(first, plain, (value, low, high))
+        out[record.case.called.get(path, path)] = Interval(value, low, high, words.unit_in(record, path))
+    return out
+
+
+def first_of(record: GraphRecord, path: str, values: tuple[float, ...]) -> tuple[float, ...]:
+    """First position or speed of a free response from the exponentials that a fit moves, SI."""
+    place, rate, guess = record.scales
+    x = record.y[record.main][0]
+    scale, offset = (place, x) if path == FIRST_POSITION else (rate, guess)
+    return tuple(float(offset + scale * np.log(v)) for v in values)
+
+
+def _located(found: Found, decided: Verdict, effects: tuple[Effect, ...]) -> Located | None:
+    if decided.verdict == NOTHING:
+        return None
+    base, best = found.base, decided.best
+    scale = base.like.least
+    c = int(np.argmax(np.sqrt(np.mean(base.e**2, axis=0)) / scale))
+    channel = found.like.sim.channels[c]
+    begin = found.like.rows[0] * found.like.sim.record.dt
+    share = float(np.clip(1.0 - np.exp(min(best.loss - base.loss, 0.0) / base.like.size), 0.0, 1.0))
+    if decided.verdict == UNNAMED:
+        free = decided.unlisted
+        if free is not None:
+            return Located(channel, free.node, free.axis, f"along the {free.axis}", begin, share)
+        return Located(channel, str(found.like.sim.body), "time", "over the whole recording", begin, share)
+    axis = TERMS[effects[0].name].axis
+    return Located(channel, effects[0].node, axis, f"along the {axis}", begin, share)
+
+
+def _cannot(found: Found) -> list[str]:
+    """Hypotheses of which a typical size would not show beside the nominal parameters."""
+    norms: dict[str, float] = {}
+    for score in found.scores:
+        norms[score.hypothesis.name] = max(norms.get(score.hypothesis.name, 0.0), score.norm)
+    return [name for name, norm in norms.items() if norm < SEEN]

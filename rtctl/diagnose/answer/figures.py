@@ -1,0 +1,225 @@
+"""Pictures of a diagnosis of a described machine, in the style of rtctl/diagnose/answer/figure_style.py."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.signal import welch
+
+from rtctl.case.format2 import is_start
+from rtctl.diagnose.answer.answer import GraphDiagnosis
+from rtctl.diagnose.answer.figure_style import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
+from rtctl.diagnose.answer.missing_force import Missing, subjects
+from rtctl.diagnose.answer.phrases import noun
+from rtctl.diagnose.answer.posterior import rivals
+from rtctl.diagnose.answer.si_format import figures as digits
+from rtctl.diagnose.answer.si_format import percent
+from rtctl.diagnose.answer.words import called, channel_unit, here, value_unit
+from rtctl.diagnose.evidence.diagnosis import NOTHING
+from rtctl.diagnose.evidence.hats import binned
+from rtctl.diagnose.likelihood.fits import Z90
+
+MOST_BARS = 8
+MOST_PANELS = 3
+OWN = 0.85  # of the tolerance's interval, from which on the recording says nothing of a parameter
+LEAST_BAR = 1e-4
+PLACES = ("position", "angle")  # axes along which both directions may differ
+FINER = 60  # bins along a place
+ALIKE = 2.0  # over the observer's bandwidth: rows whose errors count as one
+APART = 0.5  # of the largest, from which on they are drawn apart
+
+
+def missing_force(d: GraphDiagnosis) -> Figure:
+    """What the model lacks against the axis where it lives, binned, with the law that was found through it."""
+    runs, panels = Missing(d), subjects(d)[:MOST_PANELS]
+    figure, axes = new(0.4 + 3.0 * len(panels), len(panels), 1)
+    for ax, (term, node, axis) in zip(axes, panels, strict=True):
+        if axis == "frequency":
+            _spectrum(ax, runs, term, node)
+        else:
+            _curves(ax, d, runs, term, node, axis)
+        at = here(runs.machine, node)
+        title = f"{noun(term)} at {at}" if term else f"what is left at {at}"
+        ax.set_title(title, color=INK, fontsize=10, loc="left", pad=22)
+        legend(ax, ncols=4, loc="lower left", bbox_to_anchor=(-0.01, 0.98), columnspacing=1.2, handlelength=1.6)
+    return figure
+
+
+def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: str) -> None:
+    c, rows = runs.of(term, node, axis), runs.rows
+    block = max(4, round(ALIKE / runs.fast.follow / d.record.dt))
+    parts = {"": np.ones(len(c.x[rows]), bool)}
+    bins = BINS
+    if axis in PLACES and d.verdict != NOTHING:
+        bins = FINER
+        forward = runs.speed(node)[rows] > 0.0
+        parts |= {", forwards": forward, ", backwards": ~forward}
+    found = {
+        way: binned(c.x[rows][keep], c.y[rows][keep], c.law[rows][keep], bins, block, np.mean)
+        for way, keep in parts.items()
+    }
+    both = [k for k in found if k] if _differ(found, 3 if term else 1) else [""]
+    size = max(float(np.nanmax(np.abs(found[k][1]), initial=0.0)) for k in both)
+    law = max(float(np.nanmax(np.abs(found[k][3]), initial=0.0)) for k in both) if term else 0.0
+    scale, shown = prefixed(np.array([size]), c.y_unit)
+    across, along = prefixed(c.x, c.x_unit) if c.x_unit != "degrees" else (1.0, c.x_unit)
+    half = 0.0
+    for way, marker, line in zip(both, "o^", ("-", "--"), strict=False):
+        middle, m, band, known = found[way]
+        ax.fill_between(across * middle, scale * (m - band), scale * (m + band), color=BEFORE, alpha=0.3, lw=0)
+        ax.plot(across * middle, scale * m, marker, ms=3.5, color=BEFORE, label=f"missing{way}")
+        if term:
+            ax.plot(
+                across * middle,
+                scale * known,
+                line,
+                color=AFTER,
+                lw=1.8,
+                label=f"law{way}" if way else "law that was found",
+            )
+        half = max(half, _middle(band))
+    free = d.decided.unlisted
+    if not term and d.located is not None and free is not None and axis == free.axis:
+        inside = np.degrees(free.knots) if c.x_unit == "degrees" else across * free.knots
+        ax.plot(inside, scale * free.force, color=AFTER, lw=1.5, marker="s", ms=3, label="free force that fits best")
+    ax.axhline(0, color=SEEN, lw=0.8)
+    top = scale * (1.4 * max(size, law) + half)
+    ax.set_ylim(-top or -1.0, top or 1.0)
+    label(ax, f"{c.x_words}, {along}", f"{c.y_words}, {shown}")
+
+
+def _differ(found: dict[str, np.ndarray], row: int) -> bool:
+    """Whether a row of the curves (4, bins) depends on the direction of motion, with "" for both directions at once."""
+    ways = [v[[0, row]][:, np.isfinite(v[0])] for k, v in found.items() if k]
+    if len(ways) < 2 or min(v.shape[1] for v in ways) < 2:
+        return False
+    (x0, y0), (x1, y1) = ways
+    gap = np.abs(y0 - np.interp(x0, x1, y1))
+    size = max(np.abs(y0).max(), np.abs(y1).max())
+    return bool((np.max(gap) if row == 3 else np.median(gap)) > APART * size)
+
+
+def _middle(half: np.ndarray) -> float:
+    good = half[np.isfinite(half)]
+    return float(np.median(good)) if len(good) else 0.0
+
+
+def _spectrum(ax, runs: Missing, term: str, node: str) -> None:
+    """Missing force by frequency, without the effect and with it."""
+    c = runs.of(term, node, "time")
+    rate = 1.0 / runs.d.record.dt
+    y, rest = c.y[runs.rows], (c.y - c.law)[runs.rows]
+    size = min(len(y), max(256, round(4 * rate)))
+    scale, shown = prefixed(np.array([np.std(y)]), c.y_unit)
+    for values, color, text in ((y, BEFORE, "missing without it"), (rest, AFTER, "left with it")):
+        f, p = welch(values, rate, nperseg=size)
+        ax.loglog(f[1:], scale * np.sqrt(p[1:]), color=color, lw=1.0, label=text)
+    ax.tick_params(which="both", colors=INK, labelsize=8.5)
+    ax.set_xlim(2.0 * rate / size, min(rate / 2, 4 * runs.fast.follow))
+    ax.set_xlabel("frequency, Hz")
+    ax.set_ylabel(f"{c.y_words}, {shown}/rtHz")
+
+
+def heldout(d: GraphDiagnosis) -> Figure:
+    """Residual of each sensor on rows that no fit saw, in units of its noise, before and after; the motion on top."""
+    late = d.heldout.late.parts[0]
+    sim, record = late.sim, late.sim.record
+    names = sim.channels
+    first = "before" if d.decided.best.names else "the description, fitted"
+    models = [(first, d.heldout.models[0], BEFORE), ("after", d.heldout.models[1], AFTER)]
+    models = models[: 2 if d.heldout.models[1].terms != d.heldout.models[0].terms else 1]
+    residuals = [(text, late.raw(m) / (late.least * np.sqrt(late.mean)), color) for text, m, color in models]
+    order = np.argsort(-np.max([np.sqrt(np.mean(e**2, axis=0)) for _, e, _ in residuals], axis=0))[:MOST_PANELS]
+    figure, axes = new(1.5 + 1.6 * len(order), 1 + len(order), 1, sharex=True)
+    rows = slice(late.rows[0], late.rows[1])
+    scale, unit = prefixed(sim.seen[rows], _unit(d, sim.main))
+    axes[0].plot(*thin(record.t[rows] - record.t[0], scale * sim.seen[rows]), color=SEEN, lw=1.6)
+    label(axes[0], "", unit, f"Recorded by {here(record.case.machine, sim.main)}")
+    t = (late.rows[0] + late.mean * np.arange(len(residuals[0][1]))) * record.dt
+    for ax, c in zip(axes[1:], order, strict=True):
+        worst = 3.0
+        for text, e, color in residuals:
+            rms = float(np.sqrt(np.mean(e[:, c] ** 2)))
+            ax.plot(*thin(t, e[:, c]), color=color, lw=0.9, label=f"{text}: {digits(rms, 2)} rms")
+            worst = max(worst, float(np.abs(e[:, c]).max()))
+        ax.axhspan(-2, 2, color=NOISE, alpha=0.3, lw=0)
+        ax.set_ylim(-1.1 * worst, 1.1 * worst)
+        label(ax, "", "in noise", f"Residual of {here(record.case.machine, names[c])}")
+        legend(ax, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.97))
+    axes[-1].set_xlabel("time, s", color=INK, fontsize=9.5)
+    return figure
+
+
+def _unit(d: GraphDiagnosis, sensor: str) -> str:
+    return channel_unit(d.record.case.machine, sensor)
+
+
+def posterior(d: GraphDiagnosis) -> Figure:
+    """Probability of each combination of effects, of the description alone, and of a force without a name."""
+    bars = rivals(d)[:MOST_BARS]
+    figure, (ax,) = new(0.8 + 0.33 * len(bars))
+    for row, bar in enumerate(bars):
+        ax.barh(row, 100 * bar.probability, color=BEFORE if bar.free else AFTER, height=0.6)
+        text = percent(bar.probability) if bar.probability > LEAST_BAR else f"1e{bar.behind / np.log(10.0):.0f}"
+        ax.text(100 * bar.probability + 1.0, row, text, va="center", fontsize=8.5, color=INK)
+    machine = d.record.case.machine
+    said = [bar.free or " + ".join(called(machine, n) for n in bar.names) or "the description alone" for bar in bars]
+    ax.set_yticks(range(len(bars)), [_folded(text) for text in said])
+    ax.tick_params(axis="y", labelsize=8.5)
+    ax.invert_yaxis()
+    ax.set_xlim(0, 118)
+    ax.set_xticks(range(0, 101, 20))
+    ax.grid(axis="y", visible=False)
+    label(ax, "probability, %")
+    return figure
+
+
+def _folded(text: str, most: int = 44) -> str:
+    """A long text in two lines, at the plus or space next to its middle."""
+    if len(text) <= most:
+        return text
+    gaps = [i for i, sign in enumerate(text) if sign == " "]
+    middle = min(gaps, key=lambda i: abs(i - len(text) // 2))
+    return f"{text[:middle]}\n{text[middle + 1 :]}"
+
+
+def parameters(d: GraphDiagnosis) -> Figure | None:
+    """Fitted numbers over the nominal ones with 90 % intervals; grey where the interval is the owner's tolerance."""
+    names = [path for path in d.parameters if not is_start(path)]
+    if not names:
+        return None
+    space, owner = d.found.base.space, d.nominal
+    figure, (ax,) = new(0.9 + 0.24 * len(names))
+    for row, name in enumerate(names):
+        v, nominal = d.parameters[name], owner[name]
+        tolerance = 100 * space.tolerance(path_of(d, name))
+        if np.isfinite(tolerance):
+            ax.barh(row, 2 * tolerance, left=-tolerance, color=SEEN, alpha=0.25, height=0.8)
+        value, low, high = (100 * (x / nominal - 1) for x in (v.value, v.low, v.high))
+        ends = [[max(value - min(low, high), 0)], [max(max(low, high) - value, 0)]]
+        ax.errorbar(value, row, xerr=ends, fmt="o", ms=4, color=SEEN if untold(d, name) else AFTER, capsize=3)
+    ax.axvline(0, color=INK, lw=0.8)
+    ax.set_yticks(range(len(names)), names)
+    ax.tick_params(axis="y", labelsize=8.5)
+    ax.invert_yaxis()
+    label(ax, "fitted over nominal, %; grey band: the owner's tolerance")
+    return figure
+
+
+def path_of(d: GraphDiagnosis, name: str) -> str:
+    """Path of a fitted number by the symbol or path under which it is told."""
+    called = d.record.case.called
+    return next(path for path in d.found.base.space.names if called.get(path, path) == name)
+
+
+def untold(d: GraphDiagnosis, name: str) -> bool:
+    """Whether the interval of a fitted number is that of the owner's tolerance: the recording says nothing of it."""
+    space = d.predictor.space
+    weight = float(space.prior()[space.names.index(path_of(d, name))])
+    v = d.parameters[name]
+    if weight <= 0.0 or v.value == 0.0:
+        return False
+    ends = np.abs(np.log((v.low / v.value, v.high / v.value))) if v.low * v.high > 0 else np.inf
+    half = float(np.max(ends))  # the owner's own bound may cut off one of them
+    return half > OWN * Z90 / np.sqrt(weight)
+
+
+__all__ = ["heldout", "missing_force", "parameters", "posterior", "untold", "value_unit"]

@@ -1,0 +1,277 @@
+"""Report of a diagnosis of a described machine: one HTML file that needs nothing else, and a table for the terminal."""
+
+from collections import defaultdict
+from typing import Any, NamedTuple
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from rtctl.case.format2 import is_start
+from rtctl.diagnose.answer import figures, played, words
+from rtctl.diagnose.answer import si_format as numbers
+from rtctl.diagnose.answer.answer import GraphDiagnosis
+from rtctl.diagnose.answer.missing_force import machine_words
+from rtctl.diagnose.answer.page import COLOR, Picture, interval, svg
+from rtctl.diagnose.answer.phrases import need, noun, phrase_of
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Interval
+from rtctl.plants.physics import TERMS
+
+LEAST = 1e-3  # probability of a look-alike that is told where nothing is known to tell it apart
+ONE_LINE = 36  # characters of an effect with its name that fit on one line of a console of 80
+MOST_RIVALS = 4  # look-alikes of one effect in the table
+PICTURES = {
+    "missing": (figures.missing_force, {
+        "": "What it takes to keep the simulation without the effect on the recorded track, by the axis where the "
+            "effect lives: means with their 95 % bands, and what the effect that was found gives instead.",
+        UNNAMED: "What it takes to keep the simulation on the recorded track, by the axis where it lives: means with "
+                 "their 95 % bands, and the free force that fits best.",
+        NOTHING: "What it takes to keep the simulation on the recorded track: means with their 95 % bands, which hold "
+                 "zero where nothing is missing.",
+    }),
+    "heldout": (figures.heldout, {
+        "": "Residual of each sensor on rows that no fit saw, in units of the noise of its counts or steps. The grey "
+            "band holds 95 % of that noise.",
+    }),
+    "posterior": (figures.posterior, {
+        "": "Mean posterior over resampled segments. A force without a name is a free function of one axis; 1e-9 is "
+            "how probable an answer is beside the first.",
+    }),
+    "parameters": (figures.parameters, {
+        "": "Fitted numbers over the nominal ones with 90 % intervals. A wrong number is not missing physics.",
+    }),
+}  # fmt: skip
+
+
+MISSING = {
+    NAMED: "What is missing, and the law that was found",
+    AMBIGUOUS: "What is missing, and the likeliest law",
+    UNNAMED: "What is missing, and the free force that fits best",
+    NOTHING: "What is left: no force with a pattern",
+}
+
+
+class Row(NamedTuple):
+    """A number of the machine in the table."""
+
+    path: str
+    nominal: str
+    fitted: str
+    interval: str
+    unit: str
+    untold: bool
+
+
+def html(d: GraphDiagnosis) -> str:
+    """The report as one text."""
+    env = Environment(
+        loader=PackageLoader("rtctl.diagnose.answer", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    r = d.record
+    begin, end = d.heldout.rows
+    return env.get_template("report.html.j2").render(
+        d=d,
+        title=f"{machine_words(r.case.machine)}, {r.t[-1] - r.t[0]:.4g} s at {numbers.nice(1 / r.dt, 'Hz', 3)}",
+        headline=d.headline,
+        missing=MISSING[d.verdict],
+        summary=summary(d),
+        effects=effect_rows(d),
+        checks=checks(d),
+        why=reason(d),
+        rivals=rival_rows(d),
+        instead=instead(d),
+        parameters=parameter_rows(d),
+        cannot=cannot_rows(d),
+        warnings=d.as_json()["warnings"],
+        figures=pictures(d),
+        together=together(d),
+        footer=f"rtctl diagnose, {d.seconds:.1f} s; {sum(len(one.t) for one in d.records)} rows, prediction fitted to "
+        f"rows {begin} to {end}{'' if len(d.records) == 1 else f' of {r.name}'}.",
+    )
+
+
+def together(d: GraphDiagnosis) -> str:
+    """What several recordings have been taken for, in a sentence; "" for one recording."""
+    if len(d.records) == 1:
+        return ""
+    names = [r.name for r in d.records]
+    return (
+        f"{len(names)} recordings of one machine: {', '.join(names[:-1])} and {names[-1]}. Numbers and effects are "
+        f"shared; the figures show {names[0]}."
+    )
+
+
+def pictures(d: GraphDiagnosis) -> dict[str, Picture]:
+    """All figures that this diagnosis has."""
+    found = {}
+    for name, (draw, captions) in PICTURES.items():
+        figure = draw(d)
+        if figure is not None:
+            caption = captions.get(d.verdict, captions[""])
+            found[name] = Picture(svg(figure, name, f"{caption} {d.headline}"), caption)
+    return found
+
+
+def summary(d: GraphDiagnosis) -> str:
+    """Held-out errors in one line, as shares of the recorded motion."""
+    shown = [d.heldout.before, d.heldout.after, d.heldout.floor]
+    floor = numbers.percent(shown[2])
+    if not d.decided.best.names:
+        return f"Error on the part that was not fitted: {numbers.percent(shown[0])} of the motion; noise makes {floor}."
+    one, two = (numbers.percent(x) for x in shown[:2])
+    return f"Error on the part that was not fitted: {one} of the motion before, {two} after; noise makes {floor}."
+
+
+def effect_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
+    """Name, node, size, interval and confidence; one row for each parameter."""
+    rows: list[tuple[str, ...]] = []
+    for e in d.effects:
+        first = f"{noun(e.name)} ({e.name})", words.here(d.record.case.machine, e.node)
+        for k, (name, v) in enumerate(list(e.parameters.items()) or [("", Interval(np.nan, np.nan, np.nan))]):
+            value, ends = interval(v, v.unit) if name else ("", "")
+            told = f"{name} = {value}" if name else ""
+            ends = ends if v.high > v.low else ""
+            rows.append((*(first if k == 0 else ("", "")), told, ends, f"{100 * e.confidence:.0f} %" if k == 0 else ""))
+    return rows
+
+
+def checks(d: GraphDiagnosis) -> list[str]:
+    """What a mechanic should look at, a sentence for each effect that was found."""
+    machine = d.record.case.machine
+    found = [(words.here(machine, e.node), TERMS[e.name].check) for e in d.effects if TERMS[e.name].check]
+    return list(dict.fromkeys(f"{at[:1].upper()}{at[1:]}: {line}" for at, line in found))
+
+
+def reason(d: GraphDiagnosis) -> str:
+    """Why no name is given, where none is."""
+    if d.verdict not in (UNNAMED, NOTHING) or not d.decided.why:
+        return ""
+    return f"The verdict is {d.verdict}: {told_names(d, d.decided.why)}."
+
+
+def told_names(d: GraphDiagnosis, text: str) -> str:
+    """A sentence with the names "term:node" of the candidates in words."""
+    for name in sorted(d.decided.best.names, key=len, reverse=True):
+        text = text.replace(name, words.called(d.record.case.machine, name))
+    return text
+
+
+def rival_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
+    """Found, look-alike, probability and the experiment that separates the two."""
+    machine = d.record.case.machine
+    rows = []
+    for e in d.effects:
+        for r in e.look_alikes:
+            tell = TERMS[e.name].look_alikes.get(r.name, "") or TERMS[r.name].look_alikes.get(e.name, "")
+            p = f"{100 * r.p_value:.1f} %" if r.p_value >= LEAST else "< 0.1 %"
+            if r.p_value < LEAST and not tell:
+                continue
+            names = (words.called(machine, f"{x.name}:{x.node}") for x in (e, r))
+            rows.append((*names, p, tell))
+    return rows[: MOST_RIVALS * len(d.effects)]
+
+
+def instead(d: GraphDiagnosis) -> list[str]:
+    """What to record next where this recording leaves several answers, a sentence each."""
+    if d.experiment is not None:
+        return run_next(d.experiment)
+    return [*([d.planned.untold] if d.planned.untold else []), *without_motion(d)]
+
+
+def run_next(experiment: dict[str, Any]) -> list[str]:
+    """What an experiment does, what it tells, how it is run, and how far each motion that was tried gets."""
+    why, seconds = experiment["why"], float(experiment["seconds"])
+    tried = sorted(why["distance"].items(), key=lambda item: -item[1])
+    far = "; ".join(f"{name.replace('_', ' ')} {value:.2g}" for name, value in tried)
+    return [
+        experiment["words"],
+        why["words"],
+        f"Put the machine where the recording began{played.room(experiment)}, run "
+        f"`{played.command(seconds)}` and diagnose both recordings together.",
+        f"Expected distance between the rivals by motion, over the noise: {far}.",
+        *(f"{name.replace('_', ' ')}: left out, {reason}." for name, reason in why["refused"].items()),
+    ]
+
+
+def without_motion(d: GraphDiagnosis) -> list[str]:
+    """The same where no motion was planned."""
+    if d.verdict == AMBIGUOUS:
+        names = list(dict.fromkeys(e.name for e in d.effects))
+        pairs = [(a, b) for a in names for b in names if b in TERMS[a].look_alikes]
+        lines = [f"{noun(a)} or {noun(b)}: {TERMS[a].look_alikes[b]}" for a, b in pairs[:2]]
+        return lines or [f"To show {noun(n)}: {need(f'{n}:')}." for n in names]
+    if d.verdict == UNNAMED and d.located is not None:
+        at = words.here(d.record.case.machine, d.located.node)
+        machine = d.record.case.machine
+        blind = [
+            b for b in machine.bodies if not machine.is_frame(b) and b not in {s.body for s in machine.sensors.values()}
+        ]
+        lines = [
+            f"The rest lives at {at}, by {d.located.axis}. Vary the {d.located.axis} there alone, slowly, both ways, "
+            "and keep all else as it is.",
+        ]
+        if blind:
+            at = words.here(machine, blind[0])
+            lines.append(f"A sensor at {at}, which has none, says on which side of its joints the effect acts.")
+        return lines
+    return []
+
+
+def parameter_rows(d: GraphDiagnosis) -> list[Row]:
+    """The fitted numbers with their nominal values."""
+    rows = []
+    for path, v in d.parameters.items():
+        start = is_start(path)
+        scale, unit = _scaled(v.value if start else d.nominal[path], v.unit)
+        low, high = sorted((v.low, v.high))
+        nominal, fitted = (numbers.figures(scale * x, 4) for x in (d.nominal[path], v.value))
+        nominal = "" if start else nominal
+        ends = " to ".join(numbers.figures(scale * x, 3) for x in (low, high))
+        rows.append(Row(path, nominal, fitted, ends, unit, figures.untold(d, path)))
+    return rows
+
+
+def _scaled(value: float, unit: str) -> tuple[float, str]:
+    power = numbers.prefix(value, unit, 3)
+    return 10.0**-power, numbers.PREFIXES[power] + unit
+
+
+def cannot_rows(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
+    """Effect, nodes and what a recording would have to hold, of what cannot be told from this one."""
+    nodes: dict[str, list[str]] = defaultdict(list)
+    for entry in d.cannot_test:
+        name, _, node = entry.partition(":")
+        nodes[name].append(words.here(d.record.case.machine, node).removeprefix("the "))
+    return [(noun(n), ", ".join(there), phrase_of(n).need if phrase_of(n) else "") for n, there in nodes.items()]  # type: ignore[union-attr]
+
+
+def terminal(d: GraphDiagnosis) -> RenderableType:
+    """Verdict, effects, look-alikes and errors for the console."""
+    parts: list[RenderableType] = [
+        Text.assemble((f" {d.verdict} ", f"bold reverse {COLOR.get(d.verdict, 'white')}"), " ", d.headline)
+    ]
+    if together(d):
+        parts.append(Text(together(d), style="dim"))
+    if d.effects:
+        table = Table(box=None, pad_edge=False, header_style="dim")
+        for name in ("effect", "at", "size", "90 % interval", "confidence"):
+            right = name in ("90 % interval", "confidence")
+            table.add_column(name, justify="right" if right else "left", overflow="fold", no_wrap=name == "effect")
+        for first, *others in effect_rows(d):  # the name of an effect stays whole
+            table.add_row(*map(Text, (first.replace(" (", "\n(") if len(first) > ONE_LINE else first, *others)))
+        parts += [Text(), table]
+    alike = [f"{look} ({p})" for _, look, p, _ in rival_rows(d)[:MOST_RIVALS] if not p.startswith("<")]
+    if alike and d.verdict in (NAMED, AMBIGUOUS):
+        parts.append(Text(f"look-alikes: {'; '.join(alike)}", style="dim"))
+    parts += [Text(line, style="dim") for line in checks(d)]
+    parts.append(Text(summary(d), style="dim"))
+    if reason(d) and d.verdict == UNNAMED:
+        parts.append(Text(reason(d), style="dim"))
+    parts += [Text(line, style="dim") for line in instead(d)]
+    if d.cannot_test:
+        many = len(d.cannot_test)
+        text = f"{many} effect{'s' * (many > 1)} cannot be told from this recording; the report says what to record."
+        parts.append(Text(text, style="dim"))
+    return Group(*parts)

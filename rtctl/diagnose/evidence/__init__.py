@@ -1,0 +1,1 @@
+"""Forces without a name, rivals, their probabilities, held-out rows, the verdict."""

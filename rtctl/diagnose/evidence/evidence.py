@@ -1,0 +1,116 @@
+"""Evidence: combinations of effects, the description alone and forces without a name are rivals for one probability.
+
+A probability is the mean of the posterior over resampled segments of the recording (a bagged posterior). Where two
+models are both wrong, the posterior of one recording is sure of either; the mean over what could have been recorded
+is not. The law of a name is exact to some per cent alone: a small free force beside it counts for the name, a large
+one against it.
+
+Source: Huggins & Miller, Reproducible model selection using bagged posteriors, Bayesian Analysis 18 (2023);
+Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of model discrepancy, Inverse Problems 30
+(2014).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.evidence.free import AXES, SIZE, TIME, Free, free_forces
+from rtctl.diagnose.evidence.wander import LITTLE, log_density, wandering
+from rtctl.diagnose.likelihood.fits import DISCREPANCY, Fitted, share_of
+from rtctl.diagnose.model.node_scaling import Measures
+from rtctl.diagnose.search.search import Found
+from rtctl.plants.physics import TERMS
+
+SEGMENTS = 32
+DRAWS = 300
+UNLISTED = 3.0  # nats: prior odds against a force that has no name
+BESIDE = 3  # combinations beside which free forces are asked for
+LEAST = 1e-4  # of the force that moves a node: a discrepancy that is smaller is none
+
+
+class Rival(NamedTuple):
+    """One explanation of a recording."""
+
+    fit: Fitted
+    free: Free | None  # a force without a name beside the fit
+    merit: float  # logarithm of the posterior on the whole recording, nats, up to a constant
+    probability: float
+
+    @property
+    def unlisted(self) -> bool:
+        """Whether the free force is more than what the law of a name may be wrong by."""
+        return self.free is not None and self.free.share == SIZE
+
+
+def rivals(found: Found) -> tuple[Rival, ...]:
+    """All explanations that were fitted, with free forces beside the likeliest; the most probable first."""
+    base = found.base
+    fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
+    sim = base.like.parts[0].sim
+    unit = Measures(sim, base.model.base, {}).of("force", str(sim.body))
+
+    def wrong(fit: Fitted) -> float:
+        """What the laws of a fit may be wrong by, in forces that move the machine: the correction at the followed body
+        has less of what the effects are, also of those in a sensor or a drive."""
+        if not fit.names or not len(fit.pushes[0]):
+            return 0.0
+        change = float(np.sqrt(np.mean((base.pushes[0] - fit.pushes[0])[:, 0] ** 2)))
+        return DISCREPANCY * change / unit if np.isfinite(change) else 0.0
+
+    best = set(found.best.names)  # and whether a small error of fewer laws does as well
+    entries: list[tuple[Fitted, Free | None, float]] = []
+    for rank, fit in enumerate(fits):
+        off = wrong(fit)
+        wander = wandering(fit)
+        usual = float(np.linalg.norm([LITTLE, off, wander.noise]))
+        listed = found.merit(fit) + log_density(wander.share, usual)
+        entries.append((fit, None, listed))
+        if wander.free is not None:
+            entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, SIZE) - UNLISTED))
+        if rank < BESIDE or set(fit.names) < best:
+            shares = (SIZE, *((off,) if fit.names and off > LEAST else ()))
+            free = free_forces(fit, shares)
+            large = [f for f in free if f.share == SIZE and (not fit.names or exceeds(base, fit, f))]
+            entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
+            small = [f for f in free if f.share < SIZE and f.axis in arguments(fit)]
+            entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
+    losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
+    chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
+    out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
+    return tuple(sorted(out, key=lambda r: -r.probability))
+
+
+def arguments(fit: Fitted) -> set[str]:
+    """Axes along which the laws of a fit may be wrong: an error of a law is a function of its own argument. One that
+    shows by frequency or tension has no axis here, and may be wrong along any but time."""
+    out: set[str] = set()
+    for h in fit.space.hypotheses:
+        axis = TERMS[h.term].axis
+        out |= {axis} if axis in AXES else set(AXES) - {TIME}
+        out |= {"position"} if axis == "angle" else set()  # of less than a turn
+    return out
+
+
+def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:
+    """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
+    return share_of(base.e, fit.e, free.e) > DISCREPANCY
+
+
+def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
+    """Mean posterior (rivals,) over resampled segments, of merits (rivals,) on the whole and losses (rivals, segments)
+    that are part of them."""
+    count = losses.shape[1]
+    weights = np.random.default_rng(0).multinomial(count, np.full(count, 1.0 / count), DRAWS)
+    drawn = (merits + losses.sum(axis=1)) - weights @ losses.T
+    odds = np.exp(drawn - drawn.max(axis=1, keepdims=True))
+    return np.asarray((odds / odds.sum(axis=1, keepdims=True)).mean(axis=0))
+
+
+def _shared(free: list[Free]) -> list[tuple[Free, float]]:
+    """Free forces of one size, each with the logarithm of its prior: they share it. A large one leaves a force that
+    comes and goes as small as its law may be wrong by."""
+    each = -float(np.log(max(len(free), 1)))
+    return [
+        (f, each + (log_density(0.0, float(np.hypot(LITTLE, DISCREPANCY * f.rms))) if f.share == SIZE else 0.0))
+        for f in free
+    ]

@@ -1,0 +1,62 @@
+"""Prediction of rows that no fit saw: fitted to the first part of a record, judged on the rest under the observer."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.fits import Fitted, refit, without
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.model.model import GraphModel
+
+HELD = 0.25  # share of the record
+WORSE = 1.0  # nats by which rows that no fit saw must be predicted worse, until a name is withdrawn: less is chance
+
+
+class Heldout(NamedTuple):
+    """Errors on the held-out rows by the spread of the followed sensor, and the rows that were fitted."""
+
+    before: float
+    after: float
+    floor: float
+    gain: float  # nats by which the best predicts them better, each under the noise of the rows before
+    rows: tuple[int, int]
+    fits: tuple[Fitted, Fitted]  # base and best, as the rows before were fitted
+    early: Likelihood  # of the rows before
+    late: Likelihood  # of the held-out rows
+
+    @property
+    def models(self) -> tuple[GraphModel, GraphModel]:
+        """The models of both."""
+        return self.fits[0].model, self.fits[1].model
+
+
+def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, Fitted]:
+    """Held-out error of the base and of the best model, each fitted to the rows before, and the best model, without
+    the effects (`fewer`) without which the held-out rows are predicted better."""
+    first, late = base.like.split(HELD)
+
+    def early(f: Fitted) -> Fitted:
+        return refit(first, f.space, f.x, rounds=6) if f.space.names or f.space.hypotheses else f
+
+    def foretold(f: Fitted) -> float:
+        return late.foretold(late.raw(f.model), f.like)
+
+    own = early(best)
+    while fewer and len(best.names) > 1:
+        less = [refit(first, *without(own, index), rounds=6) for index in range(len(best.names))]
+        losses = [foretold(f) for f in less]
+        index = int(np.argmin(losses))
+        if losses[index] > foretold(own) - WORSE:
+            break
+        own, best = less[index], refit(best.like, *without(best, index))
+    return judged(base.like, first, late, (early(base), own)), best
+
+
+def judged(whole: Likelihood, early: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted]) -> Heldout:
+    """Errors of the base and the best model on the rows of `late`, by the spread of each sensor on those of `whole`."""
+    spread = whole.spread
+    residuals = [late.raw(f.model) for f in fits]
+    before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)
+    floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
+    one, two = (late.foretold(e, f.like) for e, f in zip(residuals, fits, strict=True))
+    return Heldout(before, after, min(floor, after), one - two, early.rows, fits, early, late)

@@ -1,0 +1,127 @@
+"""Verdict from the probabilities of all rivals: a name from 0.9, else what is certain of it, nothing, or no name."""
+
+from typing import NamedTuple
+
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
+from rtctl.diagnose.evidence.evidence import Rival, rivals
+from rtctl.diagnose.evidence.free import Free
+from rtctl.diagnose.likelihood.clock import Clock, clock
+from rtctl.diagnose.likelihood.fits import Fitted, explained
+from rtctl.diagnose.search.search import Found
+
+SURE = 0.9  # probability from which a name is given, or that something is missing
+MOSTLY = 0.5  # share of the residual's power above the noise that names have to take off
+ALIKE = 3  # names of an ambiguous answer
+
+
+class Verdict(NamedTuple):
+    """What the recording says."""
+
+    verdict: str
+    best: Fitted  # the model that stands: the base where nothing is named
+    confidence: tuple[float, ...]  # of each effect of the best
+    rivals: tuple[tuple[tuple[str, float], ...], ...]  # of each effect: term:node in its place, probability
+    probabilities: tuple[tuple[tuple[str, ...], float], ...]  # of combinations, best first
+    unlisted: Free | None  # the likeliest force without a name
+    beside: Fitted  # the model beside which it stands
+    why: str  # one sentence
+    table: tuple[Rival, ...]  # all rivals, the most probable first
+    ticks: Clock | None = None  # their times, where they are off
+
+
+def verdict(found: Found) -> Verdict:
+    """Verdict of a search, and of the times of the ticks: those show in the noise that the best model leaves."""
+    decided = of_motion(found)
+    ticks = clock(decided.best)
+    if ticks.probability < SURE:
+        return decided
+    kind = NAMED if decided.verdict == NOTHING else decided.verdict
+    return decided._replace(verdict=kind, ticks=ticks)
+
+
+def of_motion(found: Found) -> Verdict:
+    """Verdict on what moves the machine."""
+    table = rivals(found)
+    named: dict[tuple[str, ...], float] = {}
+    for rival in table:
+        if not rival.unlisted:
+            named[rival.fit.names] = named.get(rival.fit.names, 0.0) + rival.probability
+    ranked = tuple(sorted(named.items(), key=lambda item: -item[1]))
+    nothing, unlisted = named.get((), 0.0), 1.0 - sum(named.values())
+    fits = {r.fit.names: r.fit for r in table}
+    top = max((r for r in table if r.unlisted), key=lambda r: r.merit, default=None)
+    free, beside = (None, found.base) if top is None else (top.free, top.fit)
+    best = fits[certain(ranked)]
+
+    def answer(kind: str, model: Fitted, why: str) -> Verdict:
+        return Verdict(kind, model, (), (), ranked, free, beside, why, table)
+
+    if nothing > 1.0 - SURE and nothing > unlisted:
+        return answer(NOTHING, found.base, f"the description alone has a probability of {100 * nothing:.0f} %")
+    if unlisted > 0.5 or not best.names:
+        assert top is not None and free is not None
+        also = f"beside {', '.join(beside.names)} " if beside.names else ""
+        why = f"{also}a force at {free.node} by {free.axis} without a name has a probability of {100 * unlisted:.0f} %"
+        return answer(UNNAMED, beside, why)
+    share = explained(found.base, best)
+    if share < MOSTLY:
+        bare = max((r for r in table if not r.fit.names), key=lambda r: r.merit)
+        why = f"{', '.join(best.names)} takes off {100 * share:.0f} % of what is missing"
+        if bare.unlisted:
+            return answer(UNNAMED, best, why)
+        return answer(NOTHING, found.base, f"{why}, and the rest is as noise of the sensors leaves it")
+    return of_names(answer(NAMED, best, ""))
+
+
+def of_names(decided: Verdict) -> Verdict:
+    """The verdict with the confidence in each effect of its best model, and its rivals."""
+    ranked, best = decided.probabilities, decided.best
+    confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
+    others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
+    kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
+    return decided._replace(verdict=kind, confidence=confidence, rivals=others)
+
+
+def fewer(decided: Verdict, best: Fitted) -> Verdict:
+    """The verdict with a model that lacks some of the effects, without which rows that no fit saw are predicted
+    better."""
+    if best.names == decided.best.names or decided.verdict not in (NAMED, AMBIGUOUS):
+        return decided
+    gone = ", ".join(name for name in decided.best.names if name not in best.names)
+    return of_names(decided._replace(best=best, why=f"without {gone} the last rows are predicted better"))
+
+
+def certain(ranked: tuple[tuple[tuple[str, ...], float], ...]) -> tuple[str, ...]:
+    """The likeliest combination, without an effect that may as well be absent."""
+    best = next((names for names, _ in ranked if names), ())
+    for name in best:
+        rest = tuple(other for other in best if other != name)
+        term = name.partition(":")[0]
+        sure = sum(p for names, p in ranked if holds(names, term)) >= SURE
+        absent = sum(p for names, p in ranked if set(names) == set(rest)) > 1.0 - SURE
+        if rest and absent and not sure:
+            return next(names for names, _ in ranked if set(names) == set(rest))
+    return best
+
+
+def terms(f: Fitted) -> list[str]:
+    """Term of each hypothesis."""
+    return [h.term for h in f.space.hypotheses]
+
+
+def holds(names: tuple[str, ...], term: str) -> bool:
+    """Whether a combination has a term, at any node."""
+    return any(name.partition(":")[0] == term for name in names)
+
+
+def _rivals(
+    ranked: tuple[tuple[tuple[str, ...], float], ...], best: tuple[str, ...], index: int
+) -> tuple[tuple[str, float], ...]:
+    """Names in the place of one effect of the best, with their probability, highest first."""
+    rest = set(best) - {best[index]}
+    out: dict[str, float] = {}
+    for names, p in ranked:
+        others = [name for name in names if name not in rest]
+        if rest <= set(names) and len(others) == 1 and others[0] != best[index]:
+            out[others[0]] = out.get(others[0], 0.0) + p
+    return tuple(sorted(out.items(), key=lambda item: -item[1])[: 2 * ALIKE])

@@ -1,0 +1,114 @@
+"""Ticks off their times: no motion shows them, but the noise of what moves, which then grows with its rate.
+
+A tick that comes late by d shows a reading that is d times its rate further on, and the d of all sensors are the same.
+They move the machine, too: a command acts until the next one is written, and a law with a derivative answers a late
+reading, which is ahead, with a command against the motion that is then cut short. On average that is a force along
+the motion, by the square of their standard deviation. `timed` reads each d back from the residual and holds each
+command for as long as it was.
+
+Source: Cervin et al., How does control timing affect performance, IEEE Control Systems 23(3) (2003).
+"""
+
+from copy import copy
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.special import expit, logsumexp
+
+from rtctl.diagnose.likelihood.fits import Fitted
+from rtctl.diagnose.likelihood.joint import Joint
+from rtctl.diagnose.likelihood.likelihood import COUNTED, Likelihood, coarsened
+from rtctl.diagnose.likelihood.noise import levels, surprise
+from rtctl.diagnose.model.kernel import TRACK
+from rtctl.diagnose.model.model import GraphModel
+from rtctl.diagnose.model.simulate import Simulator
+from rtctl.plants.physics import TERMS
+
+STEADY, CERTAIN = 0.025, 4e-6  # of a tick, and s: less is what the clock of any computer does
+MOST = 0.5  # of a tick
+GRID = 60  # standard deviations that are tried, alike in their logarithm
+CHANCE = 0.3  # of the power of a residual, which must be chance where it tells of time
+OTHER = 3.0  # nats: prior odds against a noise of one sensor that grows with its rate for a reason of its own
+SLOW, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which a force is averaged
+TAIL = 0.05  # of probability, beyond each end of a 90 % interval
+UNSTEADY = next((t.name, t.stands[0].element, *t.typical) for t in TERMS.values() if t.clock)  # term, node, size
+
+
+class Clock(NamedTuple):
+    """Times of the ticks, as the noise of a fit tells of them."""
+
+    sigma: float  # s, standard deviation
+    low: float  # 90 % interval
+    high: float
+    gain: float  # nats of evidence that they are off by more than those of any clock
+
+    @property
+    def probability(self) -> float:
+        """That they are."""
+        return float(expit(self.gain))
+
+
+def clock(fit: Fitted, chance: float = CHANCE) -> Clock:
+    """Times of the ticks by the residuals of a fit, of the sensors of which at least a share `chance` is chance.
+
+    What speaks against them is a clock as any other, and a noise of each sensor that grows with its rate on its own.
+    """
+    dt = fit.like.sim.record.dt
+    least = max(STEADY * dt, CERTAIN)
+    if MOST * dt <= least or fit.like.sim.mode != TRACK:
+        return Clock(0.0, 0.0, 0.0, -np.inf)
+    sizes = np.geomspace(least, MOST * dt, GRID)
+    each = np.concatenate([_likely(part, own, sizes, chance) for part, own in fit.like.cut(fit.e)]) * fit.power
+    likely = each.sum(axis=0)
+    weight = np.exp((likely - likely.max()) * coarsened(fit.like.size, COUNTED) / fit.power)
+    total = np.cumsum(weight) / weight.sum()
+    low, middle, high = (float(np.interp(q, total, sizes)) for q in (TAIL, 0.5, 1.0 - TAIL))
+    own = float(np.sum(logsumexp(each, axis=1) - np.log(GRID))) - OTHER
+    gain = float(logsumexp(likely) - np.log(GRID) - np.logaddexp(likely[0], own))
+    return Clock(middle, low, high, gain)
+
+
+def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray, chance: float) -> np.ndarray:
+    """Logarithm of the likelihood (positions, sizes) of residuals where ticks are off by each of `sizes`, s.
+
+    Inertia keeps the rate of a position alike from tick to tick; that of a force or a current tells nothing of time. A
+    residual that its past foretells is motion that the model lacks, and what grows there is its own.
+    """
+    sensors = part.sim.case.machine.sensors
+    out = [np.zeros((0, len(sizes)))]
+    for c, name in enumerate(part.sim.channels):
+        if name not in sensors or sensors[name].measures != "position":
+            continue
+        noise, own = part.noise[c], e[part.present[c], c]
+        rest, grows = noise.filtered(own), part.growth[c][noise.order :]
+        if np.mean(rest**2) <= chance * np.var(own):
+            continue
+        rate = grows[:, -1] / (part.mean * part.sim.record.dt) ** 2
+        late = rate * float(noise.a @ noise.a) / part.mean
+        each = [levels(rest, grows[:, :-1], float(part.least[c]), size**2 * late) for size in sizes]
+        out.append(-np.array([[float(np.sum(surprise(rest / level, level))) for level in each]]))
+    return np.concatenate(out)
+
+
+def timed(fit: Fitted, found: Clock) -> Likelihood:
+    """The likelihood of a fit whose commands are held for as long as they were, on average over PUSH ticks."""
+    parts = [copy(part) for part in fit.like.parts]
+    for part in parts:
+        part.sim = _timed(part, fit.model, found.sigma)
+    return parts[0] if len(parts) == 1 else Joint(parts)
+
+
+def _timed(part: Likelihood, model: GraphModel, sigma: float) -> Simulator:
+    """The simulator of one recording with the commands as long as they were held, where a position tells of it."""
+    sim = part.sim
+    if sim.shows_speed:
+        return sim
+    other, dt = copy(sim), sim.record.dt
+    y = sim.run(sim.own(model))[:, sim.layout.sensors[sim.main]]
+    e, rate = sim.seen - y, np.gradient(y, dt)
+    noise = float(np.min(part.noise[part.channels.index(sim.column(sim.main))].sigma)) * part.mean**0.5  # at rest
+    late = (e - uniform_filter1d(e, SLOW)) * rate * sigma**2 / ((sigma * rate) ** 2 + noise**2)
+    longer = np.append(np.diff(late), 0.0) / dt
+    other.volts = np.ascontiguousarray(sim.volts + uniform_filter1d(sim.volts * longer[:, None], PUSH, axis=0))
+    return other

@@ -1,0 +1,253 @@
+"""Fit of a model to a recording under a noise of its own, with its evidence.
+
+The noise is estimated from the residual of the fit, and the fit made again: a noise that was estimated without an
+effect holds the effect for noise. The evidence is Laplace's: the likelihood at its maximum, times the prior there,
+times the volume of the posterior.
+
+Source: MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28; Miller & Dunson, Robust Bayesian
+inference via coarsening, JASA 114 (2019) for the power of the likelihood.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.descent import ALL, EFFECTS, Point, derivatives, descend, weights
+from rtctl.diagnose.likelihood.inexact import errors
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.likelihood.pushes import pushes
+from rtctl.diagnose.model.model import GraphModel
+from rtctl.diagnose.model.space import COSINE, INVERSE, REST, SINE, SIZE, Space
+from rtctl.plants.physics import TERMS
+
+ROUNDS = 3  # of noise and fit
+ENOUGH = 2.0  # nats, that a further round must gain
+LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a recording may say nothing
+MATTERS = 0.5  # nats of the prior that going back must gain
+FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
+RESTLESS = 1.2  # times what differs from block to block, the same
+DISCREPANCY = 0.1  # of the missing force: standard deviation of what the law of a name may be wrong by
+Z90 = 1.645  # standard deviations of a 90 % interval, each way
+
+
+class Fitted(NamedTuple):
+    """A model fitted to a record."""
+
+    space: Space
+    x: np.ndarray
+    e: np.ndarray  # (blocks, sensors) residual, SI
+    J: np.ndarray  # (blocks, sensors, unknowns) of the residual, in single precision
+    A: np.ndarray  # (unknowns, unknowns) their inner products, as innovations
+    like: Likelihood  # with its own noise
+    loss: float  # negative logarithm of the likelihood, nats
+    pushes: tuple[np.ndarray, ...]  # (windows, followed) corrections of the observer in each recording, N or Nm
+
+    @property
+    def model(self):
+        """The model itself."""
+        model: GraphModel = self.space.model(self.x)
+        return model
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """term:node of each hypothesis."""
+        return tuple(h.name for h in self.space.hypotheses)
+
+    @property
+    def seldom(self) -> float:
+        """Prior odds against the names, nats, beside that each is one of many."""
+        return sum(TERMS[h.term].seldom for h in self.space.hypotheses)
+
+    @property
+    def power(self) -> float:
+        """Share of the likelihood that counts."""
+        return self.like.power
+
+    @property
+    def information(self) -> np.ndarray:
+        """Second derivative (unknowns, unknowns) of the negative logarithm of the posterior."""
+        return curvature(self, self.power)
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence, nats, up to a constant that all models of the record share."""
+        weight = prior(self.space)
+        volume = float(np.linalg.slogdet(self.information)[1]) - float(np.sum(np.log(weight)))
+        fitness = -self.power * self.loss - 0.5 * float(weight @ self.x**2)
+        return fitness - 0.5 * float(volume)
+
+
+def curvature(f: Fitted, power: float) -> np.ndarray:
+    """Second derivative (unknowns, unknowns) of the negative logarithm of a posterior, a share of whose likelihood
+    counts."""
+    return np.asarray(power * f.A + np.diag(prior(f.space)))
+
+
+def half_widths(information: np.ndarray) -> np.ndarray:
+    """Half widths (unknowns,) of the 90 % intervals, each way, by the second derivative of the posterior."""
+    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0)))
+
+
+def prior(space: Space) -> np.ndarray:
+    """Precision of the prior of each unknown: the owner's tolerance, and a typical size of each effect."""
+    out = list(weights(space)[: space.nb])
+    for h in space.hypotheses:
+        for c in h.coordinates:
+            width = 1.0 if np.isinf(c.high) or np.isinf(c.low) else max(0.3 * (c.high - c.low), 1e-3)
+            out.append(1.0 / (SPREAD[c.kind] if c.kind in SPREAD else min(width, 2.0)) ** 2)
+    return np.array(out)
+
+
+SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0, REST: 3.0}  # standard deviation of a size, in typical sizes
+
+
+def refit(
+    like: Likelihood,
+    space: Space,
+    x: np.ndarray | None = None,
+    known: np.ndarray | None = None,
+    floor: Likelihood | None = None,
+    rounds: int = 10,
+    relax: bool = True,
+) -> Fitted:
+    """The model of `space` from x: by least squares and under the noise `floor`, then under the noise that it left.
+
+    Least squares finds large effects, a noise that knows them finds small ones. `known` (blocks, sensors, unknowns) are
+    the derivatives in the first columns, as a model with fewer effects has them. Parameters are fitted as if the laws
+    were exact: their errors weigh evidence, and would else stand for an effect that the fit left too small.
+    """
+    like = like.slackened(None)
+    low, high = space.bounds()
+    x = np.clip(space.start() if x is None else np.asarray(x, float), low, high)
+    e = like.raw(space.model(x))
+    J = np.zeros((*e.shape, len(x)), np.float32)
+    count = 0 if known is None else known.shape[2]
+    if known is not None:
+        J[..., :count] = known
+    start = Point(x, e, derivatives(like, space, x, range(count, len(x)), J), EFFECTS if count else ALL)
+
+    def judged(at: Point) -> tuple[float, Point, Likelihood]:
+        own = like.told(at.e)
+        return own.loss(at.e), at, own
+
+    tried = [judged(descend(like.flat(e), space, start, rounds, 1e-2, EFFECTS))]
+    if floor is not None:
+        tried.append(judged(descend(floor, space, start, rounds, 1e-2, EFFECTS)))
+    best = min(tried, key=lambda one: one[0])
+    for _ in range(ROUNDS):
+        found = judged(descend(best[2], space, best[1], rounds, 1e-3))
+        gain = best[0] - found[0]
+        if gain > 0.0:
+            best = found
+        else:  # derivatives that were taken later
+            best = best[0], best[1]._replace(J=found[1].J), best[2]
+        if gain < ENOUGH:
+            break
+    at = best[1]
+    like = like.slackened(errors(like, space, at.x, at.e))
+    model = fitted_at(like.told(at.e), space, at)
+    return relaxed(model) if relax else model
+
+
+def relaxed(f: Fitted) -> Fitted:
+    """The model with what the recording does not tell back where the owner put it, as far as that costs nothing.
+
+    Difference quotients of a machine with dry friction are not exact: directions along which the recording says
+    nothing, as that of all forces and inertias together, look as if it said a little, and a fit that strayed along them
+    does not find back.
+    """
+    weight = prior(f.space)
+    root = np.sqrt(weight)
+    values, vectors = np.linalg.eigh(f.power * f.A / np.outer(root, root))
+    for loose in LOOSE:
+        idle = vectors[:, values < loose]
+        z = f.x * root
+        x = (z - idle @ (idle.T @ z)) / root
+        gained = 0.5 * float(weight @ (f.x**2 - x**2))
+        if gained < MATTERS:
+            continue
+        x = np.clip(x, *f.space.bounds())
+        e = f.like.raw(f.space.model(x))
+        exact = f.like.slackened(None)
+        at = descend(exact.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
+        trial = fitted_at(f.like.told(at.e), f.space, at)
+        if trial.log_evidence > f.log_evidence:
+            return trial
+    return f
+
+
+def fitted_at(own: Likelihood, space: Space, at: Point) -> Fitted:
+    """A model where its fit came to, under a noise."""
+    white = own.white(at.J)
+    return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e), pushes(own, space.model(at.x)))
+
+
+def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
+    """Space, start and derivatives of a model without one of its hypotheses."""
+    gone = base.space.columns(index)
+    return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
+
+
+def faint(f: Fitted) -> list[int]:
+    """Numbers of the effects of a model whose sizes may all be zero, by their 90 % intervals."""
+    half, out = half_widths(f.information), []
+    for index, h in enumerate(f.space.hypotheses):
+        sizes = f.space.columns(index)[h.sizes]
+        if len(sizes) and (np.abs(f.x[sizes]) < half[sizes]).all():
+            out.append(index)
+    return out
+
+
+def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:
+    """Noise (sensors,) of counting, and of what differs from one block to the next without a pattern, SI."""
+    restless = np.std(np.diff(f.e, axis=0), axis=0) / np.sqrt(2.0)
+    return f.like.least * np.sqrt(f.like.mean), restless
+
+
+def silent(f: Fitted) -> bool:
+    """Whether a model leaves no more than noise in any sensor."""
+    level, restless = quiet(f)
+    return bool((np.sqrt(np.mean(f.e**2, axis=0)) <= np.maximum(FLOOR * level, RESTLESS * restless)).all())
+
+
+def explained(base: Fitted, best: Fitted) -> float:
+    """Share of the power of the residual, above the noise of the sensor, that the best model takes off.
+
+    Noise is what counting leaves, and what differs from one block to the next without a pattern. The sensor in which
+    most is missing counts.
+    """
+    level, restless = quiet(best)
+    least = np.maximum(FLOOR * level, RESTLESS * restless)
+    before = np.sqrt(np.mean(base.e**2, axis=0))
+    after = np.sqrt(np.mean(best.e**2, axis=0))
+    c = int(np.argmax(before / least))
+    excess = before[c] ** 2 - least[c] ** 2
+    if excess <= 0.0 or after[c] <= least[c]:
+        return 1.0
+    return float((before[c] ** 2 - after[c] ** 2) / excess)
+
+
+def explained_force(base: Fitted, best: Fitted) -> float:
+    """Share of the power of what the observer had to push with that the best model takes off, of the followed body
+    where most is missing; 0 where no observer follows the machine."""
+    before, after = (np.concatenate([np.mean(slow**2, axis=0) for slow in f.pushes if len(slow)] or [np.zeros(1)])
+                     for f in (base, best))  # fmt: skip
+    c = int(np.argmax(before))
+    return float(1.0 - after[c] / before[c]) if np.isfinite(after[c]) and 0.0 < before[c] < np.inf else 0.0
+
+
+def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
+    """What a further effect takes off over what all take off, rms, of the residual or of the observer's pushes, and of
+    the sensor that shows most of it."""
+    found = share_of(base.e, fewer.e, more.e)
+    for slow in zip(base.pushes, fewer.pushes, more.pushes, strict=True):
+        if len(slow[0]) and all(np.isfinite(part).all() for part in slow):
+            found = max(found, share_of(*slow))
+    return found
+
+
+def share_of(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
+    """The same of values (rows, k) under the three models."""
+    further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
+    whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
+    return float(np.max(further / np.maximum(whole, 1e-300)))

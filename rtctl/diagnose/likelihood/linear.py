@@ -1,0 +1,57 @@
+"""Linear model of a fit: the residual as a function of the fitted parameters about where they are, under a given noise.
+
+Screening, starts of fits and free forces all solve for the parameters beside something new; they share this.
+"""
+
+from copy import copy
+from functools import cached_property
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.fits import Fitted, prior
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.likelihood.solver import bounded_step
+
+DAMPING = 1e-9  # of a bounded step, relative
+
+
+class Linear:
+    """Derivatives of the residual of a fitted model: raw (blocks, sensors, unknowns), and white under a noise."""
+
+    def __init__(self, base: Fitted):
+        self.base, self.like = base, base.like
+        self.start, self.coarse = base.like.rough(base.model)  # residuals that differences are taken from
+        self.raw = np.asarray(base.J, float)
+        self.weight = prior(base.space)
+
+    def under(self, like: Likelihood) -> "Linear":
+        """The same under another noise."""
+        other = copy(self)
+        other.like = like
+        for derived in ("white", "H"):
+            other.__dict__.pop(derived, None)
+        return other
+
+    @cached_property
+    def white(self) -> np.ndarray:
+        """Derivatives of the innovations (innovations, unknowns)."""
+        return self.like.white(self.raw)
+
+    @cached_property
+    def H(self) -> np.ndarray:
+        """Half the second derivative of the cost, prior included."""
+        return np.asarray(self.white.T @ self.white + np.diag(self.weight))
+
+    def slope(self, r: np.ndarray) -> np.ndarray:
+        """Derivative of the cost where the innovations are r (innovations,)."""
+        return np.asarray(self.white.T @ r + self.weight * self.base.x)
+
+    def step(self, e: np.ndarray) -> np.ndarray:
+        """Step of the parameters that suits the residuals e (blocks, sensors) best, within their bounds."""
+        low, high = self.base.space.bounds()
+        return bounded_step(self.H, self.slope(self.like.white(e)), self.base.x, low, high, DAMPING)
+
+    def left(self, dx: np.ndarray, C: np.ndarray) -> np.ndarray:
+        """Residuals after a step of the parameters and of the directions C (blocks, sensors, k) beside them."""
+        n = len(self.base.x)
+        return np.asarray(self.base.e + np.tensordot(self.raw, dx[:n], axes=1) + np.tensordot(C, dx[n:], axes=1))

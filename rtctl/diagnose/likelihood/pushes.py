@@ -1,0 +1,55 @@
+"""Corrections of the tracking observer, averaged over windows: forces that the model lacks, without the sensor's noise.
+
+Noise of a sensor is quick: the observer averages over it. A force that no law explains is slow enough to be followed,
+and so stands in what the observer pushes with. A quick observer pushes with noise mostly: a smooth window takes that
+off, where the mean over a box keeps the noise of its two ends.
+
+Source: disturbance observer (Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mechatronics 1, 1996).
+"""
+
+from functools import cache
+
+import numpy as np
+from scipy.signal import lfilter
+
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.model.kernel import TRACK
+from rtctl.diagnose.model.model import GraphModel
+from rtctl.diagnose.model.observer import DAMPED, SMOOTHED
+
+LONG = 100  # windows of noise, by which its part is measured
+
+
+def pushes(like: Likelihood, model: GraphModel) -> tuple[np.ndarray, ...]:
+    """Corrections (windows, followed) of the observer in each recording, N or Nm at the followed bodies; no windows
+    where the machine is not followed."""
+    out = []
+    for part in like.parts:
+        if part.sim.mode == TRACK:
+            push = part.sim.everything(part.sim.own(model), n=part.rows[1])[1][part.rows[0] :]
+            out.append(averaged(push, part.sim.window))
+        else:
+            out.append(np.zeros((0, len(part.sim.followed))))
+    return tuple(out)
+
+
+def averaged(push: np.ndarray, width: int) -> np.ndarray:
+    """Means (windows, k) of values (rows, k) over Hann windows that lie `width` rows apart, and are twice as long."""
+    count = max(len(push) // width - 1, 0)
+    rise, fall = (np.hanning(2 * width + 1)[:-1] / width).reshape(2, width)
+    cells = push[: (count + 1) * width].reshape(-1, width, push.shape[1])
+    up, down = (np.tensordot(half, cells, (0, 1)) for half in (rise, fall))
+    return np.asarray(up[:-1] + down[1:]) if count else np.zeros((0, push.shape[1]))
+
+
+@cache
+def answer(follow: float, dt: float, width: int) -> float:
+    """Standard deviation of the mean over windows, `width` ticks of dt s apart, of what an observer of bandwidth
+    `follow`, rad/s, makes of white noise of standard deviation one, for a unit of inertia."""
+    w = follow * dt
+    white = np.random.default_rng(0).standard_normal(LONG * width)
+    e = lfilter([1.0, -2.0, 1.0], [1.0, DAMPED * w - 2.0, 1.0 - DAMPED * w + w**2], white)
+    a = -np.expm1(-SMOOTHED * w)
+    rate = lfilter([a], [1.0, a - 1.0], np.diff(e, prepend=e[0])) / dt
+    push = follow**2 * e + DAMPED * follow * rate
+    return float(np.std(averaged(push[:, None], width)))

@@ -1,0 +1,65 @@
+"""Slow residuals of the followed sensors: an autoregression foretells them, however large they are.
+
+A likelihood of innovations alone holds a slow error of a model for noise that is coloured. So the residual, averaged
+over windows, counts beside its innovations, by the larger of its own size and of what an error of the laws makes: a
+small share of the force that moves the machine.
+
+Source: Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of model discrepancy, Inverse
+Problems 30 (2014).
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.model.kernel import TRACK
+from rtctl.diagnose.model.model import nominal
+from rtctl.diagnose.model.node_scaling import Measures
+from rtctl.diagnose.model.observer import DAMPED
+from rtctl.diagnose.model.simulate import Simulator
+
+UNKNOWN = 0.01  # of the force that moves the machine: standard deviation of what laws are wrong by
+
+
+class Slow(NamedTuple):
+    """A followed sensor."""
+
+    column: int  # among the channels
+    width: int  # blocks of a window
+    least: float  # SI: residual that an error of the laws makes
+    sigma: float  # SI: standard deviation of the averaged residual
+
+    def of(self, e: np.ndarray) -> np.ndarray:
+        """Averages (windows, ...) of residuals (blocks, sensors, ...), SI."""
+        count = len(e) // self.width
+        own = e[: count * self.width, self.column]
+        return np.asarray(own.reshape(count, self.width, *e.shape[2:]).mean(axis=1))
+
+    def told(self, e: np.ndarray) -> "Slow":
+        """The same with the standard deviation that residuals (blocks, sensors) show."""
+        own = self.of(e)
+        return self._replace(sigma=float(np.hypot(self.least, np.sqrt(np.mean(own**2))))) if len(own) else self
+
+    def losses(self, e: np.ndarray, count: int) -> np.ndarray:
+        """Negative logarithm of the likelihood of residuals (blocks, sensors) by segment (count,), nats, up to a
+        constant."""
+        own = self.told(e)
+        r = own.of(e) / own.sigma
+        return np.bincount(
+            np.arange(len(r)) * count // max(len(r), 1), 0.5 * r**2 + np.log(own.sigma / own.least), count
+        )
+
+
+def slow(sim: Simulator, channels: Sequence[int], mean: int) -> list[Slow]:
+    """The followed sensors among the `channels`, where blocks are `mean` ticks long."""
+    if sim.mode != TRACK:
+        return []
+    measures, out = Measures(sim, nominal(sim.case).base, {}), []
+    for one in sim.followed:
+        column, follow = sim.column(one.sensor), sim.bandwidth(one)
+        if column in channels:
+            stiff = (DAMPED * follow if one.shows_speed else follow**2) * measures.inertia(one.body)
+            least = UNKNOWN * measures.of("force", one.body) / stiff
+            out.append(Slow(list(channels).index(column), max(1, round(sim.window / mean)), least, least))
+    return out

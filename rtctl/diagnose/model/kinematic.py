@@ -1,0 +1,63 @@
+"""Machine of a kinematic problem: positions that follow the first one through the joints, where no force was measured.
+
+Nobody knows forces there, and none is asked for. A joint that is rigid in the description is a spring too stiff to be
+seen, at which lost motion and an uneven ratio can act. A body that nothing brakes would fly on through lost motion; it
+rubs as little as no reading shows.
+
+Source: Lurie & Enright, Classical feedback control (2000), for the play operator: what follows stays until it is moved.
+"""
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from rtctl.case.format2 import GraphCase
+from rtctl.diagnose.model.model import rigid
+from rtctl.plants.graph.layout import layout
+
+QUICK = (1000.0, 3000.0)  # rad/s, at which a stiff joint rings with what it moves: least and most
+DAMPED = 1.4  # damping of the same, twice its ratio
+SLIGHT = 0.05  # steps of the reading by which friction may stretch a stiff joint
+BRAKES = 2.0  # times the force that the given motion takes: what follows must not fly on
+OVER = 7  # rows, over which an acceleration is taken
+
+
+def followed(case: GraphCase, main: str, fine: dict[str, float], x: np.ndarray, dt: float) -> GraphCase:
+    """The case with a spring for each rigid joint and friction for each body that has none.
+
+    `main` is the sensor of the motion x (n,) that is given; `fine` is the step or noise of each reading, SI.
+    """
+    machine, values, given = case.machine, dict(case.values), set(case.values)
+    own = str(machine.sensors[main].body)
+    bends = np.quantile(np.abs(savgol_filter(x, OVER, 3, deriv=2, delta=dt)), 0.999) if len(x) >= OVER else 0.0
+    ratios = rigid(case.layout, values, own)
+    joints, bodies = dict(machine.joints), dict(machine.bodies)
+    needs = [BRAKES * bends * abs(ratios.get(str(machine.sensors[s].body), 0.0)) / (SLIGHT * fine[s])
+             for s in fine if s != main and fine[s] > 0.0]  # fmt: skip
+    quick = float(np.clip(np.sqrt(max(needs, default=0.0)), *QUICK))
+    for name, joint in machine.joints.items():
+        if joint.stiffness is None:
+            ends = [end for end in (getattr(joint, "from"), joint.to) if end in ratios]
+            mass = max(_felt(case, end, joint.to) for end in ends if end != own or len(ends) == 1)
+            made = {"stiffness": quick**2 * mass, "damping": DAMPED * quick * mass}
+            joints[name] = joint.model_copy(update=made)
+            for key, value in made.items():
+                values[f"joints.{name}.{key}"] = value
+                given.discard(f"joints.{name}.{key}")
+    for name, body in machine.bodies.items():
+        if name != own and not machine.is_frame(name) and body.dry == 0.0:
+            mass = values[f"bodies.{name}.{'inertia' if body.turns else 'mass'}"]
+            dry = mass * max(BRAKES * abs(ratios[name]) * float(bends), 1e-12)
+            bodies[name] = body.model_copy(update={"dry": dry})
+            values[f"bodies.{name}.dry"] = dry
+            given.discard(f"bodies.{name}.dry")
+    changed = machine.model_copy(update={"joints": joints, "bodies": bodies})
+    taken = tuple(path for path in values if path not in given)
+    return case._replace(machine=changed, layout=layout(changed), values=values, made=taken)
+
+
+def _felt(case: GraphCase, name: str, far: str) -> float:
+    """Inertia or mass of one end of a joint, as its far end feels it."""
+    body = case.machine.bodies[name]
+    mass = case.values[f"bodies.{name}.{'inertia' if body.turns else 'mass'}"]
+    ends = [case.layout.ratio(end, case.values) for end in (name, far)]
+    return float(mass * (ends[0] / ends[1]) ** 2) if all(ends) else float(mass)

@@ -1,0 +1,221 @@
+"""Record of a described machine: commands, sensors and measured inputs on an even clock, in SI units."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl.case.format2 import HELD_PROBLEMS, GraphCase
+from rtctl.config.errors import NoAnswer, UserError, nearest
+from rtctl.diagnose.model.kinematic import followed
+from rtctl.diagnose.model.model import GraphModel, rigid
+from rtctl.diagnose.record.columns import unwrap
+from rtctl.diagnose.record.format1 import Record
+from rtctl.plants.graph.params import drive_gain
+from rtctl.trace.clock import even_rows, increasing
+
+BEYOND = 10  # rows that a recording has to have beside one for each unknown: its noise is estimated as well
+EARLY = 10  # rows, from which the speed at the first is guessed
+
+
+class GraphRecord(NamedTuple):
+    """Columns of a recording, row by row."""
+
+    case: GraphCase
+    t: np.ndarray  # (n,) s
+    dt: float  # s
+    ref: np.ndarray  # (n,) nan where there is none
+    w: np.ndarray  # (n,) excitation
+    u: np.ndarray  # (n, drives) command, in each drive's unit
+    y: dict[str, np.ndarray]  # sensor -> (n,) SI; a counter's value is the middle of its count
+    grain: dict[str, float]  # sensor -> step of its numbers, SI; 0 where nobody knows it
+    forces: np.ndarray | None  # (n, bodies in order) measured inputs, N or Nm
+    edges: dict[str, np.ndarray] = {}  # noqa: RUF012  # sensor without direction -> (n,) its counts
+    positions: dict[str, np.ndarray] = {}  # body -> (n,) measured inputs, rad or m  # noqa: RUF012
+    name: str = ""  # of the recording, where there are several of one machine
+    scales: tuple[float, float, float] = (1.0, 1.0, 0.0)  # of a first position, a first speed, and a guess of the speed
+    source: Record | None = None  # the record of exchange format 1 that it was made of
+
+    @property
+    def main(self) -> str:
+        """The sensor that the observer follows: the first of a position, else of a speed, else the first."""
+        sensors = self.case.machine.sensors
+        for wanted in ("position", "speed"):
+            for name, sensor in sensors.items():
+                if sensor.measures == wanted and sensor.body is not None and name in self.y:
+                    return name
+        return next(iter(self.y))
+
+
+def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> GraphRecord:
+    """The record of these columns, checked; `path` is told in messages.
+
+    Raises UserError that names file, column and row and says what would be right, NoAnswer where the recording
+    supports no verdict.
+    """
+    t = _column(path, columns, "t", "s, clock at the tick")
+    unknowns = len(case.fitted)
+    if len(t) < unknowns + BEYOND:
+        raise NoAnswer(
+            f"{path} holds {len(t)} rows; {unknowns} unknown numbers and the noise need {unknowns + BEYOND} at least"
+        )
+    rows = len(t)
+    t, dt, even = _clock(path, t, case)
+    n = len(t)
+    blank = np.full(rows, np.nan)
+    ref = columns.get("ref", blank)
+    w = np.nan_to_num(np.asarray(columns.get("w", np.zeros(rows)), float))
+    machine = case.machine
+    driven = [] if case.problem == "free" else list(machine.drives.values())
+    u = np.zeros((n, len(machine.drives)))
+    for d, drive in enumerate(driven):
+        u[:, d] = even(_column(path, columns, drive.column, f"{drive.unit}, command") * _on(path, columns, drive))
+    y: dict[str, np.ndarray] = {}
+    grain: dict[str, float] = {}
+    edges: dict[str, np.ndarray] = {}
+    for name, sensor in machine.sensors.items():
+        if sensor.column not in columns and len(machine.sensors) > 1 and y:
+            continue
+        raw = _column(path, columns, sensor.column, f"sensor {name}")
+        counter = sensor.counts_per_unit is not None
+        if counter:
+            off = np.flatnonzero(raw != np.round(raw))
+            if len(off):
+                raise UserError(
+                    f"{path}: column '{sensor.column}', row {off[0]}: {raw[off[0]]:g} is not a whole number; "
+                    "a counter counts"
+                )
+            raw = unwrap(raw)[0] + 0.5
+        if not sensor.direction:
+            edges[name] = even(raw)
+            continue
+        y[name] = even(raw) / sensor.scale
+        grain[name] = abs(sensor.grain / sensor.scale)
+    if u.size and not np.ptp(u, axis=0).any() and case.problem == "driven":
+        names = " and ".join(f"'{d.column}'" for d in driven)
+        raise NoAnswer(f"{path}: {names} never changes; the machine was not driven, so it supports no verdict")
+    if not y:
+        raise NoAnswer(f"{path}: no sensor tells a direction; a diagnosis needs one position or speed that does")
+    first = next(iter(y))
+    if np.ptp(y[first]) == 0.0:
+        raise NoAnswer(f"{path}: column '{machine.sensors[first].column}' never changes; nothing moved")
+    forces, positions = _forces(path, columns, case)
+    record = GraphRecord(
+        case, t, dt, even(np.asarray(ref, float)), even(w), u, y, grain,
+        None if forces is None else np.stack([even(f) for f in forces.T], axis=1),
+        edges, {body: even(x) for body, x in positions.items()},
+    )  # fmt: skip
+    if case.problem == "static" and record.main in case.machine.sensors:
+        made = _made(case, u, str(case.machine.sensors[record.main].body))
+        record = record._replace(y=y | made, grain=grain | dict.fromkeys(made, 0.0))
+    _check_problem(path, record)
+    record = record._replace(scales=_scales(record))
+    if case.problem != "kinematic":
+        return record
+    fine = {name: grain[name] or float(np.std(np.diff(y[name], 2))) / 10.0 for name in y}
+    return record._replace(case=followed(case, record.main, fine, y[record.main], dt))
+
+
+def _on(path: Path, columns: dict[str, np.ndarray], drive: Any) -> np.ndarray | float:
+    """1 in the rows (n,) in which a drive is on, 0 in the others."""
+    if drive.enabled is None:
+        return 1.0
+    on = _column(path, columns, drive.enabled, "0 or 1, whether the drive is on")
+    bad = np.flatnonzero((on != 0.0) & (on != 1.0))
+    if len(bad):
+        raise UserError(
+            f"{path}: column '{drive.enabled}', row {bad[0]}: {on[bad[0]]:g}; it should be 0 (off) or 1 (on)"
+        )
+    return on
+
+
+def _made(case: GraphCase, u: np.ndarray, main: str) -> dict[str, np.ndarray]:
+    """Force (n,) that the drives were measured to make, N or Nm at the main body's, under the first drive's name."""
+    at = levers(GraphModel(case.layout, case.values), main)
+    return {next(iter(at)): u @ np.array(list(at.values()))} if at else {}
+
+
+def levers(model: GraphModel, main: str) -> dict[str, float]:
+    """Force of each drive at the body `main` for one unit of its command, N or Nm, joints taken as rigid."""
+    machine, values, moved = model.layout.machine, model.base, rigid(model.layout, model.base, main)
+    out = {}
+    for name, drive in machine.drives.items():
+        body = drive.body if drive.body is not None else machine.joints[str(drive.joint)].to
+        out[name] = drive_gain(values, name) * moved.get(body, 0.0)
+    return out
+
+
+def _check_problem(path: Path, record: GraphRecord) -> None:
+    """Raise NoAnswer where the recording lacks what its problem is about, UserError where an input is what it tells."""
+    problem, machine, bodies = record.case.problem, record.case.machine, record.case.layout.bodies
+    for name, entry in record.case.inputs.items():
+        own = machine.sensors[record.main].body if entry.measures == "position" else None
+        if own is not None and bodies[entry.body].coordinate == bodies[own].coordinate:
+            raise UserError(
+                f"{record.case.file}: inputs.{name}.body: '{entry.body}' moves with the body of sensor {record.main}; "
+                "a position that is an input is that of another body, beyond a spring"
+            )
+    if problem not in HELD_PROBLEMS:
+        return
+    shown = {name: machine.sensors[name] for name in record.y if name in machine.sensors}
+    if record.main not in shown or shown[record.main].measures not in ("position", "speed"):
+        raise NoAnswer(f"{path}: a {problem} problem needs the position or speed of a body, which no column shows")
+    if problem == "kinematic" and sum(s.measures == "position" for s in shown.values()) < 2:
+        raise NoAnswer(f"{path}: a kinematic problem compares two positions at least; the recording shows one")
+    if problem == "static" and len(record.y) < 2:
+        raise NoAnswer(
+            f"{path}: a static problem needs a measured force: a drive's column or a sensor of force or current"
+        )
+
+
+def _scales(record: GraphRecord) -> tuple[float, float, float]:
+    """Scales of the first position and the first speed of the main sensor, and a guess of that speed."""
+    x = record.y[record.main]
+    if record.case.machine.sensors[record.main].measures == "speed":
+        return float(np.std(x)) or 1.0, 1.0, 0.0
+    few = min(EARLY, len(x))
+    guess = float(np.polyfit(record.dt * np.arange(few), x[:few], min(2, few - 1))[-2])
+    rate = float(np.sqrt(np.mean(np.gradient(x, record.dt) ** 2)))
+    return 0.1 * float(np.ptp(x)) or 1.0, rate or 1.0, guess
+
+
+def _forces(
+    path: Path, columns: dict[str, np.ndarray], case: GraphCase
+) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
+    """Measured forces (n, bodies), None where there are none, and measured positions (n,) by body."""
+    names = list(case.machine.bodies)
+    forces, positions = None, {}
+    for name, entry in case.inputs.items():
+        values = _column(path, columns, entry.column, f"input {name}") / entry.per_unit
+        if entry.measures == "position":
+            positions[entry.body] = values
+            continue
+        forces = np.zeros((len(values), len(names))) if forces is None else forces
+        forces[:, names.index(entry.body)] += values
+    return forces, positions
+
+
+def _clock(path: Path, t: np.ndarray, case: GraphCase):
+    """Even times, tick, and what lays a column onto them."""
+
+    def row(k: int) -> str:
+        return f"{path}: column 't', row {k}"
+
+    if case.sample_rate is not None:
+        clock = even_rows(t, case.sample_rate, row, "sample_rate in case.json is {:g} Hz", gaps=True)
+        return clock.t, 1.0 / case.sample_rate, lambda values: values
+    increasing(t, row)
+    dt = float(np.median(np.diff(t)))
+    even = np.arange(t[0], t[-1] + 0.5 * dt, dt)
+    return even, dt, lambda values: np.interp(even, t, values)
+
+
+def _column(path: Path, columns: dict[str, np.ndarray], name: str, meaning: str) -> np.ndarray:
+    if name not in columns:
+        hint = nearest(name, columns)
+        raise UserError(f"{path} has no column '{name}' ({meaning})" + (f"; is it '{hint}'?" if hint else ""))
+    values = np.asarray(columns[name], dtype=float)
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise UserError(f"{path}: column '{name}', row {bad[0]}: {values[bad[0]]:g}; it should be a finite number")
+    return values

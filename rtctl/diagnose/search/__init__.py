@@ -1,0 +1,1 @@
+"""Hypotheses, and combinations of them by evidence."""

@@ -1,0 +1,112 @@
+"""Extension of models by one more effect each: those that promise most, of all models together, are fitted.
+
+Which effect comes first does not matter then: a model that is behind on its own is extended where the two together
+promise more.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.fits import Fitted, refit, relaxed
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.search.hypotheses import combined, hypotheses
+from rtctl.diagnose.search.screen import Score, Screened, screen
+
+STARTS = 2  # of the first few fits
+FIRST = 3
+OTHERS = 3  # nodes of the best terms beside the first
+BEST = 2  # terms that are tried at their other nodes
+LEAST = 6.0  # nats that screening must promise for a refit
+
+Known = dict[tuple[str, ...], Fitted]  # by the names of the effects in alphabetical order
+Merit = Callable[[Fitted], float]  # logarithm of the posterior of a model
+
+
+class Promise(NamedTuple):
+    """An effect beside a model."""
+
+    parent: Fitted
+    looked: Screened
+    score: Score
+    gain: float  # logarithm of the posterior as screening sees it
+    power: float  # the same by least squares
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Those of the model that it would be."""
+        return key((*self.parent.names, self.score.hypothesis.name))
+
+    @property
+    def term(self) -> tuple[int, str]:
+        """The model that is extended, and the term, wherever it stands."""
+        return id(self.parent), self.score.hypothesis.term
+
+
+def extended(
+    like: Likelihood, parents: Sequence[Fitted], known: Known, most: int, merit: Merit, looked: Screened | None = None
+) -> list[Fitted]:
+    """Refits of models with the most promising hypotheses beside them; `looked` is what screening said of one model.
+
+    Each term is tried at its most promising node, then the best terms at their other nodes. `known` gets all of them.
+    """
+    looks = [looked if looked is not None else screened(parent) for parent in parents]
+    found = [promise for pair in zip(parents, looks, strict=True) for promise in promises(*pair, merit)]
+    top: dict[tuple[int, str], dict[tuple[str, ...], list[Promise]]] = {}
+    for promise in in_turns(found):
+        if max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top):
+            top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
+
+    def refitted(these: list[Promise], starts: int) -> Fitted:
+        names = these[0].names
+        if names not in known:
+            fits = [
+                refit(like, one.parent.space.add(one.score.hypothesis), x, one.parent.J, one.looked.floor, relax=False)
+                for one in these[:starts]
+                for x in one.looked.starts(one.score, starts)
+            ]
+            known[names] = max(fits, key=lambda f: f.log_evidence)
+        return known[names]
+
+    firsts = {
+        term: refitted(next(iter(nodes.values())), STARTS if rank < FIRST else 1)
+        for rank, (term, nodes) in enumerate(top.items())
+    }
+    out = list(firsts.values())
+    for term in sorted(firsts, key=lambda term: -merit(firsts[term]))[:BEST]:
+        out += [refitted(these, 1) for these in list(top[term].values())[1 : 1 + OTHERS]]
+    for f in sorted(out, key=lambda f: -merit(f))[:FIRST]:
+        known[key(f.names)] = relaxed(f)
+    return list({f.names: f for f in (known[key(f.names)] for f in out)}.values())
+
+
+def promises(parent: Fitted, looked: Screened, merit: Merit) -> list[Promise]:
+    """All effects beside a model."""
+    own, size = merit(parent), parent.like.size
+    plain = -size * float(np.mean([np.log(noise.sigma) for noise in parent.like.flat(parent.e).noise]))
+    return [
+        Promise(parent, looked, score, own + parent.power * score.gain,
+                plain - 0.5 * size * np.log(max(1.0 - 2.0 * score.power / size, 1e-9)))
+        for score in looked.scores
+    ]  # fmt: skip
+
+
+def in_turns(found: Sequence[Promise]) -> list[Promise]:
+    """Promises in the order in which they deserve a fit: by what they gain, and by what least squares takes off."""
+    orders = [sorted(found, key=lambda one: -one.gain), sorted(found, key=lambda one: -one.power)]
+    return list({id(one): one for pair in zip(*orders, strict=True) for one in pair}.values())
+
+
+def screened(parent: Fitted) -> Screened:
+    """Scores beside a model."""
+    sim, model = parent.like.sim, parent.model
+    candidates = [
+        h for h in hypotheses(sim, model, combined(parent.like, model), model.terms) if h.name not in parent.names
+    ]
+    return screen(parent, candidates)
+
+
+def key(names: Iterable[str]) -> tuple[str, ...]:
+    """The names of a combination, in alphabetical order."""
+    return tuple(sorted(names))

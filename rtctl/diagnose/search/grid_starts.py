@@ -1,0 +1,122 @@
+"""Starts of a hypothesis: where a search begins to walk through the parameters of a term at a node.
+
+How a search walks through a term's parameters is told by the term itself (plants/physics/search.py). Starts are shares
+of what the recording shows of the node: its rms speed, its span, the rms force of its drive.
+"""
+
+from collections.abc import Iterable
+from itertools import product
+
+import numpy as np
+
+from rtctl.diagnose.model.node_scaling import Measures
+from rtctl.diagnose.model.space import COSINE, INVERSE, PLACE, REST, SHAPE, SINE, SIZE, Coordinate, Hypothesis
+from rtctl.own.term import sizes
+from rtctl.plants.physics import TERMS, Element, Term, having
+from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Rest, Shape, Size, Turn, Where
+
+ONCE = 1.5  # times a turn: what comes less often is no cogging of a shaft that may be out of balance, which has teeth
+TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
+
+
+def searched(name: str) -> bool:
+    """Whether a term is among the hypotheses that every record is asked about."""
+    return bool(sizes(name) or TERMS[name].search)
+
+
+def shows_alone(term: Term, element: Element, slides: bool, blind: bool) -> bool:
+    """Whether the only sensor of the only body shows a term that elsewhere takes another sensor to compare with."""
+    return "lone" in element.traits and {"slides": slides, "unsigned": blind}.get(term.needs.alone, False)
+
+
+def parts_of(name: str) -> tuple[Part, ...]:
+    """What is fitted of a term; of one that does not say, what it calls typical, the first being its size."""
+    if TERMS[name].search:
+        return TERMS[name].search
+    (first, (low, high)), *others = TERMS[name].typical.items()
+    more = (Shape(n, "one", ((a * b) ** 0.5,), (b / a) ** 0.5) for n, (a, b) in others)
+    return (Size(first, "one", (low * high) ** 0.5), *more)
+
+
+def starts_of(term: str, node: str, parts: tuple[Part, ...], m: Measures) -> list[Hypothesis]:
+    """One hypothesis for each combination of starts."""
+    m.term = term
+    axes: list[list[tuple[tuple[Coordinate, ...], dict]]] = [list(_options(part, node, m)) for part in parts]
+    out = []
+    for combination in product(*axes):
+        coordinates = tuple(c for option, _ in combination for c in option)
+        fixed = {k: v for _, extra in combination for k, v in extra.items()}
+        out.append(Hypothesis(term, node, coordinates, fixed))
+    return out
+
+
+def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordinate, ...], dict]]:
+    if isinstance(part, Size):
+        offset = m.dry(node) if part.offset == "dry" else 0.0
+        shares = part.share if isinstance(part.share, tuple) else (part.share,)
+        top = part.most if part.most < np.inf else 0.5 * m.most(part.name)
+        for scale in dict.fromkeys(min(x * m.of(part.measure, node), top) for x in shares):
+            least = part.least if part.signed else part.finest * m.of("grain", node) / scale
+            if part.undoes:
+                least = -(m.dry(node) if part.undoes == "dry" else m.thick(node)) / scale - 1e-3
+            most = part.most / scale if part.measure == "one" else part.most
+            slight = max(part.slight, m.of(part.blur, node) / scale if part.blur else 0.0)
+            yield (Coordinate(part.name, SIZE, scale, least, most, offset=offset, slight=slight),), {}
+    elif isinstance(part, Shape):
+        measure = m.of(part.measure, node)
+        low, high = min(part.starts) * measure / part.reach, max(part.starts) * measure * part.reach
+        for start in part.starts:
+            value = start * measure
+            if part.fixed:
+                yield (), {part.name: value}
+            else:
+                yield (Coordinate(part.name, SHAPE, value, np.log(low / value), np.log(high / value)),), {}
+    elif isinstance(part, Limit):
+        limits = [start * m.of(part.measure, node) for start in part.starts]
+        for limit in limits or m.hints.get(f"{part.measure}:{node}", []):
+            yield (Coordinate(part.name, INVERSE, limit, 0.0),), {}
+    elif isinstance(part, Turn):
+        scale = part.share * m.of(part.measure, node)
+        name = f"{part.amplitude}|{part.phase}"
+        yield (Coordinate(name, COSINE, scale), Coordinate(name, SINE, scale)), {}
+    elif isinstance(part, Hint):
+        found = m.hints.get(f"{part.kind}:{node}", m.hints.get(part.kind, []))
+        s = m.scale(node)
+        if node in having(m.record.plant, "sensor", "lone") and part.kind == "wavelength":
+            low, high = part.lengths
+            found = [value for value in found if low < value < high]
+        if part.kind == "order" and node in having(m.record.plant, "body", "rotor"):
+            found = [value for value in found if value > ONCE]
+        for value in found:
+            if part.place:
+                yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}
+            else:
+                turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
+                step, longest = min(1e-2, TURN / turns), part.reach
+                if part.kind == "wavelength":  # less than a whole one is a spring and a push, or any curve
+                    longest = min(longest, float(np.log(turns / (2 * np.pi))))
+                if longest > 0.0:
+                    yield (Coordinate(part.name, SHAPE, value, -part.reach, longest, step=step),), {}
+    elif isinstance(part, Where):
+        yield (), {}
+        yield (), {part.name: m.scale(node).at(0.5)}
+    elif isinstance(part, Rest):
+        yield (Coordinate(part.name, REST, part.share * m.of(part.measure, node), offset=m.scale(node).at(0.5)),), {}
+    elif isinstance(part, Jumps):
+        jumps = m.hints.get(f"jump:{node}", [])
+        if jumps:
+            tick, (_, first) = m.record.dt, jumps[0]  # counts are lost between two ticks: the later one reads all of it
+            (at, _), *more = [(max(when - tick, 0.0), size / first) for when, size in jumps]
+            yield (Coordinate(part.name, SIZE, abs(first)),), {"at": at, "more": tuple(more), "over": tick}
+    elif isinstance(part, At):
+        s = m.scale(node)
+        low, high = 0.2 * part.narrow * s.span, 4.0 * part.wide * s.span
+        places = [((k + 0.5) / part.places, part.wide, 1.0 / part.places) for k in range(part.places)]
+        spots = [(spot, part.narrow, 2 * part.narrow) for spot in m.hints.get("spot", [])]
+        for where, share, reach in places + spots:
+            width = share * s.span
+            place = Coordinate(part.name, PLACE, reach * s.span, -1.5, 1.5, offset=s.at(where))
+            yield (place, Coordinate(part.width, SHAPE, width, np.log(low / width), np.log(high / width))), {}
+    else:
+        for value in part.values:
+            yield (), {part.name: value * m.of(part.measure, node) if part.measure else value}

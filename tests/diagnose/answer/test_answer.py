@@ -1,0 +1,62 @@
+import pytest
+from graph_cases import named, nothing, unnamed
+
+from rtctl.case.format2 import START
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
+
+
+def test_nothing():
+    d = nothing()
+    assert d.verdict == NOTHING
+    assert not d.effects
+    assert d.located is None
+    assert d.headline.startswith("Nothing is missing")
+    assert d.heldout.before < 2 * d.heldout.floor
+    for path, v in d.parameters.items():
+        nominal = 0.0 if path == START else d.record.case.values[path]  # kept as its exponential
+        assert v.low <= nominal <= v.high, path
+
+
+def test_dry_friction_of_the_carriage():
+    d = named()
+    assert d.verdict == NAMED
+    assert [(e.name, e.node) for e in d.effects] == [("friction.coulomb", "carriage")]
+    force = d.effects[0].parameters["F_C"]
+    assert force.low <= 2.0 <= force.high
+    assert force.unit == "N"
+    assert "The carriage rubs" in d.headline
+    assert d.heldout.after < 0.2 * d.heldout.before
+
+
+def test_a_force_without_a_name():
+    d = unnamed()
+    assert d.verdict == UNNAMED
+    assert not d.effects
+    assert d.located.node == "rod"
+    assert d.decided.why
+
+
+@pytest.mark.parametrize("d", [nothing, named, unnamed])
+def test_json_has_the_keys_of_the_exchange_format(d):
+    data = d().as_json()
+    assert {
+        "verdict",
+        "effects",
+        "located",
+        "parameters",
+        "fit",
+        "cannot_test",
+        "separating_experiment",
+        "seconds",
+    } <= set(data)
+    assert set(data["fit"]) == {"heldout_nrmse_before", "heldout_nrmse_after", "noise_floor"}
+    assert all(len(p["ci90"]) == 2 for p in data["parameters"].values())
+
+
+def test_a_rival_without_a_size_is_called_by_its_name():
+    d = named()
+    rival = Effect("drive.gain_asymmetry", "amplifier", 0.3, {}, (), "friction.coulomb:carriage")
+    effects = (d.effects[0]._replace(confidence=0.6), rival)
+    told = d._replace(decided=d.decided._replace(verdict=AMBIGUOUS), effects=effects)
+    assert "cannot tell which" in told.headline
+    assert "at the amplifier" in told.headline

@@ -1,0 +1,118 @@
+"""Closed loop of our own recordings by the tick of their config: with an own law, and with another plant."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from rtctl import api
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.diagnose.answer.emulate import can_emulate, emulate
+from rtctl.diagnose.answer.freerun import compare
+from rtctl.diagnose.answer.load import of_bundle
+from rtctl.diagnose.model.by_symbol import owner_model
+from rtctl.diagnose.model.format1 import graph_record
+from rtctl.diagnose.record.format1 import INPUT
+from rtctl.own import files, model
+from rtctl.own.files import give
+from rtctl.trace.bundle import load_bundle
+
+ROOT = Path(__file__).parents[3]
+STEPS = [{"at": 0.2, "to": 0.02, "ramp": 0.2}, {"at": 1.6, "to": 0.0, "ramp": 0.2}]
+
+
+@pytest.fixture(scope="module")
+def own(config, tmp_path_factory) -> Path:
+    """A recording of the axis under a law of the user's own; the law lies beside it."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "my_law.py").write_text((ROOT / "rtctl/own/templates/my_law.py").read_text())
+    settings = yaml.safe_load((ROOT / "configs/axis.yaml").read_text())
+    settings["law"]["position"] = {"kind": "./my_law.py:MyLaw", "gain": 8000.0, "tau_d": 0.02}
+    settings |= {"name": config("axis").name, "reference": {"steps": STEPS}}
+    (folder / "own.yaml").write_text(yaml.safe_dump(settings))
+    api.record(api.load_config(folder / "own.yaml", {"loop.mode": "fused"}), 2.5, folder / "run")
+    return folder
+
+
+@pytest.fixture
+def foreign(monkeypatch):
+    """This process has read no own file."""
+    monkeypatch.setattr(files, "_trusted", set())
+    model._model.cache_clear()
+    model._law.cache_clear()
+
+
+def test_without_the_file_the_recorded_command_is_the_input(own, foreign):
+    bundle = load_bundle(own / "run")
+    record = of_bundle(bundle)
+    assert not compare(record, bundle=bundle).closed
+    said = next(warning for warning in record.case.warnings if INPUT in warning)
+    assert "a position law of an own file, ./my_law.py:MyLaw" in said and "--own ./my_law.py" in said
+    with pytest.raises(UserError, match="own file"):
+        compare(record, True, 0, bundle)
+    with pytest.raises(UserError, match="--own"):
+        emulate(bundle, record)
+
+
+def test_with_the_file_the_loop_is_closed_to_the_bit(own, foreign):
+    give([own / "my_law.py"])
+    bundle = load_bundle(own / "run")
+    record = of_bundle(bundle)
+    assert not record.source.closed_loop
+    found = compare(record, bundle=bundle)
+    assert found.closed and set(found.channels) == {"x", "u"}
+    for channel in found.channels.values():
+        np.testing.assert_array_equal(channel.simulated, channel.recorded)
+    assert np.ptp(found.channels["u"].recorded) > 0.5
+
+
+def with_values(record, **changes):
+    """The record under other parameters than its owner says."""
+    return graph_record(record.source, owner_model(record.source.case).change(**changes))
+
+
+def test_another_plant_gives_another_command(own, foreign):
+    give([own / "my_law.py"])
+    bundle = load_bundle(own / "run")
+    record = of_bundle(bundle)
+    heavier = compare(with_values(record, M=1.2 * record.case.values["bodies.carriage.mass"]), True, 0, bundle)
+    assert 1e-4 < heavier.channels["x"].nrmse < 0.1
+    assert heavier.channels["u"].nrmse > 0.01
+
+
+def test_a_model_that_trips_the_machine_is_no_answer(own, foreign):
+    give([own / "my_law.py"])
+    bundle = load_bundle(own / "run")
+    with pytest.raises(NoAnswer, match="trips the machine at tick"):
+        emulate(bundle, with_values(of_bundle(bundle), K=1e-3))
+
+
+def test_a_described_machine_runs_its_own_tick(config, tmp_path):
+    changes = {"name": config("axis").name, "loop.mode": "fused"}
+    bundle = api.record(api.load_config("machines/belt", changes), 1.5, tmp_path / "run")
+    record = of_bundle(bundle)
+    found = compare(record, bundle=bundle)
+    assert found.closed and set(found.channels) == {*record.y, *record.case.machine.drives}
+    for channel in found.channels.values():
+        np.testing.assert_array_equal(channel.simulated, channel.recorded)
+    machine = record.case.machine.model_dump(mode="json", exclude_unset=True)
+    (tmp_path / "heavy.yaml").write_text(yaml.safe_dump({"machine": heavier(machine)}))
+    other = compare(of_bundle(bundle, tmp_path / "heavy.yaml"), bundle=bundle)
+    assert other.closed and 1e-6 < other.channels["encoder"].nrmse < 0.5
+
+
+def heavier(machine):
+    """The description with one body of twice the mass or inertia."""
+    name, body = next((n, b) for n, b in machine["bodies"].items() if "mass" in b or "inertia" in b)
+    key = "mass" if "mass" in body else "inertia"
+    return {**machine, "bodies": {**machine["bodies"], name: {**body, key: 2.0 * body[key]}}}
+
+
+def test_only_a_whole_recording_of_our_own_is_emulated(own):
+    bundle = load_bundle(own / "run")
+    assert can_emulate(bundle)
+    assert not can_emulate(bundle._replace(case={**bundle.case, "config": None}))
+    late = {name: values[3:] for name, values in bundle.columns.items()}
+    assert not can_emulate(bundle._replace(columns=late))
+    assert not can_emulate(bundle._replace(columns={k: v for k, v in bundle.columns.items() if k != "order"}))

@@ -1,0 +1,73 @@
+"""Free runs of models against recordings of described machines."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import yaml
+from graph_cases import BELT, RUB, case_of, command, record
+from test_loop import SECONDS, blank
+
+from rtctl.cli.common import load_config
+from rtctl.config.errors import UserError
+from rtctl.config.load import set_path
+from rtctl.diagnose.answer.believe import believing
+from rtctl.diagnose.answer.freerun import compare
+from rtctl.loop import fused
+
+
+@cache
+def rubbing():
+    """A belt axis whose carriage rubs more than its owner says."""
+    return record(case_of(BELT, problem="driven"), command(6.0), terms=[RUB])
+
+
+@pytest.fixture
+def model(tmp_path):
+    """A file of the same machine with what its owner does not know of."""
+    path = tmp_path / "model.yaml"
+    path.write_text(yaml.safe_dump({"machine": BELT, "plant": {"physics": [RUB]}}))
+    return path
+
+
+def test_a_model_that_has_what_is_missing_is_nearer(model):
+    before, after = compare(rubbing()), compare(believing(rubbing(), model))
+    assert not before.closed and before.skipped == after.skipped > 0
+    assert set(after.channels) == {"encoder", "scale"}
+    assert after.channels["scale"].unit == "m" and after.channels["encoder"].unit == "rad"
+    for name, channel in after.channels.items():
+        assert channel.nrmse < 0.02 < 0.2 * before.channels[name].nrmse
+
+
+def test_rows_at_the_start_are_followed(model):
+    whole = compare(believing(rubbing(), model), skip=1000)
+    assert whole.skipped == 1000 and len(whole.t) == len(rubbing().t) - 1000
+    assert whole.channels["encoder"].recorded[0] == rubbing().y["encoder"][1000]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"), [({"closed": True}, "its law is not known"), ({"skip": 10**6}, "--skip")]
+)
+def test_what_cannot_be_is_refused(words, message):
+    with pytest.raises(UserError, match=message):
+        compare(rubbing(), **words)
+
+
+def test_a_model_of_another_machine_is_refused(tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text(yaml.safe_dump({**BELT, "bodies": {**BELT["bodies"], "wheel": {"inertia": 1e-5}}}))
+    with pytest.raises(UserError, match="wheel"):
+        believing(rubbing(), other)
+
+
+def test_the_loop_is_closed_by_its_own_law():
+    config = set_path(load_config("machines/belt", []), "loop.mode", "fused")
+    rows = fused.run(config, SECONDS + 0.5).between(0.0, SECONDS)
+    empty = blank(config)
+    sensors = empty.case.machine.sensors
+    y = {name: (rows[s.column] + 0.5) / s.scale for name, s in sensors.items()}
+    recorded = empty._replace(ref=np.array(rows["ref"]), w=np.array(rows["w"]), u=rows["u"][:, None], y=y)
+    found = compare(recorded)
+    assert found.closed and set(found.channels) == {"encoder", "scale", "amplifier"}
+    assert found.channels["amplifier"].unit == "V"
+    assert all(channel.nrmse < 0.02 for channel in found.channels.values())

@@ -1,0 +1,75 @@
+import io
+import re
+
+import numpy as np
+import pytest
+from graph_cases import named, nothing, unnamed
+from rich.console import Console
+
+from rtctl.diagnose.answer import report
+from rtctl.diagnose.answer.missing_force import Missing, subjects
+from rtctl.diagnose.answer.posterior import rivals
+
+
+def said(d, width=110):
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(report.terminal(d))
+    return console.export_text()
+
+
+def test_page_of_a_named_effect_needs_nothing_else():
+    page = report.html(named())
+    assert "The carriage rubs" in page
+    assert not re.search(r'(src|href)="(?!#)', page)
+    assert "<script" not in page
+    assert page.count("<svg") == 4
+    assert "friction.coulomb" in page
+    assert "spring balance" in page  # what a mechanic looks at
+    assert "prefers-color-scheme: dark" in page
+
+
+@pytest.mark.parametrize(
+    ("d", "words"), [(nothing, "What is left: no force with a pattern"), (unnamed, "Record this instead")]
+)
+def test_page_of_a_verdict_without_a_name(d, words):
+    assert words in report.html(d())
+
+
+def test_the_law_goes_through_what_is_missing():
+    runs = Missing(named())
+    assert subjects(named()) == [("friction.coulomb", "carriage", "velocity")]
+    curve = runs.of("friction.coulomb", "carriage", "velocity")
+    fast = np.abs(curve.x) > 0.05
+    fast[: runs.rows.start] = False
+    ahead = fast & (curve.x > 0)
+    np.testing.assert_allclose(np.median(curve.law[ahead]), -2.0, rtol=0.2)
+    np.testing.assert_allclose(np.median(curve.y[ahead]), np.median(curve.law[ahead]), rtol=0.1)
+    assert (curve.x_unit, curve.y_unit) == ("m/s", "N")
+
+
+def test_probabilities_sum_to_one_with_the_free_force_among_them():
+    for d in (nothing(), named(), unnamed()):
+        bars = rivals(d)
+        assert sum(b.probability for b in bars) == pytest.approx(1.0)
+        assert any(b.names == () and not b.free for b in bars)
+    assert any(b.free for b in rivals(unnamed()))
+    assert rivals(named())[0].names == ("friction.coulomb:carriage",)
+
+
+def test_numbers_of_which_the_recording_says_nothing_are_grey():
+    rows = {row.path: row for row in report.parameter_rows(named())}
+    assert set(rows) == set(named().parameters)
+    assert not rows["drives.amplifier.gain"].untold
+    assert any(row.untold for row in rows.values())
+
+
+def test_terminal():
+    text = said(named())
+    assert "named" in text
+    assert "F_C" in text
+    assert "Error on the part that was not fitted" in text
+    assert "The verdict is unnamed" in said(unnamed())
+
+
+def test_the_name_of_an_effect_stays_whole():
+    assert "(friction.coulomb)" in said(named(), 80)

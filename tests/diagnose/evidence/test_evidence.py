@@ -1,0 +1,44 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rtctl.diagnose.evidence.evidence import SEGMENTS, arguments, bagged
+
+
+def test_what_every_segment_says_stays_sure():
+    losses = np.stack([np.full(SEGMENTS, 0.0), np.full(SEGMENTS, 1.0)])
+    chances = bagged(-losses.sum(axis=1), losses)
+    assert chances[0] > 0.999
+    assert chances.sum() == pytest.approx(1.0)
+
+
+def test_models_that_divide_the_segments_are_near_one_half():
+    losses = np.zeros((2, SEGMENTS))
+    losses[0, ::2] = losses[1, 1::2] = 20.0
+    losses[1, 0] += 3.0  # alone, the whole recording would be sure of the first
+    merits = -losses.sum(axis=1)
+    assert 1.0 / (1.0 + np.exp(merits[1] - merits[0])) > 0.95
+    assert bagged(merits, losses)[0] == pytest.approx(0.5, abs=0.1)
+
+
+def test_segments_alike_leave_the_posterior_of_the_whole():
+    merits = np.array([0.0, -1.0, -2.0])
+    odds = np.exp(merits)
+    np.testing.assert_allclose(bagged(merits, np.ones((3, SEGMENTS))), odds / odds.sum())
+
+
+@pytest.mark.parametrize(
+    ("terms", "axes"),
+    [(["friction.coulomb"], {"velocity"}), (["load.gravity"], {"angle", "position"}),
+     (["load.spring", "drive.deadband"], {"position", "command"}), ([], set())],
+)  # fmt: skip
+def test_a_law_is_wrong_along_its_own_argument(terms, axes):
+    assert (
+        arguments(SimpleNamespace(space=SimpleNamespace(hypotheses=[SimpleNamespace(term=t) for t in terms]))) == axes
+    )
+
+
+def test_no_law_of_a_motion_is_wrong_along_time():
+    spring = SimpleNamespace(space=SimpleNamespace(hypotheses=[SimpleNamespace(term="structure.resonance")]))
+    assert "time" not in arguments(spring)

@@ -1,0 +1,50 @@
+import numpy as np
+from graph_cases import BELT, RUB, case_of, command, named, record
+
+from rtctl.diagnose.evidence.diagnosis import NAMED
+from rtctl.diagnose.evidence.prediction import predict
+from rtctl.diagnose.evidence.verdict import fewer
+from rtctl.diagnose.likelihood.fits import refit
+from rtctl.diagnose.likelihood.joint import together
+from rtctl.diagnose.search.hypotheses import hypotheses
+
+
+def with_gust():
+    """Fits of a belt axis whose carriage rubs, and on whose motor something pushes but in the last part.
+
+    They are the base, and a model with dry friction and an offset of the amplifier.
+    """
+    u = command(0.6)
+    gust = np.where(np.arange(len(u)) < 0.7 * len(u), 0.02, 0.0)
+    like, space = together([record(case_of(BELT), u, [RUB], push=gust)])
+    base = refit(like, space)
+    wanted = ("friction.coulomb:carriage", "drive.offset:amplifier")
+    for name in wanted:
+        space = space.add(next(h for h in hypotheses(like.sim, base.model) if h.name == name))
+    return base, refit(like, space)
+
+
+def test_an_effect_that_predicts_worse_is_left_out_alone():
+    base, both = with_gust()
+    heldout, best = predict(base, both, True)
+    assert best.names == ("friction.coulomb:carriage",)
+    assert heldout.fits[1].names == best.names
+    assert heldout.after < heldout.before
+
+
+def test_all_effects_stay_where_none_may_go():
+    base, both = with_gust()
+    heldout, best = predict(base, both)
+    assert best is both
+    assert heldout.fits[1].names == both.names
+
+
+def test_the_verdict_says_what_was_left_out():
+    d = named()
+    best = d.decided.best
+    more = best._replace(space=best.space.add(best.space.hypotheses[0]._replace(node="motor")))
+    found = fewer(d.decided._replace(best=more), best)
+    assert (found.verdict, found.best.names) == (NAMED, best.names)
+    assert found.why == "without friction.coulomb:motor the last rows are predicted better"
+    assert len(found.confidence) == 1
+    assert fewer(d.decided, best) is d.decided

@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+from graph_cases import named, nothing, unnamed
+
+from rtctl.diagnose.evidence.predictive import free_error, least_squares, predictive, probable
+
+
+def test_least_squares_go_back_to_the_recorded_machine():
+    best = named().found.best
+    size = best.space.columns(0)[0]
+    x = best.x.copy()
+    x[size] *= 1.3
+    found = least_squares(best.like, best._replace(x=x))
+    assert found[size] == pytest.approx(best.x[size], rel=0.1)
+
+
+def test_a_free_run_of_the_right_model_is_nearer():
+    d = named()
+    base, best = (f.model for f in d.heldout.fits)
+    assert free_error(d.heldout.late, best) < 0.3 * free_error(d.heldout.late, base)
+
+
+def test_a_model_that_runs_away_predicts_nothing():
+    d = named()
+    base = d.found.base.model
+    lost = base._replace(base=base.base | {"joints.belt.damping": -1e6})
+    assert free_error(d.heldout.late, lost) == np.inf
+
+
+def test_the_predictor_has_all_effects_of_the_verdict():
+    d = named()
+    assert set(d.decided.best.names) <= set(d.predictor.names)
+    assert {e.name + ":" + e.node for e in d.effects} <= set(d.predictor.names)
+
+
+@pytest.mark.parametrize("d", [nothing(), unnamed()])
+def test_where_nothing_is_named_the_model_stays(d):
+    assert d.predictor is d.decided.best
+    assert predictive(d.decided, d.heldout) is d.decided.best
+
+
+def test_probable_models_have_more_effects():
+    decided = named().decided
+    best = decided.best
+    more = best._replace(space=best.space.add(best.space.hypotheses[0]._replace(node="motor")))
+    table = (*decided.table, decided.table[0]._replace(fit=more))
+    likely = ((best.names, 0.6), (more.names, 0.4))
+    assert probable(decided._replace(table=table, probabilities=likely)) == [more]
+    assert probable(decided._replace(table=table, probabilities=((best.names, 0.95), (more.names, 0.05)))) == []

@@ -1,0 +1,101 @@
+import numpy as np
+from scipy.signal import lfilter
+
+from rtctl.diagnose.likelihood.noise import Noise, levels, noise_of, noises_of, whitened
+
+A = np.array([1.0, -1.5, 0.7])  # of a known process
+ALL = np.arange(20_000)
+
+
+def test_autoregression_of_a_known_process():
+    e = lfilter([1.0], A, 0.02 * np.random.default_rng(1).standard_normal(20_000))
+    found = noise_of(e, 2, 1e-9)
+    np.testing.assert_allclose(found.a, A, atol=0.02)
+    np.testing.assert_allclose(found.sigma, 0.02, rtol=0.02)
+    (white,) = whitened([found], e[:, None], [ALL])
+    assert len(white) == len(e) - found.order
+    np.testing.assert_allclose(white.std(), 1.0, rtol=0.01)
+    assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.02
+
+
+def test_least_innovation():
+    assert noise_of(1e-6 * np.random.default_rng(1).standard_normal(1000), 3, 1e-3).sigma == 1e-3
+
+
+def test_a_constant_is_no_noise():
+    e = np.random.default_rng(2).standard_normal(4000)
+    shifted = noise_of(e + 50.0, 4, 1e-9)
+    np.testing.assert_allclose(shifted.a, noise_of(e, 4, 1e-9).a, atol=1e-9)
+    assert shifted.filtered(e + 50.0).mean() > 10.0
+
+
+def test_order_of_a_short_residual():
+    assert noise_of(np.random.default_rng(3).standard_normal(100), 20, 1e-9).order == 5
+
+
+def test_many_residuals_at_once():
+    noise = Noise(A, 0.5)
+    e = np.random.default_rng(4).standard_normal((50, 3))
+    np.testing.assert_allclose(noise.filtered(e)[:, 1], noise.filtered(e[:, 1]))
+
+
+def test_no_columns_have_no_innovations():
+    noise = Noise(A, 0.5)
+    assert noise.filtered(np.zeros((100, 0))).shape == (98, 0)
+    assert noise.filtered(np.zeros((100, 3))).shape == (98, 3)
+
+
+def test_what_moves_two_sensors_counts_once():
+    rng = np.random.default_rng(5)
+    force = lfilter([1.0], A, rng.standard_normal(20_000))
+    e = np.stack([force, np.roll(force, 1)], axis=1) + 0.1 * rng.standard_normal((20_000, 2))
+    both, white = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
+    alone = noise_of(e[:, 1], 4, 1e-9)
+    assert both[0] == noise_of(e[:, 0], 4, 1e-9)._replace(a=both[0].a)
+    assert both[1].sigma < 0.6 * alone.sigma
+    first, second = whitened(both, e, [ALL, ALL])
+    np.testing.assert_allclose(white, (first, second))
+    np.testing.assert_allclose((first.std(), second.std()), 1.0, rtol=0.01)
+    assert abs(np.corrcoef(first, second)[0, 1]) < 0.02
+
+
+def test_sensors_of_their_own_tell_nothing_of_each_other():
+    e = np.random.default_rng(6).standard_normal((20_000, 2))
+    (_, two), _ = noises_of(e, [ALL, ALL], 4, np.full(2, 1e-9))
+    assert np.abs(two.beside[0]).max() < 0.03
+    np.testing.assert_allclose(two.sigma, 1.0, rtol=0.02)
+
+
+def test_a_sensor_that_shows_edges_now_and_then():
+    rng = np.random.default_rng(7)
+    e = rng.standard_normal((20_000, 2))
+    e[:, 1] = 0.8 * e[:, 0] + 0.6 * e[:, 1]
+    rows = ALL[::7]
+    both, _ = noises_of(e, [ALL, rows], 0, np.full(2, 1e-9))
+    np.testing.assert_allclose(both[1].beside[0], [0, 0, 0, 0.8, 0, 0, 0], atol=0.04)
+    many = rng.standard_normal((20_000, 2, 3))
+    whole = whitened(both, many, [ALL, rows])
+    single = whitened(both, many[..., 1], [ALL, rows])
+    for one, other in zip(whole, single, strict=True):
+        np.testing.assert_allclose(one[:, 1], other)
+
+
+def test_noise_that_grows():
+    rng = np.random.default_rng(8)
+    square = rng.uniform(0.0, 4.0, 20_000) ** 2
+    e = np.sqrt(0.04 + 0.09 * square) * rng.standard_normal(len(square))
+    found = levels(e, square[:, None], 1e-9)
+    np.testing.assert_allclose(found**2, 0.04 + 0.09 * square, rtol=0.1)
+    np.testing.assert_allclose(levels(e, square[:, None], 1e-9, 0.09 * square), found, rtol=0.1)
+    assert levels(e, square[:, None], 0.5).min() == 0.5
+    (noise,), (white,) = noises_of(e[:, None], [ALL], 0, np.full(1, 1e-9), [square[:, None]])
+    np.testing.assert_allclose(white.std(), 1.0, rtol=0.01)
+    assert abs(np.std(white[square < 1.0]) / np.std(white[square > 9.0]) - 1.0) < 0.05
+    np.testing.assert_allclose(noise.averaged().sigma, e.std(), rtol=0.01)
+
+
+def test_noise_that_does_not_grow():
+    rng = np.random.default_rng(9)
+    square = rng.uniform(0.0, 4.0, 20_000) ** 2
+    found = levels(rng.standard_normal(len(square)), square[:, None], 1e-9)
+    np.testing.assert_allclose(found, 1.0, rtol=0.06)

@@ -1,0 +1,26 @@
+"""Motion and inertia of all that a joint carries, against closed forms."""
+
+import numpy as np
+import pytest
+from graph_cases import BELT, case_of
+
+from rtctl.case.format2 import read_case
+from rtctl.diagnose.model.loop import lowest_mode
+from rtctl.diagnose.model.model import carried, moved_inertia, nominal, rigid
+
+
+@pytest.mark.parametrize("stiffness", [4e4, None])
+@pytest.mark.parametrize(("main", "inertia"), [("motor", 4e-5 + 1.5 * 0.0127**2), ("carriage", 1.5 + 4e-5 / 0.0127**2)])
+def test_inertia_is_that_of_all_that_joints_carry(main, inertia, stiffness):
+    joint = BELT["joints"]["belt"] if stiffness else {"from": "motor", "to": "carriage", "ratio": 0.0127}
+    model = nominal(read_case(case_of({**BELT, "joints": {"belt": joint}}), "bundle"))
+    moved = carried(model.layout, model.base, rigid(model.layout, model.base, main))
+    assert len(moved) == (2 if stiffness else 1)
+    assert moved_inertia(model.params(1e-3).inertia, moved) == pytest.approx(inertia)
+
+
+def test_lowest_mode_is_that_of_the_belt():
+    """w^2 = k (n^2 / J + 1 / m)."""
+    model = nominal(read_case(case_of(BELT), "bundle"))
+    hertz = np.sqrt(4e4 * (0.0127**2 / 4e-5 + 1.0 / 1.5)) / (2 * np.pi)
+    assert lowest_mode(model.layout.machine, model.params(1e-3)) == pytest.approx(hertz, rel=1e-6)

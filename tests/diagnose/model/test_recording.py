@@ -1,0 +1,96 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from graph_cases import BELT, PENDULUM, RATE, case_of, write_bundle
+
+from rtctl.case.format2 import read_case
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.diagnose.answer.load import load
+from rtctl.diagnose.model.recording import record_of
+
+N = 200
+COUNTS = np.round(3000 * np.sin(np.arange(N) / 20))
+COLUMNS = {"t": np.arange(N) / RATE, "u": np.sin(np.arange(N) / 9), "rod_counts": COUNTS}
+
+
+def of(columns, case=None):
+    return record_of(columns, read_case(case or case_of(PENDULUM), "bench"), Path("bench/recording.parquet"))
+
+
+def test_bundle_in_si(tmp_path):
+    record = load(write_bundle(tmp_path / "bench", case_of(PENDULUM), COLUMNS))
+    assert record.dt == 1 / RATE
+    assert record.u.shape == (N, 1)
+    np.testing.assert_allclose(record.y["encoder"], (COUNTS + 0.5) / 5000.0)  # the middle of a count
+    assert record.grain["encoder"] == 1 / 5000.0
+    assert record.main == "encoder"
+
+
+def test_a_counter_that_wraps_is_one_way():
+    way = np.round(np.linspace(0, 100_000, N))
+    record = of({**COLUMNS, "rod_counts": (way + 32768) % 65536 - 32768})
+    np.testing.assert_allclose(np.diff(record.y["encoder"]), np.diff(way) / 5000.0)
+
+
+def test_a_sensor_beside_the_first_may_be_absent():
+    record = of({"t": COLUMNS["t"], "u": COLUMNS["u"], "encoder_counts": COUNTS}, case_of(BELT))
+    assert list(record.y) == ["encoder"]
+
+
+def test_uneven_times_are_laid_on_an_even_clock():
+    t = COLUMNS["t"] + 2e-4 * np.sin(np.arange(N))
+    record = of({**COLUMNS, "t": t}, case_of(PENDULUM) | {"sample_rate": None})
+    np.testing.assert_allclose(np.diff(record.t), record.dt)
+    np.testing.assert_allclose(record.u[:, 0], np.interp(record.t, t, COLUMNS["u"]))
+
+
+def test_measured_inputs_act_on_their_body():
+    case = case_of(PENDULUM, inputs={"wind": {"body": "rod", "column": "load", "per_unit": 10.0}})
+    record = of({**COLUMNS, "load": np.full(N, 5.0)}, case)
+    np.testing.assert_allclose(record.forces, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "sentence"),
+    [
+        ({"u": None, "uu": COLUMNS["u"]}, UserError, "no column 'u' (V, command); is it 'uu'?"),
+        ({"rod_counts": None}, UserError, "no column 'rod_counts' (sensor encoder)"),
+        ({"rod_counts": COUNTS + 0.3}, UserError, "column 'rod_counts', row 0: 0.3 is not a whole number"),
+        ({"u": np.where(np.arange(N) == 7, np.nan, 1.0)}, UserError, "column 'u', row 7: nan; it should be a finite"),
+        ({"u": np.zeros(N)}, NoAnswer, "'u' never changes; the machine was not driven"),
+        ({"rod_counts": np.zeros(N)}, NoAnswer, "column 'rod_counts' never changes; nothing moved"),
+        ({"t": np.arange(N) / 400.0}, UserError, "sample_rate in case.json is 500 Hz"),
+    ],
+)
+def test_refusals(change, kind, sentence):
+    columns = {name: values for name, values in {**COLUMNS, **change}.items() if values is not None}
+    with pytest.raises(kind) as error:
+        of(columns)
+    assert sentence in str(error.value)
+
+
+def test_too_few_rows():
+    case = case_of(PENDULUM)
+    least = len(read_case(case, "bench").fitted) + 10
+    with pytest.raises(
+        NoAnswer, match=f"holds {least - 1} rows; {least - 10} unknown numbers and the noise need {least}"
+    ):
+        of({name: values[: least - 1] for name, values in COLUMNS.items()}, case)
+
+
+def test_a_drive_acts_where_it_is_on():
+    case = case_of(PENDULUM)
+    motor = {**PENDULUM["drives"]["motor"], "enabled": "torque_on"}
+    case["machine"] = {**PENDULUM, "drives": {"motor": motor}}
+    on = np.where(np.arange(N) < 120, 1.0, 0.0)
+    np.testing.assert_array_equal(of({**COLUMNS, "torque_on": on}, case).u[:, 0], COLUMNS["u"] * on)
+    with pytest.raises(UserError, match=r"column 'torque_on', row 120: 0\.5; it should be 0"):
+        of({**COLUMNS, "torque_on": np.where(on > 0, 1.0, 0.5)}, case)
+
+
+def test_edges_alone_are_refused():
+    case = case_of(PENDULUM)
+    case["machine"]["sensors"] = {"encoder": {**case["machine"]["sensors"]["encoder"], "direction": False}}
+    with pytest.raises(NoAnswer, match="no sensor tells a direction"):
+        of(COLUMNS, case)

@@ -1,0 +1,106 @@
+"""What a record suggests by itself, on signals in which it is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, jumps, peaks, spectrum, spots
+
+
+def turning(n=6000, turns=3.0, seed=0):
+    """An angle (n,) rad that goes to and fro, at uneven speed."""
+    t = np.linspace(0, 1, n)
+    return turns * 2 * np.pi * (0.5 - 0.5 * np.cos(2 * np.pi * 2 * t)) + 0.3 * np.sin(2 * np.pi * 5 * t)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.sampled_from([1.0, 2.0, 4.5, 7.0, 13.0, 28.5]), st.floats(-3.1, 3.1), st.integers(0, 1000))
+def test_an_order_is_found_in_drift_friction_and_noise(order, phase, seed):
+    angle = turning()
+    rng = np.random.default_rng(seed)
+    signal = np.cos(order * angle + phase) + 0.7 * rng.standard_normal(len(angle))
+    signal += 2.0 + 0.1 * angle + 1.5 * np.sign(np.gradient(angle))
+    found = peaks(ORDERS, spectrum(angle, signal, ORDERS), MOST)
+    assert found[0] == pytest.approx(order, abs=0.26 if order < 12 else 0.51)
+
+
+def test_a_share_of_the_variance_is_between_none_and_all():
+    angle = turning()
+    share = spectrum(angle, np.cos(3 * angle), np.array([3.0, 7.0]))
+    assert share[0] == pytest.approx(1.0, abs=1e-6)
+    assert 0.0 <= share[1] < 0.2
+
+
+def test_of_less_than_half_a_period_nothing_is_said():
+    angle = np.linspace(0, 1.0, 500)
+    share = spectrum(angle, np.cos(angle), np.array([0.5, 2.0, 4.0]))
+    assert (share[:2] == 0.0).all()
+    assert share[2] > 0.0
+
+
+def test_a_signal_of_nothing_has_no_peaks():
+    angle = turning()
+    assert peaks(ORDERS, spectrum(angle, np.zeros(len(angle)), ORDERS), MOST) == []
+
+
+def test_peaks_come_highest_first():
+    height = np.array([0, 1, 0, 3, 0, 2, 0, 0.5, 0, 0])
+    assert peaks(np.arange(10.0), height, 3) == [3.0, 5.0, 1.0]
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.floats(0.1, 0.9), st.sampled_from([-1.0, 1.0]))
+def test_a_spot_is_found_beside_a_slope(where, sign):
+    way = 0.05 * (1 - np.cos(np.linspace(0, 12 * np.pi, 8000)))
+    at = 0.1 * where
+    signal = sign * np.exp(-0.5 * ((way - at) / 1.5e-3) ** 2) + 5.0 * way
+    signal += 0.05 * np.random.default_rng(0).standard_normal(len(way))
+    assert spots(way, signal, 4)[0] == pytest.approx(where, abs=0.025)
+    assert len(spots(way, signal, 3)) == 3
+
+
+def test_counts_that_were_lost_for_good_are_found_largest_first():
+    rng = np.random.default_rng(0)
+    error = 0.3 * rng.standard_normal(4000)
+    error[1500:] += 20.0
+    error[3000:] -= 60.0
+    error[2200] += 40.0  # comes back at once
+    found = jumps(error, 1.0)
+    assert [k for k, _ in found] == [3000, 1500]
+    assert [size for _, size in found] == pytest.approx([-60.0, 20.0], abs=1.0)
+
+
+def test_jumps_that_noise_nearly_hides_count_where_one_is_sure_and_are_of_one_size():
+    rng = np.random.default_rng(2)
+    error = 0.7 * rng.standard_normal(8000)
+    for k in range(500, 8000, 500):
+        error[k:] += 7.0 if k % 1000 else -7.0
+    found = jumps(error, 1.0)
+    assert {k for k, _ in found} <= set(range(500, 8000, 500)) and len(found) >= 14
+    sizes = [abs(size) for _, size in found]
+    assert max(sizes) - min(sizes) < 1e-9 and sizes[0] == pytest.approx(7.0, abs=0.3)
+    weak = 0.7 * rng.standard_normal(8000)
+    weak[4000:] += 4.5
+    assert jumps(weak, 1.0) == []  # alone it may be chance
+
+
+def test_a_reversal_that_the_model_misses_is_no_jump():
+    """An error that rings up within ticks stands out of the record, but not out of the ticks around it."""
+    error = 0.2 * np.random.default_rng(0).standard_normal(4000)
+    error[2000:2060] += 30.0 * np.sin(np.arange(60) * 0.5)
+    assert jumps(error, 1.0) == []
+
+
+def test_two_jumps_within_a_few_ticks_are_two():
+    error = np.random.default_rng(3).normal(0.0, 0.3, 1000)
+    error[500:] += 33.0
+    error[502:] += 33.0
+    assert sorted(k for k, _ in jumps(error, 1.0)) == [500, 502]
+    error[504:] += 33.0  # three are a motion
+    assert jumps(error, 1.0) == []
+
+
+def test_in_noise_nothing_jumps():
+    error = 0.5 * np.random.default_rng(1).standard_normal(4000)
+    assert jumps(error, 1.0) == []

@@ -1,0 +1,28 @@
+from graph_cases import named
+
+from rtctl.diagnose.search.extend import Promise, extended, in_turns, key, screened
+
+
+def promise(gain, power):
+    """A promise of which only the numbers are asked."""
+    return Promise(None, None, None, gain, power)
+
+
+def test_what_least_squares_sees_has_every_second_turn():
+    one, two, three = promise(9.0, 1.0), promise(5.0, 2.0), promise(1.0, 8.0)
+    assert in_turns([two, three, one])[:2] == [one, three]
+    assert len(in_turns([one, two, three])) == 3
+
+
+def test_the_effect_that_promises_most_is_fitted_beside_any_model():
+    found = named().found
+    merit = found.merit
+    known = {}
+    fits = extended(found.like, [found.base], known, 2, merit, None)
+    assert known[key(fits[0].names)] is fits[0] or set(known) >= {key(f.names) for f in fits}
+    assert max(fits, key=merit).names == ("friction.coulomb:carriage",)
+
+
+def test_a_model_is_not_extended_by_what_it_has():
+    best = named().found.best
+    assert not set(best.names) & {score.hypothesis.name for score in screened(best).scores}

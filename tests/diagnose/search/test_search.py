@@ -1,0 +1,50 @@
+from graph_cases import BELT, RUB, case_of, command, named, record
+
+from rtctl.diagnose.answer.answer import diagnose_record
+from rtctl.diagnose.search.search import ALIKE, adds, apart, likeness
+
+OFFSET = {"term": "drive.offset", "node": "amplifier", "offset": 0.03}
+
+
+def test_two_effects_are_found_together():
+    found = diagnose_record(record(case_of(BELT), command(0.6), [RUB, OFFSET])).found
+    assert "friction.coulomb:carriage" in found.best.names
+    assert len(found.best.names) == 2
+    pairs = {frozenset(f.names): found.merit(f) for f in found.fits}
+    assert pairs[frozenset(("friction.coulomb:carriage", "drive.offset:amplifier"))] > found.merit(found.best) - 2.0
+
+
+def test_what_one_effect_is_wrong_by_is_no_second_one():
+    assert named().found.best.names == ("friction.coulomb:carriage",)
+
+
+def test_models_that_explain_the_same_are_extended_once():
+    found = named().found
+    best, base = found.best, found.base
+    assert likeness(base, best, best) > ALIKE
+    assert apart(base, [best, best._replace(x=best.x.copy())]) == [best]
+
+
+def test_a_further_effect_brings_a_share_of_all_evidence():
+    found = named().found
+    base, best = found.base, found.best
+    more = best._replace(x=best.x.copy())
+
+    def merit(brought):
+        return lambda f: {id(base): 0.0, id(best): 100.0, id(more): 100.0 + brought}[id(f)]
+
+    assert adds(base, base, best, merit(0.0))
+    assert not adds(base, best, more, merit(5.0))
+    assert adds(base, best, more, merit(6.0))  # it leaves no more than noise, as the one effect does
+
+
+def test_a_further_effect_may_be_large_instead():
+    found = named().found
+    base, best = found.base, found.best
+    fewer, more = best._replace(e=0.5 * base.e), best._replace(e=0.1 * base.e)
+
+    def merit(brought):
+        return lambda f: {id(base): 0.0, id(fewer): 100.0, id(more): 100.0 + brought}[id(f)]
+
+    assert adds(base, fewer, more, merit(4.0))
+    assert not adds(base, fewer, more, merit(2.0))  # by chance
