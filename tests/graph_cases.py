@@ -107,3 +107,18 @@ def unnamed():
     u = command(4.0)
     now_and_then = np.sin(2 * np.pi * 1.1 * np.arange(len(u)) / RATE) > 0.8
     return diagnose_record(record(case_of(PENDULUM), u, push=0.2 * now_and_then))
+
+
+def at_rest(config, seconds):
+    """A record of a config's machine at rest, `seconds` long."""
+    case = {
+        "format": 2, "sample_rate": config.loop.rate, "delay_samples": 1.0, "tolerance": {"default": 0.15},
+        "machine": config.machine.model_dump(mode="json", exclude_unset=True),
+        "config": config.model_dump(mode="json", exclude_unset=True),
+    }  # fmt: skip
+    read, n = read_case(case, "."), round(seconds * config.loop.rate)
+    t = np.arange(n) / config.loop.rate
+    sensors = read.machine.sensors
+    grain = {name: abs(s.grain / s.scale) for name, s in sensors.items()}
+    still = {name: np.zeros(n) for name in sensors}
+    return GraphRecord(read, t, t[1], t * 0.0, t * 0.0, np.zeros((n, len(read.machine.drives))), still, grain, None)

@@ -5,8 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 import yaml
-from graph_cases import BELT, RUB, case_of, command, record
-from test_loop import SECONDS, blank
+from graph_cases import BELT, RUB, at_rest, case_of, command, record
 
 from rtctl.cli.common import load_config
 from rtctl.config.errors import UserError
@@ -14,6 +13,8 @@ from rtctl.config.load import set_path
 from rtctl.diagnose.answer.believe import believing
 from rtctl.diagnose.answer.freerun import compare
 from rtctl.loop import fused
+
+SECONDS = 2.0
 
 
 @cache
@@ -63,7 +64,7 @@ def test_a_model_of_another_machine_is_refused(tmp_path):
 def test_the_loop_is_closed_by_its_own_law():
     config = set_path(load_config("machines/belt", []), "loop.mode", "fused")
     rows = fused.run(config, SECONDS + 0.5).between(0.0, SECONDS)
-    empty = blank(config)
+    empty = at_rest(config, SECONDS)
     sensors = empty.case.machine.sensors
     y = {name: (rows[s.column] + 0.5) / s.scale for name, s in sensors.items()}
     recorded = empty._replace(ref=np.array(rows["ref"]), w=np.array(rows["w"]), u=rows["u"][:, None], y=y)
