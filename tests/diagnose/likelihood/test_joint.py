@@ -47,7 +47,8 @@ def test_losses_add_up_and_residuals_are_stacked():
     np.testing.assert_array_equal(e, np.concatenate(parts))
     assert like.loss(e) == pytest.approx(sum(p.loss(own) for p, own in zip(like.parts, parts, strict=True)))
     own = like.told(e)
-    assert len(own.white(e)) == own.size
+    slow = sum(len(one.of(part)) for p, part in own.cut(e) for one in p.slow)
+    assert len(own.white(e)) == own.size + slow
     np.testing.assert_allclose(own.white(e[:, :, None])[:, 0], own.white(e))
     early, late = like.split(0.25)
     assert len(early.raw(model)) + len(late.raw(model)) == pytest.approx(len(e), abs=2)

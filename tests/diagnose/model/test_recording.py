@@ -91,6 +91,7 @@ def test_a_drive_acts_where_it_is_on():
 
 def test_edges_alone_are_refused():
     case = case_of(PENDULUM)
-    case["machine"]["sensors"] = {"encoder": {**case["machine"]["sensors"]["encoder"], "direction": False}}
+    blind = {**PENDULUM["sensors"]["encoder"], "direction": False}
+    case["machine"] = {**PENDULUM, "sensors": {"encoder": blind}}
     with pytest.raises(NoAnswer, match="no sensor tells a direction"):
         of(COLUMNS, case)
