@@ -31,6 +31,7 @@ from rtctl.trace.replay import replay
 TESTS = Path(__file__).parent
 sys.path.insert(0, str(TESTS))  # for served.py and compiled.py, under importlib mode
 CONFIGS = Path(__file__).parents[1] / "configs"
+SHARED = TESTS.parents[1] / "shared"  # recordings from outside the project
 KEPT = Path(__file__).parents[1] / "build" / "tests"  # home and caches of every process that the tests start
 number = itertools.count(1)
 settings.register_profile("any machine", deadline=None)  # no test is wrong because it was slow
@@ -232,3 +233,16 @@ def library() -> Iterator[None]:
     TERMS.clear()
     TERMS.update(before)
     registered.clear()
+
+
+@pytest.fixture
+def shared() -> Callable[[str], Path]:
+    """`shared("data/emps")`: a recording from outside the project; skips where it is missing."""
+
+    def find(name: str) -> Path:
+        folder = SHARED / name
+        if not (folder / "case.json").is_file():
+            pytest.skip(f"{folder} is missing")
+        return folder
+
+    return find

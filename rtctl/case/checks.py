@@ -50,6 +50,22 @@ def number(where: Path, key: str, value: Any) -> float | None:
     return found
 
 
+def sample_rate(where: Path, case: dict[str, Any]) -> float | None:
+    """Sample rate of a case, Hz; None where the clock is uneven. Raises UserError where it is not positive."""
+    rate = number(where, "sample_rate", case.get("sample_rate"))
+    if rate is not None and rate <= 0:
+        raise UserError(f"{where}: sample_rate is {rate:g}; it should be above 0 Hz, or null where the clock is uneven")
+    return rate
+
+
+def delay_samples(where: Path, case: dict[str, Any]) -> float | None:
+    """Delay of the commands of a case, samples; None where it is missing. Raises UserError where it is out of range."""
+    delay = number(where, "delay_samples", case.get("delay_samples"))
+    if delay is not None and not 0 <= delay <= 100:
+        raise UserError(f"{where}: delay_samples is {delay:g}; it should be between 0 and 100")
+    return delay
+
+
 def strange(where: Path, name: str, before: str, known: Any) -> str:
     """Warning of a key that nobody knows."""
     return f"{where}: {before}{name} is not a key that this program knows; it is left out" + perhaps(

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from rtctl.case.checks import FROM_ELSEWHERE, number, part, perhaps, strange
+from rtctl.case.checks import FROM_ELSEWHERE, delay_samples, number, part, perhaps, sample_rate, strange
 from rtctl.case.config_law import ConfigLaw, UnsaidLaw, config_law
 from rtctl.case.laws import Law, UnknownLaw, controller
 from rtctl.case.parts import Drive, Reaches, Sensors
@@ -82,16 +82,11 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     profile, exchange = profile_of(plant), exchange_of(plant)
     refuse_plant(case.get("config"), f"{where}: config.")
     warnings = [strange(where, key, "", KEYS) for key in case if key not in (*KEYS, *FROM_ELSEWHERE)]
-    rate = number(where, "sample_rate", case.get("sample_rate"))
-    if rate is not None and rate <= 0:
-        raise UserError(f"{where}: sample_rate is {rate:g}; it should be above 0 Hz, or null where the clock is uneven")
-    delay = number(where, "delay_samples", case.get("delay_samples"))
+    rate, delay = sample_rate(where, case), delay_samples(where, case)
     if delay is None:
         delay = 1.0 if exchange.delay is None else exchange.delay
         if exchange.delay is None:
             warnings.append(f"{where}: delay_samples is missing; 1 is taken")
-    if not 0 <= delay <= 100:
-        raise UserError(f"{where}: delay_samples is {delay:g}; it should be between 0 and 100")
     sensors = part(where, "sensors", Sensors, case.get("sensors"), warnings)
     drive = part(where, "drive", Drive, _listed(case.get("drive")), warnings)
     _check_gains(where, exchange, drive)

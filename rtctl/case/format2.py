@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from rtctl.case.checks import FROM_ELSEWHERE, number, strange
+from rtctl.case.checks import FROM_ELSEWHERE, delay_samples, number, sample_rate, strange
 from rtctl.config.complaints import sentences
 from rtctl.config.errors import UserError, nearest
 from rtctl.plants.graph.coupled import felt
@@ -129,16 +129,11 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         values |= dict.fromkeys(_own_starts(machine, placed), 1.0)
     tolerances, default = _tolerances(where, case.get("tolerance"), values, warnings)
     differ = _differ(where, case.get("per_recording"), values)
-    rate = number(where, "sample_rate", case.get("sample_rate"))
-    if rate is not None and rate <= 0.0:
-        raise UserError(f"{where}: sample_rate is {rate:g}; it should be above 0 Hz, or null where the clock is uneven")
-    delay = number(where, "delay_samples", case.get("delay_samples"))
+    rate, delay = sample_rate(where, case), delay_samples(where, case)
     if delay is None:
         delay = 0.0
         if machine.drives and problem == "driven":
             warnings.append(f"{where}: delay_samples is missing; 0 is taken")
-    if not 0.0 <= delay <= 100.0:
-        raise UserError(f"{where}: delay_samples is {delay:g}; it should be between 0 and 100")
     return GraphCase(
         machine=machine,
         layout=placed,

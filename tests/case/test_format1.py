@@ -1,6 +1,5 @@
 import json
 import math
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -10,21 +9,6 @@ from known_cases import case_of
 from rtctl.case.format1 import believed, read_case
 from rtctl.case.laws import CascadeLaw, NoLaw, PdLaw, SectionsLaw, UnknownLaw, pd_section
 from rtctl.config.errors import UserError
-
-SHARED = Path(__file__).parents[2].parent / "shared"
-
-
-@pytest.fixture
-def shared():
-    """`shared("data/emps")`: a recording from outside the project; skips where it is missing."""
-
-    def find(name):
-        folder = SHARED / name
-        if not (folder / "case.json").is_file():
-            pytest.skip(f"{folder} is missing")
-        return folder
-
-    return find
 
 
 def refused(case):

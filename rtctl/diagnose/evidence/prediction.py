@@ -9,6 +9,7 @@ from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.model import GraphModel
 
 HELD = 0.25  # share of the record
+ROUNDS = 6  # steps of a fit to the rows before
 WORSE = 1.0  # nats by which rows that no fit saw must be predicted worse, until a name is withdrawn: less is chance
 
 
@@ -19,10 +20,14 @@ class Heldout(NamedTuple):
     after: float
     floor: float
     gain: float  # nats by which the best predicts them better, each under the noise of the rows before
-    rows: tuple[int, int]
     fits: tuple[Fitted, Fitted]  # base and best, as the rows before were fitted
     early: Likelihood  # of the rows before
     late: Likelihood  # of the held-out rows
+
+    @property
+    def rows(self) -> tuple[int, int]:
+        """First row that was fitted, and the first that was not."""
+        return self.early.rows
 
     @property
     def models(self) -> tuple[GraphModel, GraphModel]:
@@ -35,21 +40,23 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
     the effects (`fewer`) without which the held-out rows are predicted better."""
     first, late = base.like.split(HELD)
 
-    def early(f: Fitted) -> Fitted:
-        return refit(first, f.space, f.x, rounds=6) if f.space.names or f.space.hypotheses else f
-
     def foretold(f: Fitted) -> float:
         return late.foretold(late.raw(f.model), f.like)
 
-    own = early(best)
+    own = fitted_to(first, best)
     while fewer and len(best.names) > 1:
-        less = [refit(first, *without(own, index), rounds=6) for index in range(len(best.names))]
+        less = [refit(first, *without(own, index), rounds=ROUNDS) for index in range(len(best.names))]
         losses = [foretold(f) for f in less]
         index = int(np.argmin(losses))
         if losses[index] > foretold(own) - WORSE:
             break
         own, best = less[index], refit(best.like, *without(best, index))
-    return judged(base.like, first, late, (early(base), own)), best
+    return judged(base.like, first, late, (fitted_to(first, base), own)), best
+
+
+def fitted_to(rows: Likelihood, f: Fitted) -> Fitted:
+    """A model fitted to some rows, from where it is; as it is where nothing may move."""
+    return refit(rows, f.space, f.x, rounds=ROUNDS) if f.space.names or f.space.hypotheses else f
 
 
 def judged(whole: Likelihood, early: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted]) -> Heldout:
@@ -59,4 +66,4 @@ def judged(whole: Likelihood, early: Likelihood, late: Likelihood, fits: tuple[F
     before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)
     floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
     one, two = (late.foretold(e, f.like) for e, f in zip(residuals, fits, strict=True))
-    return Heldout(before, after, min(floor, after), one - two, early.rows, fits, early, late)
+    return Heldout(before, after, min(floor, after), one - two, fits, early, late)

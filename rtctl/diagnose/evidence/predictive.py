@@ -10,10 +10,10 @@ Source: Ljung, System Identification (1999), ch. 8.5 (the prefilter decides wher
 import numpy as np
 
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED
-from rtctl.diagnose.evidence.prediction import Heldout
+from rtctl.diagnose.evidence.prediction import Heldout, fitted_to
 from rtctl.diagnose.evidence.verdict import SURE, Verdict
 from rtctl.diagnose.likelihood.descent import ALL, Point, derivatives, descend
-from rtctl.diagnose.likelihood.fits import Fitted, fitted_at, refit
+from rtctl.diagnose.likelihood.fits import Fitted, fitted_at
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import GraphModel
@@ -34,11 +34,10 @@ def predictive(decided: Verdict, heldout: Heldout) -> Fitted:
     like = best.like
     if decided.verdict not in (NAMED, AMBIGUOUS) or any(part.sim.mode != TRACK for part in like.parts):
         return best
-    more = {f.names: f for f in probable(decided)}
     tried: list[tuple[float, Fitted, bool]] = []
     usual = min(1.0, like.sim.followed[0].bandwidth / like.sim.follow)
-    for f in (best, *more.values()):
-        early = heldout.fits[1] if f is best else refit(heldout.early, f.space, f.x, rounds=6)
+    for f in (best, *probable(decided)):
+        early = heldout.fits[1] if f is best else fitted_to(heldout.early, f)
         plain = f.space.model(least_squares(early.like.following(usual), early))
         tried += [(free_error(heldout.late, early.model), f, False), (free_error(heldout.late, plain), f, True)]
     _, f, by_squares = min(tried, key=lambda one: one[0])

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import GraphModel
-from rtctl.diagnose.model.observer import DAMPED, SMOOTHED
+from rtctl.diagnose.model.observer import DAMPED, SMOOTHED, stiffness
 
 LONG = 100  # windows of noise, by which its part is measured
 
@@ -51,5 +51,6 @@ def answer(follow: float, dt: float, width: int) -> float:
     e = lfilter([1.0, -2.0, 1.0], [1.0, DAMPED * w - 2.0, 1.0 - DAMPED * w + w**2], white)
     a = -np.expm1(-SMOOTHED * w)
     rate = lfilter([a], [1.0, a - 1.0], np.diff(e, prepend=e[0])) / dt
-    push = follow**2 * e + DAMPED * follow * rate
+    by_error, by_rate = stiffness(follow, 1.0)
+    push = by_error * e + by_rate * rate
     return float(np.std(averaged(push[:, None], width)))

@@ -16,7 +16,7 @@ import numpy as np
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.node_scaling import Measures
-from rtctl.diagnose.model.observer import DAMPED
+from rtctl.diagnose.model.observer import stiffness
 from rtctl.diagnose.model.simulate import Simulator
 
 UNKNOWN = 0.01  # of the force that moves the machine: standard deviation of what laws are wrong by
@@ -38,17 +38,19 @@ class Slow(NamedTuple):
 
     def told(self, e: np.ndarray) -> "Slow":
         """The same with the standard deviation that residuals (blocks, sensors) show."""
-        own = self.of(e)
-        return self._replace(sigma=float(np.hypot(self.least, np.sqrt(np.mean(own**2))))) if len(own) else self
+        return self._replace(sigma=self._size(self.of(e)))
+
+    def _size(self, own: np.ndarray) -> float:
+        """Standard deviation by averages (windows,)."""
+        return float(np.hypot(self.least, np.sqrt(np.mean(own**2)))) if len(own) else self.sigma
 
     def losses(self, e: np.ndarray, count: int) -> np.ndarray:
         """Negative logarithm of the likelihood of residuals (blocks, sensors) by segment (count,), nats, up to a
         constant."""
-        own = self.told(e)
-        r = own.of(e) / own.sigma
-        return np.bincount(
-            np.arange(len(r)) * count // max(len(r), 1), 0.5 * r**2 + np.log(own.sigma / own.least), count
-        )
+        own = self.of(e)
+        sigma = self._size(own)
+        segment = np.arange(len(own)) * count // max(len(own), 1)
+        return np.bincount(segment, 0.5 * (own / sigma) ** 2 + np.log(sigma / self.least), count)
 
 
 def slow(sim: Simulator, channels: Sequence[int], mean: int) -> list[Slow]:
@@ -59,7 +61,7 @@ def slow(sim: Simulator, channels: Sequence[int], mean: int) -> list[Slow]:
     for one in sim.followed:
         column, follow = sim.column(one.sensor), sim.bandwidth(one)
         if column in channels:
-            stiff = (DAMPED * follow if one.shows_speed else follow**2) * measures.inertia(one.body)
+            stiff = stiffness(follow, measures.inertia(one.body))[one.shows_speed]
             least = UNKNOWN * measures.of("force", one.body) / stiff
             out.append(Slow(list(channels).index(column), max(1, round(sim.window / mean)), least, least))
     return out

@@ -24,6 +24,14 @@ class Followed(NamedTuple):
         return FOLLOW_SPEED if self.shows_speed else FOLLOW
 
 
+def stiffness(follow: float, inertia: float) -> tuple[float, float]:
+    """Force of an observer for a unit of its error in position, and for a unit in speed, N or Nm each.
+
+    `follow` is the bandwidth, rad/s, `inertia` that of the followed body with all that moves with it.
+    """
+    return follow**2 * inertia, DAMPED * follow * inertia
+
+
 def followed(record: GraphRecord) -> tuple[Followed, ...]:
     """Sensors that the observer follows: the main one, and of each body that joints do not connect with one of them."""
     case = record.case

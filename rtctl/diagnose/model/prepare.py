@@ -9,7 +9,7 @@ from rtctl.config.errors import UserError
 from rtctl.diagnose.model import kernel
 from rtctl.diagnose.model.kernel import HELD, TRACK
 from rtctl.diagnose.model.model import GraphModel, carried, moved_inertia, rigid
-from rtctl.diagnose.model.observer import DAMPED, SMOOTHED, Followed
+from rtctl.diagnose.model.observer import DAMPED, SMOOTHED, Followed, stiffness
 from rtctl.diagnose.model.slots import SLOTS
 from rtctl.idiom import fill_record, record_dtype
 from rtctl.plants.element import Element
@@ -159,7 +159,7 @@ def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: 
             j["way"][number, at] = ratio
         inertia = moved_inertia(params.inertia, moved)
         follow = sim.bandwidth(one)
-        j["P"][number], j["D"][number] = follow**2 * inertia, DAMPED * follow * inertia
+        j["P"][number], j["D"][number] = stiffness(follow, inertia)
         j["K"][number], j["L"][number] = (
             (0.0, DAMPED * follow * dt) if one.shows_speed else (DAMPED * follow * dt, follow**2 * dt)
         )

@@ -1,5 +1,4 @@
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -11,8 +10,6 @@ from rtctl.case.format1 import read_case
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.record.format1 import check, law_agreement, load_record, recompute_law
 from rtctl.trace.bundle import load_case, save_case
-
-SHARED = Path(__file__).parents[3].parent / "shared"
 
 
 @pytest.fixture
@@ -55,19 +52,6 @@ def bundle_of(tmp_path):
         return folder
 
     return write
-
-
-@pytest.fixture
-def shared():
-    """`shared("data/emps")`: a recording from outside the project; skips where it is missing."""
-
-    def find(name):
-        folder = SHARED / name
-        if not (folder / "case.json").is_file():
-            pytest.skip(f"{folder} is missing")
-        return folder
-
-    return find
 
 
 def law_in_force(folder):
