@@ -142,7 +142,7 @@ def _back(stand: Stand, rows: Any, came: int, limit: int) -> bool:
     off = slice(k, on)
     return bool(
         safety.TRIPS[int(rows["trip"][k])][0] == "link_lost"
-        and rows["link_age"][k] == limit + 1
+        and rows["link_age"][k - 1] <= limit < rows["link_age"][k]  # periods: a late tick may pass several
         and not any(rows[name][off].any() for name in stand.outputs)
         and rows["tick"][on] >= came
         and rows[stand.error][on] == 0.0
