@@ -16,7 +16,7 @@ AROUND = 8  # ticks that a jump is compared with
 SURE, UNSURE = 6.0, 4.0  # times the noise from tick to tick: a jump, and one if there are others like it
 TWIN = 1.4  # times another jump nearby, which is as large
 ALIKE = 2.5  # times the same: jumps that differ by less may be of one size
-ORDERS = np.concatenate([np.arange(0.5, 12.0, 0.25), np.arange(12.0, 61.0, 0.5)])
+ORDERS = np.arange(1.0, 61.0)  # whole: what a disc or a shaft adds is the same after each turn
 SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
 
 
@@ -57,6 +57,16 @@ def peaks(grid: np.ndarray, height: np.ndarray, most: int) -> list[float]:
     """The grid's highest local maxima, highest first."""
     inner = np.flatnonzero((height > np.roll(height, 1)) & (height >= np.roll(height, -1)) & (height > 0))
     return [float(grid[i]) for i in inner[np.argsort(-height[inner])][:most]]
+
+
+def orders_of(span: float, height: np.ndarray, most: int) -> list[float]:
+    """Orders by `height` (ORDERS). A way of `span` rad that is no whole turn does not tell neighbours apart: those of
+    the highest are among them."""
+    tops = peaks(ORDERS, height, most)
+    if not tops or span >= 2 * np.pi:
+        return tops
+    near = [order for order in (tops[0] - 1.0, tops[0] + 1.0) if order in ORDERS and order not in tops]
+    return [tops[0], *near, *tops[1:]][:most]
 
 
 def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 80) -> list[float]:

@@ -15,7 +15,9 @@ from rtctl.own.term import sizes
 from rtctl.plants.physics import TERMS, Element, Term, having
 from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Rest, Shape, Size, Turn, Where
 
-ONCE = 1.5  # times a turn: what comes less often is no cogging of a shaft that may be out of balance, which has teeth
+ONCE = (
+    1.0  # times a turn: what comes no more often is no cogging of a shaft that may be out of balance, which has teeth
+)
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
 
 
@@ -90,11 +92,12 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
         for value in found:
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}
+            elif part.kind != "wavelength":  # an order is a whole number
+                yield (), {part.name: value}
             else:
-                turns = s.span * (value if part.kind == "order" else 2 * np.pi / value)  # rad, along the whole way
-                step, longest = min(1e-2, TURN / turns), part.reach
-                if part.kind == "wavelength":  # less than a whole one is a spring and a push, or any curve
-                    longest = min(longest, float(np.log(turns / (2 * np.pi))))
+                turns = s.span * 2 * np.pi / value  # rad, along the whole way
+                step = min(1e-2, TURN / turns)
+                longest = min(part.reach, float(np.log(turns / (2 * np.pi))))  # less than one is any curve
                 if longest > 0.0:
                     yield (Coordinate(part.name, SHAPE, value, -part.reach, longest, step=step),), {}
     elif isinstance(part, Where):

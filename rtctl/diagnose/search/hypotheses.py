@@ -11,7 +11,7 @@ from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import Measures, lever, way
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.model.space import Hypothesis
-from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, jumps, peaks, seen, spectrum, spots
+from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, jumps, orders_of, peaks, seen, spectrum, spots
 from rtctl.diagnose.search.grid_starts import parts_of, searched, shows_alone, starts_of
 from rtctl.idiom import Settings
 from rtctl.plants.graph.description import Sensor
@@ -108,7 +108,8 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         number = sim.leader(node)
         x, d, rate = ways[number], push[:, number], rates[number]
         if ratio != 0.0 and sim.case.machine.turns(node):
-            found[f"order:{node}"] = peaks(ORDERS, seen(x * ratio, d, rate * abs(ratio), ORDERS, quick), MOST)
+            height = seen(x * ratio, d, rate * abs(ratio), ORDERS, quick)
+            found[f"order:{node}"] = orders_of(float(np.ptp(x * ratio)), height, MOST)
         elif ratio != 0.0:
             waves = waves_of(x * ratio)
             found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
@@ -128,15 +129,18 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
             found[f"{kind}:{name}"] = found[f"{kind}:{sensor.body}"]
             continue
         errors[name] = error
-        waves = 2 * np.pi / ORDERS if kind == "order" else waves_of(x * ratio)
-        tops = peaks(2 * np.pi / waves, spectrum(x * ratio, error, 2 * np.pi / waves), MOST)
-        found[f"{kind}:{name}"] = tops if kind == "order" else [2 * np.pi / top for top in tops]
+        if kind == "order":
+            found[f"order:{name}"] = orders_of(float(np.ptp(x * ratio)), spectrum(x * ratio, error, ORDERS), MOST)
+        else:
+            waves = waves_of(x * ratio)
+            found[f"wavelength:{name}"] = peaks(waves, spectrum(x * ratio, error, 2 * np.pi / waves), MOST)
     for name, joint in sim.case.machine.joints.items():
         for end in ("from", "to"):
             body = getattr(joint, end)
             orders, x = found.get(f"order:{body}", []), ways[sim.leader(body)]
             for error in errors.values() if orders else ():
-                orders = peaks(ORDERS, spectrum(x * sim.ratios[body], error, ORDERS), MOST)
+                turned = x * sim.ratios[body]
+                orders = orders_of(float(np.ptp(turned)), spectrum(turned, error, ORDERS), MOST)
             found[f"order_{end}:{name}"] = orders
     for name in sim.layout.links:
         at = gauges.layout.sensors.get(GAUGE + name)
