@@ -82,5 +82,6 @@ GRAVITY = Term(
     sliding=(Size("A", "force", 0.2, signed=True), Choice("form", ("incline",))),
     static=True,
     seldom=3.0,
+    round="load.imbalance",
     draws={"A": Draw(0.2, 1.0, "force")},
 )

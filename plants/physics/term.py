@@ -84,6 +84,7 @@ class Term:
     static: bool = False  # a function of what `axis` says, without memory
     joint: Callable[[Any], dict[str, float]] | None = None  # numbers of the joint at its node
     seldom: float = 0.0  # nats of prior odds against it: another name of the same law is the usual one
+    round: str = ""  # name of the same law at a body that goes round whole turns
     late: str = ""  # "delay" of what is commanded, or what "bends" to one
     stiff: bool = False  # alters a spring: simulated in shorter steps
     slips: bool = False  # lets go what a contact carries: the bodies behind it move freely

@@ -14,11 +14,12 @@ from rtctl.diagnose.model.space import Hypothesis
 from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, jumps, orders_of, peaks, seen, spectrum, spots
 from rtctl.diagnose.search.grid_starts import parts_of, searched, shows_alone, starts_of
 from rtctl.idiom import Settings
+from rtctl.plants.element import Element
 from rtctl.plants.graph.description import Sensor
 from rtctl.plants.graph.elements import contacts, undriven
 from rtctl.plants.graph.layout import layout
 from rtctl.plants.linear import MOST_SENSORS
-from rtctl.plants.physics import TERMS, nodes, standing
+from rtctl.plants.physics import TERMS, Term, nodes, standing
 
 QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it shows
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
@@ -64,11 +65,23 @@ def hypotheses(
                 or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, False))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
                 or (term.needs.both_ways and not measures.both_ways(node))
+                or called_otherwise(sim, term, element, measures.scale(node).span)
             ):
                 continue
             for parts in stand.ways or ((term.sliding if slides else ()) or parts_of(name),):
                 out += starts_of(name, node, parts, measures)
     return out
+
+
+def called_otherwise(sim: Simulator, term: Term, element: Element, span: float) -> bool:
+    """Whether the law of a term has another name at an element that moves over `span`: where it turns, one for whole
+    turns and one for less."""
+    if "turns" not in element.traits:
+        return False
+    if span >= 2 * np.pi:
+        return bool(term.round) and element.node in nodes(TERMS[term.round], sim.elements)
+    others = (t for t in TERMS.values() if t.round == term.name and t.in_format(sim.case.format))
+    return any(element.node in nodes(other, sim.elements) for other in others)
 
 
 def combined(like: Likelihood, model: GraphModel) -> dict[str, list]:

@@ -60,11 +60,11 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
     found = under(like, space, progress)
     progress("telling how quickly the observer follows")
     times = quicker(found.best)
-    return under(like.following(times), space, progress) if times > 1.0 else found
+    return under(like.following(times), space, progress, found.fits[:RIVALS]) if times > 1.0 else found
 
 
-def under(like: Likelihood, space: Space, progress: Progress) -> Found:
-    """The same under one observer."""
+def under(like: Likelihood, space: Space, progress: Progress, before: Sequence[Fitted] = ()) -> Found:
+    """The same under one observer; the best models under the one `before` are rivals here as well."""
     base, grown, looked, odds = begun(like, space, progress)
     like = base.like  # with the times of the ticks
     merit = partial(merit_of, odds=odds)
@@ -83,6 +83,9 @@ def under(like: Likelihood, space: Space, progress: Progress) -> Found:
         parents = apart(base, better)[: 1 if silent(better[0]) else BEAM]  # of noise alone no rival explains more
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
         grown = extended(like, parents, known, NAMES[level], merit)
+    for f in (f for f in before if key(f.names) not in known):
+        known[key(f.names)] = again = refit(like, f.space, f.x)
+        known |= {key(g.names): g for g in _smaller(like, again, known)}
     for _ in range(EXCHANGES):
         best = standing(base, known, merit)[0]
         progress(f"exchanging each of {', '.join(best.names)}")
