@@ -50,6 +50,7 @@ MACHINE = state(  # a machine: its matrices for one substep, its state, and what
     u=(float, MOST_DRIVES),  # what enters the linear machine: volts, or amperes asked for
     y=(float, MOST_SENSORS),  # what each sensor would show before it is cut into counts, SI
     y_rate=(float, MOST_SENSORS),  # its rate where it is a position, else 0
+    y_speed=(int, MOST_SENSORS),  # 1: it is a speed
     x=(float, MOST_STATES),
     x_next=(float, MOST_STATES),
     qm=(float, MOST_BODIES),  # positions and velocities at the middle of the substep

@@ -37,6 +37,8 @@ def prepare(p, m):
     for i in range(p.nq):
         m.dry_base[i] = p.dry[i]
         m.inertia[i] = p.inertia[i]
+    for c in range(p.ny):
+        m.y_speed[c] = 1 if p.sensor_kind[c] == SPEED else 0
     for j in range(p.nl):
         linear.link(m, j, p.link_i[j], p.link_a[j], p.link_j[j], p.link_b[j], p.link_c[j], p.link_k[j])
     reel.start_reels(p, m)

@@ -129,8 +129,10 @@ def go(s, x):
 
 
 @tick
-def rectified(p, s, x):
-    """What the reading is off at position `x`, rad or m."""
+def rectified(p, s, x, y, speed):
+    """What the reading `y` is off at position `x`, rad or m; `speed` is 1 where it is a speed, which has no memory."""
+    if speed != 0:
+        return p.share * (abs(y) - y)
     return p.share * (s.way + abs(x - s.x) - x)
 
 
@@ -158,6 +160,7 @@ def scale(p, y):
 
 
 X = {"": "{r} * {m}.x[{i}]", ":ivu": "{m}.x[ivu.CAPSTAN]"}  # position at the sensor; the IVU's encoder is no node
+READING = "{m}.y[{c}], {m}.y_speed[{c}]"
 MISSED_COUNTS = Term(
     name="sensor.missed_counts",
     words="counts get lost: the reading jumps and the jump stays",
@@ -172,10 +175,7 @@ MISSED_COUNTS = Term(
             for kind, x in X.items()
         },
     },
-    stands=(
-        stand("sensor", "position"),
-        stand("sensor", "speed"),
-    ),
+    stands=(stand("sensor", "position"),),
     look_alikes={
         "transmission.slip": "drive to a hard stop and back: slip comes with force, lost counts with nothing",
         "load.bump": "pass the place ten times: a bump comes back to zero error, lost counts add up",
@@ -203,13 +203,16 @@ MISSED_COUNTS = Term(
 RECTIFIED = Term(
     name="sensor.rectified",
     words="it cannot tell direction: it counts up on the way out and on the way back",
-    equation="y = integral of |x'| dt",
+    equation="y = integral of |x'| dt; of a sensor of speed y = |v|",
     source="thesis 7.1.3",
     settings=RectifiedSettings,
     build=build_rectified,
     act={
         **{f"force{kind}": f"sensor.go({{s}}, {x})" for kind, x in X.items()},
-        **{f"reading{kind}": f"{{m}}.y[{{c}}] += sensor.rectified({{p}}, {{s}}, {x})" for kind, x in X.items()},
+        **{
+            f"reading{kind}": f"{{m}}.y[{{c}}] += sensor.rectified({{p}}, {{s}}, {x}, {READING})"
+            for kind, x in X.items()
+        },
     },
     stands=(
         stand("sensor", "position"),

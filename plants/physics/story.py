@@ -31,7 +31,7 @@ class Needs(NamedTuple):
 
     turns: float = 0.0  # turns of its node
     compared: bool = False  # another sensor to compare with
-    alone: str = ""  # what a lone sensor shows it by all the same: "slides" its node, "unsigned" the reading
+    alone: str = ""  # what a lone sensor shows it by all the same: it "slides" alone, or is an "unsigned" speed
     stiffness: bool = False  # a spring at its node
     dry: bool = False  # dry friction at its node, which it alters
     both_ways: bool = False  # motion of its node in both directions, between which it differs

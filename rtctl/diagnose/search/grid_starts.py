@@ -26,9 +26,10 @@ def searched(name: str) -> bool:
     return bool(sizes(name) or TERMS[name].search)
 
 
-def shows_alone(term: Term, element: Element, slides: bool, blind: bool) -> bool:
-    """Whether the only sensor of the only body shows a term that elsewhere takes another sensor to compare with."""
-    return "lone" in element.traits and {"slides": slides, "unsigned": blind}.get(term.needs.alone, False)
+def shows_alone(term: Term, element: Element, slides: bool, unsigned: bool) -> bool:
+    """Whether a lone sensor shows a term that elsewhere takes another sensor to compare with: the only one of the only
+    body, or one of a speed that is never negative."""
+    return {"slides": slides and "lone" in element.traits, "unsigned": unsigned}.get(term.needs.alone, False)
 
 
 def parts_of(name: str) -> tuple[Part, ...]:

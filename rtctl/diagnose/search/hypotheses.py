@@ -25,6 +25,7 @@ QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it
 WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
 SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
 ROWS = 8000  # of a spectrum
+ONE_SIGN = 0.02  # of the largest reading: the least that counts as the other sign
 CALM = 5e-3  # s, over which an acceleration is taken
 SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 ABOUT = {  # kinds of element that a problem tells of: positions of no force, a measured force of no command
@@ -53,7 +54,7 @@ def hypotheses(
             stand, element = found
             if element.kind not in ABOUT.get(sim.case.problem, (element.kind,)):
                 continue
-            slides = "slides" in element.traits
+            slides, unsigned = "slides" in element.traits, "speed" in element.traits and never_negative(sim, node)
             rubs = measures.dry(node) > SLIGHT * measures.of("force", node) or node in dry_too
             if (
                 stand.again
@@ -62,7 +63,7 @@ def hypotheses(
                 or (sim.case.plant and node not in nodes(term, sim.case.plant))
                 or ("contact" in element.traits and "contact" not in stand.needs)
                 or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
-                or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, False))
+                or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, unsigned))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
                 or (term.needs.both_ways and not measures.both_ways(node))
                 or called_otherwise(sim, term, element, measures.scale(node).span)
@@ -82,6 +83,12 @@ def called_otherwise(sim: Simulator, term: Term, element: Element, span: float) 
         return bool(term.round) and element.node in nodes(TERMS[term.round], sim.elements)
     others = (t for t in TERMS.values() if t.round == term.name and t.in_format(sim.case.format))
     return any(element.node in nodes(other, sim.elements) for other in others)
+
+
+def never_negative(sim: Simulator, sensor: str) -> bool:
+    """Whether a sensor shows one sign, but for what it is off by at rest."""
+    y = sim.record.y.get(sensor, np.zeros(0))
+    return bool(y.size and y.min() >= -ONE_SIGN * y.max())
 
 
 def combined(like: Likelihood, model: GraphModel) -> dict[str, list]:

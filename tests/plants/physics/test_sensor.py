@@ -63,10 +63,19 @@ def test_rectified_counts_up_in_either_direction(path, share):
     s, total, was = np.zeros(1, sensor.RECTIFIED_STATE).view(np.recarray)[0], 0.0, 0.0
     for x in path:
         total, was = total + abs(x - was), x
-        shown = x + sensor.rectified(p, s, x)
+        shown = x + sensor.rectified(p, s, x, x, 0)
         assert shown == pytest.approx((1 - share) * x + share * total, abs=1e-9)
         sensor.go(s, x)
-        assert x + sensor.rectified(p, s, x) == pytest.approx(shown, abs=1e-9)
+        assert x + sensor.rectified(p, s, x, x, 0) == pytest.approx(shown, abs=1e-9)
+
+
+@pytest.mark.parametrize(("share", "shown"), [(1.0, 2.0), (0.5, 0.0)])
+def test_of_a_speed_the_way_it_goes_is_lost_and_nothing_is_added_up(share, shown):
+    p = sensor.build_rectified(sensor.RectifiedSettings(node="counter", share=share), H)
+    s = np.zeros(1, sensor.RECTIFIED_STATE).view(np.recarray)[0]
+    sensor.go(s, 7.0)
+    assert -2.0 + sensor.rectified(p, s, 7.0, -2.0, 1) == shown
+    assert 2.0 + sensor.rectified(p, s, 7.0, 2.0, 1) == 2.0
 
 
 def test_scale():
