@@ -194,4 +194,6 @@ _dtypes: dict[type, np.dtype] = {}
 
 
 def _dtype(params: Any) -> np.dtype:
-    return _dtypes.setdefault(type(params), record_dtype(params))
+    if type(params) not in _dtypes:
+        _dtypes[type(params)] = record_dtype(params)
+    return _dtypes[type(params)]
