@@ -18,6 +18,7 @@ from rtctl.diagnose.model.space import Space
 from rtctl.diagnose.search.enrich import enriched, restarted
 from rtctl.diagnose.search.extend import Known, Merit, extended, key, screened
 from rtctl.diagnose.search.screen import Score, Screened
+from rtctl.plants.physics import TERMS
 
 MOST = 4  # effects
 REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
@@ -183,12 +184,25 @@ def merit_of(f: Fitted, odds: float) -> float:
 
 def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
     """Whether a further effect is worth its numbers, and takes off more than what the laws of the others may be wrong
-    by, in size or in evidence, and a part of the power that the others leave, of the residual or of the force."""
+    by, in size or in evidence, and a part of the power that the others leave, of the residual or of the force.
+
+    Evidence counts for an effect of another argument alone: the error of a law is a function of its own, and in a clean
+    recording the evidence of a small one is large.
+    """
     gained = merit(more) - merit(fewer)
     if gained < WORTH or not fewer.names:
         return gained >= WORTH
-    large = amplitude(base, fewer, more) > OFF or gained > SHARE * (merit(more) - merit(base))
+    others = {argument(h.term) for h in fewer.space.hypotheses}
+    apart = any(argument(h.term) not in others for h in more.space.hypotheses)
+    clear = apart and gained > SHARE * (merit(more) - merit(base))
+    large = clear or amplitude(base, fewer, more) > OFF
     return large and max(explained(fewer, more), explained_force(fewer, more)) > PART
+
+
+def argument(term: str) -> str:
+    """Argument of a term's law; an angle of less than a turn is a position."""
+    axis = TERMS[term].axis
+    return "position" if axis == "angle" else axis
 
 
 def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
