@@ -62,7 +62,8 @@ class At(NamedTuple):
 
 
 class Hint(NamedTuple):
-    """A shape or a place whose starts the record itself suggests: peaks of `kind` (see diagnose/hints.py)."""
+    """A shape or a place whose starts the record itself suggests: peaks of `kind`
+    (diagnose/search/suggestions.py)."""
 
     name: str
     kind: str

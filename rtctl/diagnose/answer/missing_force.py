@@ -15,7 +15,7 @@ from rtctl.diagnose.likelihood.likelihood import settled
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import speed, way
 from rtctl.diagnose.model.simulate import Simulator
-from rtctl.diagnose.search.hypotheses import faster
+from rtctl.diagnose.search.suggestions import faster
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.physics import TERMS

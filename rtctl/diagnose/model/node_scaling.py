@@ -35,7 +35,7 @@ class Scales(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What the starts of a search ask of a recording (starts.py)."""
+    """What the starts of a search ask of a recording (search/grid_starts.py)."""
 
     plant: tuple[Element, ...]
     dt: float  # s

@@ -11,8 +11,9 @@ import numpy as np
 
 from rtctl.diagnose.likelihood.fits import Fitted, refit, relaxed
 from rtctl.diagnose.likelihood.likelihood import Likelihood
-from rtctl.diagnose.search.hypotheses import combined, hypotheses
+from rtctl.diagnose.search.hypotheses import hypotheses
 from rtctl.diagnose.search.screen import Score, Screened, screen
+from rtctl.diagnose.search.suggestions import combined
 
 STARTS = 2  # of the first few fits
 FIRST = 3

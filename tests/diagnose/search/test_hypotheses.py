@@ -6,7 +6,8 @@ from graph_cases import BELT, PENDULUM, blank, case_of, command, record
 from rtctl.diagnose.model.kernel import OPEN, kernel
 from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.simulate import Simulator
-from rtctl.diagnose.search.hypotheses import hints, hypotheses
+from rtctl.diagnose.search.hypotheses import hypotheses
+from rtctl.diagnose.search.suggestions import hints
 from rtctl.plants.physics import TERMS
 
 
@@ -50,12 +51,6 @@ def test_what_compares_sensors_needs_two():
 
 def test_terms_are_those_of_the_kernel():
     assert {name.partition(":")[0] for name in of("belt")[1]} <= set(kernel().names)
-
-
-def test_order_of_a_ripple_is_hinted():
-    ripple = {"term": "ripple.cogging", "node": "motor", "A": 0.03, "per_turn": 4}
-    sim = Simulator(record(case_of(BELT), command(0.6), [ripple]))
-    assert hints(sim, nominal(sim.case), 100)["order:motor"][0] == 4.0
 
 
 def test_friction_along_the_way_asks_for_dry_friction_that_it_alters():

@@ -1,7 +1,7 @@
 from graph_cases import BELT, RUB, case_of, command, named, record
 
 from rtctl.diagnose.answer.answer import diagnose_record
-from rtctl.diagnose.search.search import ALIKE, adds, apart, likeness
+from rtctl.diagnose.search.search import ALIKE, apart, likeness
 
 OFFSET = {"term": "drive.offset", "node": "amplifier", "offset": 0.03}
 
@@ -23,41 +23,3 @@ def test_models_that_explain_the_same_are_extended_once():
     best, base = found.best, found.base
     assert likeness(base, best, best) > ALIKE
     assert apart(base, [best, best._replace(x=best.x.copy())]) == [best]
-
-
-def with_another(fit, term):
-    """A model with a further effect that does nothing."""
-    return fit._replace(space=fit.space.add(fit.space.hypotheses[0]._replace(term=term)), x=fit.x.copy())
-
-
-def test_a_further_effect_brings_a_share_of_all_evidence():
-    found = named().found
-    base, best = found.base, found.best
-    more = with_another(best, "drive.offset")
-
-    def merit(brought):
-        return lambda f: {id(base): 0.0, id(best): 100.0, id(more): 100.0 + brought}[id(f)]
-
-    assert adds(base, base, best, merit(0.0))
-    assert not adds(base, best, more, merit(5.0))
-    assert adds(base, best, more, merit(6.0))  # it leaves no more than noise, as the one effect does
-
-
-def test_evidence_does_not_count_for_a_small_effect_of_the_same_argument():
-    found = named().found
-    base, best = found.base, found.best
-    more = with_another(best, "friction.viscous")
-    merit = {id(base): 0.0, id(best): 100.0, id(more): 150.0}
-    assert not adds(base, best, more, lambda f: merit[id(f)])
-
-
-def test_a_further_effect_may_be_large_instead():
-    found = named().found
-    base, best = found.base, found.best
-    fewer, more = best._replace(e=0.5 * base.e), best._replace(e=0.1 * base.e)
-
-    def merit(brought):
-        return lambda f: {id(base): 0.0, id(fewer): 100.0, id(more): 100.0 + brought}[id(f)]
-
-    assert adds(base, fewer, more, merit(4.0))
-    assert not adds(base, fewer, more, merit(2.0))  # by chance

@@ -1,0 +1,61 @@
+"""What stands in a search: models of which every effect has a size, and brings more than the errors of the others."""
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.fits import Fitted, amplitude, explained, explained_force, faint
+from rtctl.diagnose.likelihood.slack import OFF
+from rtctl.diagnose.search.extend import Known, Merit, key
+from rtctl.plants.physics import TERMS
+
+ENOUGH = 5.0  # nats of evidence that a first effect must bring
+WORTH = 3.0  # nats that a further one must bring
+SHARE = 0.05  # of the evidence of all effects together, which a further one must bring
+PART = 0.3  # share of the power that the others leave, which a further effect must take off
+
+
+def merit_of(f: Fitted, odds: float) -> float:
+    """Logarithm of the posterior of a combination, up to a constant; `odds` are those of one effect at one place."""
+    return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
+
+
+def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
+    """Whether a further effect is worth its numbers, and takes off more than what the laws of the others may be wrong
+    by, in size or in evidence, and a part of the power that the others leave, of the residual or of the force.
+
+    Evidence counts for an effect of another argument alone: the error of a law is a function of its own, and in a clean
+    recording the evidence of a small one is large.
+    """
+    gained = merit(more) - merit(fewer)
+    if gained < WORTH or not fewer.names:
+        return gained >= WORTH
+    others = {argument(h.term) for h in fewer.space.hypotheses}
+    apart = any(argument(h.term) not in others for h in more.space.hypotheses)
+    clear = apart and gained > SHARE * (merit(more) - merit(base))
+    large = clear or amplitude(base, fewer, more) > OFF
+    return large and max(explained(fewer, more), explained_force(fewer, more)) > PART
+
+
+def argument(term: str) -> str:
+    """Argument of a term's law; an angle of less than a turn is a position."""
+    axis = TERMS[term].axis
+    return "position" if axis == "angle" else axis
+
+
+def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
+    """The models that stand, best first."""
+    return sorted((f for f in known.values() if stands(base, f, known, merit)), key=merit, reverse=True)
+
+
+def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
+    """Whether every effect of a combination has a size, and adds to the combination without it, as far as that was
+    fitted."""
+    if not np.isfinite(f.log_evidence):
+        return False
+    if not f.names:
+        return True
+    if faint(f):
+        return False
+    if len(f.names) == 1:
+        return merit(f) > merit(base) + ENOUGH
+    rest = (key(set(f.names) - {name}) for name in f.names)
+    return all(adds(base, known[names], f, merit) for names in rest if names in known)

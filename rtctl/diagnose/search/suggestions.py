@@ -1,0 +1,161 @@
+"""What a recording suggests to start from: orders, wavelengths, places, limits and jumps, by node.
+
+Source: order tracking by least squares on cosine and sine of the angle; the correction of the observer as the missing
+force (Ohnishi, Shibata & Murakami 1996).
+"""
+
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.model.model import GraphModel
+from rtctl.diagnose.model.node_scaling import lever, way
+from rtctl.diagnose.model.simulate import Simulator
+from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, jumps, orders_of, peaks, seen, spectrum, spots
+from rtctl.plants.graph.description import Sensor
+from rtctl.plants.graph.elements import contacts, undriven
+from rtctl.plants.graph.layout import layout
+from rtctl.plants.linear import MOST_SENSORS
+
+QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it shows
+WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
+ROWS = 8000  # of a spectrum
+CALM = 5e-3  # s, over which an acceleration is taken
+SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
+HOLDING = (0.995, 0.97, 0.9)  # shares of the time that a joint may hold
+GAUGE = "gauge of "  # before the name of a joint
+
+
+def combined(like: Likelihood, model: GraphModel) -> dict[str, list]:
+    """Hints of all recordings, in turns: those of the first first, no suggestion twice."""
+    found = [hints(part.sim, model, part.rows[0]) for part in like.parts]
+    out = found[0]
+    for kind in out if len(found) > 1 else ():
+        if kind.startswith("jump"):  # at a time of one recording
+            continue
+        merged: list[Any] = []
+        for rank in range(MOST):
+            merged += [h[kind][rank] for h in found if rank < len(h.get(kind, ())) and h[kind][rank] not in merged]
+        out[kind] = merged[:MOST]
+    return out
+
+
+def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
+    """Suggestions by kind (and node): order, wavelength, spot, grip of a joint, and jump (time, size) of a sensor.
+
+    A sensor that the model does not follow shows orders and wavelengths in its own error.
+    """
+    record = sim.record
+    gauges = gauged(model)
+    read, _ = sim.everything(gauges)
+    _, push = faster(sim).everything(model)
+    push = push[begin:] if np.isfinite(push[begin:]).all() else np.zeros_like(push[begin:])
+    thin = max(1, len(push) // ROWS)
+    ways = [way(sim, number)[begin:] for number in range(len(sim.followed))]
+    rates = [uniform_filter1d(np.abs(np.gradient(x)) / record.dt, 51)[::thin] for x in ways]
+    ways, push = [x[::thin] for x in ways], push[::thin]
+    quick = QUICK * faster(sim).follow
+    found: dict[str, list] = {}
+    for node, ratio in sim.ratios.items():
+        number = sim.leader(node)
+        x, d, rate = ways[number], push[:, number], rates[number]
+        if ratio != 0.0 and sim.case.machine.turns(node):
+            height = seen(x * ratio, d, rate * abs(ratio), ORDERS, quick)
+            found[f"order:{node}"] = orders_of(float(np.ptp(x * ratio)), height, MOST)
+        elif ratio != 0.0:
+            waves = waves_of(x * ratio)
+            found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
+            found[f"order:{node}"] = []
+    errors: dict[str, np.ndarray] = {}  # of the sensors that the model does not follow
+    for name in sim.channels:
+        if name not in sim.case.machine.sensors:
+            continue
+        sensor = sim.case.machine.sensors[name]
+        ratio = sim.ratios.get(str(sensor.body), 0.0) if sensor.measures == "position" else 0.0
+        if ratio == 0.0:
+            continue
+        kind = "order" if sim.case.machine.turns(str(sensor.body)) else "wavelength"
+        x = ways[sim.leader(str(sensor.body))]
+        error = (record.y[name] - read[:, sim.column(name)])[begin:][::thin]
+        if name == sim.main or not np.isfinite(error).all():
+            found[f"{kind}:{name}"] = found[f"{kind}:{sensor.body}"]
+            continue
+        errors[name] = error
+        if kind == "order":
+            found[f"order:{name}"] = orders_of(float(np.ptp(x * ratio)), spectrum(x * ratio, error, ORDERS), MOST)
+        else:
+            waves = waves_of(x * ratio)
+            found[f"wavelength:{name}"] = peaks(waves, spectrum(x * ratio, error, 2 * np.pi / waves), MOST)
+    for name, joint in sim.case.machine.joints.items():
+        for end in ("from", "to"):
+            body = getattr(joint, end)
+            orders, x = found.get(f"order:{body}", []), ways[sim.leader(body)]
+            for error in errors.values() if orders else ():
+                turned = x * sim.ratios[body]
+                orders = orders_of(float(np.ptp(turned)), spectrum(turned, error, ORDERS), MOST)
+            found[f"order_{end}:{name}"] = orders
+    for name in sim.layout.links:
+        at = gauges.layout.sensors.get(GAUGE + name)
+        pull = np.abs(read[begin:, at]) if at is not None else np.full(1, np.nan)
+        found[f"grip:{name}"] = [float(np.quantile(pull, q)) for q in HOLDING] if np.isfinite(pull).all() else []
+    found |= grips(sim, model)
+    found["spot"] = spots(ways[0], push[:, 0], MOST)
+    for name in sim.channels:
+        grain = record.grain[name]
+        if grain > 0.0 and name in sim.layout.sensors and sim.case.machine.sensors[name].measures == "position":
+            error = (record.y[name] - read[:, sim.column(name)]) / grain
+            found[f"jump:{name}"] = [
+                (float(record.t[k] - record.t[0]), size * grain) for k, size in jumps(error, 1.0)
+            ]  # fmt: skip
+    return found
+
+
+def grips(sim: Simulator, model: GraphModel, shares: tuple[float, ...] = SLIPPING) -> dict[str, list]:
+    """Limits that would hold each contact for these `shares` of the time, by what lies behind it on the rigid machine.
+
+    The bodies behind a contact are those that no drive moves but through it.
+    """
+    record, machine, values = sim.record, sim.case.machine, model.base
+    w = max(1, round(CALM / record.dt))
+    if len(record.t) <= 4 * w:
+        return {}
+    found: dict[str, list] = {}
+    for node, contact in contacts(machine).items():
+        at = lever(sim.layout, values, node, True)
+        assert at is not None
+        moved = at[1] * sim.ratios[at[0]]
+        if moved == 0.0:
+            continue
+        x = way(sim, sim.leader(at[0]))
+        v = (x[2 * w :] - x[: -2 * w]) / (2 * w * record.dt)
+        a = (x[2 * w :] - 2 * x[w:-w] + x[: -2 * w]) / (w * record.dt) ** 2
+        force = np.zeros(len(v))
+        for name in {node} if not contact.joint else undriven(machine, contact.joint):
+            own, key = sim.ratios[name], "inertia" if machine.turns(name) else "mass"
+            force += own**2 * (values[f"bodies.{name}.{key}"] * a + values.get(f"bodies.{name}.viscous", 0.0) * v)
+            force += abs(own) * values.get(f"bodies.{name}.dry", 0.0) * np.sign(v)
+        found[f"grip:{node}"] = [float(f) for f in np.quantile(np.abs(force / moved), shares)]
+    return found
+
+
+def waves_of(x: np.ndarray) -> np.ndarray:
+    """Wavelengths that are tried along a way x (n,), m."""
+    return (float(np.ptp(x)) or 1.0) * np.geomspace(0.02, 2.0, 2 * WAVES)
+
+
+def gauged(model: GraphModel) -> GraphModel:
+    """The model with a gauge of the force in each of its springs, as far as a machine may have so many sensors."""
+    machine = model.layout.machine
+    room = MOST_SENSORS - len(machine.sensors)
+    more = {
+        GAUGE + name: Sensor(joint=name, measures="force", column=GAUGE + name)
+        for name in list(model.layout.links)[:room]
+    }
+    return model._replace(layout=layout(machine.model_copy(update={"sensors": {**machine.sensors, **more}})))
+
+
+def faster(sim: Simulator) -> Simulator:
+    """The observer that shows missing forces over a wider band."""
+    return sim.following(3.0)
