@@ -4,7 +4,7 @@ import math
 import re
 from typing import Any
 
-from rtctl.case.format2 import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
+from rtctl.case.start import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
 from rtctl.diagnose.answer.phrases import Slots, harmonics, noun, phrase_of
 from rtctl.diagnose.answer.si_format import both, nice
 from rtctl.diagnose.evidence.diagnosis import Effect

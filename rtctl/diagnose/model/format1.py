@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rtctl.case.format1 import Case
-from rtctl.case.format2 import OPEN_LOOP, GraphCase
+from rtctl.case.graph_case import OPEN_LOOP, GraphCase
 from rtctl.case.quantities import of_case
 from rtctl.diagnose.model.by_symbol import Model, owner_model
 from rtctl.diagnose.model.model import GraphModel, own

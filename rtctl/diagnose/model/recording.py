@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.case.format2 import HELD_PROBLEMS, GraphCase
+from rtctl.case.graph_case import GraphCase
+from rtctl.case.start import HELD_PROBLEMS
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.model.kinematic import followed
 from rtctl.diagnose.model.model import GraphModel, rigid

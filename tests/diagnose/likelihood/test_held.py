@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from graph_cases import RATE, case_of, columns_of, record
 
-from rtctl.case.format2 import OPEN_LOOP, read_case
+from rtctl.case.format2 import read_case
+from rtctl.case.graph_case import OPEN_LOOP
 from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.likelihood.held import likelier, other_way, suits
 from rtctl.diagnose.likelihood.joint import together
