@@ -22,7 +22,7 @@ from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.record.format1 import INPUT
 from rtctl.diagnose.record.replayed import replayed_law
-from rtctl.plants.graph.term_units import body_of
+from rtctl.plants.graph.term_units import turns_at
 from rtctl.plants.graph.units import measured_unit
 from rtctl.trace.bundle import Bundle
 
@@ -177,7 +177,7 @@ def _channel(sim: Simulator, name: str, made: np.ndarray, skip: int) -> tuple[st
     measures = "force" if sensor is None else sensor.measures  # what is no sensor is the force of a drive
     if measures == "position" and name != sim.main:
         made = made + np.mean(seen[skip:] - made)
-    unit = measured_unit(measures, machine.turns(body_of(machine, name)))
+    unit = measured_unit(measures, turns_at(machine, sensor or machine.drives[name]))
     if record.source is None or sensor is None:
         return name, Channel(seen[skip:], made, unit)
     if sensor.counts_per_unit is not None:

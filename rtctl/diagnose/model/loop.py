@@ -27,7 +27,7 @@ from rtctl.own.files import OwnError
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.linearised import ringing
 from rtctl.plants.graph.params import GraphParams
-from rtctl.plants.graph.term_units import body_of
+from rtctl.plants.graph.term_units import turns_at
 from rtctl.plants.graph.units import measured_unit
 
 SLOWER = 0.2  # of the lowest natural frequency: bandwidth of a stand-in, at most
@@ -217,4 +217,4 @@ def lowest_mode(machine: Description, p: GraphParams) -> float:
 
 def _unit(record: GraphRecord, sensor: str) -> str:
     machine = record.case.machine
-    return measured_unit(machine.sensors[sensor].measures, machine.turns(body_of(machine, sensor)))
+    return measured_unit(machine.sensors[sensor].measures, turns_at(machine, machine.sensors[sensor]))
