@@ -9,8 +9,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from rtctl.case.checks import FROM_ELSEWHERE, delay_samples, sample_rate, strange
-from rtctl.case.graph_case import OPEN_LOOP, PROBLEMS, GraphCase
+from rtctl.case.controller import controller
+from rtctl.case.graph_case import PROBLEMS, GraphCase
 from rtctl.case.known import inputs, numbers, physics
+from rtctl.case.laws import NoLaw, UnknownLaw
 from rtctl.case.paths import per_recording, tolerances
 from rtctl.case.start import first_states, zeros
 from rtctl.config.complaints import sentences
@@ -51,6 +53,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         delay = 0.0
         if machine.drives and problem == "driven":
             warnings.append(f"{where}: delay_samples is missing; 0 is taken")
+    law = controller(where, case, machine, problem, warnings)
     return GraphCase(
         machine=machine,
         layout=placed,
@@ -68,7 +71,8 @@ def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
         warnings=tuple(warnings),
         file=where,
         config=_own_config(case),
-        open_loop=(case.get("controller") or {}).get("kind") == OPEN_LOOP,
+        open_loop=isinstance(law, NoLaw),
+        controller=None if isinstance(law, NoLaw | UnknownLaw) else law,
     )
 
 

@@ -4,12 +4,12 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rtctl.case.controller import GraphLaw
 from rtctl.case.start import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.plants.graph.description import Description, Input
 from rtctl.plants.graph.layout import Layout
 
 FORMAT = 2
-OPEN_LOOP = "none"  # kind of controller
 PROBLEMS = ("driven", "free", "kinematic", "static")
 EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
 START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
@@ -40,6 +40,7 @@ class GraphCase(NamedTuple):
     called: dict[str, str] = {}  # noqa: RUF012  # path -> symbol by which the owner calls it
     config: dict[str, Any] | None = None  # of a recording by our own daemon: plain data of the machine's config
     open_loop: bool = False  # no controller wrote the commands
+    controller: GraphLaw | None = None  # that wrote the command of one drive; None: the recorded command is the input
 
     def tolerance(self, path: str) -> float:
         """Share by which a value may be wrong; inf where it may be anything."""
