@@ -7,6 +7,7 @@ from rtctl.diagnose.model import loop
 from rtctl.diagnose.model.by_symbol import Model
 from rtctl.diagnose.model.format1 import graph_record
 from rtctl.diagnose.model.kernel import OPEN
+from rtctl.diagnose.model.loop_of import loop_of
 from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.record.format1 import Record, commands_of
@@ -38,7 +39,7 @@ def closed(record: Record, model: Model) -> tuple[dict[str, np.ndarray], np.ndar
     sim, model = _ready(record, model)
     if sim.layout.nq == 1:
         sim = sim.beginning(0.0, 0.0)
-    out, volts = loop.run(sim, loop.loop_of(sim.record), model, record.ref, record.w, shaped=True)
+    out, volts = loop.run(sim, loop_of(sim.record), model, record.ref, record.w, shaped=True)
     return _columns(sim, out), volts
 
 

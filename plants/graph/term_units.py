@@ -4,17 +4,21 @@ from collections.abc import Mapping
 from typing import Any
 
 from rtctl.config.units import to_si
-from rtctl.plants.graph.description import Description
+from rtctl.plants.graph.description import Description, Drive, Sensor
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.dimensions import BY_NODE, DIMENSIONS
 
 
 def body_of(machine: Description, node: str) -> str:
-    """The body whose unit a node has; "" for none."""
+    """The body that moves at a node, and whose unit the node has; "" for none.
+
+    Of a joint it is `to`, of a joint that ends at the frame `from`; of a drive or sensor that of its place.
+    """
     if node in machine.bodies:
         return node
     if node in machine.joints:
-        return str(machine.joints[node].to)
+        joint = machine.joints[node]
+        return str(getattr(joint, "from") if machine.is_frame(joint.to) else joint.to)
     for group in (machine.drives, machine.sensors):
         element: Any = group.get(node)
         if element is not None:
@@ -22,6 +26,26 @@ def body_of(machine: Description, node: str) -> str:
                 return str(element.body)
             return body_of(machine, str(element.joint or element.drive))
     return ""
+
+
+def ends_turn(machine: Description, name: str) -> tuple[bool, bool]:
+    """Whether the two ends of a joint turn; the frame is as the other end. A span is a length of tape: it slides."""
+    joint = machine.joints[name]
+    if joint.span is not None:
+        return False, False
+    a, b = getattr(joint, "from"), joint.to
+    one, two = machine.turns(a), machine.turns(b)
+    return two if machine.is_frame(a) else one, one if machine.is_frame(b) else two
+
+
+def turns_at(machine: Description, element: Drive | Sensor) -> bool:
+    """Whether what a drive moves or a sensor shows is an angle; that of a joint is in units of `to`."""
+    if element.body is not None:
+        return machine.turns(element.body)
+    if element.joint is not None:
+        return ends_turn(machine, element.joint)[1]
+    assert isinstance(element, Sensor)  # a drive acts on a body or a joint
+    return turns_at(machine, machine.drives[str(element.drive)])
 
 
 def unit_at(machine: Description, term: str, node: str, parameter: str) -> str:

@@ -1,4 +1,4 @@
-"""Laws that a case of exchange format 1 says."""
+"""Laws that a case says under `controller`, and how one of exchange format 1 is read."""
 
 import math
 from pathlib import Path
@@ -12,15 +12,21 @@ from rtctl.config.errors import UserError
 from rtctl.machines.profile import FREE_UNITS, REELS, Profile
 
 MAX_SECTIONS = 8
+INPUT = "the recorded command is taken as the input"
 
 
 class PdLaw(Part):
-    """u_c = P e + D d + friction sign(ref step) + w, shared between the two motors of the ivu."""
+    """u = P e + D d + w, where d is the filtered derivative of e."""
 
     kind: Literal["pd"] = "pd"
     P: float
     D: float
     derivative_filter_hz: float | None = Field(None, gt=0)
+
+
+class TapeLaw(PdLaw):
+    """u_c = P e + D d + friction sign(ref step) + w, shared between two motors that pull at a tape."""
+
     tension_N: float = 0.0
     friction_Nm: float = 0.0
     allocation: Literal["pull", "differential", "motor1", "motor2"] = "pull"
@@ -51,24 +57,20 @@ class UnknownLaw(Part):
     kind: str = "unknown"
 
 
-Law = PdLaw | SectionsLaw | CascadeLaw | ConfigLaw | NoLaw | UnknownLaw
+Law = PdLaw | TapeLaw | SectionsLaw | CascadeLaw | ConfigLaw | NoLaw | UnknownLaw
 KNOWN_LAWS = (PdLaw, SectionsLaw, CascadeLaw, ConfigLaw)  # that can be computed
 
 
 def controller(where: Path, profile: Profile, given: Any, rate: float | None, warnings: list[str]) -> Law:
     """The law under the key `controller`, of a machine with this profile. Raises UserError."""
     if given is None:
-        warnings.append(f"{where}: controller is missing; the recorded command is taken as the input")
+        warnings.append(f"{where}: controller is missing; {INPUT}")
         return UnknownLaw()
-    if not isinstance(given, dict):
-        raise UserError(f"{where}: controller is a {type(given).__name__}; it should be an object with a 'kind'")
-    tape, kind = profile.has(REELS), given.get("kind", "unknown")
-    if not isinstance(kind, str):
-        raise UserError(f"{where}: controller.kind is {kind!r}; it should be a word, such as pd")
+    tape, kind = profile.has(REELS), kind_of(where, given)
     if kind == "none":
         return NoLaw()
     if tape and kind == "pd":
-        return part(where, "controller", PdLaw, given, warnings)
+        return part(where, "controller", TapeLaw, given, warnings)
     if profile.has(FREE_UNITS) and kind == "cascade_p_v":
         return part(where, "controller", CascadeLaw, {k: v for k, v in given.items() if k != "law"}, warnings)
     if not tape and given.get("sections") is not None:
@@ -78,6 +80,16 @@ def controller(where: Path, profile: Profile, given: Any, rate: float | None, wa
         section = pd_section(law.P, law.D, law.derivative_filter_hz, 1 / rate)
         return part(where, "controller", SectionsLaw, {"kind": "pd", "sections": [section]}, warnings)
     return UnknownLaw(kind=kind)
+
+
+def kind_of(where: Path, given: Any) -> str:
+    """Kind of the law under the key `controller`. Raises UserError where that is no object with a word for it."""
+    if not isinstance(given, dict):
+        raise UserError(f"{where}: controller is a {type(given).__name__}; it should be an object with a 'kind'")
+    kind = given.get("kind", "unknown")
+    if not isinstance(kind, str):
+        raise UserError(f"{where}: controller.kind is {kind!r}; it should be a word, such as pd")
+    return kind
 
 
 def pd_section(P: float, D: float, filter_hz: float | None, dt: float) -> tuple[float, float, float, float, float]:

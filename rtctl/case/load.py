@@ -5,7 +5,7 @@ from typing import Any
 
 from rtctl.case import format1, format2
 from rtctl.case.format1 import Case
-from rtctl.case.format2 import GraphCase
+from rtctl.case.graph_case import GraphCase
 
 
 def read_case(case: dict[str, Any], folder: Path | str) -> Case | GraphCase:

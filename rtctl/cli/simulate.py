@@ -55,10 +55,10 @@ def simulate(
 
       rtctl simulate case emps --closed-loop --skip 20 --json
     """
+    from rtctl.case.laws import INPUT
     from rtctl.diagnose.answer.believe import check_believed
     from rtctl.diagnose.answer.freerun import compare
     from rtctl.diagnose.answer.load import of_bundle
-    from rtctl.diagnose.record.format1 import INPUT
     from rtctl.own.files import give
     from rtctl.trace.bundle import load_bundle
 

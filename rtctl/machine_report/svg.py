@@ -30,7 +30,7 @@ def svg(machine: Description, title: str) -> str:
     out = [HEAD.format(w=width, h=height, ink=INK), f'<rect width="{width}" height="{height}" fill="white"/>']
     out.append(_text(EDGE, EDGE + 2, title, weight="bold", size=15))
     for name, joint in machine.joints.items():
-        words = [name, *joint_label(machine, joint), *on_joint(machine, name)]
+        words = [name, *joint_label(machine, name), *on_joint(machine, name)]
         a, b = sorted(g.places[end] for end in ends(joint))
         out += _joint(left, top, a, b, words, joint.stiffness is not None)
     for name, (column, row) in g.places.items():

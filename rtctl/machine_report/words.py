@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 from rtctl.plants.graph.description import Body, Description
 from rtctl.plants.graph.mechanics import bodies_of, code_of
-from rtctl.plants.graph.units import FORCE, WAY, joint_units
+from rtctl.plants.graph.term_units import ends_turn, turns_at
+from rtctl.plants.graph.units import FORCE, WAY, joint_units, measured_unit
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 Line = tuple[str, str]
@@ -77,7 +77,7 @@ def _weight(body: Body) -> Iterator[str]:
 def _joints(machine: Description) -> Iterator[str]:
     for name, joint in machine.joints.items():
         a, b = getattr(joint, "from"), joint.to
-        units = joint_units(*ends_turn(machine, joint))
+        units = joint_units(*ends_turn(machine, name))
         ratio = si(joint.ratio, units["ratio"])
         if joint.stiffness is None:
             yield f"{name} couples {a} and {b} rigidly, ratio {ratio}"
@@ -87,9 +87,9 @@ def _joints(machine: Description) -> Iterator[str]:
         yield f"{name} is a spring from {a} to {b}{moves}, {si(joint.stiffness, units['stiffness'])}{damping}"
 
 
-def joint_label(machine: Description, joint: Any) -> list[str]:
+def joint_label(machine: Description, name: str) -> list[str]:
     """Ratio and stiffness of a joint, for a drawing."""
-    units = joint_units(*ends_turn(machine, joint))
+    joint, units = machine.joints[name], joint_units(*ends_turn(machine, name))
     ratio = [si(joint.ratio, units["ratio"])] if joint.ratio != 1.0 else []
     return ratio + ([si(joint.stiffness, units["stiffness"])] if joint.stiffness is not None else ["rigid"])
 
@@ -102,16 +102,9 @@ def size_label(machine: Description, name: str) -> str:
     return si(body.inertia, "kg m^2") if body.turns else si(body.mass, "kg")
 
 
-def ends_turn(machine: Description, joint: Any) -> tuple[bool, bool]:
-    """Whether the two ends of a joint turn; the frame is as the other end."""
-    a, b = getattr(joint, "from"), joint.to
-    one, two = machine.turns(a), machine.turns(b)
-    return two if machine.is_frame(a) else one, one if machine.is_frame(b) else two
-
-
 def _drives(machine: Description) -> Iterator[str]:
     for name, drive in machine.drives.items():
-        turns = machine.turns(drive.body) if drive.body else ends_turn(machine, machine.joints[str(drive.joint)])[1]
+        turns = turns_at(machine, drive)
         force, made = FORCE[turns], {"force": FORCE[turns], "current": "A", "voltage": "V"}[drive.kind]
         per = f" for 1 {drive.unit}" if drive.unit else ""
         where = drive.body or f"the two ends of {drive.joint}"
@@ -131,20 +124,7 @@ def _sensors(machine: Description) -> Iterator[str]:
     for name, sensor in machine.sensors.items():
         where = sensor.body or sensor.joint or sensor.drive
         grain = sensor.grain / abs(sensor.scale)
-        unit = column_si(machine, sensor)
+        unit = measured_unit(sensor.measures, turns_at(machine, sensor))
         fine = f", one step is {si(grain, unit)}" if grain else ", of unknown resolution"
         noise = f", noise {si(sensor.noise / abs(sensor.scale), unit)}" if sensor.noise else ""
         yield f"{name} shows the {sensor.measures} of {where} in {sensor.column}{fine}{noise}"
-
-
-def column_si(machine: Description, sensor: Any) -> str:
-    """SI unit of what a sensor measures."""
-    from rtctl.plants.graph.units import measured_unit
-
-    if sensor.body is not None:
-        turns = machine.turns(sensor.body)
-    elif sensor.joint is not None:
-        turns = ends_turn(machine, machine.joints[sensor.joint])[1]
-    else:
-        turns = True
-    return measured_unit(sensor.measures, turns)

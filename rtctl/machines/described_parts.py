@@ -9,6 +9,7 @@ from rtctl.machines.described_plant import graph_of
 from rtctl.machines.described_settings import drive_name, feedback_name
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.linearised import linearised, sensor_row
+from rtctl.plants.graph.term_units import turns_at
 from rtctl.plants.graph.units import measured_unit
 
 
@@ -97,13 +98,7 @@ def _column_unit(machine: Description, sensor: Any) -> str:
         return "counts"
     if sensor.per_unit != 1.0:
         return ""
-    turns = True
-    if sensor.body is not None:
-        turns = machine.turns(sensor.body)
-    elif sensor.joint is not None:
-        joint = machine.joints[sensor.joint]
-        turns = machine.turns(joint.to if not machine.is_frame(joint.to) else getattr(joint, "from"))
-    return measured_unit(sensor.measures, turns)
+    return measured_unit(sensor.measures, turns_at(machine, sensor))
 
 
 def forwards(config: Any) -> float:

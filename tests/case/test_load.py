@@ -2,7 +2,7 @@ from graph_cases import PENDULUM, case_of
 from known_cases import case_of as known_case
 
 from rtctl.case.format1 import Case
-from rtctl.case.format2 import GraphCase
+from rtctl.case.graph_case import GraphCase
 from rtctl.case.load import read_case
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from rtctl.case.format2 import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
+from rtctl.case.start import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.answer import words
 from rtctl.diagnose.answer.experiment import Planned, left, planned
 from rtctl.diagnose.answer.load import load

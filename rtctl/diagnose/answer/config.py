@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from rtctl.case.format2 import is_start
+from rtctl.case.start import is_start
 from rtctl.config.errors import UserError
 from rtctl.config.files import write_text
 from rtctl.config.load import Dumper

@@ -7,7 +7,7 @@ which go into the head of the file.
 from typing import Any
 
 from rtctl.case.format1 import Case, believed, exchange_of
-from rtctl.case.laws import CascadeLaw, NoLaw, PdLaw, SectionsLaw
+from rtctl.case.laws import CascadeLaw, NoLaw, SectionsLaw, TapeLaw
 from rtctl.config.fields import Shape, fill, put, written
 from rtctl.config.load import load_settings
 from rtctl.config.yaml_file import find
@@ -47,7 +47,7 @@ def carried(model: Model, record: Record) -> tuple[dict[str, Any], list[str]]:
 def _law(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]]:
     """The law of the case, or one that stands in for it."""
     changes, law = _limit(case), case.controller
-    if isinstance(law, PdLaw):
+    if isinstance(law, TapeLaw):
         more, left = _with_tape(law)
         return changes | more, left
     if isinstance(law, SectionsLaw) and len(law.sections) <= MOST_SECTIONS:
@@ -64,7 +64,7 @@ def _law(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]
     return changes | {"law.position": position}, [f"{_unknown(case)}; a cascade of {hertz:.3g} Hz stands in its place"]
 
 
-def _with_tape(law: PdLaw) -> tuple[dict[str, Any], list[str]]:
+def _with_tape(law: TapeLaw) -> tuple[dict[str, Any], list[str]]:
     """Law of two motors that pull at a tape."""
     position: dict[str, Any] = {"gain": max(law.P, 0.0), "tau_d": digits(law.D / law.P) if law.P > 0 else 0.0}
     if law.derivative_filter_hz is not None:

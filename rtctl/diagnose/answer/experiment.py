@@ -31,6 +31,7 @@ from rtctl.diagnose.likelihood.linear import DAMPING, Linear
 from rtctl.diagnose.likelihood.solver import bounded_step
 from rtctl.diagnose.model import loop
 from rtctl.diagnose.model.loop import Loop
+from rtctl.diagnose.model.loop_of import loop_of
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.simulate import Simulator
@@ -122,7 +123,7 @@ class Bench:
 
     def __init__(self, record: GraphRecord, best: Fitted):
         self.record, self.noise = record, best.like.parts[0]
-        self.loop: Loop = loop.loop_of(record)
+        self.loop: Loop = loop_of(record)
         self.sim = Simulator(record)
 
     @cached_property

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.signal import welch
 
-from rtctl.case.format2 import is_start
+from rtctl.case.start import is_start
 from rtctl.diagnose.answer.answer import GraphDiagnosis
 from rtctl.diagnose.answer.figure_style import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.answer.missing_force import Missing, subjects

@@ -10,10 +10,10 @@ from rtctl.config.files import write_text
 from rtctl.diagnose.answer import config, played, repair
 from rtctl.diagnose.answer import format1_config as export
 from rtctl.diagnose.answer.answer import GraphDiagnosis
+from rtctl.diagnose.answer.played_law import played_law
 from rtctl.diagnose.answer.results import EXPERIMENT, MODEL, REPORT, RESULT, TURN, finite, fresh, put
 from rtctl.diagnose.answer.torque_ripple_map import over_turn
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED
-from rtctl.diagnose.model import loop
 from rtctl.diagnose.model.format1 import known_model
 from rtctl.diagnose.model.model import GraphModel, nominal
 from rtctl.trace.bundle import load_case
@@ -81,7 +81,7 @@ def experiment_yaml(d: GraphDiagnosis) -> str:
     elif record.source is not None:
         data = export.to_config(known_model(nominal(record.case), record), record.source)
     else:
-        data = {**config.to_config(nominal(record.case), record), "law": loop.stand_in_law(record)}
+        data = {**config.to_config(nominal(record.case), record), "law": played_law(record)}
     names = [r.replace(" + ", " with ") for r in d.experiment["why"]["rivals"]]
     return played.text(data, d.experiment, names, record.dt * len(record.t), own is not None)
 

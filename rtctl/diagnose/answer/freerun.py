@@ -10,6 +10,7 @@ known law. What moves as it was recorded (kinematic, static) is predicted from t
 
 import numpy as np
 
+from rtctl.case.laws import INPUT
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.answer.comparison import NAMES, Channel, Comparison
 from rtctl.diagnose.answer.emulate import can_emulate, emulate
@@ -17,12 +18,12 @@ from rtctl.diagnose.likelihood.held import other_commands
 from rtctl.diagnose.likelihood.likelihood import settled
 from rtctl.diagnose.model import loop
 from rtctl.diagnose.model.kernel import OPEN, TRACK
+from rtctl.diagnose.model.loop_of import loop_of
 from rtctl.diagnose.model.model import GraphModel, nominal
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.simulate import Simulator
-from rtctl.diagnose.record.format1 import INPUT
 from rtctl.diagnose.record.replayed import replayed_law
-from rtctl.plants.graph.term_units import body_of
+from rtctl.plants.graph.term_units import turns_at
 from rtctl.plants.graph.units import measured_unit
 from rtctl.trace.bundle import Bundle
 
@@ -40,7 +41,7 @@ def compare(record: GraphRecord, closed: bool | None = None, skip: int = 0, bund
     cannot be closed or `skip` leaves less than two rows, NoAnswer where the model runs away.
     """
     n, sim = len(record.t), Simulator(record)
-    around = loop.loop_of(record)
+    around = loop_of(record)
     known = around.known and bool(np.isfinite(record.ref).all()) and sim.mode == TRACK
     ticks = closed is not False and sim.mode == TRACK and ticks_again(record, bundle, around.known)
     closed = known or ticks if closed is None else closed
@@ -177,7 +178,7 @@ def _channel(sim: Simulator, name: str, made: np.ndarray, skip: int) -> tuple[st
     measures = "force" if sensor is None else sensor.measures  # what is no sensor is the force of a drive
     if measures == "position" and name != sim.main:
         made = made + np.mean(seen[skip:] - made)
-    unit = measured_unit(measures, machine.turns(body_of(machine, name)))
+    unit = measured_unit(measures, turns_at(machine, sensor or machine.drives[name]))
     if record.source is None or sensor is None:
         return name, Channel(seen[skip:], made, unit)
     if sensor.counts_per_unit is not None:

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from rtctl.case.format2 import is_start
+from rtctl.case.start import is_start
 from rtctl.diagnose.answer import figures, played, words
 from rtctl.diagnose.answer import si_format as numbers
 from rtctl.diagnose.answer.answer import GraphDiagnosis

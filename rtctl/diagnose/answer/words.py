@@ -4,7 +4,7 @@ import math
 import re
 from typing import Any
 
-from rtctl.case.format2 import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
+from rtctl.case.start import BEGINS, FIRST_POSITION, FIRST_SPEED, START, is_start
 from rtctl.diagnose.answer.phrases import Slots, harmonics, noun, phrase_of
 from rtctl.diagnose.answer.si_format import both, nice
 from rtctl.diagnose.evidence.diagnosis import Effect
@@ -12,7 +12,7 @@ from rtctl.diagnose.model.model import PHYSICS, RECORDING, GraphModel
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.mechanics import code_of
-from rtctl.plants.graph.term_units import body_of, unit_at
+from rtctl.plants.graph.term_units import ends_turn, turns_at, unit_at
 from rtctl.plants.graph.units import measured_unit
 from rtctl.plants.physics.dimensions import DIMENSIONS
 
@@ -32,16 +32,17 @@ def unit_in(record: GraphRecord, path: str) -> str:
         entry = record.case.physics[int(number)]
         return unit_at(machine, str(entry["term"]), str(entry["node"]), key)
     if plain in (FIRST_POSITION, FIRST_SPEED):
-        turns = machine.turns(body_of(machine, record.main))
+        turns = turns_at(machine, machine.sensors[record.main])
         return DIMENSIONS["position" if plain == FIRST_POSITION else "speed"][not turns]
     return value_unit(machine, plain)
 
 
 def channel_unit(machine: Description, channel: str) -> str:
     """Unit of a sensor's reading, or of the force that drives were measured to make."""
-    if channel in machine.sensors:
-        return measured_unit(machine.sensors[channel].measures, machine.turns(body_of(machine, channel)))
-    return DIMENSIONS["force"][not machine.turns(body_of(machine, channel))]
+    sensor = machine.sensors.get(channel)
+    if sensor is not None:
+        return measured_unit(sensor.measures, turns_at(machine, sensor))
+    return DIMENSIONS["force"][not turns_at(machine, machine.drives[channel])]
 
 
 def value_unit(machine: Description, path: str) -> str:
@@ -65,11 +66,10 @@ def value_unit(machine: Description, path: str) -> str:
     if group == "bodies":
         return BODY[key][not machine.bodies[name].turns] if key in BODY else ""
     if group == "joints":
-        joint = machine.joints[name]
-        return joint_units(machine.turns(getattr(joint, "from")), machine.turns(joint.to)).get(key, "")
+        return joint_units(*ends_turn(machine, name)).get(key, "")
     if group == "drives":
         drive = machine.drives[name]
-        return drive_units(drive.kind, drive.unit, machine.turns(body_of(machine, name))).get(key, "")
+        return drive_units(drive.kind, drive.unit, turns_at(machine, drive)).get(key, "")
     return ""
 
 

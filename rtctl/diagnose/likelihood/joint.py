@@ -12,7 +12,7 @@ from copy import copy
 
 import numpy as np
 
-from rtctl.case.format2 import is_start
+from rtctl.case.start import is_start
 from rtctl.config.errors import UserError
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.noise import Noise

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from rtctl.case.format1 import Case
-from rtctl.case.format2 import OPEN_LOOP, GraphCase
+from rtctl.case.graph_case import GraphCase
+from rtctl.case.laws import NoLaw
 from rtctl.case.quantities import of_case
 from rtctl.diagnose.model.by_symbol import Model, owner_model
 from rtctl.diagnose.model.model import GraphModel, own
-from rtctl.diagnose.model.recording import GraphRecord
+from rtctl.diagnose.model.recording import MIDDLE, GraphRecord
 from rtctl.diagnose.record.format1 import Record
 from rtctl.diagnose.record.law_params import per_unit
 from rtctl.diagnose.record.speed_sensor import noise
@@ -26,7 +27,6 @@ from rtctl.plants.physics.place import PLANTS
 FORMAT = 1
 RATIOS = {"N": "R_t"}  # symbol of a ratio of two radii: one of them, which is as well known
 SAME = 1e-12  # relative, of two values that differ by rounding alone
-MIDDLE = 0.5  # counts from what a counter shows to where it is on average
 
 
 def graph_record(record: Record, model: Model | None = None) -> GraphRecord:
@@ -88,7 +88,7 @@ def graph_case(record: Record, model: Model | None = None) -> GraphCase:
         format=FORMAT,
         plant=case.plant,
         called=called,
-        open_loop=case.controller.kind == OPEN_LOOP,
+        open_loop=isinstance(case.controller, NoLaw),
     )
 
 

@@ -10,7 +10,7 @@ Source: Lurie & Enright, Classical feedback control (2000), for the play operato
 import numpy as np
 from scipy.signal import savgol_filter
 
-from rtctl.case.format2 import GraphCase
+from rtctl.case.graph_case import GraphCase
 from rtctl.diagnose.model.model import rigid
 from rtctl.plants.graph.layout import layout
 

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.case.format2 import GraphCase
+from rtctl.case.graph_case import GraphCase
 from rtctl.idiom import Settings
 from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.joints import sprung

@@ -1,6 +1,6 @@
 """Measures of a recording at each node: what is large and what is small there."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -12,6 +12,7 @@ from rtctl.plants.graph.coupled import machine_params
 from rtctl.plants.graph.elements import contacts
 from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.params import drive_gain
+from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.physics import TERMS
 
 SMOOTH = 5e-3  # s, over which a speed is taken
@@ -76,22 +77,8 @@ class Measures:
         return max(found, share * self.inertia(self.sim.followed[number].body) * a, LITTLE)
 
     def body_of(self, node: str) -> str:
-        """The body that a node belongs to: its own, that at the far end of a joint, that of a drive or sensor."""
-        m = self.machine
-        if node in m.bodies:
-            return node
-        if node in m.joints:
-            joint = m.joints[node]
-            return joint.to if not m.is_frame(joint.to) else getattr(joint, "from")
-        for group in (m.drives, m.sensors):
-            if node in group:
-                element: Any = group[node]
-                if element.body is not None:
-                    return str(element.body)
-                if element.joint is not None:
-                    return self.body_of(element.joint)
-                return self.body_of(element.drive)
-        return str(self.sim.body)
+        """The body that moves at a node; that of the followed sensor where the node has none."""
+        return body_of(self.machine, node) or str(self.sim.body)
 
     def scale(self, node: str) -> Scales:
         """Scales of a node."""

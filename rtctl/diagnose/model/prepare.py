@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rtctl.case.format2 import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
+from rtctl.case.start import BEGINS, FIRST_POSITION, FIRST_SPEED, OWN_START, START
 from rtctl.config.errors import UserError
 from rtctl.diagnose.model import kernel
 from rtctl.diagnose.model.kernel import HELD, TRACK

@@ -5,15 +5,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.case.format2 import HELD_PROBLEMS, GraphCase
+from rtctl.case.graph_case import GraphCase
+from rtctl.case.start import HELD_PROBLEMS
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.model.kinematic import followed
 from rtctl.diagnose.model.model import GraphModel, rigid
+from rtctl.diagnose.model.owner_law import checked, reference_scale
 from rtctl.diagnose.record.columns import unwrap
 from rtctl.diagnose.record.format1 import Record
 from rtctl.plants.graph.params import drive_gain
 from rtctl.trace.clock import even_rows, increasing
 
+MIDDLE = 0.5  # counts from what a counter shows to where it is on average
 BEYOND = 10  # rows that a recording has to have beside one for each unknown: its noise is estimated as well
 EARLY = 10  # rows, from which the speed at the first is guessed
 
@@ -24,7 +27,7 @@ class GraphRecord(NamedTuple):
     case: GraphCase
     t: np.ndarray  # (n,) s
     dt: float  # s
-    ref: np.ndarray  # (n,) nan where there is none
+    ref: np.ndarray  # (n,) SI, nan where there is none
     w: np.ndarray  # (n,) excitation
     u: np.ndarray  # (n, drives) command, in each drive's unit
     y: dict[str, np.ndarray]  # sensor -> (n,) SI; a counter's value is the middle of its count
@@ -63,7 +66,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     t, dt, even = _clock(path, t, case)
     n = len(t)
     blank = np.full(rows, np.nan)
-    ref = columns.get("ref", blank)
+    ref = np.asarray(columns.get("ref", blank), float) / reference_scale(case.controller, case.machine.sensors)
     w = np.nan_to_num(np.asarray(columns.get("w", np.zeros(rows)), float))
     machine = case.machine
     driven = [] if case.problem == "free" else list(machine.drives.values())
@@ -85,7 +88,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
                     f"{path}: column '{sensor.column}', row {off[0]}: {raw[off[0]]:g} is not a whole number; "
                     "a counter counts"
                 )
-            raw = unwrap(raw)[0] + 0.5
+            raw = unwrap(raw)[0] + MIDDLE
         if not sensor.direction:
             edges[name] = even(raw)
             continue
@@ -101,7 +104,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
         raise NoAnswer(f"{path}: column '{machine.sensors[first].column}' never changes; nothing moved")
     forces, positions = _forces(path, columns, case)
     record = GraphRecord(
-        case, t, dt, even(np.asarray(ref, float)), even(w), u, y, grain,
+        case, t, dt, even(ref), even(w), u, y, grain,
         None if forces is None else np.stack([even(f) for f in forces.T], axis=1),
         edges, {body: even(x) for body, x in positions.items()},
     )  # fmt: skip
@@ -109,7 +112,7 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
         made = _made(case, u, str(case.machine.sensors[record.main].body))
         record = record._replace(y=y | made, grain=grain | dict.fromkeys(made, 0.0))
     _check_problem(path, record)
-    record = record._replace(scales=_scales(record))
+    record = checked(record._replace(scales=_scales(record)))
     if case.problem != "kinematic":
         return record
     fine = {name: grain[name] or float(np.std(np.diff(y[name], 2))) / 10.0 for name in y}

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rtctl.case.format2 import HELD_PROBLEMS
+from rtctl.case.start import HELD_PROBLEMS
 from rtctl.diagnose.model import kernel
 from rtctl.diagnose.model.kernel import HELD, TRACK
 from rtctl.diagnose.model.model import GraphModel, own, rigid

@@ -11,11 +11,12 @@ import numpy as np
 
 from rtctl.case.config_law import ConfigLaw
 from rtctl.case.format1 import Case, exchange_of, machine_of, read_case
-from rtctl.case.laws import KNOWN_LAWS
+from rtctl.case.laws import INPUT, KNOWN_LAWS
 from rtctl.case.quantities import of_case
 from rtctl.case.unsaid import measured_amplifier
 from rtctl.config.errors import NoAnswer, UserError, nearest
 from rtctl.diagnose.record import law
+from rtctl.diagnose.record.agreement import Agreement, agreement, disagrees
 from rtctl.diagnose.record.columns import (
     armed,
     even_clock,
@@ -26,7 +27,8 @@ from rtctl.diagnose.record.columns import (
     unwrap,
     unwrap_turns,
 )
-from rtctl.diagnose.record.law_params import law_params, law_state, written
+from rtctl.diagnose.record.law_params import law_params, law_state
+from rtctl.diagnose.record.law_parts import written
 from rtctl.diagnose.record.replayed import LawReplay, replayed_law
 from rtctl.machines.profile import FREE_UNITS
 from rtctl.machines.profiles import profile_of
@@ -34,10 +36,7 @@ from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
 COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
-INPUT = "the recorded command is taken as the input"
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
-AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
-AGREES_MEDIAN = 2e-3
 
 
 class Record(NamedTuple):
@@ -72,24 +71,6 @@ class Record(NamedTuple):
 def commands_of(plant: str) -> tuple[str, ...]:
     """Columns of the commands of a kind of machine, in the order of its drives."""
     return tuple(drive.column for drive in machine_of(plant).drives.values())
-
-
-class Agreement(NamedTuple):
-    """How the recomputed law compares with the recorded command."""
-
-    share: float  # of rows that are equal to within 1e-9 V
-    nrmse: float  # of the command's spread
-    median: float  # of the difference, by the command's spread
-    worst: float  # V
-    worst_row: int
-
-    @property
-    def exact(self) -> bool:
-        return self.share == 1.0
-
-    @property
-    def holds(self) -> bool:
-        return self.exact or (self.nrmse < AGREES_RMS and self.median < AGREES_MEDIAN)
 
 
 def load_record(folder: Path | str) -> Record:
@@ -162,10 +143,11 @@ def check(
         t = even
     _supports(path, t, u, y, case, warnings)
     record = Record(case.plant, case, t, dt, ref, w, u, y, columns, armed=earlier)
-    agreement = law_agreement(record)
-    if (record.closed_loop or case.unsaid) and (agreement is None or not agreement.holds):
+    agreed = law_agreement(record)
+    if (record.closed_loop or case.unsaid) and (agreed is None or not agreed.holds):
         found = replayed_law(whole) if whole is not None else None
-        words = _replayed(case, found) if found is not None else case.unsaid or _disagrees(case, agreement)
+        wrong = case.unsaid or disagrees(case.controller.kind, agreed, of_case(case).command)
+        words = _replayed(case, found) if found is not None else wrong
         warnings.append(f"{path.parent}: {words}; {INPUT}")
         case, record = case._replace(controller_known=False), record._replace(replay=found)
     return record._replace(case=case._replace(warnings=tuple(warnings)))
@@ -176,15 +158,7 @@ def law_agreement(record: Record) -> Agreement | None:
     again = recompute_law(record)
     if again is None:
         return None
-    off = np.abs(again - record.u)
-    off[~np.isfinite(off)] = np.inf
-    spread = float(np.sqrt(np.sum(np.var(record.u, axis=0)))) or 1.0
-    rows = off.max(axis=1)
-    rms = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
-    worst = int(np.argmax(rows))
-    return Agreement(
-        float(np.mean(rows < 1e-9)), rms / spread, float(np.median(rows)) / spread, float(rows[worst]), worst
-    )
+    return agreement(again, record.u)
 
 
 def recompute_law(record: Record) -> np.ndarray | None:
@@ -300,13 +274,3 @@ def _supports(
 def _replayed(case: Case, found: LawReplay) -> str:
     why = case.unsaid or "the law of the config alone does not give it: it was changed while the recording ran"
     return f"{found.words}: nothing is wrong with it, but {why}" if found.identical else f"{found.words}; {why}"
-
-
-def _disagrees(case: Case, agreement: Agreement | None) -> str:
-    unit, kind = of_case(case).command, case.controller.kind
-    if agreement is None:
-        return f"the law '{kind}' cannot be recomputed from this recording"
-    return (
-        f"the law '{kind}' does not give the recorded command (off by {agreement.worst:.3g} {unit} "
-        f"in row {agreement.worst_row}, {100 * agreement.nrmse:.2g} % rms)"
-    )

@@ -1,44 +1,29 @@
 """Params of the recorded machine's law, from `controller` of case.json or from the config of our own recordings."""
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rtctl.case.config_law import ConfigLaw
 from rtctl.case.format1 import Case, believed, exchange_of, machine_of
-from rtctl.case.laws import CascadeLaw, PdLaw, SectionsLaw
+from rtctl.case.laws import SectionsLaw, TapeLaw
 from rtctl.diagnose.record import law
 from rtctl.diagnose.record.law import LawParams
+from rtctl.diagnose.record.law_parts import limited, neutral, of_case, of_settings, written
 from rtctl.drivers import at_mio_16de, ldu_amplifier
-from rtctl.drivers.at_mio_16de import AnalogOutputParams
-from rtctl.drivers.ldu_amplifier import LduAmplifierParams
-from rtctl.idiom import fill_record, record_dtype
 from rtctl.laws import (
     allocation,
     friction_feedforward,
     gain_schedule,
     inertia_feedforward,
-    limit,
-    pd,
-    pi_velocity,
-    sections,
-    shaper,
     tension,
     velocity,
 )
 from rtctl.laws.allocation import AllocationSettings
 from rtctl.laws.friction_feedforward import FrictionFeedforwardParams
-from rtctl.laws.gain_schedule import GainScheduleSettings
 from rtctl.laws.hand_over import HandOverParams
-from rtctl.laws.inertia_feedforward import InertiaFeedforwardParams
-from rtctl.laws.limit import LimitParams
-from rtctl.laws.pd import PdParams
-from rtctl.laws.pi_velocity import PiVelocityParams
 from rtctl.laws.reel_growth import ReelGrowthParams
-from rtctl.laws.shaper import ShaperParams
-from rtctl.laws.tension import TensionParams
-from rtctl.laws.velocity import VelocityParams, VelocitySettings
+from rtctl.laws.velocity import VelocitySettings
 from rtctl.machines.profile import AMPLIFIER, REELS
 from rtctl.machines.profiles import profile_of
 
@@ -46,7 +31,6 @@ if TYPE_CHECKING:
     from rtctl.diagnose.record.format1 import Record
 
 TURN = 2 * np.pi  # rad
-LARGE = 1e9  # V, limit of a drive of which the owner says none
 
 
 def per_unit(case: Case) -> list[float]:
@@ -90,92 +74,28 @@ def law_state(p: LawParams, record: "Record") -> np.ndarray:
     return s
 
 
-def written(
-    p: LawParams, s: np.ndarray, ref: np.ndarray, w: np.ndarray, reading: np.ndarray, drives: int
-) -> np.ndarray:
-    """The voltages (n, drives) that the law writes from state `s` (1,) on, which it alters, for columns (n,)."""
-    params, volts = np.zeros(1, record_dtype(p)), np.zeros((len(ref), drives))
-    fill_record(params[0], p)
-    columns = (np.array(c, float) for c in (ref, w, reading))  # those of a file cannot be written to: another type
-    law.play(params, s, *columns, volts)
-    return volts
-
-
 def plain(case: Case, dt: float) -> LawParams:
     """A law that writes nothing, with the units of a case."""
     return neutral(1 / per_unit(case)[0], dt)
 
 
-def neutral(to_unit: float, dt: float) -> LawParams:
-    """A law that writes nothing, each part in its neutral place; `to_unit` is the reference for one unit of reading."""
-    return LawParams(
-        kind=law.NONE,
-        tape=law.NO_TAPE,
-        to_unit=to_unit,
-        resolution=0.0,
-        shift=0.0,
-        origin=0.0,
-        two_tap=0,
-        velocity=VelocityParams(1.0, dt),
-        pd=PdParams(0.0, 0.0, 1.0, dt),
-        pi_velocity=PiVelocityParams(0.0, 0.0, 0.0, 0.0),
-        n_sections=0,
-        sections=np.zeros(law.MAX_SECTIONS, law.SECTION),
-        shaper=ShaperParams(1.0, 0.0),
-        computed_torque=0.0,
-        friction1=FrictionFeedforwardParams(0.0),
-        friction2=FrictionFeedforwardParams(0.0),
-        reference_speed=VelocityParams(1.0, dt),
-        hand_over=HandOverParams(math.inf, 0.0),
-        gain_schedule=gain_schedule.build(GainScheduleSettings(), dt),
-        R1=1.0,
-        R2=1.0,
-        reels=ReelGrowthParams(0.0, 0.0),
-        pull1=0.0,
-        pull2=0.0,
-        tension=TensionParams(0.0, 1.0, 1.0),
-        inertia=InertiaFeedforwardParams(0.0),
-        allocation=allocation.build(AllocationSettings(), dt),
-        limit=LimitParams(-LARGE, LARGE, math.inf),
-        output=AnalogOutputParams(0.0, 0, 0, 0, 0.0, 0.0),
-        rounds=law.EXACT,
-        amplifier=LduAmplifierParams(0, 0, LARGE),
-    )
-
-
 def _of_format(c: Any, case: Case, dt: float) -> LawParams:
     """A law in the words of the exchange format."""
-    p, drive = plain(case, dt), case.drive
-    most, step = drive.limit_volt or LARGE, drive.step_volt
-    p = p._replace(limit=LimitParams(-most, most, math.inf))
-    if step is not None:
-        half = round(drive.dac_range_volt / step)
-        p = p._replace(
-            rounds=law.HALVES_UP, output=p.output._replace(volts_per_code=step, code_min=-half, code_max=half - 1)
-        )
-    if isinstance(c, PdLaw):
+    drive = case.drive
+    p = of_case(limited(plain(case, dt), drive.limit_volt, drive.step_volt, drive.dac_range_volt), c, dt)
+    if isinstance(c, TapeLaw):
         believes = believed(case)
         volts = [1.0 / (believes[f"K_m{i}"] * drive.amp_per_volt[i - 1]) for i in (1, 2)]
-        friction = FrictionFeedforwardParams(c.friction_Nm * volts[0], held=0)
         return p._replace(
-            kind=law.PD, tape=law.CONSTANT, pd=pd.of_gains(c.P, c.D, c.derivative_filter_hz, dt),
-            friction1=friction,
+            tape=law.CONSTANT,
+            friction1=FrictionFeedforwardParams(c.friction_Nm * volts[0], held=0),
             pull1=c.tension_N * believes["R1"] * volts[0], pull2=c.tension_N * believes["R2"] * volts[1],
             allocation=allocation.build(AllocationSettings(kind=c.allocation), dt),
         )  # fmt: skip
     if isinstance(c, SectionsLaw):
         radius = exchange_of(case.plant).radius
-        return _with_sections(p._replace(to_unit=p.to_unit * (believed(case)[radius] if radius else 1.0)), c.sections)
-    if isinstance(c, CascadeLaw):
-        return p._replace(kind=law.PI_VELOCITY, two_tap=1, pi_velocity=PiVelocityParams(c.kp * c.kv, 0.0, c.kv, 0.0))
+        return p._replace(to_unit=p.to_unit * (believed(case)[radius] if radius else 1.0))
     return p
-
-
-def _with_sections(p: LawParams, coefficients: Any) -> LawParams:
-    """The same with biquads (b0, b1, b2, a1, a2) in their order."""
-    for i, section in enumerate(coefficients):
-        p.sections[i] = tuple(section)
-    return p._replace(kind=law.SECTIONS, n_sections=len(coefficients))
 
 
 def _of_config(config: Any, record: "Record") -> LawParams:
@@ -186,24 +106,6 @@ def _of_config(config: Any, record: "Record") -> LawParams:
     if profile.has(REELS):
         return _with_tape(p, config, record)
     return _amplified(p, config, dt) if profile.has(AMPLIFIER) else _plain(p, config, dt)
-
-
-def of_settings(p: LawParams, settings: Any, dt: float) -> LawParams:
-    """The same with position law, speed filter, limit and shaper of a config's `law`."""
-    return _position(p, settings, dt)._replace(
-        velocity=velocity.build(settings.velocity, dt),
-        limit=limit.build(settings.limit, dt),
-        shaper=shaper.build(settings.shaper, dt),
-    )
-
-
-def _position(p: LawParams, settings: Any, dt: float) -> LawParams:
-    position, kind = settings.position, getattr(settings.position, "kind", "pd")
-    if kind == "pi_velocity":
-        return p._replace(kind=law.PI_VELOCITY, pi_velocity=pi_velocity.build(position, dt))
-    if kind == "sections":
-        return _with_sections(p, sections.build(position, dt)[: len(position.sections)])
-    return p._replace(kind=law.PD, pd=pd.build(position, dt))
 
 
 def _plain(p: LawParams, config: Any, dt: float) -> LawParams:

@@ -9,8 +9,8 @@ import pyarrow as pa
 
 from rtctl.config.errors import UserError, nearest
 from rtctl.config.units import convert
-from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.file import Believed
+from rtctl.plants.graph.term_units import turns_at
 from rtctl.plants.graph.units import measured_unit
 from rtctl.trace.bundle import ROW_GROUP, save_case, write_parquet
 from rtctl.trace.imports.counters import unwrapped
@@ -89,7 +89,7 @@ def wanted_columns(believed: Believed) -> dict[str, Wanted]:
         if drive.enabled is not None:
             out[drive.enabled] = Wanted(drive.enabled, f"switch {name}", "", 1.0, False, f"1 where {name} is on")
     for name, sensor in machine.sensors.items():
-        unit = measured_unit(sensor.measures, _turns(machine, sensor))
+        unit = measured_unit(sensor.measures, turns_at(machine, sensor))
         counts = sensor.counts_per_unit is not None
         help_ = f"{sensor.measures} of {sensor.body or sensor.joint or sensor.drive}"
         out[sensor.column] = Wanted(sensor.column, f"sensor {name}", unit, sensor.scale, counts, help_)
@@ -101,13 +101,6 @@ def wanted_columns(believed: Believed) -> dict[str, Wanted]:
             scale = entry.get("per_unit", 1.0)
             out[entry["column"]] = Wanted(entry["column"], f"input {name}", unit, float(scale), False, f"input {name}")
     return out
-
-
-def _turns(machine: Description, sensor: Any) -> bool:
-    if sensor.body is not None:
-        return machine.turns(sensor.body)
-    joint = sensor.joint or machine.drives[sensor.drive].joint
-    return machine.turns(machine.joints[joint].to if joint else str(machine.drives[sensor.drive].body))
 
 
 def _column_of(name: str, known: Mapping[str, Wanted]) -> str:

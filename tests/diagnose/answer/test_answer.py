@@ -1,7 +1,7 @@
 import pytest
 from graph_cases import named, nothing, unnamed
 
-from rtctl.case.format2 import START
+from rtctl.case.start import START
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
 
 

@@ -2,7 +2,7 @@ import pytest
 import yaml
 from graph_cases import BELT, RUB, blank, case_of, command, named
 
-from rtctl.case.format2 import is_start
+from rtctl.case.start import is_start
 from rtctl.config.errors import UserError
 from rtctl.diagnose.answer.config import to_config, write_model
 from rtctl.diagnose.model.model import nominal, settings_of

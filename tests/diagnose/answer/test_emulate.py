@@ -7,13 +7,13 @@ import pytest
 import yaml
 
 from rtctl import api
+from rtctl.case.laws import INPUT
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.answer.emulate import can_emulate, emulate
 from rtctl.diagnose.answer.freerun import compare
 from rtctl.diagnose.answer.load import of_bundle
 from rtctl.diagnose.model.by_symbol import owner_model
 from rtctl.diagnose.model.format1 import graph_record
-from rtctl.diagnose.record.format1 import INPUT
 from rtctl.own import files, model
 from rtctl.own.files import give
 from rtctl.trace.bundle import load_bundle

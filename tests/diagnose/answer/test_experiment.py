@@ -19,6 +19,7 @@ from rtctl.diagnose.evidence.evidence import Rival
 from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.likelihood.joint import together
 from rtctl.diagnose.model import loop
+from rtctl.diagnose.model.loop_of import loop_of
 from rtctl.diagnose.model.model import nominal, settings_of
 from rtctl.diagnose.model.recording import GraphRecord, record_of
 from rtctl.diagnose.model.simulate import Simulator
@@ -36,7 +37,7 @@ def recorded(ref, name, *terms):
     y, grain = {"encoder": still}, {"encoder": 1 / 1592.0}
     blank = GraphRecord(case, still, 1.0 / RATE, ref, still, still[:, None], y, grain, None)
     model = nominal(case).add(*map(settings_of, terms))
-    out, u = loop.run(Simulator(blank), loop.loop_of(blank), model, ref, still)
+    out, u = loop.run(Simulator(blank), loop_of(blank), model, ref, still)
     columns = {"t": np.arange(n) / RATE, "tau": u[:, 0], "counts": np.floor(1592.0 * out[:, 0])}
     return record_of(columns, case, Path(name) / "recording.parquet")
 

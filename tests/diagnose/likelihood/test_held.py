@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from graph_cases import RATE, case_of, columns_of, record
 
-from rtctl.case.format2 import OPEN_LOOP, read_case
+from rtctl.case.format2 import read_case
 from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.likelihood.held import likelier, other_way, suits
 from rtctl.diagnose.likelihood.joint import together
@@ -18,7 +18,7 @@ SPRUNG = {
     "drives": {"shaker": {"body": "mass", "column": "u", "kind": "force", "gain": 5.0}},
     "sensors": {"gauge": {"body": "mass", "measures": "position", "column": "x", "counts_per_unit": 1e7}},
 }
-CASE = case_of(SPRUNG, delay_samples=0.0, controller={"kind": OPEN_LOOP})
+CASE = case_of(SPRUNG, delay_samples=0.0, controller={"kind": "none"})
 
 
 def tones(t):

@@ -7,7 +7,7 @@ from rtctl.case.format1 import read_case
 from rtctl.diagnose.answer.format1_config import read_model, write_model
 from rtctl.diagnose.model.by_symbol import owner_model
 from rtctl.diagnose.model.format1 import graph_record, known_model
-from rtctl.diagnose.model.loop import loop_of
+from rtctl.diagnose.model.loop_of import loop_of
 from rtctl.diagnose.model.model import nominal, rigid
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.model.space import Space

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtctl.case.format1 import read_case
-from rtctl.diagnose.record import law, law_params
+from rtctl.diagnose.record import law, law_params, law_parts
 from rtctl.diagnose.record.format1 import load_record
 from rtctl.drivers.at_mio_16de import AnalogOutputParams
 from rtctl.laws import allocation
@@ -24,7 +24,7 @@ BUNDLES = ("case-0001", "case-0002", "case-0003", "case-0004", "case-0005", "cas
 
 def written(p: law.LawParams, ref: Any, w: Any, reading: Any, drives: int) -> np.ndarray:
     """What the law writes for these rows, (n, drives) V."""
-    return law_params.written(p, np.zeros(1, law.LAW_STATE), ref, w, reading, drives)
+    return law_parts.written(p, np.zeros(1, law.LAW_STATE), ref, w, reading, drives)
 
 
 def params(**values: Any) -> law.LawParams:

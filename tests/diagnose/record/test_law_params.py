@@ -7,7 +7,8 @@ import pytest
 
 from rtctl import api
 from rtctl.diagnose.record.format1 import law_agreement, load_record
-from rtctl.diagnose.record.law_params import began, law_params, law_state, written
+from rtctl.diagnose.record.law_params import began, law_params, law_state
+from rtctl.diagnose.record.law_parts import written
 
 MOVES = {"reference": {"steps": [{"at": 0.2, "to": 0.02, "ramp": 0.2}, {"at": 1.6, "to": 0.0, "ramp": 0.2}]}}
 

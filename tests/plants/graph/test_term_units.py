@@ -3,7 +3,7 @@
 import pytest
 
 from rtctl.plants.graph.description import Description
-from rtctl.plants.graph.term_units import entry_in_si, unit_at
+from rtctl.plants.graph.term_units import body_of, ends_turn, entry_in_si, turns_at, unit_at
 from rtctl.plants.physics.dimensions import DIMENSIONS
 
 MACHINE = Description.model_validate({
@@ -16,6 +16,45 @@ MACHINE = Description.model_validate({
 @pytest.mark.parametrize(("node", "unit"), [("motor", "Nm"), ("carriage", "N")])
 def test_a_unit_follows_from_whether_the_node_turns(node, unit):
     assert unit_at(MACHINE, "friction.coulomb", node, "F_C") == unit
+
+
+@pytest.mark.parametrize(("size", "unit"), [("inertia", "Nm"), ("mass", "N")])
+@pytest.mark.parametrize("ends", [("frame", "part"), ("part", "frame"), ("wall", "part"), ("part", "wall")])
+@pytest.mark.parametrize("wall", ["inertia", "mass"])
+def test_a_joint_to_the_frame_has_the_unit_of_the_body_that_moves(size, unit, ends, wall):
+    machine = Description.model_validate({
+        "bodies": {"part": {size: 1.0}, "wall": {wall: 1.0, "fixed": True}},
+        "joints": {"spring": {"from": ends[0], "to": ends[1], "stiffness": 10.0}},
+        "drives": {"coil": {"joint": "spring"}},
+        "sensors": {"gauge": {"joint": "spring", "measures": "force", "column": "f"},
+                    "shunt": {"drive": "coil", "measures": "current", "column": "i"},
+                    "scale": {"body": "part", "column": "x"}},
+    })  # fmt: skip
+    assert {body_of(machine, node) for node in ("spring", "coil", "gauge", "shunt")} == {"part"}
+    assert unit_at(machine, "transmission.hysteresis", "spring", "F_h") == unit
+    assert ends_turn(machine, "spring") == (unit == "Nm", unit == "Nm")
+
+
+def test_a_sensor_may_have_the_name_of_another_body():
+    machine = Description.model_validate({
+        "bodies": {"motor": {"inertia": 1e-4}, "carriage": {"mass": 1.0}},
+        "joints": {"belt": {"from": "motor", "to": "carriage", "ratio": 0.01}},
+        "sensors": {"motor": {"body": "carriage", "column": "x"}, "carriage": {"body": "motor", "column": "phi"}},
+    })  # fmt: skip
+    assert [turns_at(machine, sensor) for sensor in machine.sensors.values()] == [False, True]
+
+
+def test_what_is_no_element_has_no_body():
+    assert body_of(MACHINE, "loop") == ""
+
+
+def test_a_span_of_tape_is_a_length():
+    machine = Description.model_validate({
+        "bodies": {"one": {"inertia": 1e-4, "radius": 0.02}, "two": {"inertia": 1e-4, "radius": 0.02}},
+        "joints": {"tape": {"from": "one", "to": "two", "span": "open", "stiffness": 450.0}},
+        "sensors": {"encoder": {"body": "one", "column": "x"}},
+    })  # fmt: skip
+    assert ends_turn(machine, "tape") == (False, False)
 
 
 def test_texts_with_units_become_si():
