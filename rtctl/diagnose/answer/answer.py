@@ -12,14 +12,13 @@ from rtctl.diagnose.answer import words
 from rtctl.diagnose.answer.experiment import Planned, left, planned
 from rtctl.diagnose.answer.load import load
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
-from rtctl.diagnose.evidence.prediction import WORSE, Heldout, predict
+from rtctl.diagnose.evidence.prediction import WORSE, Heldout, predict, predicted
 from rtctl.diagnose.evidence.predictive import predictive
 from rtctl.diagnose.evidence.verdict import SURE, Verdict, fewer, verdict
 from rtctl.diagnose.likelihood.clock import UNSTEADY
-from rtctl.diagnose.likelihood.fits import Fitted, curvature, half_widths, refit
+from rtctl.diagnose.likelihood.fits import Fitted, faint, refit, told_widths, without
 from rtctl.diagnose.likelihood.held import likelier, suits
 from rtctl.diagnose.likelihood.joint import together
-from rtctl.diagnose.likelihood.likelihood import COUNTED, coarsened
 from rtctl.diagnose.model.model import RECORDING
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
@@ -147,8 +146,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         decided = verdict(found)
         progress("predicting rows that were not fitted")
         heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
-        decided = borne_out(fewer(decided, best), heldout)
-        predictor = predictive(decided, heldout)
+        decided = borne_out(fewer(decided, best, "the last rows are predicted better"), heldout)
+        decided, heldout, predictor = told(decided, heldout)
         effects = _effects(decided, predictor)
         if len(left(decided)) > 1:
             progress("planning an experiment")
@@ -168,6 +167,21 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         )
 
 
+def told(decided: Verdict, heldout: Heldout) -> tuple[Verdict, Heldout, Fitted]:
+    """The verdict, without effects whose size in the model that predicts best may be zero, its held-out error, and that
+    model."""
+    predictor = predictive(decided, heldout)
+    while len(decided.best.names) > 1 and decided.verdict in (NAMED, AMBIGUOUS):
+        idle = {predictor.names[index] for index in faint(predictor)}
+        index = next((i for i, name in enumerate(decided.best.names) if name in idle), None)
+        if index is None:
+            break
+        rest = refit(decided.best.like, *without(decided.best, index))
+        decided, heldout = fewer(decided, rest, "all is predicted as well"), predicted(heldout, rest)
+        predictor = predictive(decided, heldout)
+    return decided, heldout, predictor
+
+
 def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
     """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
     if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > -WORSE:
@@ -181,7 +195,7 @@ def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
     """Effects of the verdict, with sizes of a model that has all of them."""
     if decided.verdict not in (NAMED, AMBIGUOUS):
         return ()
-    best, spread = decided.best, _spread(numbers)
+    best, spread = decided.best, told_widths(numbers)
     out = []
     for i, h in enumerate(best.space.hypotheses):
         looks = tuple(
@@ -211,11 +225,6 @@ def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
     return tuple(out)
 
 
-def _spread(f: Fitted) -> np.ndarray:
-    """Half width of the 90 % interval of each unknown."""
-    return half_widths(curvature(f, coarsened(f.like.size, COUNTED)))
-
-
 def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
     h, columns = f.space.hypotheses[index], f.space.columns(index)
     x, half = f.x[columns], spread[columns]
@@ -240,7 +249,7 @@ def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
 
 
 def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
-    out, spread = {}, _spread(f)
+    out, spread = {}, told_widths(f)
     lowest, highest = f.space.bounds()  # what the owner says that it can be
     for i, path in enumerate(f.space.names):
         if path.startswith(OWN_START):

@@ -54,6 +54,12 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
     return judged(base.like, first, late, (fitted_to(first, base), own)), best
 
 
+def predicted(heldout: Heldout, best: Fitted) -> Heldout:
+    """The same with another best model."""
+    early, late = heldout.early, heldout.late
+    return judged(best.like, early, late, (heldout.fits[0], fitted_to(early, best)))
+
+
 def fitted_to(rows: Likelihood, f: Fitted) -> Fitted:
     """A model fitted to some rows, from where it is; as it is where nothing may move."""
     return refit(rows, f.space, f.x, rounds=ROUNDS) if f.space.names or f.space.hypotheses else f

@@ -82,13 +82,12 @@ def of_names(decided: Verdict) -> Verdict:
     return decided._replace(verdict=kind, confidence=confidence, rivals=others)
 
 
-def fewer(decided: Verdict, best: Fitted) -> Verdict:
-    """The verdict with a model that lacks some of the effects, without which rows that no fit saw are predicted
-    better."""
+def fewer(decided: Verdict, best: Fitted, why: str) -> Verdict:
+    """The verdict with a model that lacks some of the effects, for a reason that takes up the sentence after them."""
     if best.names == decided.best.names or decided.verdict not in (NAMED, AMBIGUOUS):
         return decided
     gone = ", ".join(name for name in decided.best.names if name not in best.names)
-    return of_names(decided._replace(best=best, why=f"without {gone} the last rows are predicted better"))
+    return of_names(decided._replace(best=best, why=f"without {gone}, {why}"))
 
 
 def certain(ranked: tuple[tuple[tuple[str, ...], float], ...]) -> tuple[str, ...]:

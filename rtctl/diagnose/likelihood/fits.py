@@ -14,7 +14,7 @@ import numpy as np
 
 from rtctl.diagnose.likelihood.descent import ALL, EFFECTS, Point, derivatives, descend, weights
 from rtctl.diagnose.likelihood.inexact import errors
-from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.likelihood.likelihood import COUNTED, Likelihood, coarsened
 from rtctl.diagnose.likelihood.pushes import pushes
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.space import COSINE, INVERSE, REST, SINE, SIZE, Space
@@ -188,9 +188,14 @@ def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
     return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
 
 
+def told_widths(f: Fitted) -> np.ndarray:
+    """Half width (unknowns,) of the 90 % interval of each unknown, as an answer tells it."""
+    return half_widths(curvature(f, coarsened(f.like.size, COUNTED)))
+
+
 def faint(f: Fitted) -> list[int]:
     """Numbers of the effects of a model whose sizes may all be zero, by their 90 % intervals."""
-    half, out = half_widths(f.information), []
+    half, out = told_widths(f), []
     for index, h in enumerate(f.space.hypotheses):
         sizes = f.space.columns(index)[h.sizes]
         if len(sizes) and (np.abs(f.x[sizes]) < half[sizes]).all():

@@ -4,7 +4,7 @@ Which effect comes first does not matter then: a model that is behind on its own
 promise more.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -46,17 +46,25 @@ class Promise(NamedTuple):
 
 
 def extended(
-    like: Likelihood, parents: Sequence[Fitted], known: Known, most: int, merit: Merit, looked: Screened | None = None
+    like: Likelihood,
+    parents: Sequence[Fitted],
+    known: Known,
+    most: int,
+    merit: Merit,
+    looked: Screened | None = None,
+    also: Collection[str] = (),
 ) -> list[Fitted]:
     """Refits of models with the most promising hypotheses beside them; `looked` is what screening said of one model.
 
     Each term is tried at its most promising node, then the best terms at their other nodes. `known` gets all of them.
+    The terms `also` are tried whatever they promise.
     """
     looks = [looked if looked is not None else screened(parent) for parent in parents]
     found = [promise for pair in zip(parents, looks, strict=True) for promise in promises(*pair, merit)]
     top: dict[tuple[int, str], dict[tuple[str, ...], list[Promise]]] = {}
     for promise in in_turns(found):
-        if max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top):
+        worth = max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top)
+        if worth or promise.term[1] in also:
             top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
 
     def refitted(these: list[Promise], starts: int) -> Fitted:

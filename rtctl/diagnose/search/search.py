@@ -18,6 +18,7 @@ from rtctl.diagnose.search.enrich import enriched, restarted
 from rtctl.diagnose.search.extend import Known, Merit, extended, key, screened
 from rtctl.diagnose.search.screen import Score, Screened
 from rtctl.diagnose.search.standing import ENOUGH, adds, merit_of, standing
+from rtctl.plants.physics import TERMS
 
 MOST = 4  # effects
 REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
@@ -85,9 +86,10 @@ def under(like: Likelihood, space: Space, progress: Progress, before: Sequence[F
     for _ in range(EXCHANGES):
         best = standing(base, known, merit)[0]
         progress(f"exchanging each of {', '.join(best.names)}")
-        for rest in _smaller(like, best, known):
+        for index, rest in enumerate(_smaller(like, best, known) if len(best.names) > 1 else [base] * len(best.names)):
             known.setdefault(key(rest.names), rest)
-            for f in extended(like, [rest], known, OTHERS, merit):
+            alike = TERMS[best.space.hypotheses[index].term].look_alikes
+            for f in extended(like, [rest], known, OTHERS, merit, looked if rest is base else None, alike):
                 if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
                     known |= {key(g.names): g for g in _smaller(like, f, known)}
         if standing(base, known, merit)[0] is best:

@@ -26,3 +26,11 @@ def test_the_effect_that_promises_most_is_fitted_beside_any_model():
 def test_a_model_is_not_extended_by_what_it_has():
     best = named().found.best
     assert not set(best.names) & {score.hypothesis.name for score in screened(best).scores}
+
+
+def test_a_look_alike_is_fitted_whatever_it_promises():
+    found = named().found
+    plain = {h.term for f in extended(found.like, [found.base], {}, 1, found.merit) for h in f.space.hypotheses}
+    alike = extended(found.like, [found.base], {}, 1, found.merit, None, ("drive.deadband",))
+    assert {h.term for f in alike for h in f.space.hypotheses} == plain | {"drive.deadband"}
+    assert "drive.deadband" not in plain
