@@ -7,21 +7,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from rtctl.case.start import FIRST_POSITION, FIRST_SPEED, OWN_START, is_start
 from rtctl.diagnose.answer import words
 from rtctl.diagnose.answer.experiment import Planned, left, planned
+from rtctl.diagnose.answer.intervals import parameters, sizes
 from rtctl.diagnose.answer.load import load
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
-from rtctl.diagnose.evidence.prediction import WORSE, Heldout, predict, predicted
-from rtctl.diagnose.evidence.predictive import predictive
+from rtctl.diagnose.evidence.prediction import Heldout, predict
 from rtctl.diagnose.evidence.verdict import SURE, Verdict, fewer, verdict
+from rtctl.diagnose.evidence.withdrawn import borne_out, told
 from rtctl.diagnose.likelihood.clock import UNSTEADY
-from rtctl.diagnose.likelihood.fits import Fitted, faint, refit, told_widths, without
+from rtctl.diagnose.likelihood.fits import Fitted, refit
 from rtctl.diagnose.likelihood.held import likelier, suits
 from rtctl.diagnose.likelihood.joint import together
-from rtctl.diagnose.model.model import RECORDING
+from rtctl.diagnose.likelihood.widths import half_widths
 from rtctl.diagnose.model.recording import GraphRecord
-from rtctl.diagnose.model.space import COSINE, PLACE, REST, SHAPE, SINE, SIZE
 from rtctl.diagnose.search.search import Found, Progress, search
 from rtctl.plants.physics import TERMS
 
@@ -157,7 +156,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             decided=decided,
             effects=effects,
             located=_located(found, decided, effects),
-            parameters=_parameters(predictor, like.sim.record),
+            parameters=parameters(predictor, like.sim.record),
             predictor=predictor,
             heldout=heldout,
             planned=planned(like.sim.record, decided),
@@ -167,35 +166,11 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         )
 
 
-def told(decided: Verdict, heldout: Heldout) -> tuple[Verdict, Heldout, Fitted]:
-    """The verdict, without effects whose size in the model that predicts best may be zero, its held-out error, and that
-    model."""
-    predictor = predictive(decided, heldout)
-    while len(decided.best.names) > 1 and decided.verdict in (NAMED, AMBIGUOUS):
-        idle = {predictor.names[index] for index in faint(predictor)}
-        index = next((i for i, name in enumerate(decided.best.names) if name in idle), None)
-        if index is None:
-            break
-        rest = refit(decided.best.like, *without(decided.best, index))
-        decided, heldout = fewer(decided, rest, "all is predicted as well"), predicted(heldout, rest)
-        predictor = predictive(decided, heldout)
-    return decided, heldout, predictor
-
-
-def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
-    """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
-    if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > -WORSE:
-        return decided
-    names = ", ".join(decided.best.names)
-    why = f"with {names} the last rows are predicted worse than without, by {-heldout.gain:.3g} nats"
-    return decided._replace(verdict=UNNAMED, confidence=(), rivals=(), why=why)
-
-
 def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
     """Effects of the verdict, with sizes of a model that has all of them."""
     if decided.verdict not in (NAMED, AMBIGUOUS):
         return ()
-    best, spread = decided.best, told_widths(numbers)
+    best, spread = decided.best, half_widths(numbers)
     out = []
     for i, h in enumerate(best.space.hypotheses):
         looks = tuple(
@@ -208,7 +183,7 @@ def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
                 h.term,
                 h.node,
                 min(decided.confidence[i], 0.99),
-                _sizes(numbers, numbers.names.index(h.name), spread),
+                sizes(numbers, numbers.names.index(h.name), spread),
                 looks,
             )
         )
@@ -223,56 +198,6 @@ def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
         others = [r for r in out[0].look_alikes if r.p_value > (1.0 - SURE) / 2][:2]
         out += [Effect(r.name, r.node, r.p_value, {}, (), f"{out[0].name}:{out[0].node}") for r in others]
     return tuple(out)
-
-
-def _sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
-    h, columns = f.space.hypotheses[index], f.space.columns(index)
-    x, half = f.x[columns], spread[columns]
-    values, machine = h.values(x), f.like.sim.case.machine
-    out: dict[str, Interval] = {}
-    for i, c in enumerate(h.coordinates):
-        if c.kind == SINE:
-            continue
-        name = c.name.partition("|")[0]
-        value, unit = values[name], words.unit_at(machine, h.term, h.node, name)
-        if c.kind == SHAPE:
-            low, high = value * float(np.exp(-half[i])), value * float(np.exp(half[i]))
-        elif c.kind in (SIZE, PLACE, COSINE):
-            low, high = value - c.scale * half[i], value + c.scale * half[i]
-        elif c.kind == REST:  # of a push, by the stiffness before it
-            reach = abs(c.scale * half[i] / values[h.coordinates[i - 1].name])
-            low, high = value - reach, value + reach
-        else:
-            low = high = value
-        out[name] = Interval(value, float(low), float(high), unit)
-    return out
-
-
-def _parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
-    out, spread = {}, told_widths(f)
-    lowest, highest = f.space.bounds()  # what the owner says that it can be
-    for i, path in enumerate(f.space.names):
-        if path.startswith(OWN_START):
-            continue
-        value, nominal = f.model.base[path], f.space.owner.base[path]
-        ends = np.clip((f.x[i] - spread[i], f.x[i] + spread[i]), lowest[i], highest[i])
-        low, high = sorted(nominal * float(np.exp(end)) for end in ends)
-        plain, _, name = path.partition(RECORDING)
-        if is_start(plain) and plain not in (FIRST_POSITION, FIRST_SPEED):  # kept as its exponential
-            value, low, high = (float(np.log(v)) for v in (value, low, high))
-        elif is_start(plain):
-            first = next(p.sim.record for p in f.like.parts if p.sim.record.name == name)
-            value, low, high = first_of(first, plain, (value, low, high))
-        out[record.case.called.get(path, path)] = Interval(value, low, high, words.unit_in(record, path))
-    return out
-
-
-def first_of(record: GraphRecord, path: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    """First position or speed of a free response from the exponentials that a fit moves, SI."""
-    place, rate, guess = record.scales
-    x = record.y[record.main][0]
-    scale, offset = (place, x) if path == FIRST_POSITION else (rate, guess)
-    return tuple(float(offset + scale * np.log(v)) for v in values)
 
 
 def _located(found: Found, decided: Verdict, effects: tuple[Effect, ...]) -> Located | None:

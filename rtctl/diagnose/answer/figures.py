@@ -15,7 +15,7 @@ from rtctl.diagnose.answer.si_format import percent
 from rtctl.diagnose.answer.words import called, channel_unit, here, value_unit
 from rtctl.diagnose.evidence.diagnosis import NOTHING
 from rtctl.diagnose.evidence.hats import binned
-from rtctl.diagnose.likelihood.fits import Z90
+from rtctl.diagnose.likelihood.widths import Z90
 
 MOST_BARS = 8
 MOST_PANELS = 3

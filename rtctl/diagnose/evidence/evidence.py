@@ -16,7 +16,8 @@ import numpy as np
 
 from rtctl.diagnose.evidence.free import AXES, SIZE, TIME, Free, free_forces
 from rtctl.diagnose.evidence.wander import LITTLE, log_density, wandering
-from rtctl.diagnose.likelihood.fits import DISCREPANCY, Fitted, share_of
+from rtctl.diagnose.likelihood.fits import DISCREPANCY, Fitted
+from rtctl.diagnose.likelihood.shares import share_of
 from rtctl.diagnose.model.node_scaling import Measures
 from rtctl.diagnose.search.search import Found
 from rtctl.plants.physics import TERMS

@@ -6,7 +6,8 @@ from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.evidence.evidence import Rival, rivals
 from rtctl.diagnose.evidence.free import Free
 from rtctl.diagnose.likelihood.clock import Clock, clock
-from rtctl.diagnose.likelihood.fits import Fitted, explained
+from rtctl.diagnose.likelihood.fits import Fitted
+from rtctl.diagnose.likelihood.shares import explained
 from rtctl.diagnose.search.search import Found
 
 SURE = 0.9  # probability from which a name is given, or that something is missing

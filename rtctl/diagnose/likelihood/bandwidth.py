@@ -8,7 +8,8 @@ Source: innovation form of a state space model, Ljung, System Identification (19
 
 import numpy as np
 
-from rtctl.diagnose.likelihood.fits import FLOOR, Fitted, refit
+from rtctl.diagnose.likelihood.fits import Fitted, refit
+from rtctl.diagnose.likelihood.shares import FLOOR
 from rtctl.diagnose.model.kernel import TRACK
 
 STEP = 2.0  # from one bandwidth to the next

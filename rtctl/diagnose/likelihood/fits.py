@@ -14,7 +14,7 @@ import numpy as np
 
 from rtctl.diagnose.likelihood.descent import ALL, EFFECTS, Point, derivatives, descend, weights
 from rtctl.diagnose.likelihood.inexact import errors
-from rtctl.diagnose.likelihood.likelihood import COUNTED, Likelihood, coarsened
+from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.pushes import pushes
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.space import COSINE, INVERSE, REST, SINE, SIZE, Space
@@ -24,10 +24,7 @@ ROUNDS = 3  # of noise and fit
 ENOUGH = 2.0  # nats, that a further round must gain
 LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a recording may say nothing
 MATTERS = 0.5  # nats of the prior that going back must gain
-FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
-RESTLESS = 1.2  # times what differs from block to block, the same
 DISCREPANCY = 0.1  # of the missing force: standard deviation of what the law of a name may be wrong by
-Z90 = 1.645  # standard deviations of a 90 % interval, each way
 
 
 class Fitted(NamedTuple):
@@ -81,11 +78,6 @@ def curvature(f: Fitted, power: float) -> np.ndarray:
     """Second derivative (unknowns, unknowns) of the negative logarithm of a posterior, a share of whose likelihood
     counts."""
     return np.asarray(power * f.A + np.diag(prior(f.space)))
-
-
-def half_widths(information: np.ndarray) -> np.ndarray:
-    """Half widths (unknowns,) of the 90 % intervals, each way, by the second derivative of the posterior."""
-    return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0)))
 
 
 def prior(space: Space) -> np.ndarray:
@@ -186,73 +178,3 @@ def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
     """Space, start and derivatives of a model without one of its hypotheses."""
     gone = base.space.columns(index)
     return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
-
-
-def told_widths(f: Fitted) -> np.ndarray:
-    """Half width (unknowns,) of the 90 % interval of each unknown, as an answer tells it."""
-    return half_widths(curvature(f, coarsened(f.like.size, COUNTED)))
-
-
-def faint(f: Fitted) -> list[int]:
-    """Numbers of the effects of a model whose sizes may all be zero, by their 90 % intervals."""
-    half, out = told_widths(f), []
-    for index, h in enumerate(f.space.hypotheses):
-        sizes = f.space.columns(index)[h.sizes]
-        if len(sizes) and (np.abs(f.x[sizes]) < half[sizes]).all():
-            out.append(index)
-    return out
-
-
-def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:
-    """Noise (sensors,) of counting, and of what differs from one block to the next without a pattern, SI."""
-    restless = np.std(np.diff(f.e, axis=0), axis=0) / np.sqrt(2.0)
-    return f.like.least * np.sqrt(f.like.mean), restless
-
-
-def silent(f: Fitted) -> bool:
-    """Whether a model leaves no more than noise in any sensor."""
-    level, restless = quiet(f)
-    return bool((np.sqrt(np.mean(f.e**2, axis=0)) <= np.maximum(FLOOR * level, RESTLESS * restless)).all())
-
-
-def explained(base: Fitted, best: Fitted) -> float:
-    """Share of the power of the residual, above the noise of the sensor, that the best model takes off.
-
-    Noise is what counting leaves, and what differs from one block to the next without a pattern. The sensor in which
-    most is missing counts.
-    """
-    level, restless = quiet(best)
-    least = np.maximum(FLOOR * level, RESTLESS * restless)
-    before = np.sqrt(np.mean(base.e**2, axis=0))
-    after = np.sqrt(np.mean(best.e**2, axis=0))
-    c = int(np.argmax(before / least))
-    excess = before[c] ** 2 - least[c] ** 2
-    if excess <= 0.0 or after[c] <= least[c]:
-        return 1.0
-    return float((before[c] ** 2 - after[c] ** 2) / excess)
-
-
-def explained_force(base: Fitted, best: Fitted) -> float:
-    """Share of the power of what the observer had to push with that the best model takes off, of the followed body
-    where most is missing; 0 where no observer follows the machine."""
-    before, after = (np.concatenate([np.mean(slow**2, axis=0) for slow in f.pushes if len(slow)] or [np.zeros(1)])
-                     for f in (base, best))  # fmt: skip
-    c = int(np.argmax(before))
-    return float(1.0 - after[c] / before[c]) if np.isfinite(after[c]) and 0.0 < before[c] < np.inf else 0.0
-
-
-def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
-    """What a further effect takes off over what all take off, rms, of the residual or of the observer's pushes, and of
-    the sensor that shows most of it."""
-    found = share_of(base.e, fewer.e, more.e)
-    for slow in zip(base.pushes, fewer.pushes, more.pushes, strict=True):
-        if len(slow[0]) and all(np.isfinite(part).all() for part in slow):
-            found = max(found, share_of(*slow))
-    return found
-
-
-def share_of(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
-    """The same of values (rows, k) under the three models."""
-    further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
-    whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
-    return float(np.max(further / np.maximum(whole, 1e-300)))

@@ -11,8 +11,10 @@ import numpy as np
 
 from rtctl.diagnose.likelihood.bandwidth import quicker
 from rtctl.diagnose.likelihood.clock import clock, timed
-from rtctl.diagnose.likelihood.fits import Fitted, faint, refit, silent, without
+from rtctl.diagnose.likelihood.fits import Fitted, refit, without
 from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.likelihood.shares import silent
+from rtctl.diagnose.likelihood.widths import faint
 from rtctl.diagnose.model.space import Space
 from rtctl.diagnose.search.enrich import enriched, restarted
 from rtctl.diagnose.search.extend import Known, Merit, extended, key, screened

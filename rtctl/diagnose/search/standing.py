@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from rtctl.diagnose.likelihood.fits import Fitted, amplitude, explained, explained_force, faint
+from rtctl.diagnose.likelihood.fits import Fitted
+from rtctl.diagnose.likelihood.shares import amplitude, explained, explained_force
 from rtctl.diagnose.likelihood.slack import OFF
+from rtctl.diagnose.likelihood.widths import faint
 from rtctl.diagnose.search.extend import Known, Merit, key
 from rtctl.plants.physics import TERMS
 

@@ -2,11 +2,7 @@ import pytest
 from graph_cases import named, nothing, unnamed
 
 from rtctl.case.start import START
-from rtctl.diagnose.answer.answer import told
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect
-from rtctl.diagnose.evidence.prediction import predict
-from rtctl.diagnose.likelihood.fits import refit
-from rtctl.diagnose.search.hypotheses import hypotheses
 
 
 def test_nothing():
@@ -30,17 +26,6 @@ def test_dry_friction_of_the_carriage():
     assert force.unit == "N"
     assert "The carriage rubs" in d.headline
     assert d.heldout.after < 0.2 * d.heldout.before
-
-
-def test_an_effect_whose_size_may_be_zero_is_not_told():
-    d = named()
-    like, base, best = d.found.like, d.found.base, d.decided.best
-    offset = next(h for h in hypotheses(like.sim, base.model) if h.name == "drive.offset:amplifier")
-    more = refit(like, best.space.add(offset))
-    heldout, _ = predict(base, more)
-    decided, again, _ = told(d.decided._replace(best=more), heldout)
-    assert decided.best.names == best.names == again.fits[1].names
-    assert decided.why == "without drive.offset:amplifier, all is predicted as well"
 
 
 def test_a_force_without_a_name():

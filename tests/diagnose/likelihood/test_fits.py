@@ -2,11 +2,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from graph_cases import BELT, case_of, command, named, record
+from graph_cases import BELT, case_of, command, record
 
-from rtctl.diagnose.answer.answer import borne_out
-from rtctl.diagnose.evidence.diagnosis import NAMED, UNNAMED
-from rtctl.diagnose.likelihood.fits import faint, prior, refit, relaxed
+from rtctl.diagnose.likelihood.fits import prior, refit, relaxed
 from rtctl.diagnose.likelihood.joint import together
 
 FORCES = ("inertia", "mass", "dry", "viscous", "stiffness", "damping", "gain")
@@ -36,20 +34,3 @@ def test_every_unknown_has_a_prior():
     weight = prior(base().space)
     assert (weight > 0.0).all()
     assert np.isfinite(base().log_evidence)
-
-
-def test_a_name_that_predicts_worse_is_none():
-    d = named()
-    assert borne_out(d.decided, d.heldout).verdict == NAMED
-    worse = borne_out(d.decided, d.heldout._replace(gain=-5.0))
-    assert worse.verdict == UNNAMED
-    assert "predicted worse than without" in worse.why
-    assert not worse.confidence
-
-
-def test_an_effect_of_no_size_is_faint():
-    best = named().found.best
-    assert faint(best) == []
-    x = best.x.copy()
-    x[best.space.columns(0)[best.space.hypotheses[0].sizes]] *= 1e-3
-    assert faint(best._replace(x=x)) == [0]

@@ -1,0 +1,32 @@
+"""Names that are withdrawn: rows that no fit saw are predicted as well without them, or worse with them."""
+
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, UNNAMED
+from rtctl.diagnose.evidence.prediction import WORSE, Heldout, predicted
+from rtctl.diagnose.evidence.predictive import predictive
+from rtctl.diagnose.evidence.verdict import Verdict, fewer
+from rtctl.diagnose.likelihood.fits import Fitted, refit, without
+from rtctl.diagnose.likelihood.widths import faint
+
+
+def told(decided: Verdict, heldout: Heldout) -> tuple[Verdict, Heldout, Fitted]:
+    """The verdict, without effects whose size in the model that predicts best may be zero, its held-out error, and that
+    model."""
+    predictor = predictive(decided, heldout)
+    while len(decided.best.names) > 1 and decided.verdict in (NAMED, AMBIGUOUS):
+        idle = {predictor.names[index] for index in faint(predictor)}
+        index = next((i for i, name in enumerate(decided.best.names) if name in idle), None)
+        if index is None:
+            break
+        rest = refit(decided.best.like, *without(decided.best, index))
+        decided, heldout = fewer(decided, rest, "all is predicted as well"), predicted(heldout, rest)
+        predictor = predictive(decided, heldout)
+    return decided, heldout, predictor
+
+
+def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
+    """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
+    if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > -WORSE:
+        return decided
+    names = ", ".join(decided.best.names)
+    why = f"with {names} the last rows are predicted worse than without, by {-heldout.gain:.3g} nats"
+    return decided._replace(verdict=UNNAMED, confidence=(), rivals=(), why=why)

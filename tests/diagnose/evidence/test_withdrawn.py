@@ -1,0 +1,29 @@
+"""Names that are withdrawn after the verdict."""
+
+from graph_cases import named
+
+from rtctl.diagnose.evidence.diagnosis import NAMED, UNNAMED
+from rtctl.diagnose.evidence.prediction import predict
+from rtctl.diagnose.evidence.withdrawn import borne_out, told
+from rtctl.diagnose.likelihood.fits import refit
+from rtctl.diagnose.search.hypotheses import hypotheses
+
+
+def test_a_name_that_predicts_worse_is_none():
+    d = named()
+    assert borne_out(d.decided, d.heldout).verdict == NAMED
+    worse = borne_out(d.decided, d.heldout._replace(gain=-5.0))
+    assert worse.verdict == UNNAMED
+    assert "predicted worse than without" in worse.why
+    assert not worse.confidence
+
+
+def test_an_effect_whose_size_may_be_zero_is_not_told():
+    d = named()
+    like, base, best = d.found.like, d.found.base, d.decided.best
+    offset = next(h for h in hypotheses(like.sim, base.model) if h.name == "drive.offset:amplifier")
+    more = refit(like, best.space.add(offset))
+    heldout, _ = predict(base, more)
+    decided, again, _ = told(d.decided._replace(best=more), heldout)
+    assert decided.best.names == best.names == again.fits[1].names
+    assert decided.why == "without drive.offset:amplifier, all is predicted as well"
