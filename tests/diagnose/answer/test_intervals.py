@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from graph_cases import BELT, case_of
+from graph_cases import BELT, blank, case_of, command
 
 from rtctl.diagnose.answer.intervals import sizes
 from rtctl.diagnose.model.space import COSINE, INVERSE, SINE, SIZE, Coordinate, Hypothesis, Space
 
-MACHINE = case_of(BELT).machine
+MACHINE = blank(case_of(BELT), command(0.6)).case.machine
 
 
 def told(hypothesis, x, half):
