@@ -59,6 +59,7 @@ MACHINE = state(  # a machine: its matrices for one substep, its state, and what
     f=(float, MOST_BODIES),  # smooth force on each coordinate, N or Nm
     weight=(float, MOST_BODIES),  # part of `f` that is the weight of bodies
     push=(float, MOST_BODIES),  # with the dry friction of the last substep
+    viscous=(float, MOST_BODIES),  # friction of each coordinate by its speed, part of A
     dry_base=(float, MOST_BODIES),
     dry=(float, MOST_BODIES),  # limit of the dry friction on each coordinate
     r=(float, MOST_BODIES),  # dry friction in force

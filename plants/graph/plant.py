@@ -36,6 +36,7 @@ def prepare(p, m):
     m.h = p.h
     for i in range(p.nq):
         m.dry_base[i] = p.dry[i]
+        m.viscous[i] = p.viscous[i]
         m.inertia[i] = p.inertia[i]
     for c in range(p.ny):
         m.y_speed[c] = 1 if p.sensor_kind[c] == SPEED else 0

@@ -1,9 +1,9 @@
 """Dry friction that is larger one way than the other: a carriage that leans, a brush that bites, a seal with a lip.
 
 A node that takes F_C (1 + a) one way and F_C (1 - a) the other takes F_C either way beside a constant force of F_C a:
-sliding and holding, the two are the same law. So it is written as that force, which is never more than what dry
-friction holds, and reversals stay exact. In a physics list it stands after the terms whose friction it scales. An
-offset of the drive differs from it only where dry friction changes, by speed, load or place.
+sliding and holding, the two are the same law. So it is written as that force, which is never more than what dry and
+viscous friction of the description hold, and reversals stay exact. In a physics list it stands after the terms whose
+friction it scales. An offset of the drive differs from it only where dry friction changes, by speed, load or place.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994); Janot, Gautier & Brunot, Data set and
 reference models of EMPS (2019), whose axis has it.
@@ -42,10 +42,12 @@ def build_asymmetry(settings: AsymmetrySettings, h: float) -> AsymmetryParams:
 
 
 @tick
-def asymmetry(p, v, dry, r):
-    """Force beside symmetric dry friction of limit `dry` at speed `v` of the node; `r` takes its rotation to B_a's."""
-    limit = max(dry, 0.0)
-    return -min(max(p.a * limit + r * r * p.B_a * abs(v), -limit), limit)
+def asymmetry(p, v, dry, r, viscous):
+    """Force beside symmetric friction, dry of limit `dry` and `viscous`, at speed `v` of the node; `r` takes its
+    rotation to B_a's."""
+    held = max(dry, 0.0)
+    limit = held + viscous * abs(v)
+    return -min(max(p.a * held + r * r * p.B_a * abs(v), -limit), limit)
 
 
 ASYMMETRY = Term(
@@ -55,7 +57,7 @@ ASYMMETRY = Term(
     source="Armstrong-Helouvry 1994; EMPS, Janot, Gautier & Brunot 2019",
     settings=AsymmetrySettings,
     build=build_asymmetry,
-    act={"force": "{m}.f[{i}] += friction_direction.asymmetry({p}, {m}.vm[{i}], {m}.dry[{i}], {r})"},
+    act={"force": "{m}.f[{i}] += friction_direction.asymmetry({p}, {m}.vm[{i}], {m}.dry[{i}], {r}, {m}.viscous[{i}])"},
     stands=(stand("body", "dry"),),
     look_alikes={
         "drive.offset": "at two places or loads of different friction: asymmetry grows with it, an offset stays",
@@ -75,7 +77,7 @@ ASYMMETRY = Term(
     check=(
         "Pull slowly with a spring balance in one direction and then in the other; look at wipers, and at the level."
     ),
-    needs=Needs(dry=True, both_ways=True),
+    needs=Needs(friction=True, both_ways=True),
     search=(Size("a", "one", 0.2, signed=True, least=-4.9, most=4.9), Size("B_a", "drag", 0.05, signed=True)),
     static=True,
     draws={"a": Draw(0.1, 0.3, signed=True), "B_a": Draw(0.0, 0.0)},

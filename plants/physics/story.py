@@ -34,6 +34,7 @@ class Needs(NamedTuple):
     alone: str = ""  # what a lone sensor shows it by all the same: it "slides" alone, or is an "unsigned" speed
     stiffness: bool = False  # a spring at its node
     dry: bool = False  # dry friction at its node, which it alters
+    friction: bool = False  # dry or viscous friction there, the same
     both_ways: bool = False  # motion of its node in both directions, between which it differs
 
 

@@ -13,7 +13,7 @@ from rtctl.idiom import Settings
 from rtctl.plants.element import Element
 from rtctl.plants.physics import TERMS, Term, nodes, standing
 
-SLIGHT = 0.01  # of the force that moves a node: dry friction that nothing else could be told by
+SLIGHT = 0.01  # of the force that moves a node: friction that nothing else could be told by
 ONE_SIGN = 0.02  # of the largest reading: the least that counts as the other sign
 ABOUT = {  # kinds of element that a problem tells of: positions of no force, a measured force of no command
     "kinematic": ("joint", "sensor"),
@@ -40,7 +40,9 @@ def hypotheses(
             if element.kind not in ABOUT.get(sim.case.problem, (element.kind,)):
                 continue
             slides, unsigned = "slides" in element.traits, "speed" in element.traits and never_negative(sim, node)
-            rubs = measures.dry(node) > SLIGHT * measures.of("force", node) or node in dry_too
+            slight = SLIGHT * measures.of("force", node)
+            rubs = measures.dry(node) > slight or node in dry_too
+            drags = measures.thick(node) * measures.scale(node).speed > slight
             if (
                 stand.again
                 or not stand.offered
@@ -50,6 +52,7 @@ def hypotheses(
                 or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
                 or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, unsigned))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
+                or (term.needs.friction and not (rubs or drags))
                 or (term.needs.both_ways and not measures.both_ways(node))
                 or called_otherwise(sim, term, element, measures.scale(node).span)
             ):

@@ -69,10 +69,12 @@ def asymmetry(s: Setup, node: str, size: float, rng: np.random.Generator) -> Siz
     """Friction that differs by direction: dry, viscous or both."""
     i = s.body(node)
     kind, F = form(rng, 3), 0.8 * level(s, node)
+    by_speed = float(s.m["b_B"][i]) * speed(s, node)
     dry = min(about(rng, F / max(float(s.m["b_F"][i]), 1e-12)), 0.9) * size * sign(rng) if kind != 1 else 0.0
-    B = about(rng, F / speed(s, node)) * size * sign(rng) if kind != 0 else 0.0
-    if kind == 0 and abs(dry) * float(s.m["b_F"][i]) < 0.2 * F * size:
-        raise UnfitError("too little dry friction for an asymmetry of it")
+    share = min(about(rng, F / max(by_speed, 1e-12)), 0.9) * size * sign(rng) if kind != 0 else 0.0  # it never pushes
+    if abs(dry) * float(s.m["b_F"][i]) + abs(share) * by_speed < 0.2 * F * size:
+        raise UnfitError("too little friction for an asymmetry of it")
+    B = share * float(s.m["b_B"][i])
     s.m["b_as"][i], s.m["b_Bas"][i] = dry, B
     return {"asymmetry": dry, "viscous_asymmetry": B}
 

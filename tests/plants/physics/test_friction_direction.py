@@ -7,9 +7,9 @@ import pytest
 F_C, K, M = 20.4, 35.15, 95.1
 
 
-def run(inputs: np.ndarray, substeps: int = 4, **changes: float) -> bench.Run:
+def run(inputs: np.ndarray, substeps: int = 4, F_v: float = 0.0, **changes: float) -> bench.Run:
     term = bench.usual("friction.asymmetry", "axis", **{"a": 0.3, "B_a": 0.0, **changes})
-    return bench.run("axis", [term], inputs, substeps=substeps, F_v=0.0)
+    return bench.run("axis", [term], inputs, substeps=substeps, F_v=F_v)
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -42,6 +42,13 @@ def test_below_nothing_there_is_nothing():
     r = run(np.full(4000, -3.0), a=0.0, B_a=1e3)  # would make friction negative beyond 2 cm/s
     rate = np.diff(r.v[-100:, 0]) / 1e-3
     assert rate == pytest.approx(-3.0 * K / M, rel=1e-9)
+
+
+def test_viscous_friction_is_taken_away_as_far_as_it_goes():
+    """Backwards an axis with 200 Ns/m and as much of it by direction has dry friction alone."""
+    r = run(np.full(2000, -3.0), F_v=200.0, a=0.0, B_a=200.0)
+    rate = np.diff(r.v[-100:, 0]) / 1e-3
+    assert rate == pytest.approx(-(3.0 * K - F_C) / M, rel=1e-3)
 
 
 def test_a_reversal_is_as_exact_as_with_friction_of_one_size():
