@@ -88,10 +88,12 @@ def under(like: Likelihood, space: Space, progress: Progress, before: Sequence[F
     for _ in range(EXCHANGES):
         best = standing(base, known, merit)[0]
         progress(f"exchanging each of {', '.join(best.names)}")
-        for index, rest in enumerate(_smaller(like, best, known) if len(best.names) > 1 else [base] * len(best.names)):
+        alone = len(best.names) == 1  # beside the base all others have been asked for
+        for index, rest in enumerate([base] if alone else _smaller(like, best, known)):
             known.setdefault(key(rest.names), rest)
             alike = TERMS[best.space.hypotheses[index].term].look_alikes
-            for f in extended(like, [rest], known, OTHERS, merit, looked if rest is base else None, alike):
+            others = extended(like, [rest], known, 0 if alone else OTHERS, merit, looked if alone else None, alike)
+            for f in others:
                 if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
                     known |= {key(g.names): g for g in _smaller(like, f, known)}
         if standing(base, known, merit)[0] is best:
