@@ -8,16 +8,16 @@ FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to 
 RESTLESS = 1.2  # times what differs from block to block, the same
 
 
-def quiet(f: Fitted) -> tuple[np.ndarray, np.ndarray]:
-    """Noise (sensors,) of counting, and of what differs from one block to the next without a pattern, SI."""
+def floor(f: Fitted) -> np.ndarray:
+    """Rms (sensors,), SI, at which nothing is left to explain: by what counting leaves, and what differs from one block
+    to the next without a pattern."""
     restless = np.std(np.diff(f.e, axis=0), axis=0) / np.sqrt(2.0)
-    return f.like.least * np.sqrt(f.like.mean), restless
+    return np.asarray(np.maximum(FLOOR * (f.like.least * np.sqrt(f.like.mean)), RESTLESS * restless))
 
 
 def silent(f: Fitted) -> bool:
     """Whether a model leaves no more than noise in any sensor."""
-    level, restless = quiet(f)
-    return bool((np.sqrt(np.mean(f.e**2, axis=0)) <= np.maximum(FLOOR * level, RESTLESS * restless)).all())
+    return bool((np.sqrt(np.mean(f.e**2, axis=0)) <= floor(f)).all())
 
 
 def explained(base: Fitted, best: Fitted) -> float:
@@ -26,8 +26,7 @@ def explained(base: Fitted, best: Fitted) -> float:
     Noise is what counting leaves, and what differs from one block to the next without a pattern. The sensor in which
     most is missing counts.
     """
-    level, restless = quiet(best)
-    least = np.maximum(FLOOR * level, RESTLESS * restless)
+    least = floor(best)
     before = np.sqrt(np.mean(base.e**2, axis=0))
     after = np.sqrt(np.mean(best.e**2, axis=0))
     c = int(np.argmax(before / least))

@@ -15,9 +15,6 @@ from rtctl.own.term import sizes
 from rtctl.plants.physics import TERMS, Element, Term, having
 from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Rest, Shape, Size, Turn, Where
 
-ONCE = (
-    1.0  # times a turn: what comes no more often is no cogging of a shaft that may be out of balance, which has teeth
-)
 TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
 
 
@@ -89,7 +86,7 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             low, high = part.lengths
             found = [value for value in found if low < value < high]
         if part.kind == "order" and node in having(m.record.plant, "body", "rotor"):
-            found = [value for value in found if value > ONCE]
+            found = [value for value in found if value > 1.0]  # once a turn a rotor is out of balance; teeth are more
         for value in found:
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}

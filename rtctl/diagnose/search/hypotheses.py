@@ -40,21 +40,21 @@ def hypotheses(
             if element.kind not in ABOUT.get(sim.case.problem, (element.kind,)):
                 continue
             slides, unsigned = "slides" in element.traits, "speed" in element.traits and never_negative(sim, node)
-            slight = SLIGHT * measures.of("force", node)
+            moved, slight = measures.scale(node), SLIGHT * measures.of("force", node)
             rubs = measures.dry(node) > slight or node in dry_too
-            drags = measures.thick(node) * measures.scale(node).speed > slight
+            drags = measures.thick(node) * moved.speed > slight
             if (
                 stand.again
                 or not stand.offered
                 or not term.in_format(sim.case.format)
                 or (sim.case.plant and node not in nodes(term, sim.case.plant))
                 or ("contact" in element.traits and "contact" not in stand.needs)
-                or ("turns" in element.traits and measures.scale(node).span < 2 * np.pi * term.needs.turns)
+                or ("turns" in element.traits and moved.span < 2 * np.pi * term.needs.turns)
                 or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, unsigned))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
                 or (term.needs.friction and not (rubs or drags))
                 or (term.needs.both_ways and not measures.both_ways(node))
-                or called_otherwise(sim, term, element, measures.scale(node).span)
+                or called_otherwise(sim, term, element, moved.span)
             ):
                 continue
             for parts in stand.ways or ((term.sliding if slides else ()) or parts_of(name),):
