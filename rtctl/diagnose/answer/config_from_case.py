@@ -13,10 +13,10 @@ from rtctl.config.load import load_settings
 from rtctl.config.yaml_file import find
 from rtctl.diagnose.model.by_symbol import Model
 from rtctl.diagnose.record.format1 import Record
+from rtctl.laws import sections
 from rtctl.machines.exchange import digits
 
 FASTEST = 50e3  # Hz, of our loop
-MOST_SECTIONS = 4
 
 
 def carried(model: Model, record: Record) -> tuple[dict[str, Any], list[str]]:
@@ -50,7 +50,7 @@ def _law(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]
     if isinstance(law, TapeLaw):
         more, left = _with_tape(law)
         return changes | more, left
-    if isinstance(law, SectionsLaw) and len(law.sections) <= MOST_SECTIONS:
+    if isinstance(law, SectionsLaw) and len(law.sections) <= sections.MOST:
         changes["law.position"] = {"kind": "sections", "sections": [_biquad(s) for s in law.sections]}
         return changes, ["the start of the law: ours begins where the machine stands, with its shaper and limits"]
     if isinstance(law, CascadeLaw):

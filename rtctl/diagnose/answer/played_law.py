@@ -10,8 +10,7 @@ from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.owner_law import params
 from rtctl.diagnose.model.recording import GraphRecord, levers
 from rtctl.diagnose.model.stand_in import stand_in_law
-
-MOST_SECTIONS = 4  # of a config's law
+from rtctl.laws import sections
 
 
 def played_law(record: GraphRecord) -> dict[str, Any]:
@@ -37,7 +36,7 @@ def _position(record: GraphRecord, said: GraphLaw) -> dict[str, Any] | None:
     if isinstance(said, CascadeLaw):
         gain, speed = sign * p.pi_velocity.gain, sign * p.pi_velocity.velocity_gain
         return None if min(gain, speed) < 0.0 else {"kind": "pi_velocity", "gain": gain, "velocity_gain": speed}
-    if not sign or p.n_sections > MOST_SECTIONS:
+    if not sign or p.n_sections > sections.MOST:
         return None
     rows = [{name: float(row[name]) for name in ("b0", "b1", "b2", "a1", "a2")} for row in p.sections[: p.n_sections]]
     rows[0] |= {name: sign * rows[0][name] for name in ("b0", "b1", "b2")}
