@@ -65,11 +65,15 @@ class Descent:
         self.prior = weights(space)
         self.r = like.white(self.e)
         self.cost = self._cost(self.r, self.x)
-        self._whiten()
+        self.W, self.A = np.zeros((len(self.r), len(self.x))), np.zeros((len(self.x), len(self.x)))
+        self._whiten(range(len(self.x)))
 
-    def _whiten(self) -> None:
-        self.W = self.like.white(self.J)
-        self.A = self.W.T @ self.W
+    def _whiten(self, columns: Sequence[int]) -> None:
+        """Innovations of the derivatives in some columns, and the products of all with them."""
+        at = list(columns)
+        self.W[:, at] = self.like.white(self.J[..., at])
+        self.A[:, at] = self.W.T @ self.W[:, at]
+        self.A[at] = self.A[:, at].T
 
     def _cost(self, r: np.ndarray, x: np.ndarray) -> float:
         return 0.5 * float(r @ r) + 0.5 * float((self.prior * trust(r)) @ x**2)
@@ -77,7 +81,7 @@ class Descent:
     def renew(self, columns: Sequence[int]) -> None:
         """Take the derivatives in some columns anew."""
         derivatives(self.like, self.space, self.x, columns, self.J)
-        self._whiten()
+        self._whiten(columns)
 
     def effects(self) -> list[int]:
         """Columns of the effects."""

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import nnls
-from scipy.signal import lfilter
 
 SPAN = 3  # innovations before and after, of each earlier sensor, that foretell one of a later sensor
 ROWS = 20  # innovations for each coefficient, without which nothing is foretold
@@ -41,7 +41,7 @@ class Noise(NamedTuple):
         """What the past does not foretell (n - p, ...) of residuals (n, ...), in their unit."""
         if e.size == 0:  # of no fitted parameter
             return np.zeros((max(len(e) - self.order, 0), *e.shape[1:]))
-        return np.asarray(lfilter(self.a, [1.0], e, axis=0)[self.order :])
+        return filtered(self.a, e)
 
     def scaled(self, rest: np.ndarray) -> np.ndarray:
         """Innovations (n - p, ...) by their standard deviation."""
@@ -59,7 +59,7 @@ def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
     r = np.array([e[lag:] @ e[: n - lag] for lag in range(order + 1)]) / n
     r[0] = r[0] * (1.0 + 1e-9) + 1e-300
     a = np.concatenate([[1.0], -solve_toeplitz(r[:-1], r[1:])]) if order else np.ones(1)
-    innovation = lfilter(a, [1.0], e)[order:]
+    innovation = filtered(a, e)
     return Noise(a, max(float(np.sqrt(np.mean(innovation**2))), least))
 
 
@@ -135,14 +135,36 @@ def whitened(noises: Sequence[Noise], e: np.ndarray, present: Sequence[np.ndarra
         grids.append(gridded(rest, at, len(e)) if needed else None)
         for grid, told in zip(grids, noise.beside, strict=False):
             if grid is not None and told.any():
-                rest = rest - np.tensordot(neighbours(grid, at), told, axes=(1, 0))
+                rest = rest - filtered(told[::-1], grid)[at]
         out.append(noise.scaled(rest))
     return out
 
 
+def filtered(a: np.ndarray, e: np.ndarray) -> np.ndarray:
+    """Sum over k of a[k] e[p - k + i] for each i (n - p, ...), of a (p + 1,) and e (n, ...), in the precision of e.
+
+    Blocks of p rows are one product of matrices each, which is several times as fast as a sum for each column.
+    """
+    p, n = len(a) - 1, max(len(e) - len(a) + 1, 0)
+    rows = np.ascontiguousarray(e).reshape(len(e), -1)
+    block = max(p, 1)
+    taps = np.zeros((block, block + p), rows.dtype)
+    for i in range(block):
+        taps[i, i : i + p + 1] = a[::-1]
+    out = np.empty((n, rows.shape[1]), rows.dtype)
+    whole = n // block
+    step, own = rows.strides
+    windows = as_strided(rows, (whole, block + p, rows.shape[1]), (block * step, step, own), writeable=False)
+    np.matmul(taps, windows, out=out[: whole * block].reshape(whole, block, rows.shape[1]))
+    rest = n - whole * block
+    if rest:
+        out[whole * block :] = taps[:rest, : rest + p] @ rows[whole * block :]
+    return out.reshape(n, *e.shape[1:])
+
+
 def gridded(rest: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
     """Innovations (n + 2 SPAN, ...) on all rows, 0 where there is none and beyond both ends."""
-    out = np.zeros((n + 2 * SPAN, *rest.shape[1:]))
+    out = np.zeros((n + 2 * SPAN, *rest.shape[1:]), rest.dtype)
     out[at + SPAN] = rest
     return out
 

@@ -1,7 +1,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from rtctl.diagnose.likelihood.noise import Noise, levels, noise_of, noises_of, whitened
+from rtctl.diagnose.likelihood.noise import Noise, filtered, levels, noise_of, noises_of, whitened
 
 A = np.array([1.0, -1.5, 0.7])  # of a known process
 ALL = np.arange(20_000)
@@ -31,6 +31,16 @@ def test_a_constant_is_no_noise():
 
 def test_order_of_a_short_residual():
     assert noise_of(np.random.default_rng(3).standard_normal(100), 20, 1e-9).order == 5
+
+
+def test_a_filter_is_the_sum_that_it_says():
+    rng = np.random.default_rng(5)
+    for taps, rows in ((1, 7), (3, 3), (4, 50), (21, 1000), (4, 6)):
+        a, e = rng.standard_normal(taps), rng.standard_normal((rows, 2, 3))
+        expected = [[np.convolve(e[:, i, j], a, "valid") for j in range(3)] for i in range(2)]
+        np.testing.assert_allclose(filtered(a, e), np.moveaxis(np.array(expected), 2, 0), atol=1e-12)
+        assert filtered(a, e.astype(np.float32)).dtype == np.float32
+    assert filtered(np.ones(4), np.ones((2, 3))).shape == (0, 3)
 
 
 def test_many_residuals_at_once():
