@@ -4,7 +4,7 @@ The tape lies on the capstan of the IVU, where the difference of the two tension
 shaft of the LDU rolls on the transmission wheel, and the capstan on the strip. What has slid is an offset in the
 elongation of the links beside it:
 
-    slip    |T - c d - k d'| <= F_max,  d' against it              T - c d - k d' = +-F_max while it slides
+    slip    |T - c d - k d'| <= F_max,  d' against it              T - c d - k d' = +-F_max + eta d' while it slides
     creep   d' = (kappa |v| + rate) (T - c d - k d')               the thesis's chapters 11.2 and 12.5
 
 with T the pull of the linear model, c and k of the links that share the contact and v the speed of the surface, of the
@@ -16,7 +16,8 @@ h. Force times d' is never negative: sliding only takes energy.
 The contact of capstan and strip is rigid in the LDU's model: there the carriage, which the scale sees, falls behind
 R_c theta_c by what has slid. Slip keeps the momentum: the carriage gets F_max while the capstan runs ahead of it.
 
-Source: thesis 11.2 and 12.5; Kalker, Three-dimensional elastic bodies in rolling contact (1990), ch. 1; Shelton,
+Source: thesis 11.2 and 12.5; Perzyna, Fundamental problems in viscoplasticity (1966), for sliding that is the faster
+the more force is beyond the limit; Kalker, Three-dimensional elastic bodies in rolling contact (1990), ch. 1; Shelton,
 Dynamics of web tension control, for tape on a roller.
 """
 
@@ -42,6 +43,9 @@ class SlipSettings(Settings):
     term: Literal["transmission.slip"] = "transmission.slip"
     node: Node
     F_max: float = quantity(unit="", gt=0, le=1e6, help="what the contact carries, N (Nm of the motor at a wheel)")
+    eta: float = quantity(
+        0.0, unit="", ge=0, le=1e9, help="force beyond F_max by which it slides faster by 1 m/s (1 rad/s at a wheel)"
+    )
     R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip slips")
 
 
@@ -62,6 +66,7 @@ class CreepSettings(Settings):
 class SlipParams(NamedTuple):
     h: float
     F_max: float
+    eta: float
     R_c: float
     strip: int
 
@@ -79,7 +84,7 @@ CONTACT_STATE = state(d=float, fallen=float, rate=float)  # offset in the links;
 
 def build_slip(settings: SlipSettings, h: float) -> SlipParams:
     """The substep comes in; the exponential depends on the links, which may change."""
-    return SlipParams(h, settings.F_max, settings.R_c, int(settings.node == STRIP))
+    return SlipParams(h, settings.F_max, settings.eta, settings.R_c, int(settings.node == STRIP))
 
 
 def build_creep(settings: CreepSettings, h: float) -> CreepParams:
@@ -88,14 +93,15 @@ def build_creep(settings: CreepSettings, h: float) -> CreepParams:
 
 
 @tick
-def slide(s, F_max, T, c, k, h):
-    """Slide where `T` less what has slid exceeds the limit; the change of the contact force, 0 or against T."""
+def slide(s, F_max, eta, T, c, k, h):
+    """Slide where `T` less what has slid exceeds the limit; the mean change of the contact force, 0 or against T."""
     held = T - c * s.d
     if abs(held) <= F_max:
         return -c * s.d
-    end = (T - math.copysign(F_max, held)) / c
-    s.d = end + (s.d - end) * (math.exp(-h * c / k) if k > 0.0 else 0.0)
-    return math.copysign(F_max, held) - T
+    limit = math.copysign(F_max, held)
+    end, before = (T - limit) / c, s.d
+    s.d = end + (before - end) * (math.exp(-h * c / (k + eta)) if k + eta > 0.0 else 0.0)
+    return limit + eta * (s.d - before) / h - T
 
 
 @tick
@@ -122,7 +128,7 @@ def slip_tape(p, s, m):
     """Slip of the tape on the capstan of the IVU."""
     T = linear.tension(m, 1) - linear.tension(m, 0)
     before = s.d
-    change = slide(s, p.F_max, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h)
+    change = slide(s, p.F_max, p.eta, T, m.link_c[0] + m.link_c[1], m.link_k[0] + m.link_k[1], p.h)
     share(m, s.d, (s.d - before) / p.h, change)
 
 
@@ -141,7 +147,7 @@ def slip_joint(p, s, m, j):
     """Slip in link `j`."""
     T = undone(m, j)
     before = s.d
-    change = slide(s, p.F_max, T, m.link_c[j], m.link_k[j], p.h)
+    change = slide(s, p.F_max, p.eta, T, m.link_c[j], m.link_k[j], p.h)
     linear.slid(m, j, s.d, (s.d - before) / p.h, change)
 
 
@@ -163,7 +169,8 @@ def strip_force(p, m):
 @tick
 def fall_behind(p, s, gain, force):
     """Slip behind a rigid contact that carries F_max at most; a newton gives what is moved the speed `gain`."""
-    free = s.rate + gain * force
+    gain /= 1.0 + gain * p.eta
+    free = s.rate + gain * (force - p.eta * s.rate)
     rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
     if abs(rate) < 1e-12 * abs(free):  # rounding of a stop
         rate = 0.0
@@ -175,7 +182,7 @@ def fall_behind(p, s, gain, force):
 def slip_wheel(p, s, m, i, j):
     """Slip in link `j` of the LDU, or of node `i`, its capstan, on the strip."""
     if p.strip == 0:
-        linear.pull(m, j, slide(s, p.F_max, undone(m, j), m.link_c[j], m.link_k[j], p.h))
+        linear.pull(m, j, slide(s, p.F_max, p.eta, undone(m, j), m.link_c[j], m.link_k[j], p.h))
         return
     gain = p.h * m.G[m.nq + i, m.nu + i] * p.R_c * p.R_c  # speed that a newton gives the carriage
     fall_behind(p, s, gain, strip_force(p, m))
@@ -219,7 +226,7 @@ def slip(p, s, m, i, r, j, k):
     if k >= 0:
         T = linear.side(m, j, i) * linear.tension(m, j) + linear.side(m, k, i) * linear.tension(m, k)
         before = s.d
-        change = slide(s, p.F_max, T, m.link_c[j] + m.link_c[k], m.link_k[j] + m.link_k[k], p.h)
+        change = slide(s, p.F_max, p.eta, T, m.link_c[j] + m.link_c[k], m.link_k[j] + m.link_k[k], p.h)
         share_spans(m, i, j, k, s.d, (s.d - before) / p.h, change)
     elif j >= 0:
         slip_joint(p, s, m, j)
@@ -254,7 +261,7 @@ def behind(s, m, c):
 SLIP = Term(
     name="transmission.slip",
     words="slip: pushed too hard, the contact slides and what was gained is lost for good",
-    equation="|F| <= F_max; beyond it the contact slides",
+    equation="|F| <= F_max; beyond it the contact slides, at (|F| - F_max) / eta",
     source="thesis 11.2 and 12.5",
     settings=SlipSettings,
     build=build_slip,
@@ -289,8 +296,9 @@ SLIP = Term(
         "Mark both sides of the contact and see whether the marks part in hard acceleration; look at "
         "its pressure, oil and wear."
     ),
-    units={"F_max": "force"},
+    units={"F_max": "force", "eta": "drag"},
     search=(Limit("F_max", "grip"),),
+    richer=(Size("eta", "stiffness", 0.01),),
     contact=True,
     stiff=True,
     slips=True,

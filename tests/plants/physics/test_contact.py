@@ -26,9 +26,19 @@ def test_slip_holds_the_force_at_its_limit_and_takes_energy(pulls, F_max, c, k):
     s = state()
     for T in pulls:
         before = s.d
-        F = T + contact.slide(s, F_max, T, c, k, 1e-3)
+        F = T + contact.slide(s, F_max, 0.0, T, c, k, 1e-3)
         assert abs(F) <= F_max * (1 + 1e-9) + 1e-9
         assert F * (s.d - before) >= -1e-12
+
+
+@settings(deadline=None)
+@given(st.floats(0.1, 5), st.floats(0.1, 20), st.floats(10, 1e3), st.floats(0.0, 1.0), st.floats(0.01, 1.0))
+def test_the_faster_it_slides_the_more_force_is_beyond_the_limit(F_max, eta, c, k, v):
+    s, h = state(), 1e-3
+    for i in range(round(10 * (F_max / (c * v) + (k + eta) / c) / h) + 10):  # both ends part at a steady speed
+        T = c * v * (i + 0.5) * h + k * v
+        F = T + contact.slide(s, F_max, eta, T, c, k, h)
+    assert pytest.approx(F_max + eta * v, rel=0.02) == F
 
 
 @settings(deadline=None)
