@@ -106,6 +106,21 @@ def encoder(p, y):
     return y + harmonics(p.n * y, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3) - p.zero
 
 
+@tick
+def shown(p, y, q, speed):
+    """What a sensor of position shows for a true reading of `y` rad or m, and, where `speed` is 1, one of speed for `y`
+    rad/s or m/s at the place `q`: the rate of what a position would show."""
+    if speed == 0:
+        return encoder(p, y)
+    x = p.n * q
+    return y * (
+        1.0
+        + p.n * p.A * math.cos(x + p.phi)
+        + 2.0 * p.n * p.A2 * math.cos(2.0 * x + p.phi2)
+        + 3.0 * p.n * p.A3 * math.cos(3.0 * x + p.phi3)
+    )
+
+
 COGGING = Term(
     name="ripple.cogging",
     words="a notchy motor: turned slowly by hand it catches at even angles",
@@ -151,11 +166,15 @@ ENCODER = Term(
     source="thesis (11.5), (11.7)",
     settings=EncoderSettings,
     build=build_encoder,
-    act={"reading": "{m}.y[{c}] = ripple.encoder({p}, {m}.y[{c}])"},
+    act={
+        "reading": "{m}.y[{c}] = ripple.encoder({p}, {m}.y[{c}])",
+        "reading:described": "{m}.y[{c}] = ripple.shown({p}, {m}.y[{c}], {r} * {m}.x[{i}], {m}.y_speed[{c}])",
+    },
     stands=(
         stand("sensor", "position turns slides", usual=False),
         stand("sensor", "general position turns", ways=((DISC,), (DISC, Hint("order", "order")))),
         stand("sensor", "position turns"),
+        stand("sensor", "general speed turns", ways=((DISC,), (DISC, Hint("order", "order")))),
         stand("sensor", "general position slides", usual=False),
     ),
     look_alikes={

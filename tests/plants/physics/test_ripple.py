@@ -80,3 +80,13 @@ def test_an_encoder_error_leaves_the_machine_alone(kind, channel):
     assert np.array_equal(one.x, two.x)
     changed = np.abs(two.y - one.y).max(axis=0) > 0
     assert changed[channel] and changed.sum() == 1
+
+
+def test_a_sensor_of_speed_shows_the_rate_of_what_a_position_would_show():
+    p = ripple.build_encoder(
+        ripple.EncoderSettings(node="tacho", A=0.01, phi=0.3, order=2.0, A2=0.004, phi2=1.0, A3=0.002, phi3=2.0), 1e-3
+    )
+    v, dt = 3.0, 1e-6
+    for q in np.linspace(-4.0, 4.0, 9):
+        rate = (ripple.shown(p, q + 0.5 * v * dt, 0.0, 0) - ripple.shown(p, q - 0.5 * v * dt, 0.0, 0)) / dt
+        assert ripple.shown(p, v, q, 1) == pytest.approx(rate, rel=1e-6)
