@@ -20,8 +20,9 @@ ORDERS = np.arange(1.0, 61.0)  # whole: what a disc or a shaft adds is the same 
 SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
 
 
-def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray) -> np.ndarray:
-    """Share of the variance of `signal` that a sinusoid of each order in `angle` explains, slow drift taken out."""
+def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray, by: np.ndarray | float = 1.0) -> np.ndarray:
+    """Share of the variance of `signal` that a sinusoid of each order in `angle` explains, slow drift taken out; `by`
+    is what its amplitude goes with."""
     if len(signal) < FEWEST:
         return np.zeros(len(orders))
     z = np.linspace(-1, 1, len(signal))
@@ -34,14 +35,21 @@ def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray) -> np.nd
     for k, order in enumerate(orders):
         if order * span < np.pi:  # less than half a period
             continue
-        A = np.stack([np.cos(order * angle), np.sin(order * angle)], axis=1)
+        A = np.stack([by * np.cos(order * angle), by * np.sin(order * angle)], axis=1)
         A -= drift @ (drift.T @ A)
         b = A.T @ rest
         out[k] = float(b @ np.linalg.lstsq(A.T @ A, b, rcond=None)[0]) / total
     return out
 
 
-def seen(angle: np.ndarray, signal: np.ndarray, rate: np.ndarray, orders: np.ndarray, quick: float) -> np.ndarray:
+def seen(
+    angle: np.ndarray,
+    signal: np.ndarray,
+    rate: np.ndarray,
+    orders: np.ndarray,
+    quick: float,
+    by: np.ndarray | None = None,
+) -> np.ndarray:
     """As `spectrum`, each order where it passes slower than `quick` rad/s, so that the signal can show it; `rate` is
     that of the angle. By the number of rows that are left."""
     out = np.zeros(len(orders))
@@ -49,7 +57,8 @@ def seen(angle: np.ndarray, signal: np.ndarray, rate: np.ndarray, orders: np.nda
     for count in np.unique(rows):  # the rows of a higher order are among those of a lower one: as many are the same
         same = np.flatnonzero(rows == count)
         slow = rate * orders[same[0]] < quick
-        out[same] = spectrum(angle[slow], signal[slow], orders[same]) * count
+        own = 1.0 if by is None else by[slow]
+        out[same] = spectrum(angle[slow], signal[slow], orders[same], own) * count
     return out
 
 

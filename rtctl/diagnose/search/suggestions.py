@@ -68,11 +68,20 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
             waves = waves_of(x * ratio)
             found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
             found[f"order:{node}"] = []
+    for name, column in sim.layout.drives.items():  # its gain may repeat with the angle of what it drives
+        node = str(sim.case.machine.drives[name].body)
+        ratio, number = sim.ratios.get(node, 0.0), sim.leader(node)
+        if ratio != 0.0 and sim.case.machine.turns(node):
+            x, command = ways[number] * ratio, sim.volts[begin:, column][::thin]
+            height = seen(x, push[:, number], rates[number] * abs(ratio), ORDERS, quick, command)
+            found[f"order:{name}"] = orders_of(float(np.ptp(x)), height, MOST)
     errors: dict[str, np.ndarray] = {}  # of the sensors that the model does not follow
     for name in sim.channels:
         if name not in sim.case.machine.sensors:
             continue
         sensor = sim.case.machine.sensors[name]
+        if sensor.measures == "speed":
+            found[f"order:{name}"] = found.get(f"order:{sensor.body}", [])
         ratio = sim.ratios.get(str(sensor.body), 0.0) if sensor.measures == "position" else 0.0
         if ratio == 0.0:
             continue
