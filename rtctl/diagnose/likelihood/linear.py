@@ -11,6 +11,8 @@ import numpy as np
 from rtctl.diagnose.likelihood.fits import Fitted, prior
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.solver import bounded_step
+from rtctl.diagnose.model.space import Hypothesis
+from rtctl.plants.physics import TERMS
 
 DAMPING = 1e-9  # of a bounded step, relative
 
@@ -21,8 +23,21 @@ class Linear:
     def __init__(self, base: Fitted):
         self.base, self.like = base, base.like
         self.start, self.coarse = base.like.rough(base.model)  # residuals that differences are taken from
+        self._starts: dict[tuple[bool, bool], np.ndarray] = {(False, False): self.start}
         self.raw = np.asarray(base.J, float)
         self.weight = prior(base.space)
+
+    def start_of(self, h: Hypothesis) -> np.ndarray:
+        """Residuals that differences by a hypothesis are taken from: of the base, in the steps that its term asks for.
+
+        In other steps a difference would be that of the steps as well, whatever the effect does.
+        """
+        term = TERMS[h.term]
+        steps = (term.stiff, term.slips) if h.sizes else (False, False)
+        if steps not in self._starts:
+            none = self.base.space.add(h).model(np.concatenate([self.base.x, h.start()]))
+            self._starts[steps] = self.base.like.raw(none, self.coarse)
+        return self._starts[steps]
 
     def under(self, like: Likelihood) -> "Linear":
         """The same under another noise."""

@@ -22,6 +22,8 @@ TOO_FAR = 3.0  # times the residual: a step that changes more says little about 
 RIDGE = 1e-6
 ASKED = 40  # hypotheses that take off most, of which the gain under a noise of their own is asked
 FACTORS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of the size that a secant promises
+IDLE = 0.01  # of the least noise: a start that changes less says nothing, and no fit moves from there
+SAME = 0.2  # of a size: two noises that promise it alike give one start
 
 
 class Score(NamedTuple):
@@ -52,24 +54,34 @@ class Screened(NamedTuple):
         h, base = score.hypothesis, self.about[0].base
         space = base.space.add(h)
         sizes = np.array([c.kind in (SIZE, INVERSE) for c in h.coordinates], bool)
-        xs = [np.where(sizes, k * x, x) for x in score.x for k in (FACTORS if sizes.any() else (1.0,))]
+        first, *rest = score.x
+        told = [first, *(x for x in rest if not np.allclose(x, first, rtol=SAME, atol=SAME))]
+        xs = [np.where(sizes, k * x, x) for x in told for k in (FACTORS if sizes.any() else (1.0,))]
+        limits = np.array([c.kind == INVERSE for c in h.coordinates], bool)
+        if limits.any():  # a secant says of a limit far beyond all forces that it is none; the recording suggests one
+            xs.append(np.where(limits, 1.0, h.start()))
         low, high = space.bounds()
-        n = len(base.x)
+        n, begin = len(base.x), self.about[0].start_of(h)
 
         def placed(x: np.ndarray) -> list[tuple[float, np.ndarray]]:
             at = np.clip(np.concatenate([base.x, x]), low, high)
-            e = base.e + base.like.raw(space.model(at), self.about[0].coarse) - self.about[0].start
+            change = base.like.raw(space.model(at), self.about[0].coarse) - begin
+            if not (np.abs(change) > IDLE * base.like.least).any():
+                return []
+            e = base.e + change
             steps = [about.step(e) for about in self.about]
             losses = [base.like.loss(e + np.tensordot(self.about[0].raw, dx, axes=1)) for dx in steps]
             return [(loss, np.concatenate([base.x + dx, at[n:]])) for loss, dx in zip(losses, steps, strict=True)]
 
         found = [pair for pairs in parallel([partial(placed, x) for x in xs]) for pair in pairs]
-        return [x for _, x in sorted(found, key=lambda pair: pair[0])[:most]]
+        return [x for _, x in sorted(found, key=lambda pair: pair[0])[:most]] or [np.concatenate([base.x, score.x[0]])]
 
 
 def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     """Scores of all candidates."""
     own = Linear(base)
+    for h in candidates:
+        own.start_of(h)
     changes = parallel([partial(_change, own, h) for h in candidates])
     about = own.under(floor_noise(own, [change for found in changes for change, _ in found]))
     flat = own.under(base.like.flat(base.e))
@@ -128,6 +140,7 @@ def _change(about: Linear, h: Hypothesis) -> list[tuple[np.ndarray, float]]:
     base = about.base
     like, space = base.like, base.space.add(h)
     own = float(np.linalg.norm(like.white(about.start)))
+    begin = about.start_of(h)
     out = []
     for i in h.sizes or [-1]:
         step = 1.0 if i < 0 or h.coordinates[i].high >= 1.0 else -1.0
@@ -135,7 +148,7 @@ def _change(about: Linear, h: Hypothesis) -> list[tuple[np.ndarray, float]]:
             at = h.start()
             if i >= 0:
                 at[i] += step
-            change = like.raw(space.model(np.concatenate([base.x, at])), about.coarse) - about.start
+            change = like.raw(space.model(np.concatenate([base.x, at])), about.coarse) - begin
             size = float(np.linalg.norm(like.white(change)))
             if size <= TOO_FAR * own or i < 0 or h.coordinates[i].kind == INVERSE:
                 break
