@@ -21,6 +21,7 @@ from rtctl.diagnose.model.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
+MOST = 10  # steps in each
 ENOUGH = 2.0  # nats, that a further round must gain
 LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a recording may say nothing
 MATTERS = 0.5  # nats of the prior that going back must gain
@@ -38,6 +39,7 @@ class Fitted(NamedTuple):
     like: Likelihood  # with its own noise
     loss: float  # negative logarithm of the likelihood, nats
     pushes: tuple[np.ndarray, ...]  # (windows, followed) corrections of the observer in each recording, N or Nm
+    fresh: int = ALL  # which derivatives were taken last where the fit stands still: of its effects, or of all unknowns
 
     @property
     def model(self):
@@ -99,14 +101,18 @@ def refit(
     x: np.ndarray | None = None,
     known: np.ndarray | None = None,
     floor: Likelihood | None = None,
-    rounds: int = 10,
+    rounds: int = MOST,
     relax: bool = True,
+    draft: bool = False,
 ) -> Fitted:
     """The model of `space` from x: by least squares and under the noise `floor`, then under the noise that it left.
 
     Least squares finds large effects, a noise that knows them finds small ones. `known` (blocks, sensors, unknowns) are
     the derivatives in the first columns, as a model with fewer effects has them. Parameters are fitted as if the laws
     were exact: their errors weigh evidence, and would else stand for an effect that the fit left too small.
+
+    A `draft` takes the derivatives of its effects anew where it stands still; those of the parameters, which are most
+    of a fit's work, stay those that are known. It tells how good a model is to a few nats (`finished`).
     """
     like = like.slackened(None)
     low, high = space.bounds()
@@ -118,27 +124,51 @@ def refit(
         J[..., :count] = known
     start = Point(x, e, derivatives(like, space, x, range(count, len(x)), J), EFFECTS if count else ALL)
 
-    def judged(at: Point) -> tuple[float, Point, Likelihood]:
-        own = like.told(at.e)
-        return own.loss(at.e), at, own
-
-    tried = [judged(descend(like.flat(e), space, start, rounds, 1e-2, EFFECTS))]
+    own = _judged(like, descend(like.flat(e), space, start, rounds, 1e-2, EFFECTS))
     if floor is not None:
-        tried.append(judged(descend(floor, space, start, rounds, 1e-2, EFFECTS)))
-    best = min(tried, key=lambda one: one[0])
+        own = min(own, _judged(like, descend(floor, space, start, rounds, 1e-2, EFFECTS)), key=lambda one: one.loss)
+    if count and space.hypotheses:
+        own = _under_own_noise(like, space, own, rounds, EFFECTS)
+        if draft:
+            return weighed(like, space, own.at)._replace(fresh=EFFECTS)
+    model = weighed(like, space, _under_own_noise(like, space, own, rounds, ALL).at)
+    return relaxed(model) if relax else model
+
+
+def finished(f: Fitted) -> Fitted:
+    """A draft fitted to the end: where it stands still under derivatives of all unknowns that were taken there."""
+    if f.fresh == ALL:
+        return f
+    like = f.like.slackened(None)
+    start = _judged(like, Point(f.x, f.e, f.J, EFFECTS))
+    return weighed(like, f.space, _under_own_noise(like, f.space, start, MOST, ALL).at)
+
+
+class Judged(NamedTuple):
+    """A point of a fit under the noise that it leaves."""
+
+    loss: float  # nats
+    at: Point
+    like: Likelihood
+
+
+def _judged(like: Likelihood, at: Point) -> Judged:
+    own = like.told(at.e)
+    return Judged(own.loss(at.e), at, own)
+
+
+def _under_own_noise(like: Likelihood, space: Space, best: Judged, rounds: int, freshest: int) -> Judged:
+    """The fit under the noise that it leaves, and under that again, as long as it gains by it."""
     for _ in range(ROUNDS):
-        found = judged(descend(best[2], space, best[1], rounds, 1e-3))
-        gain = best[0] - found[0]
+        found = _judged(like, descend(best.like, space, best.at, rounds, 1e-3, freshest))
+        gain = best.loss - found.loss
         if gain > 0.0:
             best = found
         else:  # derivatives that were taken later
-            best = best[0], best[1]._replace(J=found[1].J), best[2]
+            best = best._replace(at=best.at._replace(J=found.at.J))
         if gain < ENOUGH:
             break
-    at = best[1]
-    like = like.slackened(errors(like, space, at.x, at.e))
-    model = fitted_at(like.told(at.e), space, at)
-    return relaxed(model) if relax else model
+    return best
 
 
 def relaxed(f: Fitted) -> Fitted:
@@ -162,14 +192,19 @@ def relaxed(f: Fitted) -> Fitted:
         e = f.like.raw(f.space.model(x))
         exact = f.like.slackened(None)
         at = descend(exact.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
-        trial = fitted_at(f.like.told(at.e), f.space, at)
+        trial = weighed(exact, f.space, at)
         if trial.log_evidence > f.log_evidence:
             return trial
     return f
 
 
-def fitted_at(own: Likelihood, space: Space, at: Point) -> Fitted:
-    """A model where its fit came to, under a noise."""
+def weighed(like: Likelihood, space: Space, at: Point) -> Fitted:
+    """The model where its fit came to, under its own noise and the errors of its laws.
+
+    What errors may explain hangs on how loud the noise is: it is that of the model itself, so that models compare.
+    """
+    exact = like.slackened(None).told(at.e)
+    own = exact.slackened(errors(exact, space, at.x, at.e)).told(at.e)
     white = own.white(at.J)
     return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e), pushes(own, space.model(at.x)))
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from rtctl.diagnose.likelihood.fits import Fitted, refit
+from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, relaxed
 from rtctl.diagnose.model.node_scaling import Measures
 from rtctl.diagnose.model.space import INVERSE, SIZE, Hypothesis, Space
+from rtctl.diagnose.search.extend import NEAR
 from rtctl.diagnose.search.grid_starts import starts_of
 from rtctl.diagnose.search.term_variants import forms, is_rich
 from rtctl.plants.physics import TERMS, standing
@@ -20,7 +21,9 @@ def enriched(best: Fitted) -> Fitted:
     for index in range(len(best.space.hypotheses)):
         for other in others(best, index):
             space, x = exchanged(best, index, other)
-            trial = refit(best.like, space, x, best.J[..., : space.nb])
+            trial = refit(best.like, space, x, best.J[..., : space.nb], draft=True)
+            if trial.log_evidence > best.log_evidence - NEAR:
+                trial = finished(trial)
             if trial.log_evidence > best.log_evidence + WORTH:
                 best = trial
     return best
@@ -45,8 +48,10 @@ def restarted(best: Fitted) -> Fitted:
         x = best.x.copy()
         x[:nb] = np.clip(0.15 * width * rng.standard_normal(nb), low[:nb], high[:nb])
         starts.append(x)
-    trials = [refit(best.like, space, x, best.J) for x in starts]
-    return max([best, *trials], key=lambda f: f.log_evidence)
+    trial = max((refit(best.like, space, x, best.J, draft=True) for x in starts), key=lambda f: f.log_evidence)
+    if trial.log_evidence > best.log_evidence - NEAR:
+        trial = relaxed(finished(trial))
+    return max(best, trial, key=lambda f: f.log_evidence)
 
 
 def loudness(f: Fitted) -> float:

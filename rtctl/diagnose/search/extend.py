@@ -5,12 +5,14 @@ promise more.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.likelihood.fits import Fitted, refit, relaxed
+from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, relaxed
 from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.likelihood.solver import parallel
 from rtctl.diagnose.search.hypotheses import hypotheses
 from rtctl.diagnose.search.screen import Score, Screened, screen
 from rtctl.diagnose.search.suggestions import combined
@@ -20,6 +22,7 @@ FIRST = 3
 OTHERS = 3  # nodes of the best terms beside the first
 BEST = 2  # terms that are tried at their other nodes
 LEAST = 6.0  # nats that screening must promise for a refit
+NEAR = 10.0  # nats behind the best, within which a model is a rival
 
 Known = dict[tuple[str, ...], Fitted]  # by the names of the effects in alphabetical order
 Merit = Callable[[Fitted], float]  # logarithm of the posterior of a model
@@ -67,27 +70,48 @@ def extended(
         if worth or promise.term[1] in also:
             top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
 
-    def refitted(these: list[Promise], starts: int) -> Fitted:
-        names = these[0].names
-        if names not in known:
-            fits = [
-                refit(like, one.parent.space.add(one.score.hypothesis), x, one.parent.J, one.looked.floor, relax=False)
-                for one in these[:starts]
-                for x in one.looked.starts(one.score, starts)
-            ]
-            known[names] = max(fits, key=lambda f: f.log_evidence)
-        return known[names]
+    def refitted(wanted: Sequence[tuple[list[Promise], int]]) -> list[tuple[str, ...]]:
+        """Drafts of effects beside models, from so many starts each; their names."""
+        jobs = {these[0].names: partial(_drafted, like, these[:starts], starts) for these, starts in reversed(wanted)}
+        new = [names for names in reversed(jobs) if names not in known]
+        known.update(zip(new, parallel([jobs[names] for names in new]), strict=True))
+        return [these[0].names for these, _ in wanted]
 
-    firsts = {
-        term: refitted(next(iter(nodes.values())), STARTS if rank < FIRST else 1)
-        for rank, (term, nodes) in enumerate(top.items())
-    }
-    out = list(firsts.values())
-    for term in sorted(firsts, key=lambda term: -merit(firsts[term]))[:BEST]:
-        out += [refitted(these, 1) for these in list(top[term].values())[1 : 1 + OTHERS]]
-    for f in sorted(out, key=lambda f: -merit(f))[:FIRST]:
-        known[key(f.names)] = relaxed(f)
-    return list({f.names: f for f in (known[key(f.names)] for f in out)}.values())
+    first = refitted(
+        [(next(iter(nodes.values())), STARTS if rank < FIRST else 1) for rank, nodes in enumerate(top.values())]
+    )
+    settle(known, first, merit)
+    ranked = sorted(zip(top, first, strict=True), key=lambda pair: -merit(known[pair[1]]))[:BEST]
+    others = refitted([(these, 1) for term, _ in ranked for these in list(top[term].values())[1 : 1 + OTHERS]])
+    out = list(dict.fromkeys((*first, *others)))
+    settle(known, out, merit)
+    highest = max((merit(known[names]) for names in out), default=0.0)
+    for names in (names for names in out if merit(known[names]) > highest - NEAR):
+        known[names] = relaxed(known[names])
+    return [known[names] for names in out]
+
+
+def _drafted(like: Likelihood, these: Sequence[Promise], starts: int) -> Fitted:
+    """The best draft of an effect beside a model."""
+    return max(
+        (
+            refit(like, one.parent.space.add(one.score.hypothesis), x, one.parent.J, one.looked.floor, draft=True)
+            for one in these
+            for x in one.looked.starts(one.score, starts)
+        ),
+        key=lambda f: f.log_evidence,
+    )
+
+
+def settle(known: Known, which: Iterable[tuple[str, ...]], merit: Merit) -> None:
+    """Finish the drafts of some models, the best first, until the next is behind by more than that has brought any."""
+    best, most = -np.inf, 0.0
+    for rank, names in enumerate(sorted(which, key=lambda names: -merit(known[names]))):
+        draft = known[names]
+        if rank >= FIRST and merit(draft) < best - most - NEAR:
+            break
+        known[names] = f = finished(draft)
+        best, most = max(best, merit(f)), max(most, merit(f) - merit(draft))
 
 
 def promises(parent: Fitted, looked: Screened, merit: Merit) -> list[Promise]:

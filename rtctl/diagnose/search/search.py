@@ -3,36 +3,33 @@
 Source: beam search over forward steps, with removal and exchange of each effect at the end.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.likelihood.bandwidth import quicker
-from rtctl.diagnose.likelihood.clock import clock, timed
-from rtctl.diagnose.likelihood.fits import Fitted, refit, without
+from rtctl.diagnose.likelihood.bandwidth import STEP, quicker
+from rtctl.diagnose.likelihood.descent import ALL
+from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, without
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.shares import silent
 from rtctl.diagnose.likelihood.widths import faint
 from rtctl.diagnose.model.space import Space
+from rtctl.diagnose.search.begin import Begun, Progress, begun
 from rtctl.diagnose.search.enrich import enriched, restarted
-from rtctl.diagnose.search.extend import Known, Merit, extended, key, screened
-from rtctl.diagnose.search.screen import Score, Screened
-from rtctl.diagnose.search.standing import ENOUGH, adds, merit_of, standing
+from rtctl.diagnose.search.extend import NEAR, Known, Merit, extended, key
+from rtctl.diagnose.search.screen import Score
+from rtctl.diagnose.search.standing import adds, merit_of, standing
 from rtctl.plants.physics import TERMS
 
 MOST = 4  # effects
-REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
-MORE = 1.0  # nats that this must bring
-NAMES = (8, 8, 8, 8)  # terms that are refitted in each step, beside one model or another
+NAMES = (8, 4, 4)  # terms that are refitted as a second, a third and a fourth effect, beside one model or another
 OTHERS = 3  # of them beside what is left in an exchange
-BEAM = 4  # models that are extended
+BEAM = (4, 3, 2)  # models that are extended by a second, a third and a fourth effect
 ALIKE = 0.995  # cosine from which two models do the same
 EXCHANGES = 2
-RIVALS, NEAR = 3, 5.0  # models that are asked for other forms, and nats by which the best may be ahead of them
-
-Progress = Callable[[str], None]
+RIVALS, CLOSE = 3, 5.0  # models that are asked for other forms, and nats by which the best may be ahead of them
 
 
 class Found(NamedTuple):
@@ -55,16 +52,28 @@ class Found(NamedTuple):
 
 
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
-    """Fit the base, then what is missing beside it, under the observer that suits the best model."""
-    found = under(like, space, progress)
+    """Fit the base, then what is missing beside it, under the observer that suits the best model.
+
+    How quick it has to be is asked of the best model with one effect at most. Where the best of all models asks for
+    another, all is searched again.
+    """
+    usual = begun(like, space, progress)
     progress("telling how quickly the observer follows")
-    times = quicker(found.best)
-    return under(like.following(times), space, progress, found.fits[:RIVALS]) if times > 1.0 else found
+    times, before = quicker(usual.order[0]), usual.order[:RIVALS]
+    times = times if times > STEP else 1.0  # a further effect explains that little as often
+    found = under(usual if times == 1.0 else begun(like.following(times), space, progress), progress, before)
+    progress("telling how quickly the observer follows")
+    best = found.best
+    again = quicker(best if times == 1.0 else refit(like, best.space, best.x))
+    if again == times or (min(again, times) > 1.0 and max(again / times, times / again) <= STEP):
+        return found
+    begin = usual if again == 1.0 else begun(like.following(again), space, progress)
+    return under(begin, progress, found.fits[:RIVALS])
 
 
-def under(like: Likelihood, space: Space, progress: Progress, before: Sequence[Fitted] = ()) -> Found:
+def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Found:
     """The same under one observer; the best models under the one `before` are rivals here as well."""
-    base, grown, looked, odds = begun(like, space, progress)
+    base, grown, looked, odds = begin
     like = base.like  # with the times of the ticks
     merit = partial(merit_of, odds=odds)
     known: Known = {key(f.names): f for f in (base, *grown)}
@@ -76,54 +85,49 @@ def under(like: Likelihood, space: Space, progress: Progress, before: Sequence[F
         better = enriched_near(better, known, merit, asked)
         better[0] = known[key(better[0].names)] = restarted(better[0])
         for rest in _smaller(like, better[0], known, faint(better[0])):
-            known.setdefault(key(rest.names), rest)
+            known[key(rest.names)] = rest
         if level == MOST:
             break
-        parents = apart(base, better)[: 1 if silent(better[0]) else BEAM]  # of noise alone no rival explains more
+        most = 1 if silent(better[0]) else BEAM[level - 1]  # of noise alone no rival explains more
+        parents = [finished_in(known, f) for f in apart(base, better, most)]
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
-        grown = extended(like, parents, known, NAMES[level], merit)
+        grown = extended(like, parents, known, NAMES[level - 1], merit)
     for f in (f for f in before if key(f.names) not in known):
         known[key(f.names)] = again = refit(like, f.space, f.x)
         known |= {key(g.names): g for g in _smaller(like, again, known)}
     for _ in range(EXCHANGES):
-        best = standing(base, known, merit)[0]
+        best = leading(base, known, merit)[0]
         progress(f"exchanging each of {', '.join(best.names)}")
         alone = len(best.names) == 1  # beside the base all others have been asked for
         for index, rest in enumerate([base] if alone else _smaller(like, best, known)):
-            known.setdefault(key(rest.names), rest)
+            known[key(rest.names)] = rest
             alike = TERMS[best.space.hypotheses[index].term].look_alikes
             others = extended(like, [rest], known, 0 if alone else OTHERS, merit, looked if alone else None, alike)
             for f in others:
                 if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
                     known |= {key(g.names): g for g in _smaller(like, f, known)}
-        if standing(base, known, merit)[0] is best:
+        if leading(base, known, merit)[0] is best:
             break
     progress("asking for other forms of what was found")
-    enriched_near([f for f in standing(base, known, merit) if f.names], known, merit, asked)
-    return Found(like, base, tuple(looked.scores), tuple(standing(base, known, merit)), odds)
+    enriched_near([f for f in leading(base, known, merit) if f.names], known, merit, asked)
+    return Found(like, base, tuple(looked.scores), tuple(leading(base, known, merit)), odds)
 
 
-def begun(like: Likelihood, space: Space, progress: Progress) -> tuple[Fitted, list[Fitted], Screened, float]:
-    """The base, models with one effect, what screening said of them, and the prior odds of one of them."""
-    progress("fitting the nominal parameters")
-    base = restarted(refit(like, space))
-    told = clock(base, 0.0)
-    if told.gain > 0.0:
-        progress("telling the times of the ticks")
-        held = refit(timed(base, told), space, base.x)
-        if held.log_evidence > base.log_evidence + MORE:
-            like, base = held.like, held
-    for _ in range(REBASED):
-        progress("screening every hypothesis")
-        looked = screened(base)
-        odds = float(np.log(max(len({score.hypothesis.name for score in looked.scores}), 1)))
-        progress("fitting effect 1")
-        grown = extended(like, [base], {(): base}, NAMES[0], partial(merit_of, odds=odds), looked)
-        again = rebased(base, grown)
-        if again is base:
-            break
-        base = again
-    return base, grown, looked, odds
+def leading(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
+    """The models that stand, best first; those near the best are fitted to the end."""
+    while True:
+        order = standing(base, known, merit)
+        drafts = [f for f in order if f.fresh != ALL and merit(f) > merit(order[0]) - NEAR]
+        if not drafts:
+            return order
+        for f in drafts:
+            finished_in(known, f)
+
+
+def finished_in(known: Known, f: Fitted) -> Fitted:
+    """A model that is known, fitted to the end."""
+    known[key(f.names)] = f = finished(f)
+    return f
 
 
 def enriched_near(fits: Sequence[Fitted], known: Known, merit: Merit, asked: set[tuple[str, ...]]) -> list[Fitted]:
@@ -131,18 +135,19 @@ def enriched_near(fits: Sequence[Fitted], known: Known, merit: Merit, asked: set
     its plain form is no rival."""
     order = sorted(fits, key=merit, reverse=True)
     for f in order[:RIVALS]:
-        if merit(f) > merit(order[0]) - NEAR and key(f.names) not in asked:
+        if merit(f) > merit(order[0]) - CLOSE and key(f.names) not in asked:
             known[key(f.names)] = enriched(f)
             asked.add(key(f.names))
     return sorted((known[key(f.names)] for f in order), key=merit, reverse=True)
 
 
-def apart(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The first few models of which each has other terms than those before, and changes the residual in another way."""
+def apart(base: Fitted, fits: Sequence[Fitted], most: int) -> list[Fitted]:
+    """The first models, `most` of them, of which each has other terms than those before, and changes the residual in
+    another way."""
     out: list[Fitted] = []
     for f in fits:
         terms = {h.term for h in f.space.hypotheses}
-        if len(out) < BEAM and all(
+        if len(out) < most and all(
             terms != {h.term for h in g.space.hypotheses} and likeness(base, f, g) < ALIKE for g in out
         ):
             out.append(f)
@@ -161,21 +166,8 @@ def _smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | N
     for index, name in enumerate(f.names if len(f.names) > 1 else ()):
         if which is None or index in which:
             rest = known.get(key(set(f.names) - {name}))
-            out.append(rest if rest is not None else refit(like, *without(f, index)))
+            out.append(finished(rest) if rest is not None else refit(like, *without(f, index)))
     return out
-
-
-def rebased(base: Fitted, grown: Sequence[Fitted]) -> Fitted:
-    """The base from where the best models with one effect have its parameters, if that is better by what counts.
-
-    Where the likelihood has many maxima, an effect may only have shown the way to a better one of the base.
-    """
-    for f in sorted(grown, key=lambda f: f.loss)[:REBASED]:
-        if f.loss < base.loss - ENOUGH:
-            again = refit(base.like, *without(f, 0))
-            if again.log_evidence > base.log_evidence + MORE:
-                base = again
-    return base
 
 
 def _parent(f: Fitted, beam: list[Fitted]) -> Fitted:

@@ -2,11 +2,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from graph_cases import BELT, case_of, command, record
+from graph_cases import BELT, RUB, case_of, command, record
 
-from rtctl.diagnose.likelihood.fits import prior, refit, relaxed
+from rtctl.diagnose.likelihood.descent import ALL, EFFECTS, Point
+from rtctl.diagnose.likelihood.fits import finished, prior, refit, relaxed, weighed
 from rtctl.diagnose.likelihood.joint import together
+from rtctl.diagnose.model.space import SIZE, Coordinate, Hypothesis
 
+DRY = Hypothesis("friction.coulomb", "carriage", (Coordinate("F_C", SIZE, 1.0),))
 FORCES = ("inertia", "mass", "dry", "viscous", "stiffness", "damping", "gain")
 
 
@@ -34,3 +37,30 @@ def test_every_unknown_has_a_prior():
     weight = prior(base().space)
     assert (weight > 0.0).all()
     assert np.isfinite(base().log_evidence)
+
+
+@cache
+def draft():
+    """A draft of dry friction in the recording of a belt axis that has more of it than is described."""
+    like, space = together([record(case_of(BELT), command(0.6), [RUB])])
+    alone = refit(like, space)
+    return alone, refit(like, space.add(DRY), np.append(alone.x, 1.0), alone.J, draft=True)
+
+
+def test_a_draft_that_is_finished_is_as_good_as_a_fit():
+    alone, rough = draft()
+    whole = refit(alone.like, rough.space, np.append(alone.x, 1.0), alone.J, relax=False)
+    done = finished(rough)
+    assert (rough.fresh, done.fresh, whole.fresh) == (EFFECTS, ALL, ALL)
+    assert done.log_evidence == pytest.approx(whole.log_evidence, abs=3.0)
+    assert alone.log_evidence + 100.0 < rough.log_evidence < done.log_evidence + 3.0
+    assert finished(done) is done
+
+
+def test_a_model_is_weighed_under_its_own_noise_wherever_its_fit_began():
+    alone, rough = draft()
+    at = Point(rough.x, rough.e, rough.J)
+    loud = weighed(alone.like, rough.space, at)  # the noise of a model that lacks the effect
+    quiet = weighed(rough.like, rough.space, at)
+    assert loud.loss == pytest.approx(quiet.loss, abs=1e-6)
+    assert loud.log_evidence == pytest.approx(quiet.log_evidence, abs=1e-6)

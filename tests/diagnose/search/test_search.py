@@ -22,4 +22,4 @@ def test_models_that_explain_the_same_are_extended_once():
     found = named().found
     best, base = found.best, found.base
     assert likeness(base, best, best) > ALIKE
-    assert apart(base, [best, best._replace(x=best.x.copy())]) == [best]
+    assert apart(base, [best, best._replace(x=best.x.copy())], 4) == [best]

@@ -1,0 +1,74 @@
+"""Where a search begins: the base, the times of its ticks, and models with one effect.
+
+An effect may only have shown the way to a better maximum of the base: the base is then fitted again from there.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.clock import clock, timed
+from rtctl.diagnose.likelihood.fits import Fitted, refit, without
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.model.space import Space
+from rtctl.diagnose.search.enrich import restarted
+from rtctl.diagnose.search.extend import extended, screened
+from rtctl.diagnose.search.screen import Screened
+from rtctl.diagnose.search.standing import ENOUGH, merit_of
+
+NAMES = 8  # terms that are refitted
+REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
+MORE = 1.0  # nats that this must bring
+
+Progress = Callable[[str], None]
+
+
+class Begun(NamedTuple):
+    """The models with which a search begins."""
+
+    base: Fitted
+    grown: list[Fitted]  # of one effect
+    looked: Screened  # beside the base
+    odds: float
+
+    @property
+    def order(self) -> tuple[Fitted, ...]:
+        """All of them, best first."""
+        return tuple(sorted((self.base, *self.grown), key=partial(merit_of, odds=self.odds), reverse=True))
+
+
+def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
+    """The base, models with one effect, what screening said of them, and the prior odds of one of them."""
+    progress("fitting the nominal parameters")
+    base = restarted(refit(like, space))
+    told = clock(base, 0.0)
+    if told.gain > 0.0:
+        progress("telling the times of the ticks")
+        held = refit(timed(base, told), space, base.x)
+        if held.log_evidence > base.log_evidence + MORE:
+            like, base = held.like, held
+    for _ in range(REBASED):
+        progress("screening every hypothesis")
+        looked = screened(base)
+        odds = float(np.log(max(len({score.hypothesis.name for score in looked.scores}), 1)))
+        progress("fitting effect 1")
+        grown = extended(like, [base], {(): base}, NAMES, partial(merit_of, odds=odds), looked)
+        before, base = base, rebased(base, grown)
+        if base.log_evidence < before.log_evidence + ENOUGH:
+            break
+    return Begun(base, grown, looked, odds)
+
+
+def rebased(base: Fitted, grown: Sequence[Fitted]) -> Fitted:
+    """The base from where the best models with one effect have its parameters, if that is better by what counts.
+
+    Where the likelihood has many maxima, an effect may only have shown the way to a better one of the base.
+    """
+    for f in sorted(grown, key=lambda f: f.loss)[:REBASED]:
+        if f.loss < base.loss - ENOUGH:
+            again = refit(base.like, *without(f, 0))
+            if again.log_evidence > base.log_evidence + MORE:
+                base = again
+    return base
