@@ -40,12 +40,12 @@ def record(case, name="bench", **columns):
     return record_of(whole, read_case(case, name), Path(name) / "recording.parquet")
 
 
-def moved(u, rate, inertia, force, dry=0.0, x=0.0, v=0.0):
-    """Positions (n,) of a body under the force u (n,) + force(x, v) and dry friction."""
-    out, h = [], 1.0 / rate / FINER
+def moved(u, rate, inertia, force, dry=0.0, x=0.0, v=0.0, finer=FINER):
+    """Positions (n,) of a body under the force u (n,) + force(x, v) and dry friction, in `finer` steps a tick."""
+    out, h = [], 1.0 / rate / finer
     for given in u:
         out.append(x)
-        for _ in range(FINER):
+        for _ in range(finer):
             push = given + force(x, v)
             sliding = np.sign(v) if v else np.sign(push) * (abs(push) > dry)
             change = h * (push - dry * sliding) / inertia if sliding else 0.0

@@ -73,9 +73,9 @@ def test_static_problem_without_a_force():
 
 
 def swing(viscous=3e-4, dry=0.0, cubic=0.0):
-    """A free pendulum that is let go at 1.2 rad and 2 rad/s."""
+    """A free pendulum that is let go at 1.2 rad and 2 rad/s, in steps of which nothing shows in its positions."""
     force = lambda x, v: -viscous * v - 0.15 * 0.15 * 9.80665 * np.sin(x) - cubic * x**3  # noqa: E731
-    return rounded(moved(np.zeros(800), 100.0, 3.3e-3, force, dry, x=1.2, v=2.0), 1e-5)
+    return rounded(moved(np.zeros(800), 100.0, 3.3e-3, force, dry, x=1.2, v=2.0, finer=500), 1e-5)
 
 
 def test_first_position_and_speed_of_a_free_response():
