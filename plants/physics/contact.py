@@ -16,9 +16,9 @@ h. Force times d' is never negative: sliding only takes energy.
 The contact of capstan and strip is rigid in the LDU's model: there the carriage, which the scale sees, falls behind
 R_c theta_c by what has slid. Slip keeps the momentum: the carriage gets F_max while the capstan runs ahead of it.
 
-Source: thesis 11.2 and 12.5; Perzyna, Fundamental problems in viscoplasticity (1966), for sliding that is the faster
-the more force is beyond the limit; Kalker, Three-dimensional elastic bodies in rolling contact (1990), ch. 1; Shelton,
-Dynamics of web tension control, for tape on a roller.
+Source: thesis 11.2 and 12.5; Perzyna, Fundamental problems in viscoplasticity (1966), for the sliding speed in
+proportion to the force beyond the limit; Kalker, Three-dimensional elastic bodies in rolling contact (1990), ch. 1;
+Shelton, Dynamics of web tension control, for tape on a roller.
 """
 
 import math
@@ -44,7 +44,7 @@ class SlipSettings(Settings):
     node: Node
     F_max: float = quantity(unit="", gt=0, le=1e6, help="what the contact carries, N (Nm of the motor at a wheel)")
     eta: float = quantity(
-        0.0, unit="", ge=0, le=1e9, help="force beyond F_max by which it slides faster by 1 m/s (1 rad/s at a wheel)"
+        0.0, unit="", ge=0, le=1e9, help="force beyond F_max per sliding speed, N s/m (Nm s/rad at a wheel)"
     )
     R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the LDU's capstan, where the strip slips")
 

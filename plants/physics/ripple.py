@@ -19,7 +19,9 @@ from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 TURN = 2.0 * math.pi
+QUARTER = 0.5 * math.pi  # of a period: the derivative of a sine is ahead of it
 DISC = Turn("A", "phi", "one", 0.002)
+BY_ORDER = ((DISC,), (DISC, Hint("order", "order")))
 
 
 class CoggingSettings(Settings):
@@ -108,17 +110,12 @@ def encoder(p, y):
 
 @tick
 def shown(p, y, q, speed):
-    """What a sensor of position shows for a true reading of `y` rad or m, and, where `speed` is 1, one of speed for `y`
-    rad/s or m/s at the place `q`: the rate of what a position would show."""
+    """Reading of a position sensor, rad or m, for a true position `y`. Where `speed` is 1: reading of a speed sensor,
+    rad/s or m/s, for a true speed `y` at position `q`, the rate of a position sensor's reading."""
     if speed == 0:
         return encoder(p, y)
-    x = p.n * q
-    return y * (
-        1.0
-        + p.n * p.A * math.cos(x + p.phi)
-        + 2.0 * p.n * p.A2 * math.cos(2.0 * x + p.phi2)
-        + 3.0 * p.n * p.A3 * math.cos(3.0 * x + p.phi3)
-    )
+    B, B2, B3 = p.n * p.A, 2.0 * p.n * p.A2, 3.0 * p.n * p.A3
+    return y * (1.0 + harmonics(p.n * q, B, p.phi + QUARTER, B2, p.phi2 + QUARTER, B3, p.phi3 + QUARTER))
 
 
 COGGING = Term(
@@ -172,9 +169,9 @@ ENCODER = Term(
     },
     stands=(
         stand("sensor", "position turns slides", usual=False),
-        stand("sensor", "general position turns", ways=((DISC,), (DISC, Hint("order", "order")))),
+        stand("sensor", "general position turns", ways=BY_ORDER),
         stand("sensor", "position turns"),
-        stand("sensor", "general speed turns", ways=((DISC,), (DISC, Hint("order", "order")))),
+        stand("sensor", "general speed turns", ways=BY_ORDER),
         stand("sensor", "general position slides", usual=False),
     ),
     look_alikes={

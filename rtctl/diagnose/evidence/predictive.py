@@ -13,7 +13,7 @@ from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED
 from rtctl.diagnose.evidence.prediction import Heldout, fitted_to
 from rtctl.diagnose.evidence.verdict import SURE, Verdict
 from rtctl.diagnose.likelihood.descent import ALL, Point, derivatives, descend
-from rtctl.diagnose.likelihood.fits import Fitted, weighed
+from rtctl.diagnose.likelihood.fits import Fitted, evaluated
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import GraphModel
@@ -46,7 +46,7 @@ def predictive(decided: Verdict, heldout: Heldout) -> Fitted:
     x = least_squares(like.following(usual), f)
     e = like.raw(f.space.model(x))
     at = Point(x, e, derivatives(like, f.space, x, range(len(x))))
-    return weighed(like, f.space, at)
+    return evaluated(like, f.space, at)
 
 
 def probable(decided: Verdict) -> list[Fitted]:

@@ -21,7 +21,7 @@ from rtctl.diagnose.model.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
 ROUNDS = 3  # of noise and fit
-MOST = 10  # steps in each
+MOST = 10  # Gauss-Newton steps in each
 ENOUGH = 2.0  # nats, that a further round must gain
 LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a recording may say nothing
 MATTERS = 0.5  # nats of the prior that going back must gain
@@ -39,7 +39,7 @@ class Fitted(NamedTuple):
     like: Likelihood  # with its own noise
     loss: float  # negative logarithm of the likelihood, nats
     pushes: tuple[np.ndarray, ...]  # (windows, followed) corrections of the observer in each recording, N or Nm
-    fresh: int = ALL  # which derivatives were taken last where the fit stands still: of its effects, or of all unknowns
+    fresh: int = ALL  # derivatives that are those at the solution: of the effects (a draft), or of all unknowns
 
     @property
     def model(self):
@@ -111,8 +111,8 @@ def refit(
     the derivatives in the first columns, as a model with fewer effects has them. Parameters are fitted as if the laws
     were exact: their errors weigh evidence, and would else stand for an effect that the fit left too small.
 
-    A `draft` takes the derivatives of its effects anew where it stands still; those of the parameters, which are most
-    of a fit's work, stay those that are known. It tells how good a model is to a few nats (`finished`).
+    A `draft` recomputes the derivatives of the effects only. The derivatives of the parameters, most of the work of a
+    fit, stay as `known`. The evidence of a draft is a few nats too low; `finished` fits the draft to convergence.
     """
     like = like.slackened(None)
     low, high = space.bounds()
@@ -130,22 +130,22 @@ def refit(
     if count and space.hypotheses:
         own = _under_own_noise(like, space, own, rounds, EFFECTS)
         if draft:
-            return weighed(like, space, own.at)._replace(fresh=EFFECTS)
-    model = weighed(like, space, _under_own_noise(like, space, own, rounds, ALL).at)
+            return evaluated(like, space, own.at)._replace(fresh=EFFECTS)
+    model = evaluated(like, space, _under_own_noise(like, space, own, rounds, ALL).at)
     return relaxed(model) if relax else model
 
 
 def finished(f: Fitted) -> Fitted:
-    """A draft fitted to the end: where it stands still under derivatives of all unknowns that were taken there."""
+    """Model fitted to convergence, from a draft: the derivatives of all unknowns are those at the solution."""
     if f.fresh == ALL:
         return f
     like = f.like.slackened(None)
     start = _judged(like, Point(f.x, f.e, f.J, EFFECTS))
-    return weighed(like, f.space, _under_own_noise(like, f.space, start, MOST, ALL).at)
+    return evaluated(like, f.space, _under_own_noise(like, f.space, start, MOST, ALL).at)
 
 
 class Judged(NamedTuple):
-    """A point of a fit under the noise that it leaves."""
+    """Point of a fit, with the noise model and the loss estimated from its own residual."""
 
     loss: float  # nats
     at: Point
@@ -158,7 +158,7 @@ def _judged(like: Likelihood, at: Point) -> Judged:
 
 
 def _under_own_noise(like: Likelihood, space: Space, best: Judged, rounds: int, freshest: int) -> Judged:
-    """The fit under the noise that it leaves, and under that again, as long as it gains by it."""
+    """Iteratively reweighted fit: each round takes the noise model of the round before, while the loss falls."""
     for _ in range(ROUNDS):
         found = _judged(like, descend(best.like, space, best.at, rounds, 1e-3, freshest))
         gain = best.loss - found.loss
@@ -192,16 +192,17 @@ def relaxed(f: Fitted) -> Fitted:
         e = f.like.raw(f.space.model(x))
         exact = f.like.slackened(None)
         at = descend(exact.told(e), f.space, Point(x, e, f.J), 3, 1e-3, EFFECTS)
-        trial = weighed(exact, f.space, at)
+        trial = evaluated(exact, f.space, at)
         if trial.log_evidence > f.log_evidence:
             return trial
     return f
 
 
-def weighed(like: Likelihood, space: Space, at: Point) -> Fitted:
-    """The model where its fit came to, under its own noise and the errors of its laws.
+def evaluated(like: Likelihood, space: Space, at: Point) -> Fitted:
+    """Fitted model at a point of a fit, with the evidence under its own noise model and law errors.
 
-    What errors may explain hangs on how loud the noise is: it is that of the model itself, so that models compare.
+    The noise level decides how much law errors explain. Every model takes the noise of its own residual: evidences of
+    models compare, whichever noise their fits began with.
     """
     exact = like.slackened(None).told(at.e)
     own = exact.slackened(errors(exact, space, at.x, at.e)).told(at.e)

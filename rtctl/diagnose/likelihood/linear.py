@@ -28,9 +28,9 @@ class Linear:
         self.weight = prior(base.space)
 
     def start_of(self, h: Hypothesis) -> np.ndarray:
-        """Residuals that differences by a hypothesis are taken from: of the base, in the steps that its term asks for.
+        """Residual (blocks, sensors) of the base, SI, simulated in the step size of the term of a hypothesis.
 
-        In other steps a difference would be that of the steps as well, whatever the effect does.
+        A difference between simulations of two step sizes would contain the integration error.
         """
         term = TERMS[h.term]
         steps = (term.stiff, term.slips) if h.sizes else (False, False)

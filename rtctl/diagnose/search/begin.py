@@ -1,6 +1,6 @@
-"""Where a search begins: the base, the times of its ticks, and models with one effect.
+"""Start of a search: the fitted base, the times of the ticks, and models with one effect.
 
-An effect may only have shown the way to a better maximum of the base: the base is then fitted again from there.
+A fit with one effect may lead to a higher maximum of the base: the base is refitted from its parameters.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ from rtctl.diagnose.search.extend import extended, screened
 from rtctl.diagnose.search.screen import Screened
 from rtctl.diagnose.search.standing import ENOUGH, merit_of
 
-NAMES = 8  # terms that are refitted
+NAMES = 8  # terms that are fitted as the first effect
 REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
 MORE = 1.0  # nats that this must bring
 
@@ -31,16 +31,16 @@ class Begun(NamedTuple):
     base: Fitted
     grown: list[Fitted]  # of one effect
     looked: Screened  # beside the base
-    odds: float
+    odds: float  # ln of the prior odds of one effect at one place
 
     @property
     def order(self) -> tuple[Fitted, ...]:
-        """All of them, best first."""
+        """The base and the models with one effect, by posterior."""
         return tuple(sorted((self.base, *self.grown), key=partial(merit_of, odds=self.odds), reverse=True))
 
 
 def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
-    """The base, models with one effect, what screening said of them, and the prior odds of one of them."""
+    """The base, models with one effect, the screening scores beside the base, and the prior odds of one effect."""
     progress("fitting the nominal parameters")
     base = restarted(refit(like, space))
     told = clock(base, 0.0)

@@ -21,8 +21,8 @@ SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which 
 
 
 def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray, by: np.ndarray | float = 1.0) -> np.ndarray:
-    """Share of the variance of `signal` that a sinusoid of each order in `angle` explains, slow drift taken out; `by`
-    is what its amplitude goes with."""
+    """Share of the variance of `signal` that a sinusoid of each order in `angle` explains, slow drift taken out. The
+    amplitude of the sinusoid is proportional to `by`."""
     if len(signal) < FEWEST:
         return np.zeros(len(orders))
     z = np.linspace(-1, 1, len(signal))

@@ -22,8 +22,8 @@ TOO_FAR = 3.0  # times the residual: a step that changes more says little about 
 RIDGE = 1e-6
 ASKED = 40  # hypotheses that take off most, of which the gain under a noise of their own is asked
 FACTORS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of the size that a secant promises
-IDLE = 0.01  # of the least noise: a start that changes less says nothing, and no fit moves from there
-SAME = 0.2  # of a size: two noises that promise it alike give one start
+IDLE = 0.01  # of the least noise: largest change of a residual at which the gradient of a fit is zero
+SAME = 0.2  # relative difference of two estimated sizes that give one start
 
 
 class Score(NamedTuple):
@@ -58,7 +58,7 @@ class Screened(NamedTuple):
         told = [first, *(x for x in rest if not np.allclose(x, first, rtol=SAME, atol=SAME))]
         xs = [np.where(sizes, k * x, x) for x in told for k in (FACTORS if sizes.any() else (1.0,))]
         limits = np.array([c.kind == INVERSE for c in h.coordinates], bool)
-        if limits.any():  # a secant says of a limit far beyond all forces that it is none; the recording suggests one
+        if limits.any():  # the secant of a limit is zero while no force reaches it; 1 is the limit hinted by the record
             xs.append(np.where(limits, 1.0, h.start()))
         low, high = space.bounds()
         n, begin = len(base.x), self.about[0].start_of(h)
@@ -80,7 +80,7 @@ class Screened(NamedTuple):
 def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
     """Scores of all candidates."""
     own = Linear(base)
-    for h in candidates:
+    for h in candidates:  # simulated once, before threads ask for the same
         own.start_of(h)
     changes = parallel([partial(_change, own, h) for h in candidates])
     about = own.under(floor_noise(own, [change for found in changes for change, _ in found]))

@@ -54,13 +54,13 @@ class Found(NamedTuple):
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
     """Fit the base, then what is missing beside it, under the observer that suits the best model.
 
-    How quick it has to be is asked of the best model with one effect at most. Where the best of all models asks for
-    another, all is searched again.
+    The best model with one effect at most decides the bandwidth of the observer. Where the best of all models decides
+    for another bandwidth, the search is repeated.
     """
     usual = begun(like, space, progress)
     progress("telling how quickly the observer follows")
     times, before = quicker(usual.order[0]), usual.order[:RIVALS]
-    times = times if times > STEP else 1.0  # a further effect explains that little as often
+    times = times if times > STEP else 1.0  # a second effect often explains a gain of one step
     found = under(usual if times == 1.0 else begun(like.following(times), space, progress), progress, before)
     progress("telling how quickly the observer follows")
     best = found.best
@@ -114,7 +114,7 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
 
 
 def leading(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
-    """The models that stand, best first; those near the best are fitted to the end."""
+    """Models that stand, by posterior; drafts within NEAR of the best are fitted to convergence first."""
     while True:
         order = standing(base, known, merit)
         drafts = [f for f in order if f.fresh != ALL and merit(f) > merit(order[0]) - NEAR]
@@ -125,7 +125,7 @@ def leading(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
 
 
 def finished_in(known: Known, f: Fitted) -> Fitted:
-    """A model that is known, fitted to the end."""
+    """Known model, fitted to convergence."""
     known[key(f.names)] = f = finished(f)
     return f
 
@@ -142,8 +142,7 @@ def enriched_near(fits: Sequence[Fitted], known: Known, merit: Merit, asked: set
 
 
 def apart(base: Fitted, fits: Sequence[Fitted], most: int) -> list[Fitted]:
-    """The first models, `most` of them, of which each has other terms than those before, and changes the residual in
-    another way."""
+    """The first `most` models with different terms and different changes of the residual."""
     out: list[Fitted] = []
     for f in fits:
         terms = {h.term for h in f.space.hypotheses}

@@ -58,23 +58,26 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
     ways, push = [x[::thin] for x in ways], push[::thin]
     quick = QUICK * faster(sim).follow
     found: dict[str, list] = {}
+
+    def orders_at(body: str, by: np.ndarray | None = None) -> list[float]:
+        """Orders of the missing force in the angle of a body; `by` (n,) is proportional to their amplitude."""
+        number, ratio = sim.leader(body), sim.ratios[body]
+        x = ways[number] * ratio
+        height = seen(x, push[:, number], rates[number] * abs(ratio), ORDERS, quick, by)
+        return orders_of(float(np.ptp(x)), height, MOST)
+
     for node, ratio in sim.ratios.items():
-        number = sim.leader(node)
-        x, d, rate = ways[number], push[:, number], rates[number]
+        x, d = ways[sim.leader(node)], push[:, sim.leader(node)]
         if ratio != 0.0 and sim.case.machine.turns(node):
-            height = seen(x * ratio, d, rate * abs(ratio), ORDERS, quick)
-            found[f"order:{node}"] = orders_of(float(np.ptp(x * ratio)), height, MOST)
+            found[f"order:{node}"] = orders_at(node)
         elif ratio != 0.0:
             waves = waves_of(x * ratio)
             found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
             found[f"order:{node}"] = []
-    for name, column in sim.layout.drives.items():  # its gain may repeat with the angle of what it drives
-        node = str(sim.case.machine.drives[name].body)
-        ratio, number = sim.ratios.get(node, 0.0), sim.leader(node)
-        if ratio != 0.0 and sim.case.machine.turns(node):
-            x, command = ways[number] * ratio, sim.volts[begin:, column][::thin]
-            height = seen(x, push[:, number], rates[number] * abs(ratio), ORDERS, quick, command)
-            found[f"order:{name}"] = orders_of(float(np.ptp(x)), height, MOST)
+    for name, column in sim.layout.drives.items():  # torque ripple is proportional to the command
+        body = str(sim.case.machine.drives[name].body)
+        if sim.ratios.get(body, 0.0) != 0.0 and sim.case.machine.turns(body):
+            found[f"order:{name}"] = orders_at(body, sim.volts[begin:, column][::thin])
     errors: dict[str, np.ndarray] = {}  # of the sensors that the model does not follow
     for name in sim.channels:
         if name not in sim.case.machine.sensors:

@@ -5,7 +5,7 @@ import pytest
 from graph_cases import BELT, RUB, case_of, command, record
 
 from rtctl.diagnose.likelihood.descent import ALL, EFFECTS, Point
-from rtctl.diagnose.likelihood.fits import finished, prior, refit, relaxed, weighed
+from rtctl.diagnose.likelihood.fits import evaluated, finished, prior, refit, relaxed
 from rtctl.diagnose.likelihood.joint import together
 from rtctl.diagnose.model.space import SIZE, Coordinate, Hypothesis
 
@@ -57,10 +57,10 @@ def test_a_draft_that_is_finished_is_as_good_as_a_fit():
     assert finished(done) is done
 
 
-def test_a_model_is_weighed_under_its_own_noise_wherever_its_fit_began():
+def test_a_model_is_evaluated_under_its_own_noise_wherever_its_fit_began():
     alone, rough = draft()
     at = Point(rough.x, rough.e, rough.J)
-    loud = weighed(alone.like, rough.space, at)  # the noise of a model that lacks the effect
-    quiet = weighed(rough.like, rough.space, at)
+    loud = evaluated(alone.like, rough.space, at)  # the noise of a model that lacks the effect
+    quiet = evaluated(rough.like, rough.space, at)
     assert loud.loss == pytest.approx(quiet.loss, abs=1e-6)
     assert loud.log_evidence == pytest.approx(quiet.log_evidence, abs=1e-6)
