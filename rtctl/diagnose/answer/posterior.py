@@ -24,7 +24,7 @@ def rivals(d: GraphDiagnosis) -> list[Bar]:
     for rival in d.decided.table:
         words = ""
         if rival.unlisted and rival.free is not None:
-            words = f"a force without a name at {here(machine, rival.free.node)}, by {rival.free.axis}"
+            words = f"{rival.free.kind} without a name at {here(machine, rival.free.node)}, by {rival.free.axis}"
             if rival.fit.names:
                 words += ", beside " + " + ".join(called(machine, n) for n in rival.fit.names)
         bar = found.setdefault((rival.fit.names, words), [0.0, -np.inf])

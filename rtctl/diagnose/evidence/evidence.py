@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.evidence.free import AXES, SIZE, TIME, Free, free_forces
+from rtctl.diagnose.evidence.free import Free, free_functions
+from rtctl.diagnose.evidence.places import AXES, SIZE, TIME
 from rtctl.diagnose.evidence.wander import LITTLE, log_density, wandering
 from rtctl.diagnose.likelihood.fits import DISCREPANCY, Fitted
 from rtctl.diagnose.likelihood.shares import share_of
@@ -39,8 +40,8 @@ class Rival(NamedTuple):
 
     @property
     def unlisted(self) -> bool:
-        """Whether the free force is more than what the law of a name may be wrong by."""
-        return self.free is not None and self.free.share == SIZE
+        """Whether the free function is more than what the law of a name may be wrong by."""
+        return self.free is not None and self.free.large
 
 
 def rivals(found: Found) -> tuple[Rival, ...]:
@@ -69,11 +70,10 @@ def rivals(found: Found) -> tuple[Rival, ...]:
         if wander.free is not None:
             entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, SIZE) - UNLISTED))
         if rank < BESIDE or set(fit.names) < best:
-            shares = (SIZE, *((off,) if fit.names and off > LEAST else ()))
-            free = free_forces(fit, shares)
-            large = [f for f in free if f.share == SIZE and (not fit.names or exceeds(base, fit, f))]
+            free = free_functions(fit, off if fit.names and off > LEAST else 0.0)
+            large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f))]
             entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
-            small = [f for f in free if f.share < SIZE and f.axis in arguments(fit)]
+            small = [f for f in free if not f.large and f.axis in arguments(fit)]
             entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
     losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
@@ -112,6 +112,6 @@ def _shared(free: list[Free]) -> list[tuple[Free, float]]:
     comes and goes as small as its law may be wrong by."""
     each = -float(np.log(max(len(free), 1)))
     return [
-        (f, each + (log_density(0.0, float(np.hypot(LITTLE, DISCREPANCY * f.rms))) if f.share == SIZE else 0.0))
+        (f, each + (log_density(0.0, float(np.hypot(LITTLE, DISCREPANCY * f.rms))) if f.large else 0.0))
         for f in free
     ]

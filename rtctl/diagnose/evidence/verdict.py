@@ -62,7 +62,8 @@ def of_motion(found: Found) -> Verdict:
     if unlisted > 0.5 or not best.names:
         assert top is not None and free is not None
         also = f"beside {', '.join(beside.names)} " if beside.names else ""
-        why = f"{also}a force at {free.node} by {free.axis} without a name has a probability of {100 * unlisted:.0f} %"
+        what = f"{free.kind} at {free.node} by {free.axis} without a name"
+        why = f"{also}{what} has a probability of {100 * unlisted:.0f} %"
         return answer(UNNAMED, beside, why)
     share = explained(found.base, best)
     if share < MOSTLY:

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.evidence.free import SIZE, TIME, Free
+from rtctl.diagnose.evidence.free import Free
+from rtctl.diagnose.evidence.places import TIME, Place
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.pushes import answer, averaged
@@ -38,7 +39,8 @@ def wandering(fit: Fitted) -> Wander:
             whole = measures.of("force", one.body)
             rms = float(np.std(slow[:, number])) / whole
             if rms > worst.share:
-                free = Free(one.body, TIME, SIZE, 0.0, fit.e, 0.0, t, slow[:, number], rms)
+                place = Place(one.body, TIME, [sim.record.t], whole, False)
+                free = Free(place, True, 0.0, fit.e, 0.0, t, slow[:, number], rms)
                 worst = Wander(rms, heard(part, number, width, measures.inertia(one.body)) / whole, free)
     return worst
 

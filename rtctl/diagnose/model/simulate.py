@@ -68,6 +68,7 @@ class Simulator:
         self.release = NEVER
         self.begins: tuple[float, float] | None = None  # first position and speed of the main body in a free run
         self.ratios = self.moves(record.case.values)
+        self.wrong: dict[str, np.ndarray] = {}  # errors (n,) of readings, SI
         self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
 
     @property
@@ -196,6 +197,15 @@ class Simulator:
         other.forces = np.ascontiguousarray(forces if len(self.forces) < 2 else self.forces + forces)
         return other
 
+    def misread(self, sensor: str, error: np.ndarray) -> "Simulator":
+        """The same whose sensor reads an error (n,) beside what is there, SI. An observer that follows it follows what
+        is there."""
+        other = copy(self)
+        other.wrong = {sensor: error}
+        shown = [one.sensor == sensor for one in self.followed]
+        other.watched = self.watched - np.outer(error, shown)
+        return other
+
     def seen_by(self, model: GraphModel) -> "Simulator":
         """The same whose followed sensors show what a model reads that follows them."""
         other = copy(self)
@@ -235,6 +245,8 @@ class Simulator:
         )  # fmt: skip
         out[max(done, 0) :] = np.nan
         self.counted(out, offsets)
+        for name, error in self.wrong.items():
+            out[:, self.layout.sensors[name]] += error[:n]
         if static:  # what the drives would have to make, as their nominal gain tells it
             name = next((c for c in self.channels if c not in self.layout.sensors), "")
             made, share = (record.y[name][:n], self._told(name, model)) if name else (np.zeros(n), 1.0)

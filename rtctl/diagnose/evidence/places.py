@@ -1,0 +1,120 @@
+"""Places of a free function: a force at a body, or an error of the reading of a sensor, along one axis.
+
+Position and speed are those of the model, as its observer has them: the speed of a recording that counts knows of a
+step before it comes, and a force by it pushes ahead.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rtctl.diagnose.likelihood.fits import Fitted
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.model.model import GraphModel
+from rtctl.diagnose.model.node_scaling import Measures
+from rtctl.diagnose.model.simulate import HELD
+
+SIZE = 0.3  # of the force that moves a node: standard deviation of a free force, by its prior
+ERROR = 0.01  # of the spread of a reading: that of its free error
+TIME = "time"  # axis along which a force comes and goes
+AXES = ("velocity", "position", TIME, "angle", "command")
+TURNS = 1.5  # turns from which on an angle is another axis than the position
+
+
+class Place(NamedTuple):
+    """Where a free function may act."""
+
+    node: str  # body or sensor
+    axis: str
+    values: list[np.ndarray]  # (n,) of the axis, of each recording
+    whole: float  # force that moves the body, or spread of the reading, SI
+    reads: bool  # whether it is an error of a reading
+
+    @property
+    def size(self) -> float:
+        """Standard deviation of the function by its prior, of the whole."""
+        return ERROR if self.reads else SIZE
+
+    def along(self, knots: np.ndarray, hat: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """The function (n,) that is `hat` at the knots. An error of a reading is smooth: where it had corners, the
+        machine would have to jump in speed."""
+        if self.reads and len(knots) > 2:
+            inside = np.clip(values, knots[0], knots[-1])
+            return np.asarray(CubicSpline(knots, hat, bc_type="natural")(inside))
+        return np.interp(values, knots, hat)
+
+    def run(self, part: Likelihood, model: GraphModel, value: np.ndarray, coarse: bool) -> np.ndarray:
+        """Residual (blocks, sensors) of a recording under a model with the function (n,), SI."""
+        sim, model, n = part.sim, part.sim.own(model), part.rows[1]
+        if self.reads:
+            return part.of_readings(sim.misread(self.node, value).run(model, n=n, coarse=coarse))
+        forces = np.zeros((len(value), sim.layout.nq))
+        own = sim.layout.ratio(self.node, model.base)
+        forces[:, sim.layout.coordinate(self.node)] = own * value
+        return part.of_readings(sim.pushed(forces).run(model, n=n, coarse=coarse))
+
+
+def places(fit: Fitted) -> list[Place]:
+    """Places of forces at every body and of errors of every reading, along every axis that the recordings have."""
+    sim, base = fit.like.sim, fit.model.base
+    every = [Measures(part.sim, base, {}) for part in fit.like.parts]
+    told = [Measures(part.sim.seen_by(fit.model), base, {}) for part in fit.like.parts]
+    found: list[Place] = []
+    taken: set[int] = set()
+    for body, ratio in sim.ratios.items():
+        at = sim.layout.coordinate(body)
+        if ratio == 0.0 or at in taken:  # bodies that move as one feel one force
+            continue
+        taken.add(at)
+        found += _of(told, body, body, max(m.of("force", body) for m in every), False)
+    for sensor in _read(fit):
+        spread = max(float(np.std(part.sim.record.y[sensor])) for part in fit.like.parts)
+        body = fit.like.sim.case.machine.sensors[sensor].body or str(sim.body)
+        found += _of(told, sensor, body, spread, True)
+    return [place for place in found if np.ptp(np.concatenate(place.values)) > 0.0]
+
+
+def _read(fit: Fitted) -> list[str]:
+    """Sensors whose readings a model predicts in every recording."""
+    sims = [part.sim for part in fit.like.parts]
+    held = {sims[0].main} if sims[0].mode == HELD else set()
+    return [
+        name
+        for name in sims[0].channels
+        if name in sims[0].layout.sensors and name not in held and all(name in s.channels and name not in s.edges for s in sims)
+    ]
+
+
+def _of(told: list[Measures], node: str, body: str, whole: float, reads: bool) -> list[Place]:
+    """Places of one node that moves as a body does."""
+    found = [axes(measures, body) for measures in told]
+    return [
+        Place(node, axis, after(axis, [values[axis] for values in found]), whole, reads)
+        for axis in found[0]
+        if all(axis in values for values in found)
+    ]
+
+
+def axes(m: Measures, body: str) -> dict[str, np.ndarray]:
+    """Values (n,) of each axis at a body."""
+    sim = m.sim
+    x = m.way(body)
+    out = {
+        "velocity": np.diff(x, prepend=x[:1]) / sim.record.dt,
+        "position": x,
+        TIME: sim.record.t - sim.record.t[0],
+    }
+    if m.turns(body) and np.ptp(x) > TURNS * 2 * np.pi:
+        out["angle"] = np.mod(x, 2 * np.pi)
+    if sim.volts.shape[1] and sim.case.problem != "static":  # where the force is what the model predicts
+        out["command"] = sim.volts[:, 0]
+    return out
+
+
+def after(axis: str, values: list[np.ndarray]) -> list[np.ndarray]:
+    """Values of an axis in each recording; the time of each begins where that of the one before ends."""
+    if axis != TIME:
+        return values
+    ends = np.cumsum([0.0, *(v[-1] for v in values)])
+    return [v + end for v, end in zip(values, ends, strict=False)]
