@@ -32,6 +32,7 @@ BELT = {
     },
 }  # fmt: skip
 
+CROSSTALK = 10.0  # counts for a unit of the command
 RUB = {"term": "friction.coulomb", "node": "carriage", "F_C": 2.0}
 
 
@@ -107,6 +108,15 @@ def unnamed():
     u = command(4.0)
     now_and_then = np.sin(2 * np.pi * 1.1 * np.arange(len(u)) / RATE) > 0.8
     return diagnose_record(record(case_of(PENDULUM), u, push=0.2 * now_and_then))
+
+
+@cache
+def misread():
+    """Diagnosis of a pendulum whose command leaks into the reading of its encoder."""
+    u = command(4.0)
+    columns = columns_of(case_of(PENDULUM), u)
+    columns["rod_counts"] = columns["rod_counts"] + np.round(CROSSTALK * u)
+    return diagnose_record(record_of(columns, read_case(case_of(PENDULUM), "bundle"), Path("bundle/recording.parquet")))
 
 
 def at_rest(config, seconds):

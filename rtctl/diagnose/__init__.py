@@ -6,7 +6,7 @@ Data flow through the folders one way; each imports from those before it (tests/
     model         a machine as somebody believes it, and its simulation under a recording
     likelihood    noise, errors of laws, the likelihood of a recording, and the fit of a model by it
     search        hypotheses, and combinations of them by evidence
-    evidence      forces without a name, rivals, probabilities, held-out rows, the verdict
+    evidence      forces and errors of readings without a name, rivals, probabilities, held-out rows, the verdict
     answer        words, figures, report, model, config, experiment, free run
 
 Beside them: many bundles (bundles, folder), and hidden effects (conceal, seal).

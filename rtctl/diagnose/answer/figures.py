@@ -79,7 +79,7 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
     free = d.decided.unlisted
     if not term and d.located is not None and free is not None and axis == free.axis:
         inside = np.degrees(free.knots) if c.x_unit == "degrees" else across * free.knots
-        ax.plot(inside, scale * free.force, color=AFTER, lw=1.5, marker="s", ms=3, label="free function that fits best")
+        ax.plot(inside, scale * free.value, color=AFTER, lw=1.5, marker="s", ms=3, label="free function that fits best")
     ax.axhline(0, color=SEEN, lw=0.8)
     top = scale * (1.4 * max(size, law) + half)
     ax.set_ylim(-top or -1.0, top or 1.0)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rtctl.diagnose.answer.answer import GraphDiagnosis
 from rtctl.diagnose.answer.words import channel_unit, here
+from rtctl.diagnose.evidence.free import Free
 from rtctl.diagnose.likelihood.likelihood import settled
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import speed, way
@@ -61,6 +62,9 @@ class Missing:
 
     def of(self, term: str, node: str, axis: str) -> Curve:
         """The curve of an effect of the best model; of the force that no model names where `term` is ""."""
+        free = self.d.decided.unlisted
+        if not term and free is not None and free.place.reads and free.node == node:
+            return self._misread(free)
         known = TERMS.get(term)
         without, full = self._models(term, node)
         out0, push0 = self.run(without)
@@ -68,7 +72,7 @@ class Missing:
         x, x_words, x_unit = self.abscissa(axis, node)
         channel = self._channel(known, node, out0, out1)
         at = here(self.machine, node)
-        title = f"{at[4:] if at.startswith('the ') else at}"
+        title = at.removeprefix("the ")
         if channel is not None:
             index = self.sim.column(channel)
             y = self.d.record.y[channel] - out0[:, index]
@@ -84,6 +88,17 @@ class Missing:
         unit = DIMENSIONS["force"][not turns]
         words = f"missing {what} at {here(self.machine, body)}"
         return Curve(x, x_words, x_unit, factor * push0, factor * (push0 - push1), words, unit, title)
+
+    def _misread(self, free: Free) -> Curve:
+        """The error of a reading that no model names: what is left of the reading where the machine is where the error
+        says."""
+        error, channel = free.over(0), free.node
+        out = self.sim.misread(channel, error).run(self.unnamed())
+        left = self.d.record.y[channel] - out[:, self.sim.column(channel)]
+        left = np.nan_to_num(left - np.median(left[self.rows]))
+        at, unit = here(self.machine, channel), channel_unit(self.machine, channel)
+        axis = self.abscissa(free.axis, channel)
+        return Curve(*axis, left + error, error, f"missing reading of {at}", unit, at.removeprefix("the "))
 
     def node_body(self, node: str) -> str:
         """The body at which the force of a node is shown; that of the followed sensor where the node has none."""

@@ -1,4 +1,4 @@
-"""Posterior of a diagnosis as a list: combinations of effects, the description alone, and forces without a name."""
+"""Posterior of a diagnosis as a list: combinations of effects, the description alone, and what has no name."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ class Bar(NamedTuple):
     """One rival."""
 
     names: tuple[str, ...]  # term:node
-    free: str  # in words, of a force without a name
+    free: str  # in words, of what has no name
     probability: float
     behind: float  # ln of its posterior over that of the likeliest, on the whole recording
 
 
 def rivals(d: GraphDiagnosis) -> list[Bar]:
-    """All rivals, likeliest first; their probabilities sum to one. The axes of a force without a name are one rival."""
+    """All rivals, likeliest first; their probabilities sum to one. Numbers of hats along one axis are one rival."""
     machine = d.record.case.machine
     found: dict[tuple[tuple[str, ...], str], list[float]] = {}
     for rival in d.decided.table:

@@ -26,8 +26,8 @@ PICTURES = {
     "missing": (figures.missing_force, {
         "": "What it takes to keep the simulation without the effect on the recorded track, by the axis where the "
             "effect lives: means with their 95 % bands, and what the effect that was found gives instead.",
-        UNNAMED: "What it takes to keep the simulation on the recorded track, by the axis where it lives: means with "
-                 "their 95 % bands, and the free force that fits best.",
+        UNNAMED: "What it takes to keep the simulation on the recorded track, or what the reading lacks, by the axis "
+                 "where it lives: means with their 95 % bands, and the free function that fits best.",
         NOTHING: "What it takes to keep the simulation on the recorded track: means with their 95 % bands, which hold "
                  "zero where nothing is missing.",
     }),
@@ -36,7 +36,7 @@ PICTURES = {
             "band holds 95 % of that noise.",
     }),
     "posterior": (figures.posterior, {
-        "": "Mean posterior over resampled segments. A force without a name is a free function of one axis; 1e-9 is "
+        "": "Mean posterior over resampled segments. What has no name is a free function of one axis; 1e-9 is "
             "how probable an answer is beside the first.",
     }),
     "parameters": (figures.parameters, {
@@ -48,7 +48,7 @@ PICTURES = {
 MISSING = {
     NAMED: "What is missing, and the law that was found",
     AMBIGUOUS: "What is missing, and the likeliest law",
-    UNNAMED: "What is missing, and the free force that fits best",
+    UNNAMED: "What is missing, and the free function that fits best",
     NOTHING: "What is left: no force with a pattern",
 }
 

@@ -1,1 +1,1 @@
-"""Forces without a name, rivals, their probabilities, held-out rows, the verdict."""
+"""Forces and errors of readings without a name, rivals, their probabilities, held-out rows, the verdict."""

@@ -1,4 +1,4 @@
-"""Evidence: combinations of effects, the description alone and forces without a name are rivals for one probability.
+"""Evidence: combinations of effects, the description alone and what has no name are rivals for one probability.
 
 A probability is the mean of the posterior over resampled segments of the recording (a bagged posterior). Where two
 models are both wrong, the posterior of one recording is sure of either; the mean over what could have been recorded
@@ -25,8 +25,8 @@ from rtctl.plants.physics import TERMS
 
 SEGMENTS = 32
 DRAWS = 300
-UNLISTED = 3.0  # nats: prior odds against a force that has no name
-BESIDE = 3  # combinations beside which free forces are asked for
+UNLISTED = 3.0  # nats: prior odds against what has no name
+BESIDE = 3  # combinations beside which free functions are asked for
 LEAST = 1e-4  # of the force that moves a node: a discrepancy that is smaller is none
 
 
@@ -34,7 +34,7 @@ class Rival(NamedTuple):
     """One explanation of a recording."""
 
     fit: Fitted
-    free: Free | None  # a force without a name beside the fit
+    free: Free | None  # what has no name, or the error of a law, beside the fit
     merit: float  # logarithm of the posterior on the whole recording, nats, up to a constant
     probability: float
 
@@ -45,7 +45,7 @@ class Rival(NamedTuple):
 
 
 def rivals(found: Found) -> tuple[Rival, ...]:
-    """All explanations that were fitted, with free forces beside the likeliest; the most probable first."""
+    """All explanations that were fitted, with free functions beside the likeliest; the most probable first."""
     base = found.base
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
     sim = base.like.parts[0].sim
@@ -112,6 +112,5 @@ def _shared(free: list[Free]) -> list[tuple[Free, float]]:
     comes and goes as small as its law may be wrong by."""
     each = -float(np.log(max(len(free), 1)))
     return [
-        (f, each + (log_density(0.0, float(np.hypot(LITTLE, DISCREPANCY * f.rms))) if f.large else 0.0))
-        for f in free
+        (f, each + (log_density(0.0, float(np.hypot(LITTLE, DISCREPANCY * f.rms))) if f.large else 0.0)) for f in free
     ]

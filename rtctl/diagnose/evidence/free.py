@@ -37,7 +37,7 @@ class Free(NamedTuple):
     e: np.ndarray  # (blocks, sensors) residual that it leaves
     evidence: float  # nats that it adds to the model
     knots: np.ndarray
-    force: np.ndarray  # (hats,) N or Nm; of an error rad, m, rad/s or m/s
+    value: np.ndarray  # (hats,) N or Nm; of an error rad, m, rad/s or m/s
     rms: float  # over the recording, in forces that move the node, or in spreads of the reading
 
     @property
@@ -49,6 +49,10 @@ class Free(NamedTuple):
     def axis(self) -> str:
         """Axis along which it is a function."""
         return self.place.axis
+
+    def over(self, number: int) -> np.ndarray:
+        """The function (n,) over the rows of a recording, SI."""
+        return self.place.along(self.knots, self.value, self.place.values[number])
 
     @property
     def kind(self) -> str:
@@ -131,7 +135,7 @@ def _simulated(base: Fitted, solved: _Solved, change: Callable[[np.ndarray, np.n
 
 
 def _judged(base: Fitted, e: np.ndarray, dx: np.ndarray, z: np.ndarray, volume: float) -> _Solved:
-    """What a step of the parameters and a free force gain, that leave the residuals e (blocks, sensors)."""
+    """What a step of the parameters and a free function gain, that leave the residuals e (blocks, sensors)."""
     weight = prior(base.space)
     odds = 0.5 * float(weight @ ((base.x + dx) ** 2 - base.x**2) + z @ z)
     gain = base.loss - base.like.loss(e)

@@ -82,7 +82,9 @@ def _read(fit: Fitted) -> list[str]:
     return [
         name
         for name in sims[0].channels
-        if name in sims[0].layout.sensors and name not in held and all(name in s.channels and name not in s.edges for s in sims)
+        if name in sims[0].layout.sensors
+        and name not in held
+        and all(name in s.channels and name not in s.edges for s in sims)
     ]
 
 

@@ -23,7 +23,7 @@ class Verdict(NamedTuple):
     confidence: tuple[float, ...]  # of each effect of the best
     rivals: tuple[tuple[tuple[str, float], ...], ...]  # of each effect: term:node in its place, probability
     probabilities: tuple[tuple[tuple[str, ...], float], ...]  # of combinations, best first
-    unlisted: Free | None  # the likeliest force without a name
+    unlisted: Free | None  # the likeliest force, or error of a reading, without a name
     beside: Fitted  # the model beside which it stands
     why: str  # one sentence
     table: tuple[Rival, ...]  # all rivals, the most probable first

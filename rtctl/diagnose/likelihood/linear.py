@@ -1,6 +1,6 @@
 """Linear model of a fit: the residual as a function of the fitted parameters about where they are, under a given noise.
 
-Screening, starts of fits and free forces all solve for the parameters beside something new; they share this.
+Screening, starts of fits and free functions all solve for the parameters beside something new; they share this.
 """
 
 from copy import copy

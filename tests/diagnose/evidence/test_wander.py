@@ -33,8 +33,8 @@ def test_a_random_force_is_measured():
     assert free is not None
     assert (free.node, free.axis) == ("rod", "time")
     there = np.interp(free.knots, np.arange(len(u)) / RATE, push)
-    assert np.corrcoef(free.force, there)[0, 1] > 0.7
-    assert free.force.std() == pytest.approx(there.std(), rel=0.4)
+    assert np.corrcoef(free.value, there)[0, 1] > 0.7
+    assert free.value.std() == pytest.approx(there.std(), rel=0.4)
 
 
 def test_a_random_force_has_no_name():
