@@ -22,7 +22,7 @@ from scipy.stats import t as student
 from rtctl.case.quantities import of_case
 from rtctl.diagnose.model.by_symbol import Model
 from rtctl.diagnose.record.format1 import Record
-from rtctl.diagnose.search.disturbance_estimate import peaks, spectrum
+from rtctl.diagnose.search.disturbance_estimate import Along, peaks, spectrum
 
 PLACES = 360  # over the turn
 FINEST = 60.0  # orders
@@ -117,7 +117,7 @@ def mean_of(visits: np.ndarray, sums: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def amplitudes(x: np.ndarray, torque: np.ndarray) -> tuple[Order, ...]:
     """The strongest orders of `torque` (n,) over the angle `x` (n,)."""
     thin = max(1, len(x) // 8000)
-    height = spectrum(x[::thin], torque[::thin], ORDERS)
+    height = spectrum(Along(x[::thin]), torque[::thin], ORDERS)
     found = peaks(ORDERS, height, TOLD)
     told = [Order(o, float(np.hypot(*wave(x, torque, o))), float(height[np.argmin(abs(ORDERS - o))])) for o in found]
     return tuple(sorted(told, key=lambda one: -one.amplitude))

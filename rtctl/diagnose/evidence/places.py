@@ -71,7 +71,7 @@ def places(fit: Fitted) -> list[Place]:
     for sensor in _read(fit):
         spread = max(float(np.std(part.sim.record.y[sensor])) for part in fit.like.parts)
         body = fit.like.sim.case.machine.sensors[sensor].body or str(sim.body)
-        found += _of(told, sensor, body, spread, True)
+        found += [_sampled(place, fit) for place in _of(told, sensor, body, spread, True)]
     return [place for place in found if np.ptp(np.concatenate(place.values)) > 0.0]
 
 
@@ -86,6 +86,18 @@ def _read(fit: Fitted) -> list[str]:
         and name not in held
         and all(name in s.channels and name not in s.edges for s in sims)
     ]
+
+
+def _sampled(place: Place, fit: Fitted) -> Place:
+    """A place of an error of a reading: a command that leaks in is the one that acted until the sensor was read.
+
+    The command that is computed from the reading follows its noise, and would explain it.
+    """
+    if place.axis != "command":
+        return place
+    late = [1 + int(part.sim.case.delay_samples) for part in fit.like.parts]
+    shifted = [np.concatenate([u[:1].repeat(k), u[:-k]]) for k, u in zip(late, place.values, strict=True)]
+    return place._replace(values=shifted)
 
 
 def _of(told: list[Measures], node: str, body: str, whole: float, reads: bool) -> list[Place]:

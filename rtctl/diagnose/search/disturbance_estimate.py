@@ -8,6 +8,8 @@ Source: Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mechatronics 1 (1996) for 
 squares on cosine and sine of the angle, since angles are not evenly sampled.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 MOST = 4  # hints of a kind
@@ -20,9 +22,32 @@ ORDERS = np.arange(1.0, 61.0)  # whole: what a disc or a shaft adds is the same 
 SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
 
 
-def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray, by: np.ndarray | float = 1.0) -> np.ndarray:
-    """Share of the variance of `signal` that a sinusoid of each order in `angle` explains, slow drift taken out. The
-    amplitude of the sinusoid is proportional to `by`."""
+class Along(NamedTuple):
+    """An angle, or a way, in which orders are looked for, rows (n,) each."""
+
+    angle: np.ndarray
+    by: np.ndarray | float = 1.0  # what the amplitude of a force is proportional to
+    motion: tuple[np.ndarray, np.ndarray] | None = None  # speed and acceleration, for an error of the angle itself
+
+    def at(self, rows: np.ndarray) -> "Along":
+        """The same of some rows."""
+        by = self.by[rows] if isinstance(self.by, np.ndarray) else self.by
+        motion = None if self.motion is None else (self.motion[0][rows], self.motion[1][rows])
+        return Along(self.angle[rows], by, motion)
+
+    def waves(self, order: float) -> np.ndarray:
+        """Cosine and sine (n, 2) of an order, as the signal shows them. What follows an angle that is read wrongly is
+        pushed by the second derivative of the error."""
+        c, s = np.cos(order * self.angle), np.sin(order * self.angle)
+        if self.motion is None:
+            return np.stack([self.by * c, self.by * s], axis=1)
+        v, a = order * self.motion[0], order * self.motion[1]
+        return np.stack([-(v**2) * c - a * s, -(v**2) * s + a * c], axis=1)
+
+
+def spectrum(along: Along, signal: np.ndarray, orders: np.ndarray) -> np.ndarray:
+    """Share of the variance of `signal` that each order explains, slow drift taken out."""
+    angle = along.angle
     if len(signal) < FEWEST:
         return np.zeros(len(orders))
     z = np.linspace(-1, 1, len(signal))
@@ -35,21 +60,14 @@ def spectrum(angle: np.ndarray, signal: np.ndarray, orders: np.ndarray, by: np.n
     for k, order in enumerate(orders):
         if order * span < np.pi:  # less than half a period
             continue
-        A = np.stack([by * np.cos(order * angle), by * np.sin(order * angle)], axis=1)
+        A = along.waves(order)
         A -= drift @ (drift.T @ A)
         b = A.T @ rest
         out[k] = float(b @ np.linalg.lstsq(A.T @ A, b, rcond=None)[0]) / total
     return out
 
 
-def seen(
-    angle: np.ndarray,
-    signal: np.ndarray,
-    rate: np.ndarray,
-    orders: np.ndarray,
-    quick: float,
-    by: np.ndarray | None = None,
-) -> np.ndarray:
+def seen(along: Along, signal: np.ndarray, rate: np.ndarray, orders: np.ndarray, quick: float) -> np.ndarray:
     """As `spectrum`, each order where it passes slower than `quick` rad/s, so that the signal can show it; `rate` is
     that of the angle. By the number of rows that are left."""
     out = np.zeros(len(orders))
@@ -57,8 +75,7 @@ def seen(
     for count in np.unique(rows):  # the rows of a higher order are among those of a lower one: as many are the same
         same = np.flatnonzero(rows == count)
         slow = rate * orders[same[0]] < quick
-        own = 1.0 if by is None else by[slow]
-        out[same] = spectrum(angle[slow], signal[slow], orders[same], own) * count
+        out[same] = spectrum(along.at(slow), signal[slow], orders[same]) * count
     return out
 
 

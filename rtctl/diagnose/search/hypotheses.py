@@ -12,9 +12,11 @@ from rtctl.diagnose.search.grid_starts import parts_of, searched, shows_alone, s
 from rtctl.idiom import Settings
 from rtctl.plants.element import Element
 from rtctl.plants.physics import TERMS, Term, nodes, standing
+from rtctl.plants.physics.search import Hint
 
 SLIGHT = 0.01  # of the force that moves a node: friction that nothing else could be told by
 ONE_SIGN = 0.02  # of the largest reading: the least that counts as the other sign
+BY_TURN = ("order", "order_from", "order_to")  # hints that hold half a period of what they suggest
 ABOUT = {  # kinds of element that a problem tells of: positions of no force, a measured force of no command
     "kinematic": ("joint", "sensor"),
     "static": ("body", "joint", "sensor"),
@@ -49,7 +51,6 @@ def hypotheses(
                 or not term.in_format(sim.case.format)
                 or (sim.case.plant and node not in nodes(term, sim.case.plant))
                 or ("contact" in element.traits and "contact" not in stand.needs)
-                or ("turns" in element.traits and moved.span < 2 * np.pi * term.needs.turns)
                 or (term.needs.compared and len(sim.channels) < 2 and not shows_alone(term, element, slides, unsigned))
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
                 or (term.needs.friction and not (rubs or drags))
@@ -57,8 +58,10 @@ def hypotheses(
                 or called_otherwise(sim, term, element, moved.span)
             ):
                 continue
+            turned = "turns" not in element.traits or moved.span >= 2 * np.pi * term.needs.turns
             for parts in stand.ways or ((term.sliding if slides else ()) or parts_of(name),):
-                out += starts_of(name, node, parts, measures)
+                if turned or any(isinstance(part, Hint) and part.kind in BY_TURN for part in parts):
+                    out += starts_of(name, node, parts, measures)
     return out
 
 

@@ -13,7 +13,17 @@ from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import lever, way
 from rtctl.diagnose.model.simulate import Simulator
-from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, jumps, orders_of, peaks, seen, spectrum, spots
+from rtctl.diagnose.search.disturbance_estimate import (
+    MOST,
+    ORDERS,
+    Along,
+    jumps,
+    orders_of,
+    peaks,
+    seen,
+    spectrum,
+    spots,
+)
 from rtctl.plants.graph.description import Sensor
 from rtctl.plants.graph.elements import contacts, undriven
 from rtctl.plants.graph.layout import layout
@@ -59,12 +69,26 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
     quick = QUICK * faster(sim).follow
     found: dict[str, list] = {}
 
-    def orders_at(body: str, by: np.ndarray | None = None) -> list[float]:
+    def orders_at(body: str, by: np.ndarray | float = 1.0) -> list[float]:
         """Orders of the missing force in the angle of a body; `by` (n,) is proportional to their amplitude."""
         number, ratio = sim.leader(body), sim.ratios[body]
-        x = ways[number] * ratio
-        height = seen(x, push[:, number], rates[number] * abs(ratio), ORDERS, quick, by)
-        return orders_of(float(np.ptp(x)), height, MOST)
+        along = Along(ways[number] * ratio, by)
+        height = seen(along, push[:, number], rates[number] * abs(ratio), ORDERS, quick)
+        return orders_of(float(np.ptp(along.angle)), height, MOST)
+
+    def misread(name: str) -> list[float]:
+        """Orders or wavelengths of an error of a reading that the observer follows, as the model moves."""
+        sensor = sim.case.machine.sensors[name]
+        body = str(sensor.body)
+        number, ratio, v = sim.leader(body), sim.ratios[body], read[begin:, sim.column(name)]
+        v = v if sensor.measures == "speed" else np.gradient(v) / record.dt
+        if not np.isfinite(v).all():
+            return []
+        along = Along(ways[number] * ratio, motion=(v[::thin], (np.gradient(v) / record.dt)[::thin]))
+        turns = sim.case.machine.turns(body)
+        grid = ORDERS if turns else 2 * np.pi / waves_of(along.angle)
+        height = seen(along, push[:, number], rates[number] * abs(ratio), grid, quick)
+        return orders_of(float(np.ptp(along.angle)), height, MOST) if turns else peaks(2 * np.pi / grid, height, MOST)
 
     for node, ratio in sim.ratios.items():
         x, d = ways[sim.leader(node)], push[:, sim.leader(node)]
@@ -72,41 +96,39 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
             found[f"order:{node}"] = orders_at(node)
         elif ratio != 0.0:
             waves = waves_of(x * ratio)
-            found[f"wavelength:{node}"] = peaks(waves, spectrum(x * ratio, d, 2 * np.pi / waves), MOST)
+            found[f"wavelength:{node}"] = peaks(waves, spectrum(Along(x * ratio), d, 2 * np.pi / waves), MOST)
             found[f"order:{node}"] = []
     for name, column in sim.layout.drives.items():  # torque ripple is proportional to the command
         body = str(sim.case.machine.drives[name].body)
         if sim.ratios.get(body, 0.0) != 0.0 and sim.case.machine.turns(body):
             found[f"order:{name}"] = orders_at(body, sim.volts[begin:, column][::thin])
     errors: dict[str, np.ndarray] = {}  # of the sensors that the model does not follow
-    for name in sim.channels:
-        if name not in sim.case.machine.sensors:
+    tracked = {one.sensor for one in sim.followed}
+    for name, sensor in sim.case.machine.sensors.items():
+        body = str(sensor.body)
+        ratio = sim.ratios.get(body, 0.0) if name in sim.channels else 0.0
+        if ratio == 0.0 or sensor.measures not in ("position", "speed"):
             continue
-        sensor = sim.case.machine.sensors[name]
-        if sensor.measures == "speed":
-            found[f"order:{name}"] = found.get(f"order:{sensor.body}", [])
-        ratio = sim.ratios.get(str(sensor.body), 0.0) if sensor.measures == "position" else 0.0
-        if ratio == 0.0:
-            continue
-        kind = "order" if sim.case.machine.turns(str(sensor.body)) else "wavelength"
-        x = ways[sim.leader(str(sensor.body))]
+        kind = "order" if sim.case.machine.turns(body) else "wavelength"
         error = (record.y[name] - read[:, sim.column(name)])[begin:][::thin]
-        if name == sim.main or not np.isfinite(error).all():
-            found[f"{kind}:{name}"] = found[f"{kind}:{sensor.body}"]
-            continue
-        errors[name] = error
-        if kind == "order":
-            found[f"order:{name}"] = orders_of(float(np.ptp(x * ratio)), spectrum(x * ratio, error, ORDERS), MOST)
+        if name in tracked:
+            found[f"{kind}:{name}"] = misread(name)
+        elif sensor.measures == "speed" or not np.isfinite(error).all():
+            found[f"{kind}:{name}"] = found[f"{kind}:{body}"]
         else:
-            waves = waves_of(x * ratio)
-            found[f"wavelength:{name}"] = peaks(waves, spectrum(x * ratio, error, 2 * np.pi / waves), MOST)
+            errors[name], along = error, Along(ways[sim.leader(body)] * ratio)
+            if kind == "order":
+                found[f"order:{name}"] = orders_of(float(np.ptp(along.angle)), spectrum(along, error, ORDERS), MOST)
+            else:
+                waves = waves_of(along.angle)
+                found[f"wavelength:{name}"] = peaks(waves, spectrum(along, error, 2 * np.pi / waves), MOST)
     for name, joint in sim.case.machine.joints.items():
         for end in ("from", "to"):
             body = getattr(joint, end)
             orders, x = found.get(f"order:{body}", []), ways[sim.leader(body)]
             for error in errors.values() if orders else ():
                 turned = x * sim.ratios[body]
-                orders = orders_of(float(np.ptp(turned)), spectrum(turned, error, ORDERS), MOST)
+                orders = orders_of(float(np.ptp(turned)), spectrum(Along(turned), error, ORDERS), MOST)
             found[f"order_{end}:{name}"] = orders
     for name in sim.layout.links:
         at = gauges.layout.sensors.get(GAUGE + name)

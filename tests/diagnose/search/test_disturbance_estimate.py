@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, jumps, orders_of, peaks, spectrum, spots
+from rtctl.diagnose.search.disturbance_estimate import MOST, ORDERS, Along, jumps, orders_of, peaks, spectrum, spots
 
 
 def turning(n=6000, turns=3.0, seed=0):
@@ -21,34 +21,34 @@ def test_an_order_is_found_in_drift_friction_and_noise(order, phase, seed):
     rng = np.random.default_rng(seed)
     signal = np.cos(order * angle + phase) + 0.7 * rng.standard_normal(len(angle))
     signal += 2.0 + 0.1 * angle + 1.5 * np.sign(np.gradient(angle))
-    found = orders_of(float(np.ptp(angle)), spectrum(angle, signal, ORDERS), MOST)
+    found = orders_of(float(np.ptp(angle)), spectrum(Along(angle), signal, ORDERS), MOST)
     assert found[0] == order
 
 
 def test_less_than_a_turn_does_not_tell_neighbouring_orders_apart():
     angle = turning(turns=0.4)
-    found = orders_of(float(np.ptp(angle)), spectrum(angle, np.cos(6 * angle), ORDERS), MOST)
+    found = orders_of(float(np.ptp(angle)), spectrum(Along(angle), np.cos(6 * angle), ORDERS), MOST)
     assert 6.0 in found
     assert {found[0] - 1.0, found[0] + 1.0} <= set(found)
 
 
 def test_a_share_of_the_variance_is_between_none_and_all():
     angle = turning()
-    share = spectrum(angle, np.cos(3 * angle), np.array([3.0, 7.0]))
+    share = spectrum(Along(angle), np.cos(3 * angle), np.array([3.0, 7.0]))
     assert share[0] == pytest.approx(1.0, abs=1e-6)
     assert 0.0 <= share[1] < 0.2
 
 
 def test_of_less_than_half_a_period_nothing_is_said():
     angle = np.linspace(0, 1.0, 500)
-    share = spectrum(angle, np.cos(angle), np.array([0.5, 2.0, 4.0]))
+    share = spectrum(Along(angle), np.cos(angle), np.array([0.5, 2.0, 4.0]))
     assert (share[:2] == 0.0).all()
     assert share[2] > 0.0
 
 
 def test_a_signal_of_nothing_has_no_peaks():
     angle = turning()
-    assert peaks(ORDERS, spectrum(angle, np.zeros(len(angle)), ORDERS), MOST) == []
+    assert peaks(ORDERS, spectrum(Along(angle), np.zeros(len(angle)), ORDERS), MOST) == []
 
 
 def test_peaks_come_highest_first():
