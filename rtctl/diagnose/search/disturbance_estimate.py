@@ -45,22 +45,24 @@ class Along(NamedTuple):
         return np.stack([-(v**2) * c - a * s, -(v**2) * s + a * c], axis=1)
 
 
-def spectrum(along: Along, signal: np.ndarray, orders: np.ndarray) -> np.ndarray:
-    """Share of the variance of `signal` that each order explains, slow drift taken out."""
+def spectrum(along: Along, signal: np.ndarray, orders: np.ndarray, root: np.ndarray | float = 1.0) -> np.ndarray:
+    """Share of the variance of `signal` that each order explains, slow drift taken out. `root` is the root of the
+    weights of rows."""
     angle = along.angle
     if len(signal) < FEWEST:
         return np.zeros(len(orders))
     z = np.linspace(-1, 1, len(signal))
     slow = np.stack([np.ones_like(z), angle - angle.mean(), np.sign(np.gradient(angle))], axis=1)
-    drift = np.linalg.qr(slow)[0]
-    rest = signal - drift @ (drift.T @ signal)
+    drift = np.linalg.qr((slow.T * root).T)[0]
+    rest = signal * root
+    rest -= drift @ (drift.T @ rest)
     total = float(rest @ rest) or 1.0
     out = np.zeros(len(orders))
     span = float(np.ptp(angle))
     for k, order in enumerate(orders):
         if order * span < np.pi:  # less than half a period
             continue
-        A = along.waves(order)
+        A = (along.waves(order).T * root).T
         A -= drift @ (drift.T @ A)
         b = A.T @ rest
         out[k] = float(b @ np.linalg.lstsq(A.T @ A, b, rcond=None)[0]) / total
@@ -69,13 +71,20 @@ def spectrum(along: Along, signal: np.ndarray, orders: np.ndarray) -> np.ndarray
 
 def seen(along: Along, signal: np.ndarray, rate: np.ndarray, orders: np.ndarray, quick: float) -> np.ndarray:
     """As `spectrum`, each order where it passes slower than `quick` rad/s, so that the signal can show it; `rate` is
-    that of the angle. By the number of rows that are left."""
+    that of the angle. By the number of rows that are left.
+
+    Rows count the more the faster they pass: time alone would count a stop, at which friction holds whatever the force,
+    as many rows, and the angle alone a slow turn, which averages more noise, as no more than a fast one.
+    """
     out = np.zeros(len(orders))
     rows = np.array([np.count_nonzero(rate * order < quick) for order in orders])
     for count in np.unique(rows):  # the rows of a higher order are among those of a lower one: as many are the same
         same = np.flatnonzero(rows == count)
         slow = rate * orders[same[0]] < quick
-        out[same] = spectrum(along.at(slow), signal[slow], orders[same]) * count
+        weight = np.sqrt(rate[slow])
+        total, square = float(weight.sum()), float(weight @ weight)
+        if square > 0.0:
+            out[same] = spectrum(along.at(slow), signal[slow], orders[same], np.sqrt(weight)) * total**2 / square
     return out
 
 

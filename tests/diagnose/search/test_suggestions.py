@@ -1,6 +1,7 @@
 """What a recording suggests to start from."""
 
-from graph_cases import BELT, case_of, command, record
+import numpy as np
+from graph_cases import BELT, PENDULUM, case_of, command, record
 
 from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.simulate import Simulator
@@ -22,3 +23,15 @@ def test_order_of_a_motor_that_pushes_unevenly_is_hinted_at_its_drive():
     assert found["order:amplifier"][0] == 6.0
     asked = {(h.name, h.fixed.get("per_turn")) for h in hypotheses(sim, model, found)}
     assert ("ripple.torque:amplifier", 6.0) in asked
+
+
+def test_order_of_a_disc_off_centre_is_hinted_at_the_sensor_that_the_observer_follows():
+    disc = {"term": "ripple.encoder", "node": "encoder", "A": 5e-3, "order": 4}
+    sim = Simulator(record(case_of(PENDULUM), command(2.2), [disc]))
+    model = nominal(sim.case)
+    found = hints(sim, model, 100)
+    assert np.ptp(sim.seen) < np.pi  # less than half a turn, and more than a period of the disc
+    assert found["order:encoder"][0] == 4.0
+    asked = {(h.name, h.fixed.get("order")) for h in hypotheses(sim, model, found)}
+    assert ("ripple.encoder:encoder", 4.0) in asked
+    assert ("ripple.encoder:encoder", 1.0) not in asked
