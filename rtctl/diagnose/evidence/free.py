@@ -23,7 +23,7 @@ from rtctl.diagnose.model.model import GraphModel
 
 HATS = 10  # of a first look at each axis
 FINE = 30  # of the axes that explain most
-SECOND = 2  # axes that are looked at again
+SECOND = 2  # axes of forces, and of errors of readings, that are looked at again
 SMOOTH = 0.25  # of the range: distance over which a free function is alike, by its prior
 PARTS = (1.0, 0.5, 0.25)  # of the step of the linear model, at which it is simulated
 
@@ -68,12 +68,11 @@ def free_functions(base: Fitted, error: float = 0.0) -> list[Free]:
     """
     own = Linear(base)
     about = own, own.under(base.like.flat(base.e))  # the parameters are filtered once for all places
-    found = places(base)
-    out = [free for place in found for free in _fitted(about, place, HATS, error)]
+    out = [free for place in places(base) for free in _fitted(about, place, HATS, error)]
     out.sort(key=lambda f: -f.evidence)
-    for node, axis in list(dict.fromkeys((f.node, f.axis) for f in out))[:SECOND]:
-        again = next(place for place in found if (place.node, place.axis) == (node, axis))
-        out += _fitted(about, again, FINE, error)
+    for reads in (False, True):
+        for place in list({(f.node, f.axis): f.place for f in out if f.place.reads == reads}.values())[:SECOND]:
+            out += _fitted(about, place, FINE, error)
     return sorted(out, key=lambda f: -f.evidence)
 
 
