@@ -384,6 +384,7 @@ def steps(mechanics: Any, name: str) -> ModuleType:
             for d in range(p.nu):
                 m.volts[d] = u[k, d]
             for _ in range(substeps):
+                plant.ask(p, m)
                 plant.take(p, m)
                 linear.midpoint(m)
                 plant.weigh(p, m)

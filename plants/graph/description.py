@@ -139,6 +139,9 @@ class Drive(Settings):
     resistance: float | None = Field(None, gt=0, description="ohm, of a voltage drive")
     inductance: float | None = Field(None, gt=0, description="H, of a voltage drive")
     limit: float | None = Field(None, gt=0, description="largest command, in its unit")
+    output_limit: float | None = Field(
+        None, gt=0, description="most that the drive gives whatever it is asked for, in the unit of the command"
+    )
     dac_bits: int | None = Field(None, ge=2, le=32, description="bits of the converter that the command passes")
     dac_range: float = Field(10.0, gt=0, description="largest command that the converter gives")
     bandwidth_hz: float | None = Field(None, gt=0, description="natural frequency of the drive, Hz")

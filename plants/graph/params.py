@@ -51,7 +51,8 @@ class GraphParams(NamedTuple):
     drive_kind: np.ndarray
     drive_at: np.ndarray  # first of its states in x
     drive_gain: np.ndarray
-    drive_limit: np.ndarray
+    drive_limit: np.ndarray  # of the command
+    drive_top: np.ndarray  # of the output, in units of the command
     drive_K: np.ndarray  # torque constant
     drive_R: np.ndarray
     drive_L: np.ndarray
@@ -98,6 +99,7 @@ def build(layout: Layout, values: dict[str, float], h: float) -> GraphParams:
         a["drive_kind"][number], a["drive_at"][number] = KINDS[drive.kind], nx
         a["drive_gain"][number] = values[f"{path}.gain"]
         a["drive_limit"][number] = values.get(f"{path}.limit", np.inf)
+        a["drive_top"][number] = values.get(f"{path}.output_limit", np.inf)
         a["drive_K"][number] = values.get(f"{path}.torque_constant", 1.0)
         a["drive_R"][number] = values.get(f"{path}.resistance", 1.0)
         a["drive_L"][number] = values.get(f"{path}.inductance", 0.0)

@@ -73,10 +73,17 @@ def assemble(p, m):
 
 
 @tick
-def take(p, m):
-    """Commands within their limits, from m.volts to the inputs m.u."""
+def ask(p, m):
+    """Commands within their limits, in m.volts: what a drive makes of a command comes after."""
     for d in range(p.nu):
-        m.u[d] = min(max(m.volts[d], -p.drive_limit[d]), p.drive_limit[d])
+        m.volts[d] = min(max(m.volts[d], -p.drive_limit[d]), p.drive_limit[d])
+
+
+@tick
+def take(p, m):
+    """What the drives give, within the limits of their outputs, from m.volts to the inputs m.u."""
+    for d in range(p.nu):
+        m.u[d] = min(max(m.volts[d], -p.drive_top[d]), p.drive_top[d])
 
 
 @tick

@@ -34,6 +34,7 @@ def play(p, s, u, substeps, y):
         for d in range(p.nu):
             m.volts[d] = u[k, d]
         for _ in range(substeps):
+            plant.ask(p, m)
             plant.take(p, m)
             linear.midpoint(m)
             plant.weigh(p, m)

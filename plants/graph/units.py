@@ -37,7 +37,8 @@ def drive_units(kind: str, command: str, turns: bool) -> dict[str, str]:
     gain = "" if made == command else f"{made}/{command}" if command else made
     return {
         "gain": gain, "torque_constant": f"{FORCE[turns]}/A", "resistance": "ohm", "inductance": "H",
-        "limit": command, "dac_range": command, "bandwidth_hz": "Hz", "damping": "", "zero": "s",
+        "limit": command, "output_limit": command, "dac_range": command, "bandwidth_hz": "Hz", "damping": "",
+        "zero": "s",
     }  # fmt: skip
 
 

@@ -11,9 +11,17 @@ from rtctl.plants.graph.layout import Layout
 
 FORMAT = 2
 PROBLEMS = ("driven", "free", "kinematic", "static")
-EXACT = ("limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
+EXACT = ("limit", "output_limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
 START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
-NEVER = ("dac_range", "resolution", "noise", "per_unit", "counts_per_unit", "limit")  # no parameter of the motion
+NEVER = (
+    "dac_range",
+    "resolution",
+    "noise",
+    "per_unit",
+    "counts_per_unit",
+    "limit",
+    "output_limit",
+)  # no parameter of the motion
 
 
 class GraphCase(NamedTuple):

@@ -29,7 +29,7 @@ SURE = 5.0  # steps of all sensors together that a change by TOLERANCE has to ma
 SAME = 8e-3  # singular value of the normed sensitivities below which parameters move alike
 TWINS = 1e-5  # of 1 less their correlation, parameters whose effects are one: factors of a product
 PART = 0.2  # share of the largest that makes a parameter part of a combination
-LEFT_OUT = ("limit", "dac_range", "counts_per_unit", "per_unit", "resolution", "noise")
+LEFT_OUT = ("limit", "output_limit", "dac_range", "counts_per_unit", "per_unit", "resolution", "noise")
 
 
 class Group(NamedTuple):

@@ -139,6 +139,7 @@ def plant_diagram(config: Any, h: float, seed: int) -> PlantDiagram:
                     f"p.{block.name}, s.{block.name}, tx.ao_codes[{n}], p.plant.h)"
                     for n, block in enumerate(outputs)
                 ),
+                "plant.ask(p.plant, s.plant.m)",
                 *terms.command,
                 "plant.take(p.plant, s.plant.m)",
             ),

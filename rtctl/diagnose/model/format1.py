@@ -120,7 +120,7 @@ def _drives(data: dict[str, Any], case: Case) -> None:
         if said.amp_per_volt:
             drive["gain"] = said.amp_per_volt[number]
             if said.current_limit is not None:
-                drive["limit"] = said.current_limit / said.amp_per_volt[number]
+                drive["output_limit"] = said.current_limit / said.amp_per_volt[number]
         if said.bandwidth_hz is not None:
             drive["bandwidth_hz"] = said.bandwidth_hz
             if said.damping is not None:

@@ -46,6 +46,7 @@ STEPS = '''
 @compiled
 def substep(job, p, m, t, forces, row):
     """One substep under the commands in m.volts and the recorded forces."""
+    graph.ask(p, m)
     command(t, m)
     graph.take(p, m)
     linear.midpoint(m)

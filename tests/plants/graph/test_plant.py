@@ -21,6 +21,7 @@ SEEN = {"eye": {"body": "a", "column": "eye"}}
 @tick
 def run(p, s, n):
     for _ in range(n):
+        graph.ask(p, s.m)
         graph.take(p, s.m)
         linear.midpoint(s.m)
         graph.weigh(p, s.m)
@@ -73,6 +74,24 @@ def test_a_voltage_drive_runs_to_the_speed_of_its_back_emf(extra):
     assert s.m.y[0] == pytest.approx(speed, rel=1e-6)
     assert s.m.y[1] == pytest.approx((6.0 - K * speed) / R, rel=1e-6)
     assert drive_force(p, s.m, 0) == pytest.approx(dry + viscous * speed, rel=1e-6)
+
+
+def test_a_limit_holds_the_command_and_an_output_limit_what_the_drive_makes_of_it():
+    p = params(
+        1e-4,
+        bodies={"a": {"inertia": 1e-5}},
+        drives={"m": {"body": "a", "gain": 3.0, "limit": 2.0, "output_limit": 2.5}},
+    )
+    s = started(p)
+    s.m.volts[0] = 5.0
+    graph.ask(p, s.m)
+    assert s.m.volts[0] == 2.0
+    s.m.volts[0] += 0.3  # an offset of the drive
+    graph.take(p, s.m)
+    assert s.m.u[0] == 2.3
+    s.m.volts[0] += 1.0
+    graph.take(p, s.m)
+    assert s.m.u[0] == 2.5
 
 
 @pytest.mark.parametrize(
