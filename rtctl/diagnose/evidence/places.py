@@ -1,7 +1,8 @@
 """Places of a free function: a force at a body, or an error of the reading of a sensor, along one axis.
 
-Position and speed are those of the model, as its observer has them: the speed of a recording that counts knows of a
-step before it comes, and a force by it pushes ahead.
+Position and speed are those of the model, as an observer of the usual bandwidth has them: the speed of a recording that
+counts knows of a step before it comes, and a force by it pushes ahead. That of a quick observer holds the noise of the
+reading before, and a function of it would be another observer.
 """
 
 from typing import NamedTuple
@@ -59,7 +60,7 @@ def places(fit: Fitted) -> list[Place]:
     """Places of forces at every body and of errors of every reading, along every axis that the recordings have."""
     sim, base = fit.like.sim, fit.model.base
     every = [Measures(part.sim, base, {}) for part in fit.like.parts]
-    told = [Measures(part.sim.seen_by(fit.model), base, {}) for part in fit.like.parts]
+    told = [Measures(part.sim.usual().seen_by(fit.model), base, {}) for part in fit.like.parts]
     found: list[Place] = []
     taken: set[int] = set()
     for body, ratio in sim.ratios.items():

@@ -179,6 +179,10 @@ class Simulator:
         other.follow = min(times * self.follow, self.quickest)
         return other
 
+    def usual(self) -> "Simulator":
+        """The same with an observer of the usual bandwidth."""
+        return self.following(self.followed[0].bandwidth / self.follow)
+
     def released(self, row: int) -> "Simulator":
         """The same whose correction ends at `row`: a free run from there, from the state that the observer reached."""
         other = copy(self)
