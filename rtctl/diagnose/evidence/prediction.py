@@ -40,18 +40,27 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
     the effects (`fewer`) without which the held-out rows are predicted better."""
     first, late = base.like.split(HELD)
 
-    def foretold(f: Fitted) -> float:
-        return late.foretold(late.raw(f.model), f.like)
-
     own = fitted_to(first, best)
     while fewer and len(best.names) > 1:
         less = [refit(first, *without(own, index), rounds=ROUNDS) for index in range(len(best.names))]
-        losses = [foretold(f) for f in less]
-        index = int(np.argmin(losses))
-        if losses[index] > foretold(own) - WORSE:
+        gains = [ahead(late, own, f) for f in less]
+        index = int(np.argmin(gains))
+        if gains[index] > -WORSE:
             break
         own, best = less[index], refit(best.like, *without(best, index))
     return judged(base.like, first, late, (fitted_to(first, base), own)), best
+
+
+def ahead(late: Likelihood, one: Fitted, other: Fitted) -> float:
+    """Nats by which one model foretells the rows of `late` better than another, each under its noise of rows before.
+
+    A model that left little there, without memory, loses by its slow errors in later rows to one whose larger errors are
+    expected. So it is also asked which is nearer, both under the noise of the first, and a clear answer counts.
+    """
+    e, f = late.raw(one.model), late.raw(other.model)
+    own = late.foretold(f, other.like) - late.foretold(e, one.like)
+    nearer = late.foretold(f, one.like) - late.foretold(e, one.like)
+    return max(own, nearer) if nearer > WORSE else own
 
 
 def predicted(heldout: Heldout, best: Fitted) -> Heldout:
@@ -71,5 +80,5 @@ def judged(whole: Likelihood, early: Likelihood, late: Likelihood, fits: tuple[F
     residuals = [late.raw(f.model) for f in fits]
     before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)
     floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
-    one, two = (late.foretold(e, f.like) for e, f in zip(residuals, fits, strict=True))
-    return Heldout(before, after, min(floor, after), one - two, fits, early, late)
+    gain = ahead(late, fits[1], fits[0])
+    return Heldout(before, after, min(floor, after), gain, fits, early, late)

@@ -2,7 +2,7 @@ import numpy as np
 from graph_cases import BELT, RUB, case_of, command, named, record
 
 from rtctl.diagnose.evidence.diagnosis import NAMED
-from rtctl.diagnose.evidence.prediction import predict
+from rtctl.diagnose.evidence.prediction import ahead, predict
 from rtctl.diagnose.evidence.verdict import fewer
 from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.likelihood.joint import together
@@ -48,3 +48,14 @@ def test_the_verdict_says_what_was_left_out():
     assert found.why == "without friction.coulomb:motor, the last rows are predicted better"
     assert len(found.confidence) == 1
     assert fewer(d.decided, best, "") is d.decided
+
+
+def test_a_model_that_is_nearer_is_ahead_though_larger_errors_were_expected_of_the_other():
+    heldout = named().heldout
+    base, best = heldout.fits
+    loud = best._replace(like=best.like.flat(base.e))  # knows of no better
+    assert ahead(heldout.late, best, base) > 100.0
+    assert ahead(heldout.late, base, best) < -100.0
+    assert ahead(heldout.late, best, loud) == heldout.late.foretold(
+        heldout.late.raw(best.model), loud.like
+    ) - heldout.late.foretold(heldout.late.raw(best.model), best.like)
