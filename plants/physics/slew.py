@@ -1,29 +1,37 @@
 """Rate limit of a drive: its output follows the command no faster than so much a second.
 
 Source: Slotine & Li, Applied Nonlinear Control (1991), 5.2; Duda, Prediction of pilot-in-the-loop oscillations due to
-rate saturation, J. Guidance, Control and Dynamics 20 (1997).
+rate saturation, J. Guidance, Control and Dynamics 20 (1997). Solomon, The monolithic op amp, IEEE J. Solid-State
+Circuits 9 (1974) for the stage whose current bends towards its limit.
 """
 
+import math
 from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.drive import ramp
-from rtctl.plants.physics.search import Limit
+from rtctl.plants.physics.search import Limit, Shape
 from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
+FAR = 20.0  # from which on tanh is 1 in double precision
+
 
 class SlewSettings(Settings):
-    """Without effect while rate is beyond all that the command asks for."""
+    """Without effect while rate is beyond all that the command asks for. With tau small steps take their time too, and
+    the rate bends towards its limit."""
 
     term: Literal["drive.slew"] = "drive.slew"
     node: Node
     rate: float = quantity(unit="V/s", gt=0, le=1e9, help="the output changes no faster than this")
+    tau: float = quantity(0.0, unit="s", ge=0, le=10, help="time constant of small steps; 0 for a sharp limit")
 
 
 class SlewParams(NamedTuple):
     step: float  # V, in one substep
+    bend: float  # V behind the command, by which the rate bends; 0 where it does not
+    decay: float  # substeps in a time constant, inverse
 
 
 SLEW_STATE = state(u=float)
@@ -31,20 +39,36 @@ SLEW_STATE = state(u=float)
 
 def build_slew(settings: SlewSettings, h: float) -> SlewParams:
     """Largest change in a substep of `h` s."""
-    return SlewParams(settings.rate * h)
+    tau = settings.tau
+    return SlewParams(settings.rate * h, settings.rate * tau, h / tau if tau > 0.0 else 0.0)
 
 
 @tick
 def slew(p, s, u):
     """Mean volts at the driver over a substep at a command of `u` volts."""
-    return ramp(s, u, p.step)
+    if p.bend == 0.0:
+        return ramp(s, u, p.step)
+    before = (u - s.u) / p.bend
+    after = math.copysign(bent(abs(before), p.decay), before)
+    s.u = u - p.bend * after
+    return u - 0.5 * p.bend * (before + after)
+
+
+@tick
+def bent(z, t):
+    """Solution of z' = -tanh z for a z of 0 or more, after the time t: sinh z falls as exp(-t)."""
+    if z - t > FAR:
+        return z - t
+    if z > FAR:
+        return math.asinh(0.5 * math.exp(z - t))
+    return math.asinh(math.sinh(z) * math.exp(-t))
 
 
 SLEW = Term(
     name="drive.slew",
     words="it follows in ramps: a large step takes longer than a small one",
-    equation="|y'| <= rate",
-    source="Slotine & Li 1991, 5.2",
+    equation="|y'| <= rate; or y' = rate tanh((u - y) / (rate tau))",
+    source="Slotine & Li 1991, 5.2; Solomon 1974",
     settings=SlewSettings,
     build=build_slew,
     act={"command": "{m}.volts[{c}] = slew.slew({p}, {s}, {m}.volts[{c}])"},
@@ -68,5 +92,6 @@ SLEW = Term(
     ),
     check="Command a large step and watch the output of the amplifier; look for a ramp that is set in it.",
     search=(Limit("rate", "pace", (0.2, 0.6)),),
+    richer=(Shape("tau", "tick", (2.0,), 20.0),),
     draws={"rate": Draw(0.2, 0.6, "pace")},
 )

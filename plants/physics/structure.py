@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
-from rtctl.plants.physics.search import Shape, Size
+from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
@@ -70,7 +70,8 @@ def resonance(p, s, x, v):
 
 
 class StiffeningSettings(Settings):
-    """c3 is the size. With c2 the spring is stiffer one way than the other, with b2 it loses more where it bends."""
+    """c3 is the size. With c2 the spring is stiffer one way than the other, with b2 it loses more where it bends. With
+    another power the stiffness grows by that power of the bend; at `bend` it is that of the cubic."""
 
     term: Literal["structure.stiffening"] = "structure.stiffening"
     node: Node
@@ -83,23 +84,29 @@ class StiffeningSettings(Settings):
     b2: float = quantity(
         0.0, unit="", ge=0, le=1e12, help="damping that grows with the bend squared, Ns/m^3 or Nms/rad^3 by link"
     )
+    power: float = quantity(2.0, unit="", ge=0.5, le=6, help="of the bend, by which the stiffness grows")
+    bend: float = quantity(1.0, unit="", gt=0, le=1e3, help="at which c3 is that of a cubic spring, m or rad by link")
 
 
 class StiffeningParams(NamedTuple):
     c3: float
     c2: float
     b2: float
+    power: float
+    bend: float
 
 
 def build_stiffening(settings: StiffeningSettings, h: float) -> StiffeningParams:
     """Nothing to discretise; stable while h sqrt(3 c3 e^2 / mass) stays below one."""
-    return StiffeningParams(settings.c3, settings.c2, settings.b2)
+    return StiffeningParams(settings.c3, settings.c2, settings.b2, settings.power, settings.bend)
 
 
 @tick
 def stiffening(p, e, v):
     """Pull at elongation `e` and its rate `v` beside the linear spring and damper."""
-    return (p.c2 + p.c3 * e + p.b2 * v) * e * e
+    if p.power == 2.0:
+        return (p.c2 + p.c3 * e + p.b2 * v) * e * e
+    return p.c3 * p.bend * p.bend * (abs(e) / p.bend) ** p.power * e + (p.c2 + p.b2 * v) * e * e
 
 
 RESONANCE = Term(
@@ -141,7 +148,7 @@ RESONANCE = Term(
 STIFFENING = Term(
     name="structure.stiffening",
     words="a spring that grows stiffer the further it bends",
-    equation="T = c e + k e' + c2 e^2 + c3 e^3 + b2 e^2 e'",
+    equation="T = c e + k e' + c2 e^2 + c3 e^3 + b2 e^2 e'; or c3 bend^2 (|e| / bend)^power e",
     source="Kovacic & Brennan 2011; Elliott, Ghandchi Tehrani & Langley 2015",
     settings=StiffeningSettings,
     build=build_stiffening,
@@ -170,8 +177,9 @@ STIFFENING = Term(
         "that close under load."
     ),
     needs=Needs(stiffness=True),
-    search=(Size("c3", "cubic", 0.2, signed=True),),
+    search=(Size("c3", "cubic", 0.2, signed=True), Shape("bend", "twist", (1.0,), fixed=True)),
     richer=(Size("c2", "square", 0.05, signed=True), Size("b2", "swell", 0.05)),
+    variants=Choice("power", (2.0, 1.0, 4.0)),
     stiff=True,
     draws={"c3": Draw(1.0, 5.0, "cubic")},
 )

@@ -54,8 +54,8 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
 def ahead(late: Likelihood, one: Fitted, other: Fitted) -> float:
     """Nats by which one model foretells the rows of `late` better than another, each under its noise of rows before.
 
-    A model that left little there, without memory, loses by its slow errors in later rows to one whose larger errors are
-    expected. So it is also asked which is nearer, both under the noise of the first, and a clear answer counts.
+    A model that left little there, without memory, loses by its slow errors in later rows to one whose larger errors
+    are expected. So it is also asked which is nearer, both under the noise of the first, and a clear answer counts.
     """
     e, f = late.raw(one.model), late.raw(other.model)
     own = late.foretold(f, other.like) - late.foretold(e, one.like)

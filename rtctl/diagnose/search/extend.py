@@ -18,6 +18,7 @@ from rtctl.diagnose.search.screen import Score, Screened, screen
 from rtctl.diagnose.search.suggestions import combined
 
 STARTS = 2  # of the first few fits
+ALSO = 4  # starts of names that are tried whatever they promise: screening says little of their size
 FIRST = 3
 OTHERS = 3  # nodes of the best terms beside the first
 BEST = 2  # terms that are tried at their other nodes
@@ -60,14 +61,15 @@ def extended(
     """Refits of models with the most promising hypotheses beside them; `looked` is what screening said of one model.
 
     Each term is tried at its most promising node, then the best terms at their other nodes. `known` gets all of them.
-    The terms `also` are tried whatever they promise.
+    The names `also` (term:node) are tried whatever they promise, and their terms at the most promising node.
     """
+    told = {name.partition(":")[0] for name in also}
     looks = [looked if looked is not None else screened(parent) for parent in parents]
     found = [promise for pair in zip(parents, looks, strict=True) for promise in promises(*pair, merit)]
     top: dict[tuple[int, str], dict[tuple[str, ...], list[Promise]]] = {}
     for promise in in_turns(found):
         worth = max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top)
-        if worth or promise.term[1] in also:
+        if worth or promise.term[1] in told:
             top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
 
     def refitted(wanted: Sequence[tuple[list[Promise], int]]) -> list[tuple[str, ...]]:
@@ -79,13 +81,16 @@ def extended(
         known.update(zip(jobs, parallel(list(jobs.values())), strict=True))
         return [these[0].names for these, _ in wanted]
 
+    wanted = [
+        (these, ALSO) for nodes in top.values() for these in nodes.values() if these[0].score.hypothesis.name in also
+    ]
     first = refitted(
         [(next(iter(nodes.values())), STARTS if rank < FIRST else 1) for rank, nodes in enumerate(top.values())]
     )
     settle(known, first, merit)
     ranked = sorted(zip(top, first, strict=True), key=lambda pair: -merit(known[pair[1]]))[:BEST]
     others = refitted([(these, 1) for term, _ in ranked for these in list(top[term].values())[1 : 1 + OTHERS]])
-    out = list(dict.fromkeys((*first, *others)))
+    out = list(dict.fromkeys((*first, *refitted(wanted), *others)))
     settle(known, out, merit)
     highest = max((merit(known[names]) for names in out), default=0.0)
     for names in (names for names in out if merit(known[names]) > highest - NEAR):

@@ -11,21 +11,20 @@ import numpy as np
 
 from rtctl.diagnose.likelihood.bandwidth import STEP, quicker
 from rtctl.diagnose.likelihood.descent import ALL
-from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, without
+from rtctl.diagnose.likelihood.fits import Fitted, finished, refit
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.shares import silent
 from rtctl.diagnose.likelihood.widths import faint
 from rtctl.diagnose.model.space import Space
 from rtctl.diagnose.search.begin import Begun, Progress, begun
 from rtctl.diagnose.search.enrich import enriched, restarted
+from rtctl.diagnose.search.exchange import exchanged, smaller
 from rtctl.diagnose.search.extend import NEAR, Known, Merit, extended, key
 from rtctl.diagnose.search.screen import Score
 from rtctl.diagnose.search.standing import adds, merit_of, standing
-from rtctl.plants.physics import TERMS
 
 MOST = 4  # effects
 NAMES = (8, 4, 4)  # terms that are refitted as a second, a third and a fourth effect, beside one model or another
-OTHERS = 3  # of them beside what is left in an exchange
 BEAM = (4, 3, 2)  # models that are extended by a second, a third and a fourth effect
 ALIKE = 0.995  # cosine from which two models do the same
 EXCHANGES = 2
@@ -84,7 +83,7 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
             break
         better = enriched_near(better, known, merit, asked)
         better[0] = known[key(better[0].names)] = restarted(better[0])
-        for rest in _smaller(like, better[0], known, faint(better[0])):
+        for rest in smaller(like, better[0], known, faint(better[0])):
             known[key(rest.names)] = rest
         if level == MOST:
             break
@@ -94,18 +93,11 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
         grown = extended(like, parents, known, NAMES[level - 1], merit)
     for f in (f for f in before if key(f.names) not in known):
         known[key(f.names)] = again = refit(like, f.space, f.x)
-        known |= {key(g.names): g for g in _smaller(like, again, known)}
+        known |= {key(g.names): g for g in smaller(like, again, known)}
     for _ in range(EXCHANGES):
         best = leading(base, known, merit)[0]
         progress(f"exchanging each of {', '.join(best.names)}")
-        alone = len(best.names) == 1  # beside the base all others have been asked for
-        for index, rest in enumerate([base] if alone else _smaller(like, best, known)):
-            known[key(rest.names)] = rest
-            alike = TERMS[best.space.hypotheses[index].term].look_alikes
-            others = extended(like, [rest], known, 0 if alone else OTHERS, merit, looked if alone else None, alike)
-            for f in others:
-                if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
-                    known |= {key(g.names): g for g in _smaller(like, f, known)}
+        exchanged(like, base, best, known, looked, merit)
         if leading(base, known, merit)[0] is best:
             break
     progress("asking for other forms of what was found")
@@ -157,16 +149,6 @@ def likeness(base: Fitted, one: Fitted, other: Fitted) -> float:
     """Cosine of the angle between what two models take off the residual, each sensor by its least noise."""
     a, b = ((base.e - f.e) / base.like.least for f in (one, other))
     return float(np.sum(a * b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
-
-
-def _smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | None = None) -> list[Fitted]:
-    """The model without each of its effects, or without some of them, of several."""
-    out = []
-    for index, name in enumerate(f.names if len(f.names) > 1 else ()):
-        if which is None or index in which:
-            rest = known.get(key(set(f.names) - {name}))
-            out.append(finished(rest) if rest is not None else refit(like, *without(f, index)))
-    return out
 
 
 def _parent(f: Fitted, beam: list[Fitted]) -> Fitted:

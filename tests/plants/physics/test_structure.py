@@ -49,18 +49,18 @@ def test_the_cubic_spring_holds_what_it_should():
 
 @given(st.floats(-1, 1), st.floats(-1e6, 1e6))
 def test_it_pulls_alike_both_ways(e, c3):
-    p = structure.StiffeningParams(c3, 0.0, 0.0)
+    p = structure.StiffeningParams(c3, 0.0, 0.0, 2.0, 1.0)
     assert structure.stiffening(p, -e, 0.0) == -structure.stiffening(p, e, 0.0)
 
 
 def test_a_quadratic_part_makes_it_stiffer_one_way():
-    p = structure.StiffeningParams(0.0, 2e5, 0.0)
+    p = structure.StiffeningParams(0.0, 2e5, 0.0, 2.0, 1.0)
     assert structure.stiffening(p, 0.01, 0.0) == structure.stiffening(p, -0.01, 0.0) == pytest.approx(20.0)
 
 
 @given(st.floats(-1, 1), st.floats(-10, 10), st.floats(0, 1e6))
 def test_its_damping_never_feeds_energy_in(e, v, b2):
-    p = structure.StiffeningParams(0.0, 0.0, b2)
+    p = structure.StiffeningParams(0.0, 0.0, b2, 2.0, 1.0)
     assert structure.stiffening(p, e, v) * v >= 0.0
 
 
@@ -75,3 +75,12 @@ def test_a_swing_that_bends_it_further_dies_faster():
 
     b2 = 1e9
     assert kept(1.0) < 0.9 * kept(0.1)
+
+
+@given(st.floats(1e-6, 1.0), st.floats(0.5, 6.0))
+def test_a_power_law_is_the_cubic_at_the_bend_that_it_is_told_by(bend, power):
+    p = structure.StiffeningParams(1e6, 0.0, 0.0, power, bend)
+    cubic = structure.StiffeningParams(1e6, 0.0, 0.0, 2.0, bend)
+    assert structure.stiffening(p, bend, 0.0) == pytest.approx(structure.stiffening(cubic, bend, 0.0))
+    twice = structure.stiffening(p, 2.0 * bend, 0.0) / structure.stiffening(p, bend, 0.0)
+    assert twice == pytest.approx(2.0 ** (power + 1.0))

@@ -1,0 +1,67 @@
+"""Exchange of the effects of a model for what the recording may take them for.
+
+Each effect gives way to others, and all effects of one node give way at once: two laws that are not those of the
+machine may together stand for one that is.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, without
+from rtctl.diagnose.likelihood.likelihood import Likelihood
+from rtctl.diagnose.model.space import Hypothesis
+from rtctl.diagnose.search.extend import Known, Merit, extended, key
+from rtctl.diagnose.search.screen import Screened
+from rtctl.plants.physics import TERMS
+
+OTHERS = 3  # terms that are refitted beside what is left
+
+
+def exchanged(like: Likelihood, base: Fitted, best: Fitted, known: Known, looked: Screened, merit: Merit) -> None:
+    """Fit others in the place of each effect of the best model, and of all effects of a node; `known` gets them.
+
+    `looked` is what screening said of the base.
+    """
+    alone = len(best.names) == 1  # beside the base all others have been asked for
+    gone = [
+        (rest, [h])
+        for rest, h in zip([base] if alone else smaller(like, best, known), best.space.hypotheses, strict=True)
+    ]
+    for rest, these in (*gone, *emptied(like, best, known)):
+        known[key(rest.names)] = rest
+        most, told = (0, looked) if alone else (OTHERS, None)
+        for f in extended(like, [rest], known, most, merit, told, look_alikes(these)):
+            if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
+                known |= {key(g.names): g for g in smaller(like, f, known)}
+
+
+def look_alikes(effects: Sequence[Hypothesis]) -> set[str]:
+    """Names (term:node) that effects are taken for, at their nodes."""
+    return {f"{other}:{h.node}" for h in effects for other in TERMS[h.term].look_alikes}
+
+
+def emptied(like: Likelihood, f: Fitted, known: Known) -> list[tuple[Fitted, list[Hypothesis]]]:
+    """The model without all effects of a node, for each node that has several, and these effects."""
+    out = []
+    for node in dict.fromkeys(h.node for h in f.space.hypotheses):
+        these = [h for h in f.space.hypotheses if h.node == node]
+        if len(these) > 1:
+            space, x, J = f.space, f.x, f.J
+            for h in these:
+                index = space.hypotheses.index(h)
+                gone = space.columns(index)
+                space, x, J = space.without(index), np.delete(x, gone), np.delete(J, gone, axis=2)
+            rest = known.get(key(set(f.names) - {h.name for h in these}))
+            out.append((finished(rest) if rest is not None else refit(like, space, x, J), these))
+    return out
+
+
+def smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | None = None) -> list[Fitted]:
+    """The model without each of its effects, or without some of them, of several."""
+    out = []
+    for index, name in enumerate(f.names if len(f.names) > 1 else ()):
+        if which is None or index in which:
+            rest = known.get(key(set(f.names) - {name}))
+            out.append(finished(rest) if rest is not None else refit(like, *without(f, index)))
+    return out
