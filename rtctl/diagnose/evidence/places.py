@@ -72,7 +72,9 @@ def places(fit: Fitted) -> list[Place]:
     for sensor in _read(fit):
         spread = max(float(np.std(part.sim.record.y[sensor])) for part in fit.like.parts)
         body = fit.like.sim.case.machine.sensors[sensor].body or str(sim.body)
-        found += [_sampled(place, fit) for place in _of(told, sensor, body, spread, True)]
+        late = sim.case.machine.sensors[sensor].measures == "position"  # off by the speed: a delay, which has a name
+        sampled = [_sampled(place, fit) for place in _of(told, sensor, body, spread, True)]
+        found += [place for place in sampled if not (late and place.axis == "velocity")]
     return [place for place in found if np.ptp(np.concatenate(place.values)) > 0.0]
 
 
