@@ -18,6 +18,7 @@ from rtctl.diagnose.evidence.free import Free, free_functions
 from rtctl.diagnose.evidence.places import AXES, SIZE, TIME
 from rtctl.diagnose.evidence.wander import LITTLE, log_density, wandering
 from rtctl.diagnose.likelihood.fits import DISCREPANCY, Fitted
+from rtctl.diagnose.likelihood.pushes import pushes
 from rtctl.diagnose.likelihood.shares import share_of
 from rtctl.diagnose.model.node_scaling import Measures
 from rtctl.diagnose.search.search import Found
@@ -70,10 +71,11 @@ def rivals(found: Found) -> tuple[Rival, ...]:
         if wander.free is not None:
             entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, SIZE) - UNLISTED))
         if rank < BESIDE or set(fit.names) < best:
-            free = free_functions(fit, off if fit.names and off > LEAST else 0.0)
+            along = {axis: off * share for axis, share in arguments(fit).items() if off * share > LEAST}
+            free = free_functions(fit, along)
             large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f))]
             entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
-            small = [f for f in free if not f.large and f.axis in arguments(fit)]
+            small = [f for f in free if not f.large]
             entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
     losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
@@ -81,15 +83,36 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     return tuple(sorted(out, key=lambda r: -r.probability))
 
 
-def arguments(fit: Fitted) -> set[str]:
-    """Axes along which the laws of a fit may be wrong: an error of a law is a function of its own argument. One that
-    shows by frequency or tension has no axis here, and may be wrong along any but time."""
-    out: set[str] = set()
-    for h in fit.space.hypotheses:
+def arguments(fit: Fitted) -> dict[str, float]:
+    """Axes along which the laws of a fit may be wrong, each with the share of what all effects do that those along it
+    do: an error of a law is a function of its own argument, and small beside its own effect.
+
+    A law that shows by frequency or tension has no axis here, and may be wrong along any but time.
+    """
+    out: dict[str, float] = {}
+    for h, share in zip(fit.space.hypotheses, shares(fit), strict=True):
         axis = TERMS[h.term].axis
-        out |= {axis} if axis in AXES else set(AXES) - {TIME}
-        out |= {"position"} if axis == "angle" else set()  # of less than a turn
+        along = {axis} if axis in AXES else set(AXES) - {TIME}
+        for name in along | ({"position"} if axis == "angle" else set()):  # of less than a turn
+            out[name] = float(np.hypot(out.get(name, 0.0), share))
     return out
+
+
+def shares(fit: Fitted) -> np.ndarray:
+    """What each effect of a fit does to the correction of the observer over what all do, (effects,); their squares sum
+    to one."""
+    effects = range(len(fit.names))
+    if len(fit.names) < 2 or not len(fit.pushes[0]):
+        return np.ones(len(fit.names))
+    fewer = [fit.space.without(i).model(np.delete(fit.x, fit.space.columns(i))) for i in effects]
+    sizes = [
+        np.sqrt(
+            sum(float(np.sum((one - own) ** 2)) for one, own in zip(pushes(fit.like, model), fit.pushes, strict=True))
+        )
+        for model in fewer
+    ]
+    total = float(np.linalg.norm(sizes))
+    return np.asarray(sizes) / total if np.isfinite(total) and total > 0.0 else np.ones(len(fit.names))
 
 
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:

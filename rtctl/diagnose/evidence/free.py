@@ -8,7 +8,7 @@ still explains beside a name says that the law of that name is not the machine's
 Source: Robinson, Root-N-consistent semiparametric regression, Econometrica 56 (1988).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple
 
@@ -25,6 +25,7 @@ HATS = 10  # of a first look at each axis
 FINE = 30  # of the axes that explain most
 SECOND = 2  # axes of forces, and of errors of readings, that are looked at again
 SMOOTH = 0.25  # of the range: distance over which a free function is alike, by its prior
+NONE: Mapping[str, float] = {}
 PARTS = (1.0, 0.5, 0.25)  # of the step of the linear model, at which it is simulated
 
 
@@ -60,23 +61,23 @@ class Free(NamedTuple):
         return "an error of the reading" if self.place.reads else "a force"
 
 
-def free_functions(base: Fitted, error: float = 0.0) -> list[Free]:
+def free_functions(base: Fitted, errors: Mapping[str, float] = NONE) -> list[Free]:
     """Free functions at every body and every sensor along every axis; those with most evidence first.
 
-    Each is fitted as an effect without a name, and a force as an `error` of the laws of the model as well, in forces
-    that move the body, where that is not 0.
+    Each is fitted as an effect without a name. A force along one of the axes of `errors` is fitted as an error of the
+    laws of the model as well, which has this standard deviation, in forces that move the body.
     """
     own = Linear(base)
     about = own, own.under(base.like.flat(base.e))  # the parameters are filtered once for all places
-    out = [free for place in places(base) for free in _fitted(about, place, HATS, error)]
+    out = [free for place in places(base) for free in _fitted(about, place, HATS, errors)]
     out.sort(key=lambda f: -f.evidence)
     for reads in (False, True):
         for place in list({(f.node, f.axis): f.place for f in out if f.place.reads == reads}.values())[:SECOND]:
-            out += _fitted(about, place, FINE, error)
+            out += _fitted(about, place, FINE, errors)
     return sorted(out, key=lambda f: -f.evidence)
 
 
-def _fitted(abouts: tuple[Linear, Linear], place: Place, hats: int, error: float) -> list[Free]:
+def _fitted(abouts: tuple[Linear, Linear], place: Place, hats: int, errors: Mapping[str, float]) -> list[Free]:
     base, like, start, coarse = abouts[0].base, abouts[0].base.like, abouts[0].start, abouts[0].coarse
     along = np.sort(np.concatenate(place.values))
     low, high = np.quantile(along, (1e-3, 1.0 - 1e-3))
@@ -98,7 +99,8 @@ def _fitted(abouts: tuple[Linear, Linear], place: Place, hats: int, error: float
 
     C = np.stack(parallel([partial(change, hat, base.model) for hat in np.eye(len(knots))]), axis=2) @ root
     out = []
-    for scale in (1.0, error / place.size) if error and not place.reads else (1.0,):
+    small = errors.get(place.axis, 0.0) / place.size if not place.reads else 0.0
+    for scale in (1.0, small) if small else (1.0,):
         solved = [_solved(about, C * scale) for about in abouts]
         left = max(solved, key=lambda s: s.evidence).e
         solved.append(_solved(abouts[0].under(like.told(left)), C * scale))
