@@ -10,6 +10,7 @@ Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of 
 (2014).
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +72,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
         if wander.free is not None:
             entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, SIZE) - UNLISTED))
         if rank < BESIDE or set(fit.names) < best:
-            along = {axis: off * share for axis, share in arguments(fit).items() if off * share > LEAST}
+            along = {axis: off * share for axis, share in arguments(shares(fit)).items() if off * share > LEAST}
             free = free_functions(fit, along)
             large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f))]
             entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
@@ -83,28 +84,28 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     return tuple(sorted(out, key=lambda r: -r.probability))
 
 
-def arguments(fit: Fitted) -> dict[str, float]:
-    """Axes along which the laws of a fit may be wrong, each with the share of what all effects do that those along it
-    do: an error of a law is a function of its own argument, and small beside its own effect.
+def arguments(shares: Sequence[tuple[str, float]]) -> dict[str, float]:
+    """Axes along which laws may be wrong, of terms and the share of what all effects do that each does: an error of a
+    law is a function of its own argument, and small beside its own effect.
 
     A law that shows by frequency or tension has no axis here, and may be wrong along any but time.
     """
     out: dict[str, float] = {}
-    for h, share in zip(fit.space.hypotheses, shares(fit), strict=True):
-        axis = TERMS[h.term].axis
+    for term, share in shares:
+        axis = TERMS[term].axis
         along = {axis} if axis in AXES else set(AXES) - {TIME}
         for name in along | ({"position"} if axis == "angle" else set()):  # of less than a turn
             out[name] = float(np.hypot(out.get(name, 0.0), share))
     return out
 
 
-def shares(fit: Fitted) -> np.ndarray:
-    """What each effect of a fit does to the correction of the observer over what all do, (effects,); their squares sum
-    to one."""
-    effects = range(len(fit.names))
-    if len(fit.names) < 2 or not len(fit.pushes[0]):
-        return np.ones(len(fit.names))
-    fewer = [fit.space.without(i).model(np.delete(fit.x, fit.space.columns(i))) for i in effects]
+def shares(fit: Fitted) -> list[tuple[str, float]]:
+    """Term of each effect of a fit, and what it does to the correction of the observer over what all do; the squares of
+    several sum to one."""
+    terms = [h.term for h in fit.space.hypotheses]
+    if len(terms) < 2 or not len(fit.pushes[0]):
+        return [(term, 1.0) for term in terms]
+    fewer = [fit.space.without(i).model(np.delete(fit.x, fit.space.columns(i))) for i in range(len(terms))]
     sizes = [
         np.sqrt(
             sum(float(np.sum((one - own) ** 2)) for one, own in zip(pushes(fit.like, model), fit.pushes, strict=True))
@@ -112,7 +113,8 @@ def shares(fit: Fitted) -> np.ndarray:
         for model in fewer
     ]
     total = float(np.linalg.norm(sizes))
-    return np.asarray(sizes) / total if np.isfinite(total) and total > 0.0 else np.ones(len(fit.names))
+    told = np.isfinite(total) and total > 0.0
+    return [(term, float(size / total) if told else 1.0) for term, size in zip(terms, sizes, strict=True)]
 
 
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:

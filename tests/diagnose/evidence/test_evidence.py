@@ -1,9 +1,11 @@
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
+from graph_cases import BELT, RUB, case_of, command, record
 
-from rtctl.diagnose.evidence.evidence import SEGMENTS, arguments, bagged
+from rtctl.diagnose.evidence.evidence import SEGMENTS, arguments, bagged, shares
+from rtctl.diagnose.likelihood.fits import refit
+from rtctl.diagnose.likelihood.joint import together
+from rtctl.diagnose.search.hypotheses import hypotheses
 
 
 def test_what_every_segment_says_stays_sure():
@@ -34,11 +36,21 @@ def test_segments_alike_leave_the_posterior_of_the_whole():
      (["load.spring", "drive.deadband"], {"position", "command"}), ([], set())],
 )  # fmt: skip
 def test_a_law_is_wrong_along_its_own_argument(terms, axes):
-    assert (
-        arguments(SimpleNamespace(space=SimpleNamespace(hypotheses=[SimpleNamespace(term=t) for t in terms]))) == axes
-    )
+    assert set(arguments([(term, 1.0) for term in terms])) == axes
 
 
 def test_no_law_of_a_motion_is_wrong_along_time():
-    spring = SimpleNamespace(space=SimpleNamespace(hypotheses=[SimpleNamespace(term="structure.resonance")]))
-    assert "time" not in arguments(spring)
+    assert "time" not in arguments([("structure.resonance", 1.0)])
+
+
+def test_a_law_is_wrong_by_a_share_of_its_own_effect():
+    offset = {"term": "drive.offset", "node": "amplifier", "offset": 0.01}
+    like, space = together([record(case_of(BELT), command(0.6), [RUB, offset])])
+    base = refit(like, space)
+    assert shares(base) == []
+    for name in ("friction.coulomb:carriage", "drive.offset:amplifier"):
+        space = space.add(next(h for h in hypotheses(like.sim, base.model) if h.name == name))
+    told = dict(shares(refit(like, space)))
+    assert told["friction.coulomb"] > 3.0 * told["drive.offset"]  # 2 N, and 2.5 mNm, which is 0.2 N
+    assert np.hypot(*told.values()) == pytest.approx(1.0)
+    assert arguments(list(told.items())) == {"velocity": told["friction.coulomb"], "command": told["drive.offset"]}
