@@ -71,7 +71,7 @@ def resonance(p, s, x, v):
 
 class StiffeningSettings(Settings):
     """c3 is the size. With c2 the spring is stiffer one way than the other, with b2 it loses more where it bends. With
-    another power the stiffness grows by that power of the bend; at `bend` it is that of the cubic."""
+    another power the stiffness grows, and never falls, by that power of the bend; at `bend` it is that of the cubic."""
 
     term: Literal["structure.stiffening"] = "structure.stiffening"
     node: Node
@@ -98,7 +98,8 @@ class StiffeningParams(NamedTuple):
 
 def build_stiffening(settings: StiffeningSettings, h: float) -> StiffeningParams:
     """Nothing to discretise; stable while h sqrt(3 c3 e^2 / mass) stays below one."""
-    return StiffeningParams(settings.c3, settings.c2, settings.b2, settings.power, settings.bend)
+    c3 = settings.c3 if settings.power == 2.0 else max(settings.c3, 0.0)
+    return StiffeningParams(c3, settings.c2, settings.b2, settings.power, settings.bend)
 
 
 @tick
