@@ -92,6 +92,7 @@ def prior(space: Space) -> np.ndarray:
     return np.array(out)
 
 
+EXACT = (1.0, 0.1, 0.01)  # of the usual error of a law: a law may be that of the machine
 SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0, REST: 3.0}  # standard deviation of a size, in typical sizes
 
 
@@ -202,10 +203,13 @@ def evaluated(like: Likelihood, space: Space, at: Point) -> Fitted:
     """Fitted model at a point of a fit, with the evidence under its own noise model and law errors.
 
     The noise level decides how much law errors explain. Every model takes the noise of its own residual: evidences of
-    models compare, whichever noise their fits began with.
+    models compare, whichever noise their fits began with. How exact the laws are is told by the recording as well.
     """
-    exact = like.slackened(None).told(at.e)
-    own = exact.slackened(errors(exact, space, at.x, at.e)).told(at.e)
+    own = like.slackened(None).told(at.e)
+    columns = errors(own, space, at.x, at.e)
+    if columns is not None:
+        tried = [own.slackened(share * columns).told(at.e) for share in EXACT]
+        own = min(tried, key=lambda one: one.loss(at.e))
     white = own.white(at.J)
     return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e), pushes(own, space.model(at.x)))
 

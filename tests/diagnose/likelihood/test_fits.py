@@ -6,6 +6,7 @@ from graph_cases import BELT, RUB, case_of, command, record
 
 from rtctl.diagnose.likelihood.descent import ALL, EFFECTS, Point
 from rtctl.diagnose.likelihood.fits import evaluated, finished, prior, refit, relaxed
+from rtctl.diagnose.likelihood.inexact import errors
 from rtctl.diagnose.likelihood.joint import together
 from rtctl.diagnose.model.space import SIZE, Coordinate, Hypothesis
 
@@ -64,3 +65,21 @@ def test_a_model_is_evaluated_under_its_own_noise_wherever_its_fit_began():
     quiet = evaluated(rough.like, rough.space, at)
     assert loud.loss == pytest.approx(quiet.loss, abs=1e-6)
     assert loud.log_evidence == pytest.approx(quiet.log_evidence, abs=1e-6)
+
+
+def test_a_law_that_is_exact_is_told_from_one_that_is_about_right():
+    _, rough = draft()
+    exact = finished(rough)
+    u = command(0.6)
+    stribeck = {"term": "friction.stribeck", "node": "carriage", "F_s": 3.2, "v_s": 0.1}
+    like, space = together([record(case_of(BELT), u, [RUB, stribeck])])
+    alone = refit(like, space)
+    about = refit(like, space.add(DRY), np.append(alone.x, 1.0), alone.J)
+
+    def share(f):
+        """Error that its law is given, by the usual one."""
+        return np.std(f.like.errors) / np.std(errors(f.like, f.space, f.x, f.e))
+
+    assert share(exact) < 0.2 * share(about)
+    usual = exact.like.slackened(errors(exact.like, exact.space, exact.x, exact.e)).told(exact.e)
+    assert exact.loss < usual.loss(exact.e) - 5.0
