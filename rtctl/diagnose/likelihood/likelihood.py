@@ -37,6 +37,7 @@ class Likelihood:
     """A recording, its noise and the rows that count."""
 
     errors: np.ndarray | None = None  # (blocks, sensors, columns) what the laws of a model may be wrong by
+    odds: float = 0.0  # nats against laws that are as exact
     _slack: Slack | None = None  # the same under this noise
 
     def __init__(self, sim: Simulator, noise: Sequence[Noise] | None = None, rows: tuple[int, int] | None = None):
@@ -171,10 +172,11 @@ class Likelihood:
             self._slack = Slack(self.plain(self.errors), self.power)
         return self._slack
 
-    def slackened(self, errors: np.ndarray | None) -> "Likelihood":
-        """The same where laws may be wrong by columns (blocks, sensors, columns) of standard deviation one."""
+    def slackened(self, errors: np.ndarray | None, odds: float = 0.0) -> "Likelihood":
+        """The same where laws may be wrong by columns (blocks, sensors, columns) of standard deviation one; `odds`,
+        nats, are against laws that are as exact."""
         other = copy(self)
-        other.errors, other._slack = errors, None
+        other.errors, other.odds, other._slack = errors, odds, None
         return other
 
     def left(self, e: np.ndarray) -> np.ndarray:
@@ -223,7 +225,7 @@ class Likelihood:
         if self.slack is None or self.errors is None:
             return self.parted(e, count)
         a = self.slack.size(self.plain(e))
-        beneath = 0.5 * float(a @ a) / self.power + self.slack.volume
+        beneath = (0.5 * float(a @ a) + self.odds) / self.power + self.slack.volume
         return self.parted(e + self.errors @ a, count) + beneath / count
 
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:

@@ -81,7 +81,7 @@ def seen(along: Along, signal: np.ndarray, rate: np.ndarray, orders: np.ndarray,
     for count in np.unique(rows):  # the rows of a higher order are among those of a lower one: as many are the same
         same = np.flatnonzero(rows == count)
         slow = rate * orders[same[0]] < quick
-        weight = np.sqrt(rate[slow])
+        weight = np.sqrt(np.maximum(rate[slow], 0.0))  # a moving average may round below zero
         total, square = float(weight.sum()), float(weight @ weight)
         if square > 0.0:
             out[same] = spectrum(along.at(slow), signal[slow], orders[same], np.sqrt(weight)) * total**2 / square
