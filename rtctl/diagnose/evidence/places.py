@@ -72,10 +72,16 @@ def places(fit: Fitted) -> list[Place]:
     for sensor in _read(fit):
         spread = max(float(np.std(part.sim.record.y[sensor])) for part in fit.like.parts)
         body = fit.like.sim.case.machine.sensors[sensor].body or str(sim.body)
-        late = sim.case.machine.sensors[sensor].measures == "position"  # off by the speed: a delay, which has a name
         sampled = [_sampled(place, fit) for place in _of(told, sensor, body, spread, True)]
-        found += [place for place in sampled if not (late and place.axis == "velocity")]
+        measures = sim.case.machine.sensors[sensor].measures
+        found += [place for place in sampled if not told_otherwise(place.axis, measures)]
     return [place for place in found if np.ptp(np.concatenate(place.values)) > 0.0]
+
+
+def told_otherwise(axis: str, measures: str) -> bool:
+    """Whether an error of a reading along an axis has another name: what comes and goes is noise, of whatever colour,
+    and a position that is off by the speed is late."""
+    return axis == TIME or (axis == "velocity" and measures == "position")
 
 
 def _read(fit: Fitted) -> list[str]:

@@ -11,7 +11,7 @@ def test_places_are_bodies_that_move_on_their_own_and_sensors_that_are_predicted
     found = places(named().found.base)
     assert {p.node for p in found if not p.reads} <= {"motor", "carriage"}
     assert {p.node for p in found if p.reads} == {"encoder", "scale"}
-    assert {p.axis for p in found if p.node == "scale"} == {"position", "time", "command"}
+    assert {p.axis for p in found if p.node == "scale"} == {"position", "command"}
 
 
 def test_an_error_of_a_reading_leaves_the_motion_of_the_machine():
