@@ -105,7 +105,7 @@ def shares(fit: Fitted) -> list[tuple[str, float]]:
     terms = [h.term for h in fit.space.hypotheses]
     if len(terms) < 2 or not len(fit.pushes[0]):
         return [(term, 1.0) for term in terms]
-    fewer = [fit.space.without(i).model(np.delete(fit.x, fit.space.columns(i))) for i in range(len(terms))]
+    fewer = [fit.space.model_without(i, fit.x) for i in range(len(terms))]
     sizes = [
         np.sqrt(
             sum(float(np.sum((one - own) ** 2)) for one, own in zip(pushes(fit.like, model), fit.pushes, strict=True))

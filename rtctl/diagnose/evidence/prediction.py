@@ -43,7 +43,8 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
     own = fitted_to(first, best)
     while fewer and len(best.names) > 1:
         less = [refit(first, *without(own, index), rounds=ROUNDS) for index in range(len(best.names))]
-        gains = [ahead(late, own, f) for f in less]
+        e = late.raw(own.model)
+        gains = [ahead(late, (own, e), (f, late.raw(f.model))) for f in less]
         index = int(np.argmin(gains))
         if gains[index] > -WORSE:
             break
@@ -51,15 +52,16 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
     return judged(base.like, first, late, (fitted_to(first, base), own)), best
 
 
-def ahead(late: Likelihood, one: Fitted, other: Fitted) -> float:
-    """Nats by which one model foretells the rows of `late` better than another, each under its noise of rows before.
+def ahead(late: Likelihood, one: tuple[Fitted, np.ndarray], other: tuple[Fitted, np.ndarray]) -> float:
+    """Nats by which one model foretells the rows of `late` better than another, each under its noise of rows before;
+    each comes with its residuals (blocks, sensors) there.
 
     A model that left little there, without memory, loses by its slow errors in later rows to one whose larger errors
     are expected. So it is also asked which is nearer, both under the noise of the first, and a clear answer counts.
     """
-    e, f = late.raw(one.model), late.raw(other.model)
-    own = late.foretold(f, other.like) - late.foretold(e, one.like)
-    nearer = late.foretold(f, one.like) - late.foretold(e, one.like)
+    (first, e), (second, f) = one, other
+    told = late.foretold(e, first.like)
+    own, nearer = late.foretold(f, second.like) - told, late.foretold(f, first.like) - told
     return max(own, nearer) if nearer > WORSE else own
 
 
@@ -80,5 +82,5 @@ def judged(whole: Likelihood, early: Likelihood, late: Likelihood, fits: tuple[F
     residuals = [late.raw(f.model) for f in fits]
     before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)
     floor = float(np.sqrt(np.mean(whole.least**2 * whole.mean / spread**2)))
-    gain = ahead(late, fits[1], fits[0])
+    gain = ahead(late, (fits[1], residuals[1]), (fits[0], residuals[0]))
     return Heldout(before, after, min(floor, after), gain, fits, early, late)

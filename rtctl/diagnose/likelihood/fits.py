@@ -214,7 +214,10 @@ def evaluated(like: Likelihood, space: Space, at: Point) -> Fitted:
     return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e), pushes(own, space.model(at.x)))
 
 
-def without(base: Fitted, index: int) -> tuple[Space, np.ndarray, np.ndarray]:
-    """Space, start and derivatives of a model without one of its hypotheses."""
-    gone = base.space.columns(index)
-    return base.space.without(index), np.delete(base.x, gone), np.delete(base.J, gone, axis=2)
+def without(base: Fitted, *indices: int) -> tuple[Space, np.ndarray, np.ndarray]:
+    """Space, start and derivatives of a model without one of its hypotheses, or without several."""
+    space, x, J = base.space, base.x, base.J
+    for index in sorted(indices, reverse=True):
+        gone = space.columns(index)
+        space, x, J = space.without(index), np.delete(x, gone), np.delete(J, gone, axis=2)
+    return space, x, J

@@ -13,7 +13,7 @@ def errors(like: Likelihood, space: Space, x: np.ndarray, e: np.ndarray) -> np.n
     """Errors (blocks, sensors, columns) of the effects of a model with the residuals e; None where there is none."""
     out = []
     for index, h in enumerate(space.hypotheses):
-        without = like.raw(space.without(index).model(np.delete(x, space.columns(index))))
+        without = like.raw(space.model_without(index, x))
         if not like.ran_away(without):
             out.append(columns(without - e, pace(like, space.model(x), h.node)))
     return np.concatenate(out, axis=2) if out else None

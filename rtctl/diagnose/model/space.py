@@ -169,6 +169,10 @@ class Space(NamedTuple):
         """With more hypotheses."""
         return self._replace(hypotheses=(*self.hypotheses, *hypotheses))
 
+    def model_without(self, index: int, x: np.ndarray) -> Any:
+        """The model at x, without one of the hypotheses."""
+        return self.without(index).model(np.delete(x, self.columns(index)))
+
     def without(self, index: int) -> "Space":
         """With one hypothesis less."""
         return self._replace(hypotheses=(*self.hypotheses[:index], *self.hypotheses[index + 1 :]))

@@ -6,8 +6,6 @@ machine may together stand for one that is.
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, without
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.space import Hypothesis
@@ -45,23 +43,19 @@ def emptied(like: Likelihood, f: Fitted, known: Known) -> list[tuple[Fitted, lis
     """The model without all effects of a node, for each node that has several, and these effects."""
     out = []
     for node in dict.fromkeys(h.node for h in f.space.hypotheses):
-        these = [h for h in f.space.hypotheses if h.node == node]
+        these = [index for index, h in enumerate(f.space.hypotheses) if h.node == node]
         if len(these) > 1:
-            space, x, J = f.space, f.x, f.J
-            for h in these:
-                index = space.hypotheses.index(h)
-                gone = space.columns(index)
-                space, x, J = space.without(index), np.delete(x, gone), np.delete(J, gone, axis=2)
-            rest = known.get(key(set(f.names) - {h.name for h in these}))
-            out.append((finished(rest) if rest is not None else refit(like, space, x, J), these))
+            out.append((lacking(like, f, known, *these), [f.space.hypotheses[index] for index in these]))
     return out
 
 
 def smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | None = None) -> list[Fitted]:
     """The model without each of its effects, or without some of them, of several."""
-    out = []
-    for index, name in enumerate(f.names if len(f.names) > 1 else ()):
-        if which is None or index in which:
-            rest = known.get(key(set(f.names) - {name}))
-            out.append(finished(rest) if rest is not None else refit(like, *without(f, index)))
-    return out
+    every = range(len(f.names)) if len(f.names) > 1 else ()
+    return [lacking(like, f, known, index) for index in every if which is None or index in which]
+
+
+def lacking(like: Likelihood, f: Fitted, known: Known, *indices: int) -> Fitted:
+    """The model without some of its effects, fitted to convergence."""
+    rest = known.get(key(set(f.names) - {f.names[index] for index in indices}))
+    return finished(rest) if rest is not None else refit(like, *without(f, *indices))

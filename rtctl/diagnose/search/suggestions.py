@@ -4,6 +4,8 @@ Source: order tracking by least squares on cosine and sine of the angle; the cor
 force (Ohnishi, Shibata & Murakami 1996).
 """
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -72,9 +74,8 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
     def orders_at(body: str, by: np.ndarray | float = 1.0) -> list[float]:
         """Orders of the missing force in the angle of a body; `by` (n,) is proportional to their amplitude."""
         number, ratio = sim.leader(body), sim.ratios[body]
-        along = Along(ways[number] * ratio, by)
-        height = seen(along, push[:, number], rates[number] * abs(ratio), ORDERS, quick)
-        return orders_of(float(np.ptp(along.angle)), height, MOST)
+        along, rate = Along(ways[number] * ratio, by), rates[number] * abs(ratio)
+        return listed(along, True, lambda grid: seen(along, push[:, number], rate, grid, quick))
 
     def misread(name: str) -> list[float]:
         """Orders or wavelengths of an error of a reading that the observer follows, as the model moves."""
@@ -85,18 +86,15 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         if not np.isfinite(v).all():
             return []
         along = Along(ways[number] * ratio, motion=(v[::thin], (np.gradient(v) / record.dt)[::thin]))
-        turns = sim.case.machine.turns(body)
-        grid = ORDERS if turns else 2 * np.pi / waves_of(along.angle)
-        height = seen(along, push[:, number], rates[number] * abs(ratio), grid, quick)
-        return orders_of(float(np.ptp(along.angle)), height, MOST) if turns else peaks(2 * np.pi / grid, height, MOST)
+        rate, turns = rates[number] * abs(ratio), sim.case.machine.turns(body)
+        return listed(along, turns, lambda grid: seen(along, push[:, number], rate, grid, quick))
 
     for node, ratio in sim.ratios.items():
         x, d = ways[sim.leader(node)], push[:, sim.leader(node)]
         if ratio != 0.0 and sim.case.machine.turns(node):
             found[f"order:{node}"] = orders_at(node)
         elif ratio != 0.0:
-            waves = waves_of(x * ratio)
-            found[f"wavelength:{node}"] = peaks(waves, spectrum(Along(x * ratio), d, 2 * np.pi / waves), MOST)
+            found[f"wavelength:{node}"] = listed(Along(x * ratio), False, partial(spectrum, Along(x * ratio), d))
             found[f"order:{node}"] = []
     for name, column in sim.layout.drives.items():  # torque ripple is proportional to the command
         body = str(sim.case.machine.drives[name].body)
@@ -117,18 +115,14 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
             found[f"{kind}:{name}"] = found[f"{kind}:{body}"]
         else:
             errors[name], along = error, Along(ways[sim.leader(body)] * ratio)
-            if kind == "order":
-                found[f"order:{name}"] = orders_of(float(np.ptp(along.angle)), spectrum(along, error, ORDERS), MOST)
-            else:
-                waves = waves_of(along.angle)
-                found[f"wavelength:{name}"] = peaks(waves, spectrum(along, error, 2 * np.pi / waves), MOST)
+            found[f"{kind}:{name}"] = listed(along, kind == "order", partial(spectrum, along, error))
     for name, joint in sim.case.machine.joints.items():
         for end in ("from", "to"):
             body = getattr(joint, end)
             orders, x = found.get(f"order:{body}", []), ways[sim.leader(body)]
             for error in errors.values() if orders else ():
-                turned = x * sim.ratios[body]
-                orders = orders_of(float(np.ptp(turned)), spectrum(Along(turned), error, ORDERS), MOST)
+                turned = Along(x * sim.ratios[body])
+                orders = listed(turned, True, partial(spectrum, turned, error))
             found[f"order_{end}:{name}"] = orders
     for name in sim.layout.links:
         at = gauges.layout.sensors.get(GAUGE + name)
@@ -172,6 +166,14 @@ def grips(sim: Simulator, model: GraphModel, shares: tuple[float, ...] = SLIPPIN
             force += abs(own) * values.get(f"bodies.{name}.dry", 0.0) * np.sign(v)
         found[f"grip:{node}"] = [float(f) for f in np.quantile(np.abs(force / moved), shares)]
     return found
+
+
+def listed(along: Along, turns: bool, height: Callable[[np.ndarray], np.ndarray]) -> list[float]:
+    """Orders, or wavelengths in m of what slides, by their height (n,) as a function of the orders, rad^-1 or m^-1."""
+    if turns:
+        return orders_of(float(np.ptp(along.angle)), height(ORDERS), MOST)
+    waves = waves_of(along.angle)
+    return peaks(waves, height(2 * np.pi / waves), MOST)
 
 
 def waves_of(x: np.ndarray) -> np.ndarray:

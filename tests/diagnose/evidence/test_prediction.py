@@ -54,8 +54,9 @@ def test_a_model_that_is_nearer_is_ahead_though_larger_errors_were_expected_of_t
     heldout = named().heldout
     base, best = heldout.fits
     loud = best._replace(like=best.like.flat(base.e))  # knows of no better
-    assert ahead(heldout.late, best, base) > 100.0
-    assert ahead(heldout.late, base, best) < -100.0
-    assert ahead(heldout.late, best, loud) == heldout.late.foretold(
+    lone, both, deaf = ((f, heldout.late.raw(f.model)) for f in (base, best, loud))
+    assert ahead(heldout.late, both, lone) > 100.0
+    assert ahead(heldout.late, lone, both) < -100.0
+    assert ahead(heldout.late, both, deaf) == heldout.late.foretold(
         heldout.late.raw(best.model), loud.like
     ) - heldout.late.foretold(heldout.late.raw(best.model), best.like)
