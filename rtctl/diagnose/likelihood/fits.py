@@ -206,9 +206,12 @@ def evaluated(like: Likelihood, space: Space, at: Point) -> Fitted:
     models compare, whichever noise their fits began with. How exact the laws are is told by the recording as well.
     """
     own = like.slackened(None).told(at.e)
-    columns = errors(own, space, at.x, at.e)
-    if columns is not None:
-        tried = [own.slackened(share * columns, odds).told(at.e) for share, odds in EXACT.items()]
+    laws, fixed = errors(own, space, at.x, at.e)
+    if laws.shape[2] + fixed.shape[2]:
+        tried = [
+            own.slackened(np.concatenate([fixed, share * laws], axis=2), odds).told(at.e)
+            for share, odds in EXACT.items()
+        ]
         own = min(tried, key=lambda one: one.loss(at.e))
     white = own.white(at.J)
     return Fitted(space, at.x, at.e, at.J, white.T @ white, own, own.loss(at.e), pushes(own, space.model(at.x)))

@@ -3,20 +3,28 @@
 import numpy as np
 
 from rtctl.diagnose.likelihood.likelihood import Likelihood
-from rtctl.diagnose.likelihood.slack import columns
+from rtctl.diagnose.likelihood.slack import Inexact, columns
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import Measures, speed
 from rtctl.diagnose.model.space import Space
 
 
-def errors(like: Likelihood, space: Space, x: np.ndarray, e: np.ndarray) -> np.ndarray | None:
-    """Errors (blocks, sensors, columns) of the effects of a model with the residuals e; None where there is none."""
-    out = []
-    for index, h in enumerate(space.hypotheses):
-        without = like.raw(space.model_without(index, x))
-        if not like.ran_away(without):
-            out.append(columns(without - e, pace(like, space.model(x), h.node)))
-    return np.concatenate(out, axis=2) if out else None
+def errors(like: Likelihood, space: Space, x: np.ndarray, e: np.ndarray) -> Inexact:
+    """Errors of the laws of a model with the residuals e (blocks, sensors): those of the description and of the effects
+    beside it."""
+    none = np.zeros((*e.shape, 0))
+    given = Inexact(none, none) if like.own is None else like.own
+    effects = [effect(like, space.model_without(i, x), e, h.node) for i, h in enumerate(space.hypotheses)]
+    return given._replace(laws=np.concatenate([given.laws, *effects], axis=2))
+
+
+def effect(like: Likelihood, without: GraphModel, e: np.ndarray, node: str) -> np.ndarray:
+    """Errors (blocks, sensors, columns) of what a node has in the model with the residuals e, and not in `without`;
+    none where that runs away."""
+    lacking = like.raw(without)
+    if like.ran_away(lacking) or not np.any(lacking - e):
+        return np.zeros((*e.shape, 0))
+    return columns(lacking - e, pace(like, without, node))
 
 
 def pace(like: Likelihood, model: GraphModel, node: str) -> np.ndarray:

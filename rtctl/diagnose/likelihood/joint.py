@@ -70,7 +70,7 @@ class Joint(Likelihood):
 
     def following(self, times: float) -> "Joint":
         """The same rows with observers that are so many `times` as quick, and laws that are exact."""
-        return self._of([part.following(times) for part in self._parts])
+        return self._of([part.following(times) for part in self._parts]).described(None)
 
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
         """Losses where the laws are exact, by segment (count,), nats: each recording has a share of the segments."""
@@ -95,11 +95,12 @@ class Joint(Likelihood):
     def split(self, share: float) -> tuple["Joint", "Joint"]:
         """The same of the first rows of each recording, and of the last `share` of each."""
         halves = [part.split(share) for part in self._parts]
-        return self._of([one for one, _ in halves]), self._of([two for _, two in halves])
+        early, late = (self._of(side).described(None) for side in zip(*halves, strict=True))
+        return early, late
 
     def during(self, begin: int, end: int) -> "Joint":
         """The same of rows `begin` to `end` of each recording."""
-        return self._of([part.during(begin, min(end, part.rows[1])) for part in self._parts])
+        return self._of([part.during(begin, min(end, part.rows[1])) for part in self._parts]).described(None)
 
     def _of(self, parts: Sequence[Likelihood], errors: np.ndarray | None = None) -> "Joint":
         other = copy(self)

@@ -10,12 +10,13 @@ Source: Ljung, System Identification (1999), ch. 7 and 16.4.
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.likelihood.noise import Noise, noises_of, surprise, whitened
-from rtctl.diagnose.likelihood.slack import Slack
+from rtctl.diagnose.likelihood.slack import Inexact, Slack
 from rtctl.diagnose.likelihood.slow import slow
 from rtctl.diagnose.model.kernel import HELD
 from rtctl.diagnose.model.model import GraphModel
@@ -38,6 +39,7 @@ class Likelihood:
 
     errors: np.ndarray | None = None  # (blocks, sensors, columns) what the laws of a model may be wrong by
     odds: float = 0.0  # nats against laws that are as exact
+    own: Inexact | None = None  # what the description itself may be wrong by, beside any effect
     _slack: Slack | None = None  # the same under this noise
 
     def __init__(self, sim: Simulator, noise: Sequence[Noise] | None = None, rows: tuple[int, int] | None = None):
@@ -152,7 +154,7 @@ class Likelihood:
 
     def following(self, times: float) -> "Likelihood":
         """The same rows with an observer that is so many `times` as quick, and laws that are exact."""
-        other = self.slackened(None)
+        other = self.slackened(None).described(None)
         other.sim = self.sim.following(times)
         other.slow = slow(other.sim, self.channels, self.mean)
         return other
@@ -177,6 +179,12 @@ class Likelihood:
         nats, are against laws that are as exact."""
         other = copy(self)
         other.errors, other.odds, other._slack = errors, odds, None
+        return other
+
+    def described(self, own: Inexact | None) -> Self:
+        """The same where the description itself may be wrong, whatever is fitted beside it."""
+        other = copy(self)
+        other.own = own
         return other
 
     def left(self, e: np.ndarray) -> np.ndarray:
@@ -278,7 +286,7 @@ class Likelihood:
 
     def during(self, begin: int, end: int) -> "Likelihood":
         """The same of rows `begin` to `end`."""
-        other = self.slackened(None)
+        other = self.slackened(None).described(None)
         other.rows = (max(begin, self.rows[0]), end)
         other.noise = [noise.averaged() for noise in self.noise]
         for derived in ("present", "growth"):

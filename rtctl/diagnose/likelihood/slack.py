@@ -9,6 +9,7 @@ Problems 30 (2014); Woodbury's identity for the covariance.
 """
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -18,6 +19,13 @@ from scipy.ndimage import uniform_filter1d
 OFF = 0.05  # of what an effect does: standard deviation of its error
 ORDER = 3  # of the polynomials along what it does, and along the speed
 WIDTHS = (1, 4, 16, 64)  # blocks, of the averages between which bands of frequency lie
+
+
+class Inexact(NamedTuple):
+    """Errors (blocks, sensors, columns) of a description, of standard deviation one."""
+
+    laws: np.ndarray  # of its own laws, as far as laws are exact at all
+    unseen: np.ndarray  # of effects finer than a sensor shows
 
 
 def columns(effect: np.ndarray, speed: np.ndarray) -> np.ndarray:

@@ -27,6 +27,19 @@ class GraphModel(NamedTuple):
         """Number of the terms that the owner knows, which come first."""
         return len({path.split(".")[1] for path in self.base if path.startswith(PHYSICS)})
 
+    def without_known(self, index: int) -> "GraphModel":
+        """The same without one of the terms that the owner knows."""
+        base: dict[str, float] = {}
+        for path, value in self.base.items():
+            head, *rest = path.split(".", 2)
+            if path.startswith(PHYSICS):
+                number = int(rest[0])
+                if number == index:
+                    continue
+                path = ".".join([head, str(number - (number > index)), *rest[1:]])
+            base[path] = value
+        return self._replace(base=base, terms=(*self.terms[:index], *self.terms[index + 1 :]))
+
     def resolved(self) -> "GraphModel":
         """The same with the numbers of the owner's terms as `base` has them."""
         found: dict[int, dict[str, float]] = {}

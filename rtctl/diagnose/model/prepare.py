@@ -57,7 +57,8 @@ def ready(sim: "Simulator", model: GraphModel, mode: int | None = None, coarse: 
         raise UserError(f"physics: has {len(model.terms)} terms; {SLOTS} is the most that can be simulated")
     slots = np.zeros(1, k.slots)
     acting = [t for t in ordered(list(model.terms)) if TERMS[str(getattr(t, "term", ""))].act]
-    there = sim.elements if model.layout is sim.layout else places(model.layout)
+    same = model.layout is sim.layout or model.layout.machine.joints == sim.layout.machine.joints  # or with more gauges
+    there = sim.elements if same else places(model.layout)
     for slot, settings in zip(slots[0]["q"], acting, strict=False):
         s: Any = settings
         kernel.fill_slot(k, slot, s, spot(TERMS[s.term], s, model.layout, there, model.base), h)

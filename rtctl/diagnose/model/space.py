@@ -15,6 +15,7 @@ import numpy as np
 from rtctl.idiom import Settings
 from rtctl.plants.physics import TERMS
 
+BEYOND = 1.5  # times the tolerance: a value that a fit may reach, improbable as its prior makes it
 PRIOR = 0.7  # of the tolerance: standard deviation of the owner's error, between uniform and certain
 WIDE = 7.0  # in logarithm, of a parameter of which the owner knows nothing
 SIZE, INVERSE, SHAPE, COSINE, SINE, PLACE = "size", "inverse", "shape", "cosine", "sine", "place"
@@ -145,7 +146,7 @@ class Space(NamedTuple):
         """Lowest and highest x."""
         low, high = [], []
         for name in self.names:
-            tol = self.tolerance(name)
+            tol = BEYOND * self.tolerance(name)
             low.append(-WIDE if not np.isfinite(tol) else np.log1p(-min(tol, 0.95)))
             high.append(WIDE if not np.isfinite(tol) else np.log1p(tol))
         for h in self.hypotheses:

@@ -13,6 +13,7 @@ from rtctl.diagnose.likelihood.clock import clock, timed
 from rtctl.diagnose.likelihood.fits import Fitted, refit, without
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.space import Space
+from rtctl.diagnose.search.description_errors import inexact
 from rtctl.diagnose.search.enrich import restarted
 from rtctl.diagnose.search.extend import extended, screened
 from rtctl.diagnose.search.screen import Screened
@@ -49,6 +50,8 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
         held = refit(timed(base, told), space, base.x)
         if held.log_evidence > base.log_evidence + MORE:
             like, base = held.like, held
+    base = inexact(base)
+    like = base.like
     for _ in range(REBASED):
         progress("screening every hypothesis")
         looked = screened(base)

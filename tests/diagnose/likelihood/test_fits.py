@@ -78,8 +78,8 @@ def test_a_law_that_is_exact_is_told_from_one_that_is_about_right():
 
     def share(f):
         """Error that its law is given, by the usual one."""
-        return np.std(f.like.errors) / np.std(errors(f.like, f.space, f.x, f.e))
+        return np.std(f.like.errors) / np.std(errors(f.like, f.space, f.x, f.e).laws)
 
     assert share(exact) < 0.2 * share(about)
-    usual = exact.like.slackened(errors(exact.like, exact.space, exact.x, exact.e)).told(exact.e)
+    usual = exact.like.slackened(errors(exact.like, exact.space, exact.x, exact.e).laws).told(exact.e)
     assert exact.loss < usual.loss(exact.e) - 5.0

@@ -24,3 +24,14 @@ def test_lowest_mode_is_that_of_the_belt():
     model = nominal(read_case(case_of(BELT), "bundle"))
     hertz = np.sqrt(4e4 * (0.0127**2 / 4e-5 + 1.0 / 1.5)) / (2 * np.pi)
     assert lowest_mode(model.layout.machine, model.params(1e-3)) == pytest.approx(hertz, rel=1e-6)
+
+
+def test_the_terms_that_remain_keep_their_numbers():
+    known = [{"term": "friction.coulomb", "node": "carriage", "F_C": F} for F in (1.0, 2.0, 3.0)]
+    model = nominal(read_case(case_of(BELT, physics=known), "bundle"))
+    rest = model.without_known(1)
+    assert rest.known() == 2
+    assert [term.F_C for term in rest.resolved().terms] == [1.0, 3.0]
+    assert {p: v for p, v in rest.base.items() if p.startswith("bodies")} == {
+        p: v for p, v in model.base.items() if p.startswith("bodies")
+    }

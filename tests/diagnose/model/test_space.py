@@ -8,6 +8,7 @@ from known_records import driven
 
 from rtctl.diagnose.model.by_symbol import Model
 from rtctl.diagnose.model.space import (
+    BEYOND,
     COSINE,
     INVERSE,
     PLACE,
@@ -121,11 +122,11 @@ def test_terms_that_the_owner_has_stay():
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.15, 0.5])
-def test_bounds_are_the_owners_tolerance_either_way(tolerance):
+def test_a_value_ends_somewhat_beyond_its_tolerance_either_way(tolerance):
     s = space(STRIBECK, tolerance=tolerance)
     low, high = s.bounds()
     ends = [s.model(x).base["M"] for x in (np.where(np.isfinite(low), low, 0), np.where(np.isfinite(high), high, 0))]
-    np.testing.assert_allclose(ends, [95.0 * (1 - tolerance), 95.0 * (1 + tolerance)])
+    np.testing.assert_allclose(ends, [95.0 * (1 - BEYOND * tolerance), 95.0 * (1 + BEYOND * tolerance)])
     assert (low[3:] == [-np.inf, -3.0]).all()
     assert (high[3:] == [np.inf, 3.0]).all()
 

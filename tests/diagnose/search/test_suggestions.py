@@ -3,7 +3,7 @@
 import numpy as np
 from graph_cases import BELT, PENDULUM, case_of, command, record
 
-from rtctl.diagnose.model.model import nominal
+from rtctl.diagnose.model.model import nominal, settings_of
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.search.hypotheses import hypotheses
 from rtctl.diagnose.search.suggestions import hints
@@ -35,3 +35,10 @@ def test_order_of_a_disc_off_centre_is_hinted_at_the_sensor_that_the_observer_fo
     asked = {(h.name, h.fixed.get("order")) for h in hypotheses(sim, model, found)}
     assert ("ripple.encoder:encoder", 4.0) in asked
     assert ("ripple.encoder:encoder", 1.0) not in asked
+
+
+def test_suggestions_are_found_beside_play_at_a_lone_sensor():
+    bearing = {"from": "frame", "to": "rod", "ratio": 1.0, "stiffness": 0.5}
+    sim = Simulator(record(case_of({**PENDULUM, "joints": {"bearing": bearing}}), command(2.2)))
+    play = settings_of({"term": "transmission.backlash", "node": "encoder", "gap": 1e-3})
+    assert "order:rod" in hints(sim, nominal(sim.case).add(play), 100)

@@ -1,0 +1,68 @@
+"""What the laws of the description itself may be wrong by: its friction, the effects that its owner knows, and effects
+that are too small for a name.
+
+No dry friction lets go at once, and none is the same at all speeds. What a machine with a right description leaves of
+that is no missing physics: it is integrated out of every model, as the errors of the effects on trial are (slack.py).
+
+Source: Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of model discrepancy, Inverse
+Problems 30 (2014).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtctl.diagnose.likelihood.descent import Point
+from rtctl.diagnose.likelihood.fits import Fitted, evaluated
+from rtctl.diagnose.likelihood.inexact import effect, pace
+from rtctl.diagnose.likelihood.slack import Inexact, columns
+from rtctl.diagnose.model.space import SIZE, Coordinate, Hypothesis
+from rtctl.diagnose.search.hypotheses import hypotheses
+
+FRICTION = (".dry", ".viscous")  # of a body, in the paths of a description
+LESS = 0.1  # of the friction of the description: step of the difference quotient
+FINE = (0.25, 0.5)  # of the least size of an effect that a sensor could show: what may be there without a name
+
+
+def inexact(base: Fitted) -> Fitted:
+    """The fitted description, whose own laws may be wrong."""
+    model, like = base.model, base.like.slackened(None).described(None)
+    known = [effect(like, model.without_known(i), base.e, str(model.terms[i].node)) for i in range(model.known())]
+    laws = np.concatenate([rubbing(base), *known], axis=2)
+    own = Inexact(laws, unseen(base, hypotheses(like.parts[0].sim, model)))
+    return evaluated(like.described(own), base.space, Point(base.x, base.e, base.J))
+
+
+def rubbing(base: Fitted) -> np.ndarray:
+    """Errors (blocks, sensors, columns) of the friction of the description, of standard deviation one.
+
+    A small share is taken off: without friction a machine may not come to rest where it was recorded to stand.
+    """
+    like, model = base.like, base.model
+    less = {path: value * (1.0 - LESS * path.endswith(FRICTION)) for path, value in model.base.items()}
+    change = like.raw(model._replace(base=less)) - base.e
+    if like.ran_away(base.e + change) or not np.any(change):
+        return np.zeros((*base.e.shape, 0))
+    return columns(change / LESS, pace(like, model, str(like.parts[0].sim.body)))
+
+
+def unseen(base: Fitted, candidates: Sequence[Hypothesis]) -> np.ndarray:
+    """Errors (blocks, sensors, columns), of standard deviation one, that effects make which are finer than the sensor
+    could show: of each candidate that has a least size."""
+    fine: dict[str, Hypothesis] = {}
+    for h in candidates:  # the first form of a term is its plainest
+        if any(has_least(c) for c in h.coordinates):
+            fine.setdefault(h.name, h)
+    changes = []
+    for h in fine.values():
+        for share in FINE:
+            x = [share * c.low if has_least(c) else c.start for c in h.coordinates]
+            e = base.like.raw(base.model.add(h.settings(x)))
+            if not base.like.ran_away(e) and np.any(e - base.e):
+                changes.append(e - base.e)
+    return np.stack(changes, axis=2) if changes else np.zeros((*base.e.shape, 0))
+
+
+def has_least(c: Coordinate) -> bool:
+    """Whether a size begins where a sensor could show it."""
+    return c.kind == SIZE and c.low > 0.0
