@@ -11,9 +11,10 @@ from rtctl.diagnose.answer import words
 from rtctl.diagnose.answer.experiment import Planned, left, planned
 from rtctl.diagnose.answer.intervals import parameters, sizes
 from rtctl.diagnose.answer.load import load
+from rtctl.diagnose.calibration import SURE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.evidence.prediction import Heldout, predict
-from rtctl.diagnose.evidence.verdict import SURE, Verdict, fewer, verdict
+from rtctl.diagnose.evidence.verdict import Verdict, fewer, verdict
 from rtctl.diagnose.evidence.withdrawn import borne_out, told
 from rtctl.diagnose.likelihood.clock import UNSTEADY
 from rtctl.diagnose.likelihood.fits import Fitted, refit

@@ -23,7 +23,8 @@ from rtctl.diagnose.answer import words
 from rtctl.diagnose.answer.motions import Limits, Motion
 from rtctl.diagnose.answer.plan import FULL, OVER, SPEED_OVER, Experiment, chosen, eased, limits_in
 from rtctl.diagnose.answer.si_format import nice
-from rtctl.diagnose.evidence.verdict import ALIKE, SURE, Verdict
+from rtctl.diagnose.calibration import SURE
+from rtctl.diagnose.evidence.verdict import ALIKE, Verdict
 from rtctl.diagnose.likelihood.descent import derivatives
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.likelihood import Likelihood, coarsened

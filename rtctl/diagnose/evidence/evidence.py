@@ -15,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.calibration import FREE_FORCE, LAW_ERROR_OF_FORCE, ODDS, UNEXPLAINED
 from rtctl.diagnose.evidence.free import Free, free_functions
-from rtctl.diagnose.evidence.places import AXES, SIZE, TIME
-from rtctl.diagnose.evidence.wander import LITTLE, log_density, wandering
-from rtctl.diagnose.likelihood.fits import DISCREPANCY, Fitted
+from rtctl.diagnose.evidence.places import AXES, TIME
+from rtctl.diagnose.evidence.wander import log_density, wandering
+from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.pushes import pushes
 from rtctl.diagnose.likelihood.shares import share_of
 from rtctl.diagnose.model.node_scaling import Measures
@@ -27,7 +28,6 @@ from rtctl.plants.physics import TERMS
 
 SEGMENTS = 32
 DRAWS = 300
-UNLISTED = 3.0  # nats: prior odds against what has no name
 BESIDE = 3  # combinations beside which free functions are asked for
 LEAST = 1e-4  # of the force that moves a node: a discrepancy that is smaller is none
 
@@ -59,23 +59,23 @@ def rivals(found: Found) -> tuple[Rival, ...]:
         if not fit.names or not len(fit.pushes[0]):
             return 0.0
         change = float(np.sqrt(np.mean((base.pushes[0] - fit.pushes[0])[:, 0] ** 2)))
-        return DISCREPANCY * change / unit if np.isfinite(change) else 0.0
+        return LAW_ERROR_OF_FORCE * change / unit if np.isfinite(change) else 0.0
 
     best = set(found.best.names)  # and whether a small error of fewer laws does as well
     entries: list[tuple[Fitted, Free | None, float]] = []
     for rank, fit in enumerate(fits):
         off = wrong(fit)
         wander = wandering(fit)
-        usual = float(np.linalg.norm([LITTLE, off, wander.noise]))
+        usual = float(np.linalg.norm([UNEXPLAINED, off, wander.noise]))
         listed = found.merit(fit) + log_density(wander.share, usual)
         entries.append((fit, None, listed))
         if wander.free is not None:
-            entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, SIZE) - UNLISTED))
+            entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, FREE_FORCE) - ODDS))
         if rank < BESIDE or set(fit.names) < best:
             along = {axis: off * share for axis, share in arguments(shares(fit)).items() if off * share > LEAST}
             free = free_functions(fit, along)
             large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f))]
-            entries += [(fit, f, found.merit(fit) + f.evidence + own - UNLISTED) for f, own in _shared(large)]
+            entries += [(fit, f, found.merit(fit) + f.evidence + own - ODDS) for f, own in _shared(large)]
             small = [f for f in free if not f.large]
             entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
     losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
@@ -119,7 +119,7 @@ def shares(fit: Fitted) -> list[tuple[str, float]]:
 
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:
     """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
-    return share_of(base.e, fit.e, free.e) > DISCREPANCY
+    return share_of(base.e, fit.e, free.e) > LAW_ERROR_OF_FORCE
 
 
 def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
@@ -137,5 +137,6 @@ def _shared(free: list[Free]) -> list[tuple[Free, float]]:
     comes and goes as small as its law may be wrong by."""
     each = -float(np.log(max(len(free), 1)))
     return [
-        (f, each + (log_density(0.0, float(np.hypot(LITTLE, DISCREPANCY * f.rms))) if f.large else 0.0)) for f in free
+        (f, each + (log_density(0.0, float(np.hypot(UNEXPLAINED, LAW_ERROR_OF_FORCE * f.rms))) if f.large else 0.0))
+        for f in free
     ]

@@ -10,14 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rtctl.diagnose.calibration import FREE_ERROR, FREE_FORCE
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import Measures
 from rtctl.diagnose.model.simulate import HELD
 
-SIZE = 0.3  # of the force that moves a node: standard deviation of a free force, by its prior
-ERROR = 0.01  # of the spread of a reading: that of its free error
 TIME = "time"  # axis along which a force comes and goes
 AXES = ("velocity", "position", TIME, "angle", "command")
 TURNS = 1.5  # turns from which on an angle is another axis than the position
@@ -35,7 +34,7 @@ class Place(NamedTuple):
     @property
     def size(self) -> float:
         """Standard deviation of the function by its prior, of the whole."""
-        return ERROR if self.reads else SIZE
+        return FREE_ERROR if self.reads else FREE_FORCE
 
     def along(self, knots: np.ndarray, hat: np.ndarray, values: np.ndarray) -> np.ndarray:
         """The function (n,) that is `hat` at the knots. An error of a reading is smooth: where it had corners, the

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.calibration import WORSE
 from rtctl.diagnose.likelihood.fits import Fitted, refit, without
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.model import GraphModel
 
 HELD = 0.25  # share of the record
 ROUNDS = 6  # steps of a fit to the rows before
-WORSE = 1.0  # nats by which rows that no fit saw must be predicted worse, until a name is withdrawn: less is chance
 
 
 class Heldout(NamedTuple):

@@ -9,9 +9,10 @@ Source: Ljung, System Identification (1999), ch. 8.5 (the prefilter decides wher
 
 import numpy as np
 
+from rtctl.diagnose.calibration import SURE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED
 from rtctl.diagnose.evidence.prediction import Heldout, fitted_to
-from rtctl.diagnose.evidence.verdict import SURE, Verdict
+from rtctl.diagnose.evidence.verdict import Verdict
 from rtctl.diagnose.likelihood.descent import ALL, Point, derivatives, descend
 from rtctl.diagnose.likelihood.fits import Fitted, evaluated
 from rtctl.diagnose.likelihood.likelihood import Likelihood

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from rtctl.diagnose.calibration import MOSTLY, SURE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.evidence.evidence import Rival, rivals
 from rtctl.diagnose.evidence.free import Free
@@ -10,8 +11,6 @@ from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.shares import explained
 from rtctl.diagnose.search.search import Found
 
-SURE = 0.9  # probability from which a name is given, or that something is missing
-MOSTLY = 0.5  # share of the residual's power above the noise that names have to take off
 ALIKE = 3  # names of an ambiguous answer
 
 

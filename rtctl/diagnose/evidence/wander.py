@@ -15,8 +15,6 @@ from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.pushes import answer, averaged
 from rtctl.diagnose.model.node_scaling import Measures
 
-LITTLE = 0.004  # of the force that moves the machine: standard deviation of what a description that is right leaves
-
 
 class Wander(NamedTuple):
     """Force that comes and goes, of the recording and the followed body where it is largest."""

@@ -1,7 +1,8 @@
 """Names that are withdrawn: rows that no fit saw are predicted as well without them, or worse with them."""
 
+from rtctl.diagnose.calibration import WORSE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, UNNAMED
-from rtctl.diagnose.evidence.prediction import WORSE, Heldout, predicted
+from rtctl.diagnose.evidence.prediction import Heldout, predicted
 from rtctl.diagnose.evidence.predictive import predictive
 from rtctl.diagnose.evidence.verdict import Verdict, fewer
 from rtctl.diagnose.likelihood.fits import Fitted, refit, without

@@ -8,12 +8,11 @@ Source: innovation form of a state space model, Ljung, System Identification (19
 
 import numpy as np
 
+from rtctl.diagnose.calibration import QUICKER, QUIET
 from rtctl.diagnose.likelihood.fits import Fitted, refit
-from rtctl.diagnose.likelihood.shares import FLOOR
 from rtctl.diagnose.model.kernel import TRACK
 
 STEP = 2.0  # from one bandwidth to the next
-WORTH = 30.0  # nats that another bandwidth must bring: below, all names gain alike
 
 
 def quicker(fit: Fitted) -> float:
@@ -24,7 +23,7 @@ def quicker(fit: Fitted) -> float:
         if again.log_evidence <= best.log_evidence:
             break
         best, times = again, times * STEP
-    return times if best.log_evidence > fit.log_evidence + WORTH else 1.0
+    return times if best.log_evidence > fit.log_evidence + QUICKER else 1.0
 
 
 def lags(fit: Fitted) -> bool:
@@ -32,4 +31,4 @@ def lags(fit: Fitted) -> bool:
     is quicker follows single counts, and whatever has their pattern is held for an effect."""
     like, sim = fit.like, fit.like.parts[0].sim
     rms = dict(zip(like.channels, np.std(fit.e, axis=0) / like.least, strict=True))
-    return sim.mode == TRACK and any(rms.get(sim.column(one.sensor), 0.0) > FLOOR for one in sim.followed)
+    return sim.mode == TRACK and any(rms.get(sim.column(one.sensor), 0.0) > QUIET[0] for one in sim.followed)

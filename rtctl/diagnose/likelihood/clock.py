@@ -16,20 +16,18 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.special import expit, logsumexp
 
+from rtctl.diagnose.calibration import CHANCE, CLOCK, INNOVATIONS_OF_INTERVAL, ODDS
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.joint import Joint
-from rtctl.diagnose.likelihood.likelihood import COUNTED, Likelihood, coarsened
+from rtctl.diagnose.likelihood.likelihood import Likelihood, coarsened
 from rtctl.diagnose.likelihood.noise import levels, surprise
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
-STEADY, CERTAIN = 0.025, 4e-6  # of a tick, and s: less is what the clock of any computer does
 MOST = 0.5  # of a tick
 GRID = 60  # standard deviations that are tried, alike in their logarithm
-CHANCE = 0.3  # of the power of a residual, which must be chance where it tells of time
-OTHER = 3.0  # nats: prior odds against a noise of one sensor that grows with its rate for a reason of its own
 SLOW, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which a force is averaged
 TAIL = 0.05  # of probability, beyond each end of a 90 % interval
 UNSTEADY = next((t.name, t.stands[0].element, *t.typical) for t in TERMS.values() if t.clock)  # term, node, size
@@ -55,16 +53,16 @@ def clock(fit: Fitted, chance: float = CHANCE) -> Clock:
     What speaks against them is a clock as any other, and a noise of each sensor that grows with its rate on its own.
     """
     dt = fit.like.sim.record.dt
-    least = max(STEADY * dt, CERTAIN)
+    least = max(CLOCK[0] * dt, CLOCK[1])
     if MOST * dt <= least or fit.like.sim.mode != TRACK:
         return Clock(0.0, 0.0, 0.0, -np.inf)
     sizes = np.geomspace(least, MOST * dt, GRID)
     each = np.concatenate([_likely(part, own, sizes, chance) for part, own in fit.like.cut(fit.e)]) * fit.power
     likely = each.sum(axis=0)
-    weight = np.exp((likely - likely.max()) * coarsened(fit.like.size, COUNTED) / fit.power)
+    weight = np.exp((likely - likely.max()) * coarsened(fit.like.size, INNOVATIONS_OF_INTERVAL) / fit.power)
     total = np.cumsum(weight) / weight.sum()
     low, middle, high = (float(np.interp(q, total, sizes)) for q in (TAIL, 0.5, 1.0 - TAIL))
-    own = float(np.sum(logsumexp(each, axis=1) - np.log(GRID))) - OTHER
+    own = float(np.sum(logsumexp(each, axis=1) - np.log(GRID))) - ODDS
     gain = float(logsumexp(likely) - np.log(GRID) - np.logaddexp(likely[0], own))
     return Clock(middle, low, high, gain)
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.calibration import EXACT
 from rtctl.diagnose.likelihood.descent import ALL, EFFECTS, Point, derivatives, descend, weights
 from rtctl.diagnose.likelihood.inexact import errors
 from rtctl.diagnose.likelihood.likelihood import Likelihood
@@ -25,7 +26,6 @@ MOST = 10  # Gauss-Newton steps in each
 ENOUGH = 2.0  # nats, that a further round must gain
 LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a recording may say nothing
 MATTERS = 0.5  # nats of the prior that going back must gain
-DISCREPANCY = 0.1  # of the missing force: standard deviation of what the law of a name may be wrong by
 
 
 class Fitted(NamedTuple):
@@ -92,7 +92,6 @@ def prior(space: Space) -> np.ndarray:
     return np.array(out)
 
 
-EXACT = {1.0: 0.0, 0.1: 2.3, 0.01: 4.6}  # of the usual error, and nats against it: one law in ten, in a hundred
 SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0, REST: 3.0}  # standard deviation of a size, in typical sizes
 
 

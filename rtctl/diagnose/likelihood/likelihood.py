@@ -15,6 +15,7 @@ from typing import Self
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from rtctl.diagnose.calibration import INNOVATIONS
 from rtctl.diagnose.likelihood.noise import Noise, noises_of, surprise, whitened
 from rtctl.diagnose.likelihood.slack import Inexact, Slack
 from rtctl.diagnose.likelihood.slow import slow
@@ -29,8 +30,6 @@ FORGET = 8.0  # over the bandwidth of the observer: until the start is forgotten
 QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
 SMOOTH = 9  # blocks, over which the rate of a reading is taken
 EDGE = 0.03  # of a step: the least that an edge leaves, whose tick is known
-COARSE = 10000.0  # innovations that a recording counts for at most: no model is exact
-COUNTED = 700.0  # the same for an interval: an error of a law moves its numbers more than noise
 WILD = 1e6  # residual of a model that runs away, in steps of noise
 
 
@@ -300,7 +299,7 @@ def sensor_body(sim: Simulator, name: str) -> str | None:
     return None if found is None else found.body
 
 
-def coarsened(size: int, most: float = COARSE) -> float:
+def coarsened(size: int, most: float = INNOVATIONS) -> float:
     """Share of the likelihood of `size` innovations that counts where they count for `most` at most."""
     return most / (most + size)
 

@@ -2,17 +2,15 @@
 
 import numpy as np
 
+from rtctl.diagnose.calibration import QUIET
 from rtctl.diagnose.likelihood.fits import Fitted
-
-FLOOR = 2.0  # times the least noise of the sensor, at which nothing is left to explain
-RESTLESS = 1.2  # times what differs from block to block, the same
 
 
 def floor(f: Fitted) -> np.ndarray:
     """Rms (sensors,), SI, at which nothing is left to explain: by what counting leaves, and what differs from one block
     to the next without a pattern."""
     restless = np.std(np.diff(f.e, axis=0), axis=0) / np.sqrt(2.0)
-    return np.asarray(np.maximum(FLOOR * (f.like.least * np.sqrt(f.like.mean)), RESTLESS * restless))
+    return np.asarray(np.maximum(QUIET[0] * (f.like.least * np.sqrt(f.like.mean)), QUIET[1] * restless))
 
 
 def silent(f: Fitted) -> bool:

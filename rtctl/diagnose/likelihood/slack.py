@@ -16,7 +16,8 @@ from numpy.polynomial.legendre import legvander
 from scipy.linalg import cho_factor, cho_solve
 from scipy.ndimage import uniform_filter1d
 
-OFF = 0.05  # of what an effect does: standard deviation of its error
+from rtctl.diagnose.calibration import LAW_ERROR
+
 ORDER = 3  # of the polynomials along what it does, and along the speed
 WIDTHS = (1, 4, 16, 64)  # blocks, of the averages between which bands of frequency lie
 
@@ -40,7 +41,7 @@ def columns(effect: np.ndarray, speed: np.ndarray) -> np.ndarray:
     turned = [
         rate * _rms(band) / np.maximum(_rms(rate), 1e-300) for band in bands for rate in [np.gradient(band, axis=0)]
     ]
-    parts = [OFF / np.sqrt(smooth.shape[2]) * smooth, OFF * np.stack([*bands, *turned], axis=2)]
+    parts = [LAW_ERROR / np.sqrt(smooth.shape[2]) * smooth, LAW_ERROR * np.stack([*bands, *turned], axis=2)]
     return np.asarray(np.concatenate(parts, axis=2))
 
 

@@ -13,13 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.calibration import SLOW_ERROR
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.node_scaling import Measures
 from rtctl.diagnose.model.observer import stiffness
 from rtctl.diagnose.model.simulate import Simulator
-
-UNKNOWN = 0.01  # of the force that moves the machine: standard deviation of what laws are wrong by
 
 
 class Slow(NamedTuple):
@@ -62,6 +61,6 @@ def slow(sim: Simulator, channels: Sequence[int], mean: int) -> list[Slow]:
         column, follow = sim.column(one.sensor), sim.bandwidth(one)
         if column in channels:
             stiff = stiffness(follow, measures.inertia(one.body))[one.shows_speed]
-            least = UNKNOWN * measures.of("force", one.body) / stiff
+            least = SLOW_ERROR * measures.of("force", one.body) / stiff
             out.append(Slow(list(channels).index(column), max(1, round(sim.window / mean)), least, least))
     return out

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from rtctl.diagnose.calibration import INNOVATIONS_OF_INTERVAL
 from rtctl.diagnose.likelihood.fits import Fitted, curvature
-from rtctl.diagnose.likelihood.likelihood import COUNTED, coarsened
+from rtctl.diagnose.likelihood.likelihood import coarsened
 from rtctl.diagnose.model.space import COSINE, SINE
 
 Z90 = 1.645  # standard deviations of a 90 % interval, each way
@@ -12,7 +13,7 @@ Z90 = 1.645  # standard deviations of a 90 % interval, each way
 def half_widths(f: Fitted) -> np.ndarray:
     """Half width (unknowns,) of the 90 % interval of each unknown, as an answer tells it: by the second derivative of
     a posterior in which few innovations count, since the error of a law moves its numbers more than noise."""
-    information = curvature(f, coarsened(f.like.size, COUNTED))
+    information = curvature(f, coarsened(f.like.size, INNOVATIONS_OF_INTERVAL))
     return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0)))
 
 

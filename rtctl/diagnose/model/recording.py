@@ -17,7 +17,7 @@ from rtctl.plants.graph.params import drive_gain
 from rtctl.trace.clock import even_rows, increasing
 
 MIDDLE = 0.5  # counts from what a counter shows to where it is on average
-BEYOND = 10  # rows that a recording has to have beside one for each unknown: its noise is estimated as well
+SPARE = 10  # rows that a recording has to have beside one for each unknown: its noise is estimated as well
 EARLY = 10  # rows, from which the speed at the first is guessed
 
 
@@ -58,9 +58,9 @@ def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> Gr
     """
     t = _column(path, columns, "t", "s, clock at the tick")
     unknowns = len(case.fitted)
-    if len(t) < unknowns + BEYOND:
+    if len(t) < unknowns + SPARE:
         raise NoAnswer(
-            f"{path} holds {len(t)} rows; {unknowns} unknown numbers and the noise need {unknowns + BEYOND} at least"
+            f"{path} holds {len(t)} rows; {unknowns} unknown numbers and the noise need {unknowns + SPARE} at least"
         )
     rows = len(t)
     t, dt, even = _clock(path, t, case)

@@ -12,11 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.calibration import BEYOND, TOLERANCE
 from rtctl.idiom import Settings
 from rtctl.plants.physics import TERMS
 
-BEYOND = 1.5  # times the tolerance: a value that a fit may reach, improbable as its prior makes it
-PRIOR = 0.7  # of the tolerance: standard deviation of the owner's error, between uniform and certain
 WIDE = 7.0  # in logarithm, of a parameter of which the owner knows nothing
 SIZE, INVERSE, SHAPE, COSINE, SINE, PLACE = "size", "inverse", "shape", "cosine", "sine", "place"
 REST = "rest"
@@ -159,7 +158,7 @@ class Space(NamedTuple):
         weights = []
         for name in self.names:
             tol = self.tolerance(name)
-            weights.append(1.0 / (PRIOR * tol) ** 2 if np.isfinite(tol) else 0.0)
+            weights.append(1.0 / (TOLERANCE * tol) ** 2 if np.isfinite(tol) else 0.0)
         return np.array(weights + [0.0] * (len(self.start()) - self.nb))
 
     def steps(self) -> np.ndarray:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.calibration import FIRST
 from rtctl.diagnose.likelihood.clock import clock, timed
 from rtctl.diagnose.likelihood.fits import Fitted, refit, without
 from rtctl.diagnose.likelihood.likelihood import Likelihood
@@ -17,7 +18,7 @@ from rtctl.diagnose.search.description_errors import inexact
 from rtctl.diagnose.search.enrich import restarted
 from rtctl.diagnose.search.extend import extended, screened
 from rtctl.diagnose.search.screen import Screened
-from rtctl.diagnose.search.standing import ENOUGH, merit_of
+from rtctl.diagnose.search.standing import merit_of
 
 NAMES = 8  # terms that are fitted as the first effect
 REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
@@ -59,7 +60,7 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
         progress("fitting effect 1")
         grown = extended(like, [base], {(): base}, NAMES, partial(merit_of, odds=odds), looked)
         before, base = base, rebased(base, grown)
-        if base.log_evidence < before.log_evidence + ENOUGH:
+        if base.log_evidence < before.log_evidence + FIRST:
             break
     return Begun(base, grown, looked, odds)
 
@@ -70,7 +71,7 @@ def rebased(base: Fitted, grown: Sequence[Fitted]) -> Fitted:
     Where the likelihood has many maxima, an effect may only have shown the way to a better one of the base.
     """
     for f in sorted(grown, key=lambda f: f.loss)[:REBASED]:
-        if f.loss < base.loss - ENOUGH:
+        if f.loss < base.loss - FIRST:
             again = refit(base.like, *without(f, 0))
             if again.log_evidence > base.log_evidence + MORE:
                 base = again

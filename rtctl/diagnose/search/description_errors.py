@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rtctl.diagnose.calibration import UNSEEN
 from rtctl.diagnose.likelihood.descent import Point
 from rtctl.diagnose.likelihood.fits import Fitted, evaluated
 from rtctl.diagnose.likelihood.inexact import effect, pace
@@ -21,7 +22,6 @@ from rtctl.diagnose.search.hypotheses import hypotheses
 
 FRICTION = (".dry", ".viscous")  # of a body, in the paths of a description
 LESS = 0.1  # of the friction of the description: step of the difference quotient
-FINE = (0.25, 0.5)  # of the least size of an effect that a sensor could show: what may be there without a name
 
 
 def inexact(base: Fitted) -> Fitted:
@@ -55,7 +55,7 @@ def unseen(base: Fitted, candidates: Sequence[Hypothesis]) -> np.ndarray:
             fine.setdefault(h.name, h)
     changes = []
     for h in fine.values():
-        for share in FINE:
+        for share in UNSEEN:
             x = [share * c.low if has_least(c) else c.start for c in h.coordinates]
             e = base.like.raw(base.model.add(h.settings(x)))
             if not base.like.ran_away(e) and np.any(e - base.e):

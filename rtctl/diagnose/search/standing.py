@@ -2,17 +2,12 @@
 
 import numpy as np
 
+from rtctl.diagnose.calibration import FIRST, FURTHER, FURTHER_POWER, FURTHER_SHARE, LAW_ERROR
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.shares import amplitude, explained, explained_force
-from rtctl.diagnose.likelihood.slack import OFF
 from rtctl.diagnose.likelihood.widths import faint
 from rtctl.diagnose.search.extend import Known, Merit, key
 from rtctl.plants.physics import TERMS
-
-ENOUGH = 5.0  # nats of evidence that a first effect must bring
-WORTH = 3.0  # nats that a further one must bring
-SHARE = 0.05  # of the evidence of all effects together, which a further one must bring
-PART = 0.3  # share of the power that the others leave, which a further effect must take off
 
 
 def merit_of(f: Fitted, odds: float) -> float:
@@ -28,13 +23,13 @@ def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
     recording the evidence of a small one is large.
     """
     gained = merit(more) - merit(fewer)
-    if gained < WORTH or not fewer.names:
-        return gained >= WORTH
+    if gained < FURTHER or not fewer.names:
+        return gained >= FURTHER
     others = {argument(h.term) for h in fewer.space.hypotheses}
     apart = any(argument(h.term) not in others for h in more.space.hypotheses)
-    clear = apart and gained > SHARE * (merit(more) - merit(base))
-    large = clear or amplitude(base, fewer, more) > OFF
-    return large and max(explained(fewer, more), explained_force(fewer, more)) > PART
+    clear = apart and gained > FURTHER_SHARE * (merit(more) - merit(base))
+    large = clear or amplitude(base, fewer, more) > LAW_ERROR
+    return large and max(explained(fewer, more), explained_force(fewer, more)) > FURTHER_POWER
 
 
 def argument(term: str) -> str:
@@ -58,6 +53,6 @@ def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
     if faint(f):
         return False
     if len(f.names) == 1:
-        return merit(f) > merit(base) + ENOUGH
+        return merit(f) > merit(base) + FIRST
     rest = (key(set(f.names) - {name}) for name in f.names)
     return all(adds(base, known[names], f, merit) for names in rest if names in known)

@@ -3,7 +3,8 @@ import pytest
 from graph_cases import PENDULUM, RATE, case_of, command, nothing, record
 
 from rtctl.diagnose.answer.answer import diagnose_record
-from rtctl.diagnose.evidence.wander import LITTLE, log_density, wandering
+from rtctl.diagnose.calibration import UNEXPLAINED
+from rtctl.diagnose.evidence.wander import log_density, wandering
 from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.likelihood.joint import together
 
@@ -20,8 +21,8 @@ def random_force(n, rms, seed=3):
 def test_a_machine_as_described_leaves_little():
     base = nothing().found.base
     found = wandering(base)
-    assert found.share < 3 * LITTLE
-    assert 0.0 < found.noise < LITTLE
+    assert found.share < 3 * UNEXPLAINED
+    assert 0.0 < found.noise < UNEXPLAINED
 
 
 def test_a_random_force_is_measured():
@@ -45,9 +46,9 @@ def test_a_random_force_has_no_name():
 
 def test_density_of_a_share():
     values = np.linspace(0.0, 0.1, 2001)
-    density = np.exp([log_density(v, LITTLE) for v in values])
+    density = np.exp([log_density(v, UNEXPLAINED) for v in values])
     mean = np.sqrt(np.sum(density * values**2) / np.sum(density))
-    assert mean == pytest.approx(LITTLE, rel=0.01)
+    assert mean == pytest.approx(UNEXPLAINED, rel=0.01)
 
 
 def test_noise_of_a_sensor_is_no_force():
@@ -57,6 +58,6 @@ def test_noise_of_a_sensor_is_no_force():
     like, space = together([noisy])
     fit = refit(like, space)
     found = wandering(fit)
-    assert found.share > 2 * LITTLE
+    assert found.share > 2 * UNEXPLAINED
     assert found.noise == pytest.approx(found.share, rel=0.4)
     assert diagnose_record(noisy).verdict == "nothing"

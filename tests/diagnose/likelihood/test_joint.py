@@ -40,7 +40,7 @@ def test_report_names_both_recordings():
 
 
 def test_losses_add_up_and_residuals_are_stacked():
-    like = both().found.like
+    like = both().found.like.slackened(None)
     model = both().decided.best.model
     e = like.raw(model)
     parts = [part.raw(model) for part in like.parts]

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from rtctl.diagnose.likelihood.slack import OFF, Slack, columns
+from rtctl.diagnose.calibration import LAW_ERROR
+from rtctl.diagnose.likelihood.slack import Slack, columns
 
 POWER = 0.4
 
@@ -47,7 +48,7 @@ def test_an_error_is_a_share_of_what_the_effect_does():
     found = columns(effect, speed)
     np.testing.assert_allclose(found[:, 1], 0.0)
     spread = np.sqrt(np.mean(np.sum(found[:, 0] ** 2, axis=1)) / np.mean(effect[:, 0] ** 2))
-    assert 0.5 * OFF < spread < 2.0 * OFF
+    assert 0.5 * LAW_ERROR < spread < 2.0 * LAW_ERROR
 
 
 @pytest.mark.parametrize("wrong", ["yields", "late", "by speed"])

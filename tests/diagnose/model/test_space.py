@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from known_records import driven
 
+from rtctl.diagnose.calibration import BEYOND
 from rtctl.diagnose.model.by_symbol import Model
 from rtctl.diagnose.model.space import (
-    BEYOND,
     COSINE,
     INVERSE,
     PLACE,

@@ -1,0 +1,36 @@
+"""The numbers of a verdict: all are told in the docs, with the values that the program has."""
+
+import ast
+import re
+from pathlib import Path
+
+from rtctl.diagnose import calibration
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def told():
+    """Names and values of the rows of the table in docs/diagnosis.md."""
+    page = (ROOT / "docs" / "diagnosis.md").read_text("utf-8")
+    table = page.split("## Numbers that the verdict hangs on")[1].split("\n## ")[0]
+    rows = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("| `")]
+    return {tuple(re.findall(r"`(\w+)`", row[0])): tuple(float(v) for v in row[1].split(",")) for row in rows}
+
+
+def test_the_docs_tell_every_number():
+    names = {name for name in vars(calibration) if name.isupper()}
+    assert names == {name for row in told() for name in row}
+    for row, values in told().items():
+        found = [vars(calibration)[name] for name in row]
+        flat = [v for one in found for v in (one if isinstance(one, tuple | dict) else (one,))]
+        assert tuple(flat) == values
+
+
+def test_no_module_has_one_of_these_names_for_a_number_of_its_own():
+    names = {name for name in vars(calibration) if name.isupper()}
+    for path in (ROOT / "rtctl" / "diagnose").rglob("*.py"):
+        if path.name == "calibration.py":
+            continue
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.Assign):
+                assert not names & {t.id for t in node.targets if isinstance(t, ast.Name)}, path
