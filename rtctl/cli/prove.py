@@ -26,6 +26,10 @@ def prove(
     limit: Annotated[str, typer.Option("--limit", metavar="T", help="Longest time for a case, e.g. 600s.")] = "600s",
     generate_only: Annotated[bool, typer.Option("--generate-only", help="Write and seal the cases; stop.")] = False,
     heldout: Annotated[bool, typer.Option("--heldout", help="Record each machine a second time as well.")] = False,
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="The same cases as an earlier program answered them: what differs."),
+    ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the scores as JSON.")] = False,
 ) -> None:
     """Prove the diagnosis on machines whose missing physics is concealed from it.
@@ -40,11 +44,14 @@ def prove(
       rtctl prove --count 300 --seed 2026 --out /tmp/proof --jobs 2
 
       rtctl prove --machines --count 200 --seed 11 --out /tmp/machines --jobs 2
+
+      rtctl prove --count 20 --seed 7 --out now --against before
     """
     import json
 
     from rtctl.cli import common
     from rtctl.config.errors import UserError
+    from rtctl.proof import against as earlier
     from rtctl.proof import prove as proof
     from rtctl.proof.batch import PLANTS
     from rtctl.proof.machines import TOPOLOGIES
@@ -63,11 +70,15 @@ def prove(
         return
     proof.diagnose_all(out, jobs, lambda n, of: _note("diagnosed", n, of), limit=longest)
     result = proof.score_all(out)
+    differ = [] if against is None else earlier.pairs(out, against)
     if json_:
-        typer.echo(json.dumps(result, sort_keys=True))
-    else:
-        typer.echo(proof.words(result))
-        typer.echo(f"report: {out / proof.REPORT}")
+        more = {} if against is None else {"against": [pair._asdict() for pair in differ]}
+        typer.echo(json.dumps(result | more, sort_keys=True))
+        return
+    typer.echo(proof.words(result))
+    if against is not None:
+        typer.echo(earlier.words(differ))
+    typer.echo(f"report: {out / proof.REPORT}")
 
 
 def _listed(given: str | None, every: tuple[str, ...]) -> tuple[str, ...]:

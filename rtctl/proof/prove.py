@@ -88,10 +88,9 @@ def score_all(folder: Path | str) -> dict[str, Any]:
 
     folder = Path(folder)
     answers = seal.open_seal(folder)
-    diagnoses: dict[str, Any] = {}
+    diagnoses = diagnoses_of(folder)
     seconds: dict[str, float] = {}
     for bundle in cases(folder):
-        diagnoses[bundle.name] = _json(bundle / "diagnosis" / RESULT)
         took = _json(bundle / "diagnosis" / "seconds.json")
         if isinstance(took, float):
             seconds[bundle.name] = took
@@ -101,6 +100,11 @@ def score_all(folder: Path | str) -> dict[str, Any]:
     figures.reliability(result, folder / "reliability.png")
     figures.confusion(result, folder / "confusion.png")
     return result
+
+
+def diagnoses_of(folder: Path) -> dict[str, Any]:
+    """What diagnosis.json says of each case; None where there is none."""
+    return {bundle.name: _json(bundle / "diagnosis" / RESULT) for bundle in cases(folder)}
 
 
 def _json(path: Path) -> Any:
