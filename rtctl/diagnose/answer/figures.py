@@ -9,10 +9,11 @@ from rtctl.diagnose.answer.answer import GraphDiagnosis
 from rtctl.diagnose.answer.figure_style import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
 from rtctl.diagnose.answer.missing_force import Missing, subjects
 from rtctl.diagnose.answer.phrases import noun
-from rtctl.diagnose.answer.posterior import rivals
+from rtctl.diagnose.answer.posterior import in_words, rivals
+from rtctl.diagnose.answer.runner_up import lost_by
 from rtctl.diagnose.answer.si_format import figures as digits
 from rtctl.diagnose.answer.si_format import percent
-from rtctl.diagnose.answer.words import called, channel_unit, here, value_unit
+from rtctl.diagnose.answer.words import channel_unit, here, value_unit
 from rtctl.diagnose.evidence.diagnosis import NOTHING
 from rtctl.diagnose.evidence.hats import binned
 from rtctl.diagnose.likelihood.widths import Z90
@@ -160,15 +161,27 @@ def posterior(d: GraphDiagnosis) -> Figure:
         ax.barh(row, 100 * bar.probability, color=BEFORE if bar.free else AFTER, height=0.6)
         text = percent(bar.probability) if bar.probability > LEAST_BAR else f"1e{bar.behind / np.log(10.0):.0f}"
         ax.text(100 * bar.probability + 1.0, row, text, va="center", fontsize=8.5, color=INK)
-    machine = d.record.case.machine
-    said = [bar.free or " + ".join(called(machine, n) for n in bar.names) or "the description alone" for bar in bars]
-    ax.set_yticks(range(len(bars)), [_folded(text) for text in said])
+    ax.set_yticks(range(len(bars)), [_folded(in_words(d, bar)) for bar in bars])
     ax.tick_params(axis="y", labelsize=8.5)
     ax.invert_yaxis()
     ax.set_xlim(0, 118)
     ax.set_xticks(range(0, 101, 20))
     ax.grid(axis="y", visible=False)
     label(ax, "probability, %")
+    return figure
+
+
+def runner_up(d: GraphDiagnosis) -> Figure | None:
+    """Nats by which each part of the recording is more probable under the answer than under the next likeliest one."""
+    lost = lost_by(d)
+    if lost is None:
+        return None
+    figure, (ax,) = new(2.2)
+    colors = np.where(lost.nats > 0.0, AFTER, BEFORE)
+    ax.bar(lost.edges[:-1], lost.nats, np.diff(lost.edges), align="edge", color=colors, edgecolor="none")
+    ax.axhline(0, color=SEEN, lw=0.8)
+    ax.set_xlim(lost.edges[0], lost.edges[-1])
+    label(ax, "time, s" if len(d.records) == 1 else "part of the recordings", "nats for the answer")
     return figure
 
 
@@ -222,4 +235,4 @@ def untold(d: GraphDiagnosis, name: str) -> bool:
     return half > OWN * Z90 / np.sqrt(weight)
 
 
-__all__ = ["heldout", "missing_force", "parameters", "posterior", "untold", "value_unit"]
+__all__ = ["heldout", "missing_force", "parameters", "posterior", "runner_up", "untold", "value_unit"]

@@ -2,10 +2,9 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from rtctl.diagnose.answer.answer import GraphDiagnosis
 from rtctl.diagnose.answer.words import called, here
+from rtctl.diagnose.evidence.evidence import Rival
 
 
 class Bar(NamedTuple):
@@ -19,17 +18,29 @@ class Bar(NamedTuple):
 
 def rivals(d: GraphDiagnosis) -> list[Bar]:
     """All rivals, likeliest first; their probabilities sum to one. Numbers of hats along one axis are one rival."""
+    return [bar for bar, _ in groups(d)]
+
+
+def groups(d: GraphDiagnosis) -> list[tuple[Bar, Rival]]:
+    """The same, each with the likeliest of what it stands for."""
     machine = d.record.case.machine
-    found: dict[tuple[tuple[str, ...], str], list[float]] = {}
+    found: dict[tuple[tuple[str, ...], str], list[Rival]] = {}
     for rival in d.decided.table:
         words = ""
         if rival.unlisted and rival.free is not None:
             words = f"{rival.free.kind} without a name at {here(machine, rival.free.node)}, by {rival.free.axis}"
             if rival.fit.names:
                 words += ", beside " + " + ".join(called(machine, n) for n in rival.fit.names)
-        bar = found.setdefault((rival.fit.names, words), [0.0, -np.inf])
-        bar[0] += rival.probability
-        bar[1] = max(bar[1], rival.merit)
-    top = max(merit for _, merit in found.values())
-    bars = [Bar(names, words, p, merit - top) for (names, words), (p, merit) in found.items()]
-    return sorted(bars, key=lambda bar: (-bar.probability, -bar.behind))
+        found.setdefault((rival.fit.names, words), []).append(rival)
+    top = max(rival.merit for rival in d.decided.table)
+    out = []
+    for (names, words), same in found.items():
+        best = max(same, key=lambda rival: rival.merit)
+        out.append((Bar(names, words, sum(r.probability for r in same), best.merit - top), best))
+    return sorted(out, key=lambda pair: (-pair[0].probability, -pair[0].behind))
+
+
+def in_words(d: GraphDiagnosis, bar: Bar) -> str:
+    """A rival as a person would say it."""
+    machine = d.record.case.machine
+    return bar.free or " + ".join(called(machine, n) for n in bar.names) or "the description alone"

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rtctl.case.start import is_start
-from rtctl.diagnose.answer import figures, played, words
+from rtctl.diagnose.answer import figures, played, runner_up, words
 from rtctl.diagnose.answer import si_format as numbers
 from rtctl.diagnose.answer.answer import GraphDiagnosis
 from rtctl.diagnose.answer.missing_force import machine_words
@@ -38,6 +38,10 @@ PICTURES = {
     "posterior": (figures.posterior, {
         "": "Mean posterior over resampled segments. What has no name is a free function of one axis; 1e-9 is "
             "how probable an answer is beside the first.",
+    }),
+    "runner_up": (figures.runner_up, {
+        "": "What each part of the recording says for the answer, and below zero against it and for the next likeliest "
+            "one, in nats: 2.3 are ten to one.",
     }),
     "parameters": (figures.parameters, {
         "": "Fitted numbers over the nominal ones with 90 % intervals. A wrong number is not missing physics.",
@@ -80,6 +84,7 @@ def html(d: GraphDiagnosis) -> str:
         effects=effect_rows(d),
         checks=checks(d),
         why=reason(d),
+        next=runner_up.sentence(d),
         rivals=rival_rows(d),
         instead=instead(d),
         parameters=parameter_rows(d),

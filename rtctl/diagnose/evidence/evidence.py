@@ -78,10 +78,16 @@ def rivals(found: Found) -> tuple[Rival, ...]:
             entries += [(fit, f, found.merit(fit) + f.evidence + own - ODDS) for f, own in _shared(large)]
             small = [f for f in free if not f.large]
             entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
-    losses = [base.power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS) for fit, free, _ in entries]
+    losses = [losses_of(base.power, fit, free) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
     return tuple(sorted(out, key=lambda r: -r.probability))
+
+
+def losses_of(power: float, fit: Fitted, free: Free | None) -> np.ndarray:
+    """Negative logarithm (segments,) of the likelihood of each part of the recording, nats, of which the share `power`
+    counts."""
+    return power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS)
 
 
 def arguments(shares: Sequence[tuple[str, float]]) -> dict[str, float]:

@@ -22,7 +22,7 @@ def test_page_of_a_named_effect_needs_nothing_else():
     assert "The carriage rubs" in page
     assert not re.search(r'(src|href)="(?!#)', page)
     assert "<script" not in page
-    assert page.count("<svg") == 4
+    assert page.count("<svg") == 5
     assert "friction.coulomb" in page
     assert "spring balance" in page  # what a mechanic looks at
     assert "prefers-color-scheme: dark" in page
@@ -42,7 +42,7 @@ def test_the_law_goes_through_what_is_missing():
     fast = np.abs(curve.x) > 0.05
     fast[: runs.rows.start] = False
     ahead = fast & (curve.x > 0)
-    np.testing.assert_allclose(np.median(curve.law[ahead]), -2.0, rtol=0.2)
+    np.testing.assert_allclose(np.median(curve.law[ahead]), -2.0, rtol=0.3)  # the description has friction, too
     np.testing.assert_allclose(np.median(curve.y[ahead]), np.median(curve.law[ahead]), rtol=0.1)
     assert (curve.x_unit, curve.y_unit) == ("m/s", "N")
 

@@ -1,0 +1,62 @@
+"""What the next likeliest answer lost by, and where."""
+
+import numpy as np
+import pytest
+from graph_cases import named, nothing, unnamed
+
+from rtctl.diagnose.answer.report import html
+from rtctl.diagnose.answer.runner_up import Lost, answers, lost_by, runs, sentence, when
+from rtctl.diagnose.evidence.evidence import SEGMENTS
+
+
+@pytest.mark.parametrize("d", [named, nothing, unnamed])
+def test_the_next_answer_is_another_one(d):
+    lost = lost_by(d())
+    assert len(lost.nats) == SEGMENTS
+    begin, end = d().found.like.rows
+    np.testing.assert_allclose(lost.edges[[0, -1]], [begin * d().record.dt, end * d().record.dt])
+    assert lost.behind > 0.0
+    assert sentence(d()).startswith(f"The next likeliest answer is {lost.other}.")
+
+
+def test_what_the_parts_say_is_the_gap_of_the_likelihoods():
+    """Of two models without a free function: the losses of the two under their own noise."""
+    d = named()
+    pairs = [(r.fit, r.free) for r in d.decided.table if r.free is None]
+    lost = lost_by(d)
+    gaps = [
+        float(d.found.base.power * (fit.like.loss(fit.e) - d.decided.best.like.loss(d.decided.best.e)))
+        for fit, _ in pairs
+    ]
+    assert min(abs(lost.nats.sum() - gap) for gap in gaps) < 1e-3
+
+
+@pytest.mark.parametrize(("verdict", "d"), [("named", named), ("nothing", nothing), ("unnamed", unnamed)])
+def test_the_answer_is_what_the_verdict_says(verdict, d):
+    from rtctl.diagnose.answer.posterior import rivals
+
+    own = next(bar for bar in rivals(d()) if answers(d(), bar))
+    assert bool(own.free) == (verdict == "unnamed")
+    assert own.names == (("friction.coulomb:carriage",) if verdict == "named" else own.names)
+    assert own.names == (() if verdict == "nothing" else own.names)
+
+
+def test_the_parts_that_decide_are_told():
+    edges = np.arange(9.0)
+    here = Lost("x", 30.0, edges, np.array([0.0, 0.0, 10.0, 12.0, 0.5, 0.0, 8.0, 0.0]))
+    assert when(here, 1) == "It loses half of that in the rows from 2 to 4 s."
+    even = here._replace(nats=np.full(8, 0.01))
+    assert "do not decide" in when(even, 1)
+    spread = here._replace(nats=np.array([5.0, 0.0, 5.0, 0.0, 5.0, 0.0, 5.0, 0.0]) + np.array([5.0, 0.0] * 4))
+    assert when(spread, 1) == "It loses half of that in the rows from 0 to 1 s and 2 to 3 s."
+    assert when(here, 2) == ""
+
+
+def test_neighbours_are_one_run():
+    assert runs(np.array([1, 2, 3, 7, 9, 10])) == [(1, 3), (7, 7), (9, 10)]
+
+
+def test_the_report_says_why_the_next_answer_lost():
+    page = html(named())
+    assert "The next likeliest answer is" in page
+    assert "What each part of the recording says for the answer" in page
