@@ -7,9 +7,10 @@ A long recording is in parts: `part-0001`, `part-0002` and so on are bundles, an
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -17,7 +18,11 @@ import pyarrow.parquet as pq
 
 from rtctl.config import files
 from rtctl.config.errors import UserError, nearest
+from rtctl.trace import notebook
 from rtctl.trace.columns import columns_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ARROWS = "recording.arrows"
 PARQUET = "recording.parquet"
@@ -28,11 +33,48 @@ FORMATS = (FORMAT, 2)
 ROW_GROUP = 65_536  # rows; what a conversion holds in memory
 
 
-class Bundle(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Bundle:
+    """A recording as it was loaded: `bundle["capstan"]` is a column (n,)."""
+
     columns: dict[str, np.ndarray]
     case: dict[str, Any]
     folder: Path
     units: dict[str, str]  # of the columns that name theirs
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A column (n,) by its name. Raises UserError where there is none."""
+        return notebook.column(self, name)
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the columns."""
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.columns["t"])
+
+    def __repr__(self) -> str:
+        return notebook.words(self)
+
+    def _repr_html_(self) -> str:
+        return notebook.html(self)
+
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        """The columns as a stream of Arrow, for whatever reads one: `polars.from_arrow`, `duckdb`, `pyarrow.table`."""
+        return notebook.arrow(self).__arrow_c_stream__(requested_schema)
+
+    def to_pandas(self) -> Any:
+        """A DataFrame by time, s; units in its `attrs`. Raises UserError without pandas."""
+        return notebook.to_pandas(self)
+
+    def to_xarray(self) -> Any:
+        """A Dataset along `t`, s, with units. Raises UserError without xarray."""
+        return notebook.to_xarray(self)
+
+    def plot(self, *columns: str) -> "Figure":
+        """A figure of some columns over the time, or of the known ones. Raises UserError where one is not there."""
+        return notebook.plot(self, columns)
 
 
 def load_bundle(folder: Path | str) -> Bundle:

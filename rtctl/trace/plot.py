@@ -33,6 +33,7 @@ class Panel(NamedTuple):
 
 
 INK, BLUE, ORANGE, GREEN, RED, GREY = "#222222", "#0b62a8", "#d9730d", "#2e8b57", "#b3262e", "#8a8f98"
+COLORS = (BLUE, ORANGE, GREEN, RED, GREY)
 PANELS = (
     Panel(
         "Position",
@@ -91,33 +92,64 @@ def plot_run(
 ) -> Path:
     """Draw a bundle, or columns by name with `t` in s, into a PNG at `path`; what of the known names is there is drawn.
 
+    Raises as `figure_of`, and UserError where the file cannot be written.
+    """
+    save(figure_of(run, metrics, title), Path(path), "")
+    return Path(path)
+
+
+def figure_of(
+    run: Bundle | Mapping[str, np.ndarray], metrics: Sequence[Mapping[str, Any]], title: str | None = None
+) -> Figure:
+    """The same as a figure.
+
     `metrics` as from `step_metrics` (may be empty). The title is the case's machine and date where none is given.
-    Raises ValueError where there is no `t`, or nothing to draw, and UserError where the file cannot be written.
+    Raises ValueError where there is no `t`, or nothing to draw.
     """
     bundle = run if isinstance(run, Bundle) else None
-    columns = bundle.columns if bundle else dict(run)  # type: ignore[arg-type]
+    columns = dict(run) if bundle is None else bundle.columns  # type: ignore[arg-type]
     if not len(columns.get("t", ())):
         raise ValueError("nothing to draw: there is no column 't', or it is empty")
-    panels = _panels(columns, bundle.units if bundle else {})
+    panels = _panels(columns, {} if bundle is None else bundle.units)
     if not panels:
         raise ValueError(f"nothing to draw: none of the columns {', '.join(columns)} is known")
     heights = [1.5 if panel.title == "Position" else 1.0 for panel in panels]
-    figure = Figure(figsize=(11, 1.2 + 1.6 * sum(heights)), dpi=130, layout="constrained")
-    FigureCanvasAgg(figure)
-    every = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
-    for axes, panel in zip(every, panels, strict=True):
-        _draw(axes, panel, columns)
+    figure, every = _drawn(panels, columns, heights)
+    for axes in every:
         for step in metrics:
             axes.axvline(step["t"], color=GREY, linewidth=0.8, linestyle=":", zorder=0)
+    words = title or _title({} if bundle is None else bundle.case)
+    figure.suptitle(words, x=0.01, ha="left", fontsize=14, fontweight="bold")
+    if metrics:
+        every[0].set_title(summary(metrics), loc="left", fontsize=10, color="#444444")
+    return figure
+
+
+def figure_of_columns(bundle: Bundle, names: Sequence[str]) -> Figure:
+    """Columns of a bundle over the time, those of one unit in one panel."""
+    units = dict.fromkeys(bundle.units.get(name, "") for name in names)
+    panels = []
+    for unit in units:
+        there = [name for name in names if bundle.units.get(name, "") == unit]
+        traces = tuple(Trace(name, name, COLORS[k % len(COLORS)]) for k, name in enumerate(there))
+        panels.append(Panel(there[0] if len(there) == 1 else "", unit, traces))
+    return _drawn(panels, bundle.columns, [1.0] * len(panels))[0]
+
+
+def _drawn(
+    panels: Sequence[Panel], columns: Mapping[str, np.ndarray], heights: Sequence[float]
+) -> tuple[Figure, list[Axes]]:
+    """A figure with panels over one time."""
+    figure = Figure(figsize=(11, 1.2 + 1.6 * sum(heights)), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    every = list(figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
+    for axes, panel in zip(every, panels, strict=True):
+        _draw(axes, panel, columns)
     every[-1].set_xlabel("time [s]")
     if columns["t"][-1] > columns["t"][0]:
         every[-1].set_xlim(float(columns["t"][0]), float(columns["t"][-1]))
-    figure.align_ylabels(list(every))
-    figure.suptitle(title or _title(bundle.case if bundle else {}), x=0.01, ha="left", fontsize=14, fontweight="bold")
-    if metrics:
-        every[0].set_title(summary(metrics), loc="left", fontsize=10, color="#444444")
-    save(figure, Path(path), "")
-    return Path(path)
+    figure.align_ylabels(every)
+    return figure, every
 
 
 def save(figure: Figure, path: Path, option: str = "--plot ") -> None:
@@ -188,7 +220,7 @@ def _draw(axes: Axes, panel: Panel, columns: Mapping[str, np.ndarray]) -> None:
     factor, unit = _prefixed(panel.unit or "", max(_largest(y) for _, _, y in drawn))
     for trace, x, y in drawn:
         axes.plot(x, y * factor, trace.style, color=trace.color, linewidth=1.2, label=trace.label)
-    axes.set_ylabel(f"{panel.title.lower()} [{unit}]")
+    axes.set_ylabel(f"{panel.title.lower()} [{unit}]".strip())
     axes.grid(True, color="#e3e5e8", linewidth=0.7)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)

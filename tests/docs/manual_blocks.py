@@ -9,7 +9,8 @@ ROOT = Path(__file__).parents[2]
 PAGES = sorted(
     path.relative_to(ROOT)
     for path in (
-        ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", ROOT / "systemd" / "README.md", ROOT / "benchmarks" / "README.md",
+        ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md",
+        ROOT / "systemd" / "README.md", ROOT / "benchmarks" / "README.md",
         *(ROOT / "docs").rglob("*.md"),
     )
 )  # fmt: skip

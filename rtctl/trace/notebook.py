@@ -1,0 +1,109 @@
+"""A bundle in a notebook: its words and table, the ways into pandas, xarray and Arrow, and a picture of its columns."""
+
+from collections.abc import Sequence
+from html import escape
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+from rtctl.config.errors import UserError, nearest
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from rtctl.trace.bundle import Bundle
+
+ROWS = 40  # columns that the table of a bundle shows
+
+
+def column(bundle: "Bundle", name: str) -> np.ndarray:
+    """One column (n,). Raises UserError where there is none of that name."""
+    if name not in bundle.columns:
+        hint = nearest(name, bundle.columns)
+        raise UserError(f"{bundle.folder} has no column '{name}'" + (f"; did you mean '{hint}'?" if hint else ""))
+    return bundle.columns[name]
+
+
+def words(bundle: "Bundle") -> str:
+    """A bundle in one line."""
+    t = bundle.columns["t"]
+    machine = machine_of(bundle)
+    return f"<Bundle {bundle.folder}: {machine}{len(t)} rows, {seconds(t)}, {len(bundle.columns)} columns>"
+
+
+def machine_of(bundle: "Bundle") -> str:
+    """Name of the machine with a comma after it, "" where the case has none."""
+    config = bundle.case.get("config")
+    name = (config.get("name") if isinstance(config, dict) else None) or bundle.case.get("plant")
+    return f"{name}, " if name else ""
+
+
+def seconds(t: np.ndarray) -> str:
+    """How long and at what rate."""
+    if len(t) < 2 or t[-1] <= t[0]:
+        return "one row" if len(t) < 2 else "no time passes"
+    return f"{t[-1] - t[0]:.4g} s at {(len(t) - 1) / (t[-1] - t[0]):.4g} Hz"
+
+
+def html(bundle: "Bundle") -> str:
+    """A table of the columns: unit, least, mean and greatest value."""
+    rows = []
+    for name, values in list(bundle.columns.items())[:ROWS]:
+        finite = values[np.isfinite(values)] if values.dtype.kind == "f" else values
+        found = (finite.min(), finite.mean(), finite.max()) if len(finite) else ()
+        cells = "".join(f"<td style='text-align:right'>{v:.5g}</td>" for v in found) or "<td colspan=3>no number</td>"
+        rows.append(f"<tr><th>{escape(name)}</th><td>{escape(bundle.units.get(name, ''))}</td>{cells}</tr>")
+    more = len(bundle.columns) - ROWS
+    rest = f"<p>and {more} more columns</p>" if more > 0 else ""
+    head = "".join(f"<th>{word}</th>" for word in ("column", "unit", "least", "mean", "greatest"))
+    line = escape(words(bundle).strip("<>"))
+    return f"<p>{line}</p><table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>{rest}"
+
+
+def arrow(bundle: "Bundle") -> pa.Table:
+    """The columns as a table of Arrow, with their units in the metadata of the fields."""
+    fields = [
+        pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"unit": bundle.units.get(name, "")})
+        for name, values in bundle.columns.items()
+    ]
+    return pa.table(list(bundle.columns.values()), schema=pa.schema(fields))
+
+
+def to_pandas(bundle: "Bundle") -> Any:
+    """A DataFrame with the time as its index, s, and the units in `attrs`. Raises UserError without pandas."""
+    frame = extra("pandas").DataFrame(bundle.columns).set_index("t")
+    frame.attrs = {"units": dict(bundle.units), "folder": str(bundle.folder)}
+    return frame
+
+
+def to_xarray(bundle: "Bundle") -> Any:
+    """A Dataset along the time, s, each variable with its unit. Raises UserError without xarray."""
+    xarray = extra("xarray")
+    units = bundle.units
+    values = {name: ("t", v, {"units": units.get(name, "")}) for name, v in bundle.columns.items() if name != "t"}
+    time = ("t", bundle.columns["t"], {"units": units.get("t", "s")})
+    return xarray.Dataset(values, {"t": time}, {"folder": str(bundle.folder)})
+
+
+def extra(name: str) -> Any:
+    """A library that not everybody needs. Raises UserError where it is not installed."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise UserError(f"this needs the package {name}: pip install 'rtctl[notebook]'") from error
+
+
+def plot(bundle: "Bundle", columns: Sequence[str]) -> "Figure":
+    """A picture of some columns over the time, those of one unit in one panel; of the known ones where none is named.
+
+    Raises UserError where there is no such column, ValueError where none of the columns is known.
+    """
+    from rtctl.trace.plot import figure_of, figure_of_columns
+
+    if not columns:
+        return figure_of(bundle, ())
+    for name in columns:
+        column(bundle, name)
+    return figure_of_columns(bundle, columns)
