@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
+from numpy.lib.stride_tricks import as_strided, sliding_window_view
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import nnls
 
@@ -171,4 +171,6 @@ def gridded(rest: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
 
 def neighbours(grid: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Innovations (rows, 2 SPAN + 1, ...) around each of some rows."""
+    if grid.ndim == 1 and len(at) and at[-1] - at[0] + 1 == len(at):  # all in a row
+        return np.ascontiguousarray(sliding_window_view(grid, 2 * SPAN + 1)[at[0] : at[-1] + 1])
     return np.stack([grid[at + lag] for lag in range(2 * SPAN + 1)], axis=1)

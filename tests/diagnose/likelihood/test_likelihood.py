@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from graph_cases import BELT, case_of, command, nothing, record
 
-from rtctl.diagnose.likelihood.likelihood import QUANTISED, RATE, Likelihood
+from rtctl.diagnose.likelihood.likelihood import QUANTISED, RATE, Likelihood, averaged
 from rtctl.diagnose.model.model import nominal, settings_of
 from rtctl.diagnose.model.simulate import Simulator
 
@@ -99,3 +99,9 @@ def test_louder_rows_are_judged_by_their_own_size():
     one, ten = late.foretold(10.0 * e, before), late.foretold(100.0 * e, before)
     assert ten - one == pytest.approx(late.noisy(e).size * np.log(10.0), rel=0.1)
     assert late.foretold(e, before) < one
+
+
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_neighbours_are_averaged(count):
+    x = np.random.default_rng(2).standard_normal(42)
+    np.testing.assert_allclose(averaged(x, count), x.reshape(-1, count).mean(axis=1), rtol=1e-14)

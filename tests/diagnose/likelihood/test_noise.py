@@ -1,7 +1,18 @@
 import numpy as np
+import pytest
 from scipy.signal import lfilter
 
-from rtctl.diagnose.likelihood.noise import Noise, filtered, levels, noise_of, noises_of, whitened
+from rtctl.diagnose.likelihood.noise import (
+    SPAN,
+    Noise,
+    filtered,
+    gridded,
+    levels,
+    neighbours,
+    noise_of,
+    noises_of,
+    whitened,
+)  # fmt: skip
 
 A = np.array([1.0, -1.5, 0.7])  # of a known process
 ALL = np.arange(20_000)
@@ -109,3 +120,11 @@ def test_noise_that_does_not_grow():
     square = rng.uniform(0.0, 4.0, 20_000) ** 2
     found = levels(rng.standard_normal(len(square)), square[:, None], 1e-9)
     np.testing.assert_allclose(found, 1.0, rtol=0.06)
+
+
+@pytest.mark.parametrize("rows", [np.arange(40), np.arange(3, 31), np.array([0, 1, 2, 9, 10, 38, 39])])
+def test_neighbours_are_the_innovations_around_a_row(rows):
+    rest = np.random.default_rng(1).standard_normal(len(rows))
+    grid = gridded(rest, rows, 40)
+    expected = np.stack([grid[at : at + 2 * SPAN + 1] for at in rows])
+    np.testing.assert_array_equal(neighbours(grid, rows), expected)
