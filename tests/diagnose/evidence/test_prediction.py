@@ -14,9 +14,9 @@ def with_gust():
 
     They are the base, and a model with dry friction and an offset of the amplifier.
     """
-    u = command(0.6)
+    u = command(0.9)
     gust = np.where(np.arange(len(u)) < 0.7 * len(u), 0.02, 0.0)
-    like, space = together([record(case_of(BELT), u, [RUB], push=gust)])
+    like, space = together([record(case_of(BELT), u, [RUB | {"F_C": 4.0}], push=gust)])
     base = refit(like, space)
     wanted = ("friction.coulomb:carriage", "drive.offset:amplifier")
     for name in wanted:
