@@ -9,5 +9,6 @@ Data flow through the folders one way; each imports from those before it (tests/
     evidence      forces and errors of readings without a name, rivals, probabilities, held-out rows, the verdict
     answer        words, figures, report, model, config, experiment, free run
 
-Beside them: many bundles (bundles, folder), and hidden effects (conceal, seal).
+Beside them: many bundles (bundles, folder), hidden effects (conceal, seal), and the numbers that a verdict hangs on
+(calibration).
 """

@@ -1,5 +1,6 @@
 """Closed loop of our own recordings by the tick of their config: with an own law, and with another plant."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,7 +113,7 @@ def heavier(machine):
 def test_only_a_whole_recording_of_our_own_is_emulated(own):
     bundle = load_bundle(own / "run")
     assert can_emulate(bundle)
-    assert not can_emulate(bundle._replace(case={**bundle.case, "config": None}))
+    assert not can_emulate(replace(bundle, case={**bundle.case, "config": None}))
     late = {name: values[3:] for name, values in bundle.columns.items()}
-    assert not can_emulate(bundle._replace(columns=late))
-    assert not can_emulate(bundle._replace(columns={k: v for k, v in bundle.columns.items() if k != "order"}))
+    assert not can_emulate(replace(bundle, columns=late))
+    assert not can_emulate(replace(bundle, columns={k: v for k, v in bundle.columns.items() if k != "order"}))
