@@ -14,7 +14,7 @@ from pydantic import Field
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
 from rtctl.plants.physics.search import Choice, Limit, Shape, Size
-from rtctl.plants.physics.story import Draw, Needs, Phrase
+from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 DEADBAND_FORMS = ("shift", "cut", "floor")
@@ -299,7 +299,6 @@ GAIN_ASYMMETRY = Term(
     build=build_gain_asymmetry,
     act={"command": "{m}.volts[{c}] = drive.gain_asymmetry({p}, {m}.volts[{c}])"},
     stands=(stand("drive"),),
-    needs=Needs(both_signs=True),
     look_alikes={
         "friction.asymmetry": "brake at speed: the gain goes by the sign of the command, friction by that of the speed",
         "drive.offset": "command at one, two and three times the size: a gain grows with it, an offset does not",

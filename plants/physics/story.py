@@ -36,7 +36,6 @@ class Needs(NamedTuple):
     dry: bool = False  # dry friction at its node, which it alters
     friction: bool = False  # dry or viscous friction there, the same
     both_ways: bool = False  # motion of its node in both directions, between which it differs
-    both_signs: bool = False  # commands of either sign, between which it differs
 
 
 NOTHING = Needs()

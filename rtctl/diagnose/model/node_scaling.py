@@ -106,11 +106,9 @@ class Measures:
 
     def both_ways(self, node: str) -> bool:
         """Whether a node moves in both directions."""
-        return either_way(np.diff(self.way(self.lever(node)[0])))
-
-    def both_signs(self, drive: str) -> bool:
-        """Whether a drive has commands of either sign."""
-        return either_way(self.sim.volts[:, self.layout.drives[drive]])
+        moved = np.diff(self.way(self.lever(node)[0]))
+        parts = np.sum(np.maximum(moved, 0.0)), np.sum(np.maximum(-moved, 0.0))
+        return bool(min(parts) > ONE_WAY * max(*parts, LITTLE))
 
     def turns(self, node: str) -> bool:
         """Whether what a node belongs to turns."""
@@ -237,12 +235,6 @@ def lever(layout: Layout, values: dict[str, float], node: str, contact: bool) ->
         body = str(machine.joints[node].to)
         return body, values[f"bodies.{body}.radius"]
     return None
-
-
-def either_way(change: np.ndarray) -> bool:
-    """Whether values (n,) add up to something in either direction."""
-    parts = np.sum(np.maximum(change, 0.0)), np.sum(np.maximum(-change, 0.0))
-    return bool(min(parts) > ONE_WAY * max(*parts, LITTLE))
 
 
 def speed(x: np.ndarray, dt: float) -> np.ndarray:

@@ -55,7 +55,6 @@ def hypotheses(
                 or ((term.falls_to or term.replaces or term.needs.dry) and not rubs)
                 or (term.needs.friction and not (rubs or drags))
                 or (term.needs.both_ways and not measures.both_ways(node))
-                or (term.needs.both_signs and not measures.both_signs(node))
                 or called_otherwise(sim, term, element, moved.span)
             ):
                 continue

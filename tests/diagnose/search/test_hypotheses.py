@@ -120,13 +120,3 @@ def test_an_asymmetry_needs_both_directions():
     assert "friction.asymmetry:carriage" not in names
     assert "friction.coulomb:carriage" in names
     assert "friction.asymmetry:carriage" in of("belt")[1]
-
-
-def test_a_gain_that_differs_by_sign_is_asked_for_where_commands_have_either():
-    def asked(u):
-        sim = Simulator(record(case_of(BELT), u))
-        return {h.name for h in hypotheses(sim, nominal(sim.case))}
-
-    u = command(0.6)
-    assert "drive.gain_asymmetry:amplifier" in asked(u)
-    assert "drive.gain_asymmetry:amplifier" not in asked(np.abs(u))
