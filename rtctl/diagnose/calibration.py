@@ -27,8 +27,6 @@ FREE_ERROR = 0.01  # of the spread of a reading: standard deviation of an error 
 ODDS = 3.0  # nats against what has no name, and against a noise of one sensor that grows for a reason of its own
 
 # A name
-SEEN = 5.0  # standard deviations that a typical size must change the record by, beside all numbers, to be testable
-UNTESTED = 0.5  # most confidence in a name that is not: the description may as well have a wrong number
 FIRST = 5.0  # nats of evidence that a first effect must bring
 FURTHER = 3.0  # nats that a further one must bring
 FURTHER_SHARE = 0.05  # of the evidence of all effects together, which a further one must bring

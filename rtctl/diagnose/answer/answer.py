@@ -14,7 +14,6 @@ from rtctl.diagnose.answer.load import load
 from rtctl.diagnose.calibration import SURE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.evidence.prediction import Heldout, predict
-from rtctl.diagnose.evidence.testable import untestable
 from rtctl.diagnose.evidence.verdict import Verdict, fewer, verdict
 from rtctl.diagnose.evidence.withdrawn import borne_out, told
 from rtctl.diagnose.likelihood.clock import UNSTEADY
@@ -25,6 +24,8 @@ from rtctl.diagnose.likelihood.widths import half_widths
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.search.search import Found, Progress, search
 from rtctl.plants.physics import TERMS
+
+SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
 
 
 class GraphDiagnosis(NamedTuple):
@@ -160,7 +161,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             predictor=predictor,
             heldout=heldout,
             planned=planned(like.sim.record, decided),
-            cannot_test=tuple(sorted(untestable(found))),
+            cannot_test=tuple(sorted(_cannot(found))),
             seconds=time.monotonic() - began,
             records=tuple(part.sim.record for part in like.parts),
         )
@@ -216,3 +217,11 @@ def _located(found: Found, decided: Verdict, effects: tuple[Effect, ...]) -> Loc
         return Located(channel, str(found.like.sim.body), "time", "over the whole recording", begin, share)
     axis = TERMS[effects[0].name].axis
     return Located(channel, effects[0].node, axis, f"along the {axis}", begin, share)
+
+
+def _cannot(found: Found) -> list[str]:
+    """Hypotheses of which a typical size would not show beside the nominal parameters."""
+    norms: dict[str, float] = {}
+    for score in found.scores:
+        norms[score.hypothesis.name] = max(norms.get(score.hypothesis.name, 0.0), score.norm)
+    return [name for name, norm in norms.items() if norm < SEEN]

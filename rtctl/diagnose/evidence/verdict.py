@@ -2,11 +2,10 @@
 
 from typing import NamedTuple
 
-from rtctl.diagnose.calibration import MOSTLY, SURE, UNTESTED
+from rtctl.diagnose.calibration import MOSTLY, SURE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.evidence.evidence import Rival, rivals
 from rtctl.diagnose.evidence.free import Free
-from rtctl.diagnose.evidence.testable import untestable, without_untestable
 from rtctl.diagnose.likelihood.clock import Clock, clock
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.shares import explained
@@ -28,7 +27,6 @@ class Verdict(NamedTuple):
     why: str  # one sentence
     table: tuple[Rival, ...]  # all rivals, the most probable first
     ticks: Clock | None = None  # their times, where they are off
-    unsure: frozenset[str] = frozenset()  # term:node that this recording cannot test
 
 
 def verdict(found: Found) -> Verdict:
@@ -73,17 +71,13 @@ def of_motion(found: Found) -> Verdict:
         if bare.unlisted:
             return answer(UNNAMED, best, why)
         return answer(NOTHING, found.base, f"{why}, and the rest is as noise of the sensors leaves it")
-    unsure = untestable(found)
-    best = without_untestable(found, best, unsure)
-    return of_names(answer(NAMED, best, "")._replace(unsure=unsure))
+    return of_names(answer(NAMED, best, ""))
 
 
 def of_names(decided: Verdict) -> Verdict:
     """The verdict with the confidence in each effect of its best model, and its rivals."""
     ranked, best = decided.probabilities, decided.best
-    most = (UNTESTED if name in decided.unsure else 1.0 for name in best.names)
-    sums = (sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
-    confidence = tuple(map(min, sums, most))
+    confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
     return decided._replace(verdict=kind, confidence=confidence, rivals=others)
