@@ -161,7 +161,7 @@ BACKLASH = Term(
             "joint",
             "general rigid",
             usual=False,
-            ways=((Size("gap", "span", (3e-4, 3e-3)), Choice("c", (FIRM,), "firm")),),
+            ways=((Size("gap", "span", (3e-4, 3e-3), finest=2.0), Choice("c", (FIRM,), "firm")),),
         ),
     ),
     look_alikes={
@@ -183,7 +183,11 @@ BACKLASH = Term(
         need="reversals",
     ),
     check="Hold one side of the coupling and turn the other by hand; look at keys, set screws and gear teeth.",
-    search=(Size("gap", "twist", (0.3, 5.0, 60.0)), Choice("damping", (0.0, 1.0)), Choice("edge", (0.005, 0.1))),
+    search=(
+        Size("gap", "twist", (0.3, 5.0, 60.0), finest=2.0),
+        Choice("damping", (0.0, 1.0)),
+        Choice("edge", (0.005, 0.1)),
+    ),
     richer=(Shape("edge", "one", (0.05,), 20.0),),
     variants=Choice("damping", (0.0, 1.0)),
     units={"c": "stiffness"},

@@ -147,7 +147,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         progress("predicting rows that were not fitted")
         heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
         decided = borne_out(fewer(decided, best, "the last rows are predicted better"), heldout)
-        decided, heldout, predictor = told(decided, heldout)
+        decided, heldout, predictor = told(decided, heldout, found)
         effects = _effects(decided, predictor)
         if len(left(decided)) > 1:
             progress("planning an experiment")

@@ -1,17 +1,18 @@
 """Names that are withdrawn: rows that no fit saw are predicted as well without them, or worse with them."""
 
-from rtctl.diagnose.calibration import WORSE
-from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, UNNAMED
+from rtctl.diagnose.calibration import FIRST, WORSE
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.evidence.prediction import Heldout, predicted
 from rtctl.diagnose.evidence.predictive import predictive
 from rtctl.diagnose.evidence.verdict import Verdict, fewer
 from rtctl.diagnose.likelihood.fits import Fitted, refit, without
 from rtctl.diagnose.likelihood.widths import faint
+from rtctl.diagnose.search.search import Found
 
 
-def told(decided: Verdict, heldout: Heldout) -> tuple[Verdict, Heldout, Fitted]:
+def told(decided: Verdict, heldout: Heldout, found: Found) -> tuple[Verdict, Heldout, Fitted]:
     """The verdict, without effects whose size in the model that predicts best may be zero, its held-out error, and that
-    model."""
+    model. What is left without them stands if it is worth its numbers on its own."""
     predictor = predictive(decided, heldout)
     while len(decided.best.names) > 1 and decided.verdict in (NAMED, AMBIGUOUS):
         idle = {predictor.names[index] for index in faint(predictor)}
@@ -19,6 +20,10 @@ def told(decided: Verdict, heldout: Heldout) -> tuple[Verdict, Heldout, Fitted]:
         if index is None:
             break
         rest = refit(decided.best.like, *without(decided.best, index))
+        if found.merit(rest) < found.merit(found.base) + FIRST:
+            why = f"{', '.join(rest.names)} shows beside {decided.best.names[index]} alone, whose size may be zero"
+            gone = decided._replace(verdict=NOTHING, best=found.base, confidence=(), rivals=(), why=why)
+            return gone, predicted(heldout, found.base), found.base
         decided, heldout = fewer(decided, rest, "all is predicted as well"), predicted(heldout, rest)
         predictor = predictive(decided, heldout)
     return decided, heldout, predictor

@@ -1,8 +1,8 @@
 """Names that are withdrawn after the verdict."""
 
-from graph_cases import named
+from graph_cases import named, nothing
 
-from rtctl.diagnose.evidence.diagnosis import NAMED, UNNAMED
+from rtctl.diagnose.evidence.diagnosis import NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.evidence.prediction import predict
 from rtctl.diagnose.evidence.withdrawn import borne_out, told
 from rtctl.diagnose.likelihood.fits import refit
@@ -24,6 +24,21 @@ def test_an_effect_whose_size_may_be_zero_is_not_told():
     offset = next(h for h in hypotheses(like.sim, base.model) if h.name == "drive.offset:amplifier")
     more = refit(like, best.space.add(offset))
     heldout, _ = predict(base, more)
-    decided, again, _ = told(d.decided._replace(best=more), heldout)
+    decided, again, _ = told(d.decided._replace(best=more), heldout, d.found)
     assert decided.best.names == best.names == again.fits[1].names
     assert decided.why == "without drive.offset:amplifier, all is predicted as well"
+
+
+def test_what_stands_beside_an_idle_effect_alone_is_not_told():
+    """A sound machine's offset, which brings nothing on its own."""
+    d = nothing()
+    like, base = d.found.like, d.found.base
+    names = ("drive.offset:motor", "load.spring:rod")
+    space = base.space.add(*(next(h for h in hypotheses(like.sim, base.model) if h.name == name) for name in names))
+    both = refit(like, space)
+    heldout, _ = predict(base, both)
+    decided, again, predictor = told(d.decided._replace(verdict=NAMED, best=both), heldout, d.found)
+    assert decided.verdict == NOTHING
+    assert decided.best is predictor is base
+    assert again.fits[1].names == ()
+    assert "alone, whose size may be zero" in decided.why
