@@ -78,7 +78,7 @@ def killed(runtime: Path, tmp_path: Path) -> Iterator[Callable[[Any], list[int]]
         order = {"config": data, "out": str(tmp_path / "killed"), "length": LONG}
         made.append(subprocess.Popen([sys.executable, "-c", RUN, json.dumps(order)]))
         pid, path = made[-1].pid, segment_path(config.name)
-        wait_for(path.exists)
+        wait_for(lambda: path.exists() and path.stat().st_size >= STATUS.itemsize)  # made, then sized
         wait_for(lambda: status_of(path)["tick"] > 1000, 200)
         stream = tmp_path / "killed" / "recording.arrows"
         wait_for(lambda: stream.exists() and stream.stat().st_size > SOME_ROWS)
