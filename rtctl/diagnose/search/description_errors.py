@@ -15,8 +15,8 @@ import numpy as np
 from rtctl.diagnose.calibration import UNSEEN
 from rtctl.diagnose.likelihood.descent import Point
 from rtctl.diagnose.likelihood.fits import Fitted, evaluated
-from rtctl.diagnose.likelihood.inexact import effect, pace
-from rtctl.diagnose.likelihood.slack import Inexact, columns
+from rtctl.diagnose.likelihood.inexact import effect
+from rtctl.diagnose.likelihood.slack import Inexact
 from rtctl.diagnose.model.space import SIZE, Coordinate, Hypothesis
 from rtctl.diagnose.search.hypotheses import hypotheses
 
@@ -26,7 +26,7 @@ LESS = 0.1  # of the friction of the description: step of the difference quotien
 
 def inexact(base: Fitted) -> Fitted:
     """The fitted description, whose own laws may be wrong."""
-    model, like = base.model, base.like.slackened(None).described(None)
+    model, like = base.model, base.like
     known = [effect(like, model.without_known(i), base.e, str(model.terms[i].node)) for i in range(model.known())]
     laws = np.concatenate([rubbing(base), *known], axis=2)
     own = Inexact(laws, unseen(base, hypotheses(like.parts[0].sim, model)))
@@ -38,12 +38,9 @@ def rubbing(base: Fitted) -> np.ndarray:
 
     A small share is taken off: without friction a machine may not come to rest where it was recorded to stand.
     """
-    like, model = base.like, base.model
+    model = base.model
     less = {path: value * (1.0 - LESS * path.endswith(FRICTION)) for path, value in model.base.items()}
-    change = like.raw(model._replace(base=less)) - base.e
-    if like.ran_away(base.e + change) or not np.any(change):
-        return np.zeros((*base.e.shape, 0))
-    return columns(change / LESS, pace(like, model, str(like.parts[0].sim.body)))
+    return effect(base.like, model._replace(base=less), base.e, str(base.like.parts[0].sim.body)) / LESS
 
 
 def unseen(base: Fitted, candidates: Sequence[Hypothesis]) -> np.ndarray:
