@@ -172,9 +172,10 @@ def posterior(d: GraphDiagnosis) -> Figure:
 
 
 def runner_up(d: GraphDiagnosis) -> Figure | None:
-    """Nats by which each part of the recording is more probable under the answer than under the next likeliest one."""
+    """Nats by which each part of the recording is more probable under the answer than under the next likeliest one;
+    None where no part says anything."""
     lost = lost_by(d)
-    if lost is None:
+    if lost is None or not lost.nats.any():
         return None
     figure, (ax,) = new(2.2)
     colors = np.where(lost.nats > 0.0, AFTER, BEFORE)

@@ -22,7 +22,7 @@ def test_page_of_a_named_effect_needs_nothing_else():
     assert "The carriage rubs" in page
     assert not re.search(r'(src|href)="(?!#)', page)
     assert "<script" not in page
-    assert page.count("<svg") == 5
+    assert page.count("<svg") == 4
     assert "friction.coulomb" in page
     assert "spring balance" in page  # what a mechanic looks at
     assert "prefers-color-scheme: dark" in page

@@ -57,6 +57,13 @@ def test_neighbours_are_one_run():
 
 
 def test_the_report_says_why_the_next_answer_lost():
-    page = html(named())
+    page = html(unnamed())
     assert "The next likeliest answer is" in page
     assert "What each part of the recording says for the answer" in page
+
+
+def test_nothing_is_drawn_where_no_part_says_anything():
+    assert not lost_by(named()).nats.any()
+    page = html(named())
+    assert "The rows do not decide between them" in page
+    assert "What each part of the recording says for the answer" not in page
