@@ -22,9 +22,10 @@ UNSEEN = (0.25, 0.5)  # of the least size of an effect that a sensor could show:
 # Priors
 TOLERANCE = 0.7  # of the tolerance: standard deviation of the owner's error, between uniform and certain
 BEYOND = 1.5  # times the tolerance: a value that a fit may reach, improbable as its prior makes it
+FACTOR = 3.0  # by which a number is wrong that is wrong by far: one standard deviation, in logarithm
 FREE_FORCE = 0.3  # of the force that moves a node: standard deviation of a force without a name
 FREE_ERROR = 0.01  # of the spread of a reading: standard deviation of an error of it without a name
-ODDS = 3.0  # nats against what has no name, and against a noise of one sensor that grows for a reason of its own
+ODDS = 3.0  # nats against what has no name, against a number that is wrong by far, and against a noise of one sensor that grows for a reason of its own
 
 # A name
 FIRST = 5.0  # nats of evidence that a first effect must bring

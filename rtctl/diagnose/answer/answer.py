@@ -22,6 +22,7 @@ from rtctl.diagnose.likelihood.held import likelier, suits
 from rtctl.diagnose.likelihood.joint import together
 from rtctl.diagnose.likelihood.widths import half_widths
 from rtctl.diagnose.model.recording import GraphRecord
+from rtctl.diagnose.search.doubts import doubted
 from rtctl.diagnose.search.search import Found, Progress, search
 from rtctl.plants.physics import TERMS
 
@@ -67,6 +68,9 @@ class GraphDiagnosis(NamedTuple):
         machine, model = self.record.case.machine, self.decided.best.model
         if self.verdict == NOTHING:
             return "Nothing is missing that this recording shows: the description follows it down to the noise."
+        doubt = self.decided.beside.space.doubted
+        if self.verdict == UNNAMED and doubt:
+            return words.wrong_number(self.record, doubt, self.nominal[doubt], self.decided.beside.model.base[doubt])
         if self.verdict == UNNAMED:
             at = self.located
             where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
@@ -80,7 +84,8 @@ class GraphDiagnosis(NamedTuple):
         text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
         if len(open_) == 1:
             p = min(e.confidence for e in self.effects)
-            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name."
+            other = f"a wrong {doubt}" if doubt else "an effect without a name"
+            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or {other}."
         return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
 
     def as_json(self) -> dict[str, Any]:
@@ -142,7 +147,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         if other is not None:
             progress("taking the commands the other way between their samples")
             found = search(other, space, progress)
-        progress("weighing names against forces without one")
+        progress("weighing names against wrong numbers and forces without a name")
+        found = found._replace(doubts=doubted(found))
         decided = verdict(found)
         progress("predicting rows that were not fitted")
         heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
@@ -214,6 +220,9 @@ def _located(found: Found, decided: Verdict, effects: tuple[Effect, ...]) -> Loc
         free = decided.unlisted
         if free is not None:
             return Located(channel, free.node, free.axis, f"along the {free.axis}", begin, share)
+        if decided.beside.space.doubted:
+            node = decided.beside.space.doubted.split(".")[1]
+            return Located(channel, node, "time", f"in the number {decided.beside.space.doubted}", begin, share)
         return Located(channel, str(found.like.sim.body), "time", "over the whole recording", begin, share)
     axis = TERMS[effects[0].name].axis
     return Located(channel, effects[0].node, axis, f"along the {axis}", begin, share)

@@ -26,11 +26,11 @@ def groups(d: GraphDiagnosis) -> list[tuple[Bar, Rival]]:
     machine = d.record.case.machine
     found: dict[tuple[tuple[str, ...], str], list[Rival]] = {}
     for rival in d.decided.table:
-        words = ""
+        words = f"a wrong {rival.doubted}" if rival.doubted else ""
         if rival.unlisted and rival.free is not None:
             words = f"{rival.free.kind} without a name at {here(machine, rival.free.node)}, by {rival.free.axis}"
-            if rival.fit.names:
-                words += ", beside " + " + ".join(called(machine, n) for n in rival.fit.names)
+        if words and rival.fit.names:
+            words += ", beside " + " + ".join(called(machine, n) for n in rival.fit.names)
         found.setdefault((rival.fit.names, words), []).append(rival)
     top = max(rival.merit for rival in d.decided.table)
     out = []

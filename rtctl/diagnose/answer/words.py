@@ -121,6 +121,15 @@ def clause(machine: Description, effect: Effect, model: GraphModel) -> str:
     return f"{phrase.head.format_map(slots)}: {phrase.detail.format_map(slots)}"
 
 
+def wrong_number(record: GraphRecord, path: str, believed: float, value: float) -> str:
+    """A number of the description that is wrong by far: "drives.motor.gain is 0.32, and 1 in the description: ..."."""
+    unit = unit_in(record, path)
+    return (
+        f"A number of the description is wrong: {path} is {nice(value, unit)}, and {nice(believed, unit)} in the "
+        f"description, which is more than its tolerance. Correct it, or look for what makes the machine act so."
+    )
+
+
 def called(machine: Description, entry: str) -> str:
     """A hypothesis "name:node" in a few words: "dry friction at the carriage"."""
     name, _, node = entry.partition(":")

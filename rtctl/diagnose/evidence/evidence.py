@@ -29,6 +29,7 @@ from rtctl.plants.physics import TERMS
 SEGMENTS = 32
 DRAWS = 300
 BESIDE = 3  # combinations beside which free functions are asked for
+NEAR = 50.0  # nats: models with a wrong number that are further behind the best are not asked for free functions
 LEAST = 1e-4  # of the force that moves a node: a discrepancy that is smaller is none
 
 
@@ -41,9 +42,15 @@ class Rival(NamedTuple):
     probability: float
 
     @property
+    def doubted(self) -> str:
+        """The number of the description that is wrong by far in it; empty where none is."""
+        return self.fit.space.doubted
+
+    @property
     def unlisted(self) -> bool:
-        """Whether the free function is more than what the law of a name may be wrong by."""
-        return self.free is not None and self.free.large
+        """Whether a number of the description is wrong by far, or a free function is more than what the law of a name
+        may be wrong by."""
+        return bool(self.doubted) or (self.free is not None and self.free.large)
 
 
 def rivals(found: Found) -> tuple[Rival, ...]:
@@ -56,28 +63,32 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     def wrong(fit: Fitted) -> float:
         """What the laws of a fit may be wrong by, in forces that move the machine: the correction at the followed body
         has less of what the effects are, also of those in a sensor or a drive."""
-        if not fit.names or not len(fit.pushes[0]):
+        if fit is base or not len(fit.pushes[0]):
             return 0.0
         change = float(np.sqrt(np.mean((base.pushes[0] - fit.pushes[0])[:, 0] ** 2)))
         return LAW_ERROR_OF_FORCE * change / unit if np.isfinite(change) else 0.0
 
     best = set(found.best.names)  # and whether a small error of fewer laws does as well
+    least = found.merit(found.best) - NEAR
     entries: list[tuple[Fitted, Free | None, float]] = []
-    for rank, fit in enumerate(fits):
-        off = wrong(fit)
+    for rank, fit in enumerate((*fits, *found.doubts)):
+        doubt = bool(fit.space.doubted)
+        own = found.merit(fit) - doubt * (ODDS + float(np.log(len(fit.space.names))))
+        off = wrong(fit) if fit.names or doubt else 0.0
         wander = wandering(fit)
         usual = float(np.linalg.norm([UNEXPLAINED, off, wander.noise]))
-        listed = found.merit(fit) + log_density(wander.share, usual)
+        listed = own + log_density(wander.share, usual)
         entries.append((fit, None, listed))
-        if wander.free is not None:
-            entries.append((fit, wander.free, found.merit(fit) + log_density(wander.share, FREE_FORCE) - ODDS))
-        if rank < BESIDE or set(fit.names) < best:
-            along = {axis: off * share for axis, share in arguments(shares(fit)).items() if off * share > LEAST}
+        if wander.free is not None and not doubt:
+            entries.append((fit, wander.free, own + log_density(wander.share, FREE_FORCE) - ODDS))
+        if (own > least) if doubt else (rank < BESIDE or set(fit.names) < best):
+            may = dict.fromkeys(axes_of(fit.space.doubted), 1.0) if doubt else arguments(shares(fit))
+            along = {axis: off * share for axis, share in may.items() if off * share > LEAST}
             free = free_functions(fit, along)
-            large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f))]
-            entries += [(fit, f, found.merit(fit) + f.evidence + own - ODDS) for f, own in _shared(large)]
+            large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f)) and not doubt]
+            entries += [(fit, f, own + f.evidence + prior - ODDS) for f, prior in _shared(large)]
             small = [f for f in free if not f.large]
-            entries += [(fit, f, listed + f.evidence + own) for f, own in _shared(small)]
+            entries += [(fit, f, listed + f.evidence + prior) for f, prior in _shared(small)]
     losses = [losses_of(base.power, fit, free) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
@@ -103,6 +114,11 @@ def arguments(shares: Sequence[tuple[str, float]]) -> dict[str, float]:
         for name in along | ({"position"} if axis == "angle" else set()):  # of less than a turn
             out[name] = float(np.hypot(out.get(name, 0.0), share))
     return out
+
+
+def axes_of(number: str) -> set[str]:
+    """Axes along which the law that has a number of the description may be wrong."""
+    return {"command"} if number.startswith("drives.") else set(AXES) - {TIME, "command"}
 
 
 def shares(fit: Fitted) -> list[tuple[str, float]]:

@@ -59,9 +59,9 @@ def of_motion(found: Found) -> Verdict:
     if nothing > 1.0 - SURE and nothing > unlisted:
         return answer(NOTHING, found.base, f"the description alone has a probability of {100 * nothing:.0f} %")
     if unlisted > 0.5 or not best.names:
-        assert top is not None and free is not None
+        assert top is not None
         also = f"beside {', '.join(beside.names)} " if beside.names else ""
-        what = f"{free.kind} at {free.node} by {free.axis} without a name"
+        what = f"a wrong {top.doubted}" if free is None else f"{free.kind} at {free.node} by {free.axis} without a name"
         why = f"{also}{what} has a probability of {100 * unlisted:.0f} %"
         return answer(UNNAMED, beside, why)
     share = explained(found.base, best)
@@ -77,7 +77,8 @@ def of_motion(found: Found) -> Verdict:
 def of_names(decided: Verdict) -> Verdict:
     """The verdict with the confidence in each effect of its best model, and its rivals."""
     ranked, best = decided.probabilities, decided.best
-    confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
+    sure = [(r.fit.names, r.probability) for r in decided.table if r.doubted or not r.unlisted]
+    confidence = tuple(sum(p for names, p in sure if holds(names, term)) for term in terms(best))
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
     return decided._replace(verdict=kind, confidence=confidence, rivals=others)

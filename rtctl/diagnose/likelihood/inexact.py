@@ -10,11 +10,13 @@ from rtctl.diagnose.model.space import Space
 
 
 def errors(like: Likelihood, space: Space, x: np.ndarray, e: np.ndarray) -> Inexact:
-    """Errors of the laws of a model with the residuals e (blocks, sensors): those of the description and of the effects
-    beside it."""
+    """Errors of the laws of a model with the residuals e (blocks, sensors): those of the description, of the effects
+    beside it, and of a number that is wrong by far."""
     none = np.zeros((*e.shape, 0))
     given = Inexact(none, none) if like.own is None else like.own
     effects = [effect(like, space.model_without(i, x), e, h.node) for i, h in enumerate(space.hypotheses)]
+    if space.doubted:
+        effects.append(effect(like, space.model_believed(x), e, space.doubted.split(".")[1]))
     return given._replace(laws=np.concatenate([given.laws, *effects], axis=2))
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtctl.diagnose.calibration import BEYOND, TOLERANCE
+from rtctl.diagnose.calibration import BEYOND, FACTOR, TOLERANCE
 from rtctl.idiom import Settings
 from rtctl.plants.physics import TERMS
 
@@ -107,6 +107,7 @@ class Space(NamedTuple):
     names: tuple[str, ...]  # plant parameters
     tolerance: Callable[[str], float]
     hypotheses: tuple[Hypothesis, ...] = ()
+    doubted: str = ""  # the parameter that may be wrong by a factor, if one
 
     @property
     def nb(self) -> int:
@@ -145,7 +146,7 @@ class Space(NamedTuple):
         """Lowest and highest x."""
         low, high = [], []
         for name in self.names:
-            tol = BEYOND * self.tolerance(name)
+            tol = np.inf if name == self.doubted else BEYOND * self.tolerance(name)
             low.append(-WIDE if not np.isfinite(tol) else np.log1p(-min(tol, 0.95)))
             high.append(WIDE if not np.isfinite(tol) else np.log1p(tol))
         for h in self.hypotheses:
@@ -157,8 +158,8 @@ class Space(NamedTuple):
         """Weight of x^2 in the cost: the owner's values count for what they are worth, an effect is free."""
         weights = []
         for name in self.names:
-            tol = self.tolerance(name)
-            weights.append(1.0 / (TOLERANCE * tol) ** 2 if np.isfinite(tol) else 0.0)
+            spread = np.log(FACTOR) if name == self.doubted else TOLERANCE * self.tolerance(name)
+            weights.append(1.0 / spread**2 if np.isfinite(spread) else 0.0)
         return np.array(weights + [0.0] * (len(self.start()) - self.nb))
 
     def steps(self) -> np.ndarray:
@@ -172,6 +173,12 @@ class Space(NamedTuple):
     def model_without(self, index: int, x: np.ndarray) -> Any:
         """The model at x, without one of the hypotheses."""
         return self.without(index).model(np.delete(x, self.columns(index)))
+
+    def model_believed(self, x: np.ndarray) -> Any:
+        """The model at x, with the owner's value of the doubted parameter."""
+        x = x.copy()
+        x[self.names.index(self.doubted)] = 0.0
+        return self._replace(doubted="").model(x)
 
     def without(self, index: int) -> "Space":
         """With one hypothesis less."""

@@ -39,6 +39,7 @@ class Found(NamedTuple):
     scores: tuple[Score, ...]  # beside the base
     fits: tuple[Fitted, ...]  # best first, the base among them
     odds: float  # ln of the prior odds of one effect at one place
+    doubts: tuple[Fitted, ...] = ()  # models in which one number of the description is wrong by far
 
     def merit(self, f: Fitted) -> float:
         """Logarithm of the posterior, up to a constant."""
