@@ -1,0 +1,50 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from graph_cases import BELT, RUB, case_of, columns_of, command
+
+from rtctl.case.format2 import read_case
+from rtctl.diagnose.evidence.evidence import rivals
+from rtctl.diagnose.likelihood.fits import refit
+from rtctl.diagnose.likelihood.joint import together
+from rtctl.diagnose.model.recording import record_of
+from rtctl.diagnose.search.doubts import doubted, may
+from rtctl.diagnose.search.search import Found
+
+WEAK = 0.3  # of the gain of the description
+GAIN = "drives.amplifier.gain"
+
+
+def found_of(machine, terms=()):
+    """The fitted description of the belt axis, beside a recording of `machine`."""
+    columns = columns_of(case_of(machine), command(0.6), terms)
+    like, space = together([record_of(columns, read_case(case_of(BELT), "bundle"), Path("bundle/recording.parquet"))])
+    base = refit(like, space)
+    return Found(like, base, (), (base,), 3.0)
+
+
+def weak():
+    """The belt axis with an amplifier that gives a third of what it should."""
+    amplifier = dict(BELT["drives"]["amplifier"])
+    return {**BELT, "drives": {"amplifier": {**amplifier, "gain": WEAK * float(amplifier["gain"])}}}
+
+
+def test_a_gain_that_is_wrong_by_far_is_found():
+    found = found_of(weak())
+    doubts = doubted(found)
+    gain = next(f for f in doubts if f.space.doubted == GAIN)
+    assert gain.x[gain.space.names.index(GAIN)] == pytest.approx(np.log(WEAK), abs=0.05)
+    first = rivals(found._replace(doubts=doubts))[0]
+    assert first.doubted == GAIN
+    assert first.unlisted
+
+
+def test_a_right_description_is_not_doubted():
+    assert doubted(found_of(BELT)) == ()
+
+
+def test_what_has_a_name_of_its_own_is_no_wrong_number():
+    assert not any(f.space.doubted.endswith(".dry") for f in doubted(found_of(BELT, [RUB])))
+    assert not may("physics.0.k")
+    assert may("joints.belt.stiffness")
