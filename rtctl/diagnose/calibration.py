@@ -1,7 +1,7 @@
 """Numbers that a verdict hangs on, in one place: what is assumed of noise, of laws, of priors, and what a name needs.
 
 Numbers of the search, which only decide how much is tried, stand where they are used. `rtctl prove` measures what a
-change of one of these does; docs/diagnosis.md says where each comes from.
+change of one of these does; docs/diagnosis_details.md says where each comes from.
 """
 
 # The recording
@@ -25,7 +25,7 @@ BEYOND = 1.5  # times the tolerance: a value that a fit may reach, improbable as
 FACTOR = 3.0  # by which a number is wrong that is wrong by far: one standard deviation, in logarithm
 FREE_FORCE = 0.3  # of the force that moves a node: standard deviation of a force without a name
 FREE_ERROR = 0.01  # of the spread of a reading: standard deviation of an error of it without a name
-ODDS = 3.0  # nats against what has no name, against a number that is wrong by far, and against a noise of one sensor that grows for a reason of its own
+ODDS = 3.0  # nats against what has no name, a number that is wrong by far, and a noise of one sensor of its own growth
 
 # A name
 FIRST = 5.0  # nats of evidence that a first effect must bring

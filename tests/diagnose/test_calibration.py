@@ -9,8 +9,8 @@ ROOT = Path(__file__).parent.parent.parent
 
 
 def told():
-    """Names and values of the rows of the table in docs/diagnosis.md."""
-    page = (ROOT / "docs" / "diagnosis.md").read_text("utf-8")
+    """Names and values of the rows of the table in docs/diagnosis_details.md."""
+    page = (ROOT / "docs" / "diagnosis_details.md").read_text("utf-8")
     table = page.split("## Numbers that the verdict hangs on")[1].split("\n## ")[0]
     rows = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("| `")]
     return {tuple(re.findall(r"`(\w+)`", row[0])): tuple(float(v) for v in row[1].split(",")) for row in rows}

@@ -7,7 +7,12 @@ import pytest
 from manual_blocks import ROOT
 
 PACKAGE = ROOT / "rtctl" / "diagnose"
-PAGES = ("docs/diagnosis.md", "docs/decisions/0017-described-machines-likelihood.md", "docs/proof.md")
+PAGES = (
+    "docs/diagnosis.md",
+    "docs/diagnosis_details.md",
+    "docs/decisions/0017-described-machines-likelihood.md",
+    "docs/proof.md",
+)
 
 
 def missing(text: str) -> list[str]:

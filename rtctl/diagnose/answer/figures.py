@@ -182,7 +182,7 @@ def runner_up(d: GraphDiagnosis) -> Figure | None:
     ax.bar(lost.edges[:-1], lost.nats, np.diff(lost.edges), align="edge", color=colors, edgecolor="none")
     ax.axhline(0, color=SEEN, lw=0.8)
     ax.set_xlim(lost.edges[0], lost.edges[-1])
-    label(ax, "time, s" if len(d.records) == 1 else "part of the recordings", "nats for the answer")
+    label(ax, "time, s" if len(d.records) == 1 else "share of the rows of all recordings", "nats for the answer")
     return figure
 
 

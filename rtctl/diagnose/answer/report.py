@@ -1,5 +1,6 @@
 """Report of a diagnosis of a described machine: one HTML file that needs nothing else, and a table for the terminal."""
 
+import re
 from collections import defaultdict
 from typing import Any, NamedTuple
 
@@ -157,10 +158,13 @@ def reason(d: GraphDiagnosis) -> str:
 
 
 def told_names(d: GraphDiagnosis, text: str) -> str:
-    """A sentence with the names "term:node" of the candidates in words."""
-    for name in sorted(d.decided.best.names, key=len, reverse=True):
-        text = text.replace(name, words.called(d.record.case.machine, name))
-    return text
+    """A sentence with each "term:node" in words, also of models that were turned down."""
+    machine = d.record.case.machine
+
+    def told(found: re.Match[str]) -> str:
+        return words.called(machine, found[0]) if found[1] in TERMS else found[0]
+
+    return re.sub(r"([a-z_]+\.[a-z_]+):[\w-]+", told, text)
 
 
 def rival_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:

@@ -18,7 +18,7 @@ class Lost(NamedTuple):
 
     other: str  # in words
     behind: float  # nats: ln of the odds of the answer against it, on the whole recording
-    edges: np.ndarray  # (parts + 1,) of the parts, s; of several recordings 0 to the number of recordings
+    edges: np.ndarray  # (parts + 1,) of the parts, s; of several recordings shares of all their rows, 0 to 1
     nats: np.ndarray  # (parts,) for the answer
 
 
@@ -33,11 +33,8 @@ def lost_by(d: GraphDiagnosis) -> Lost | None:
     power = d.found.base.power
     nats = losses_of(power, two.fit, two.free) - losses_of(power, one.fit, one.free)
     parts = np.linspace(0.0, 1.0, len(nats) + 1)
-    if len(d.records) == 1:
-        begin, end = d.found.like.rows
-        edges = (begin + parts * (end - begin)) * d.record.dt
-    else:
-        edges = parts * len(d.records)
+    begin, end = d.found.like.rows
+    edges = parts if len(d.records) > 1 else (begin + parts * (end - begin)) * d.record.dt
     return Lost(in_words(d, other), bar.behind - other.behind, edges, nats)
 
 

@@ -73,3 +73,8 @@ def test_terminal():
 
 def test_the_name_of_an_effect_stays_whole():
     assert "(friction.coulomb)" in said(named(), 80)
+
+
+def test_models_that_were_turned_down_are_named_in_words():
+    text = report.told_names(unnamed(), "beside friction.coulomb:carriage, a wrong drives.motor.gain at time:12 s")
+    assert text == "beside dry friction at the carriage, a wrong drives.motor.gain at time:12 s"
