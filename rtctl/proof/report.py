@@ -41,6 +41,7 @@ def summary(R: Json) -> list[list[Any]]:
         rows.append([f"90 % intervals that hold the truth, {name}", share, ci[name]["of"]])
     rows += [["Brier score of the confidence", cal["brier"], cal["names"]],
              ["expected calibration error", cal["ece"], cal["names"]]]  # fmt: skip
+    rows.append(["nulls: p-value of their evidence being too large", R["nulls"]["p_value"], R["nulls"]["cases"]])
     if R.get("seconds"):
         rows.append(
             ["seconds a case, median (longest)", f"{R['seconds']['median']:.1f} ({R['seconds']['longest']:.1f})", None]

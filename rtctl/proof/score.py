@@ -9,6 +9,8 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable
 from typing import Any
 
+from rtctl.proof.nulls import nulls
+
 NOTHING_MISSING = ("null", "parameters", "decoy")
 VERDICTS = ("named", "ambiguous", "unnamed", "nothing")
 BINS = 10
@@ -189,6 +191,7 @@ def score(answers: Json, diagnoses: dict[str, Json | None], visible: float = 0.3
     result["recall_by_name"] = {n: round(sum(x) / len(x), 3) for n, x in sorted(by_name.items())}
     result["confusion"] = {row: dict(sorted(columns.items())) for row, columns in sorted(confusion.items())}
     result["failures"] = failures
+    result["nulls"] = nulls(cases, diagnoses)
     if len(plants := sorted({a["plant"] for a in cases.values()})) > 1:
         result["by_plant"] = {p: _brief({c: a for c, a in cases.items() if a["plant"] == p}, diagnoses) for p in plants}
     times = sorted(float(v) for v in (seconds or {}).values())
