@@ -68,9 +68,9 @@ class GraphDiagnosis(NamedTuple):
         machine, model = self.record.case.machine, self.decided.best.model
         if self.verdict == NOTHING:
             return "Nothing is missing that this recording shows: the description follows it down to the noise."
-        doubt = self.decided.beside.space.doubted
-        if self.verdict == UNNAMED and doubt:
-            return words.wrong_number(self.record, doubt, self.nominal[doubt], self.decided.beside.model.base[doubt])
+        wrong = self._wrong_number()
+        if self.verdict == UNNAMED and wrong and self.decided.unlisted is None:
+            return wrong
         if self.verdict == UNNAMED:
             at = self.located
             where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
@@ -78,15 +78,22 @@ class GraphDiagnosis(NamedTuple):
         sure = [words.clause(machine, e, model) for e in self.effects if e.confidence >= SURE]
         if self.verdict == NAMED:
             text = "; ".join(sure)
-            return f"{text[:1].upper()}{text[1:]}."
+            return f"{text[:1].upper()}{text[1:]}. {wrong}".strip()
         open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
         first = "; ".join(sure)
         text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
         if len(open_) == 1:
             p = min(e.confidence for e in self.effects)
-            other = f"a wrong {doubt}" if doubt else "an effect without a name"
-            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or {other}."
-        return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
+            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name. {wrong}".strip()
+        return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}. {wrong}".strip()
+
+    def _wrong_number(self) -> str:
+        """The number of the description that is wrong by far in the model that stands, in a sentence; "" for none."""
+        model = self.decided.best
+        path = model.space.doubted
+        if not path:
+            return ""
+        return words.wrong_number(self.record, path, self.nominal[path], model.model.base[path])
 
     def as_json(self) -> dict[str, Any]:
         """diagnosis.json in the form of the exchange format."""

@@ -26,7 +26,7 @@ def groups(d: GraphDiagnosis) -> list[tuple[Bar, Rival]]:
     machine = d.record.case.machine
     found: dict[tuple[tuple[str, ...], str], list[Rival]] = {}
     for rival in d.decided.table:
-        words = f"a wrong {rival.doubted}" if rival.doubted else ""
+        words = f"a wrong {rival.doubted}" if rival.unlisted and rival.doubted else ""
         if rival.unlisted and rival.free is not None:
             words = f"{rival.free.kind} without a name at {here(machine, rival.free.node)}, by {rival.free.axis}"
         if words and rival.fit.names:

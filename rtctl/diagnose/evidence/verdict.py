@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
-from rtctl.diagnose.calibration import MOSTLY, SURE
+from rtctl.diagnose.calibration import MOSTLY, SURE, VISIBLE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.evidence.evidence import Rival, rivals
 from rtctl.diagnose.evidence.free import Free
 from rtctl.diagnose.likelihood.clock import Clock, clock
 from rtctl.diagnose.likelihood.fits import Fitted
-from rtctl.diagnose.likelihood.shares import explained
+from rtctl.diagnose.likelihood.shares import explained, shown
 from rtctl.diagnose.search.search import Found
 
 ALIKE = 3  # names of an ambiguous answer
@@ -48,7 +48,9 @@ def of_motion(found: Found) -> Verdict:
             named[rival.fit.names] = named.get(rival.fit.names, 0.0) + rival.probability
     ranked = tuple(sorted(named.items(), key=lambda item: -item[1]))
     nothing, unlisted = named.get((), 0.0), 1.0 - sum(named.values())
-    fits = {r.fit.names: r.fit for r in table}
+    fits: dict[tuple[str, ...], Fitted] = {}  # the likeliest with each combination: a number may be wrong as well
+    for rival in (r for r in table if not r.unlisted):
+        fits.setdefault(rival.fit.names, rival.fit)
     top = max((r for r in table if r.unlisted), key=lambda r: r.merit, default=None)
     free, beside = (None, found.base) if top is None else (top.free, top.fit)
     best = fits[certain(ranked)]
@@ -58,7 +60,14 @@ def of_motion(found: Found) -> Verdict:
 
     if nothing > 1.0 - SURE and nothing > unlisted:
         return answer(NOTHING, found.base, f"the description alone has a probability of {100 * nothing:.0f} %")
-    if unlisted > 0.5 or not best.names:
+    nameless = unlisted > 0.5 or not best.names
+    stands = beside if nameless else best
+    if not (nameless and free) and (seen := shown(found.base, stands)) < VISIBLE:
+        why = (
+            f"no explanation takes off more than {100 * seen:.0f} % of what is missing beyond the noise of the sensors"
+        )
+        return answer(NOTHING, found.base, why)
+    if nameless:
         assert top is not None
         also = f"beside {', '.join(beside.names)} " if beside.names else ""
         what = f"a wrong {top.doubted}" if free is None else f"{free.kind} at {free.node} by {free.axis} without a name"
@@ -77,8 +86,7 @@ def of_motion(found: Found) -> Verdict:
 def of_names(decided: Verdict) -> Verdict:
     """The verdict with the confidence in each effect of its best model, and its rivals."""
     ranked, best = decided.probabilities, decided.best
-    sure = [(r.fit.names, r.probability) for r in decided.table if r.doubted or not r.unlisted]
-    confidence = tuple(sum(p for names, p in sure if holds(names, term)) for term in terms(best))
+    confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
     return decided._replace(verdict=kind, confidence=confidence, rivals=others)

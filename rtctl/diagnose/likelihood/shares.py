@@ -43,6 +43,22 @@ def explained_force(base: Fitted, best: Fitted) -> float:
     return float(1.0 - after[c] / before[c]) if np.isfinite(after[c]) and 0.0 < before[c] < np.inf else 0.0
 
 
+def shown(base: Fitted, best: Fitted) -> float:
+    """Share of the power of the residual beyond sensor noise, or of the observer's force, that the best model takes
+    off, of the sensor in which most is missing: at most one, and what a reader sees of an effect.
+
+    Noise of a sensor that counts is what counting leaves; of any other, what differs from block to block.
+    """
+    counts = np.array([base.like.sim.record.grain[name] > 0.0 for name in base.like.sim.channels])
+    restless = np.std(np.diff(best.e, axis=0), axis=0) / np.sqrt(2.0)
+    noise = np.where(counts, base.like.least * np.sqrt(base.like.mean), restless) ** 2
+    before, after = np.mean(base.e**2, axis=0), np.mean(best.e**2, axis=0)
+    c = int(np.argmax(before / noise))
+    excess = before[c] - noise[c]
+    seen = float((before[c] - after[c]) / excess) if excess > 0.0 else 0.0
+    return min(max(seen, explained_force(base, best)), 1.0)
+
+
 def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
     """What a further effect takes off over what all take off, rms, of the residual or of the observer's pushes, and of
     the sensor that shows most of it."""

@@ -17,13 +17,12 @@ from rtctl.diagnose.search.search import Found
 
 
 def doubted(found: Found) -> tuple[Fitted, ...]:
-    """Fits (at most one a model and number) with one number free of its tolerance, beside the description alone, the
-    best model, and that model without each of its effects. A number is asked where the fit took it beyond its
-    tolerance."""
+    """Fits (at most one a model and number) with one number free of its tolerance in the place of an effect: beside the
+    description alone, and beside the best model without each of its effects. A number is asked where the fit took it
+    beyond its tolerance."""
     best = found.best
     fewer = [refit(best.like, *without(best, index)) for index in range(len(best.names))] if best.names[1:] else []
-    beside = [found.base, *fewer, *([best] if best.names else [])]
-    return tuple(_free(f, name) for f in beside for name in strained(f))
+    return tuple(_free(f, name) for f in (found.base, *fewer) for name in strained(f))
 
 
 def strained(f: Fitted) -> list[str]:
