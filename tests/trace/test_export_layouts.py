@@ -46,9 +46,20 @@ def test_csv(recording):
 
 
 def test_mcap(recording):
-    reader = pytest.importorskip("mcap.reader")
+    decoder = pytest.importorskip("mcap_protobuf.decoder")
+    from mcap.reader import make_reader
+
     kind, folder = recording
     with export(folder, "mcap").path.open("rb") as file:
+        opened = make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+        _, channel, _, row = next(iter(opened.iter_decoded_messages()))
+    assert set(curves(layout(kind))) <= {f"{channel.topic}/{field.name}" for field in row.DESCRIPTOR.fields}
+
+
+def test_mcap_json(recording):
+    reader = pytest.importorskip("mcap.reader")
+    kind, folder = recording
+    with export(folder, "mcap-json").path.open("rb") as file:
         _, channel, message = next(iter(reader.make_reader(file).iter_messages()))
     assert set(curves(layout(kind))) <= {f"{channel.topic}/{name}" for name in json.loads(message.data)}
 
