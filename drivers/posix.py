@@ -1,0 +1,46 @@
+"""Reads and writes of a file descriptor that never block, from compiled code. What fails returns -errno.
+
+Source: read(2), write(2), ppoll(2), errno(3).
+"""
+
+import errno
+
+from numba import carray, types
+
+from rtctl.idiom import state, tick
+
+POLLIN = 1
+AGAIN = -errno.EAGAIN
+GONE = -errno.EPIPE  # a stream that has ended
+SECOND = 1_000_000_000
+
+_read = types.ExternalFunction("read", types.intp(types.int32, types.intp, types.uintp))
+_write = types.ExternalFunction("write", types.intp(types.int32, types.intp, types.uintp))
+_ppoll = types.ExternalFunction("ppoll", types.int32(types.intp, types.uintp, types.intp, types.intp))
+_errno = types.ExternalFunction("__errno_location", types.CPointer(types.int32)())
+
+WAIT_STATE = state(polled=(int, 1), spec=(int, 2))  # pollfd and timespec
+
+
+@tick
+def read(fd, buffer):
+    """Up to as many bytes as `buffer`, an array, holds; returns how many, 0 at the end of a stream."""
+    n = _read(fd, buffer.ctypes.data, buffer.size * buffer.itemsize)
+    return n if n >= 0 else -int(carray(_errno(), 1)[0])
+
+
+@tick
+def write(fd, buffer, size):
+    """The first `size` bytes of `buffer`; returns how many were taken."""
+    n = _write(fd, buffer.ctypes.data, size)
+    return n if n >= 0 else -int(carray(_errno(), 1)[0])
+
+
+@tick
+def wait(s, fd, nanoseconds):
+    """Wait for something to read, `nanoseconds` at most; returns 1, 0 where nothing came."""
+    s.polled[0] = fd | (POLLIN << 32)
+    left = max(nanoseconds, 0)
+    s.spec[0], s.spec[1] = left // SECOND, left % SECOND
+    n = _ppoll(s.polled.ctypes.data, 1, s.spec.ctypes.data, 0)
+    return n if n >= 0 else -int(carray(_errno(), 1)[0])
