@@ -50,8 +50,8 @@ class Quantity(NamedTuple):
 class Wiring(NamedTuple):
     """Which channels a machine uses, in the order of the frame's codes."""
 
-    outputs: tuple[mio.AnalogOutputSettings | Quantity, ...]
-    inputs: tuple[mio.AnalogInputSettings | Quantity, ...] = ()
+    outputs: tuple[Any, ...]  # AnalogOutputSettings of a card's channel, or a Quantity
+    inputs: tuple[Any, ...] = ()  # AnalogInputSettings, or a Quantity
     counters: int = 1  # counters 0 to n - 1 hold encoders
     lines: tuple[int, ...] = ()  # digital lines that the loop writes; the others are inputs
     drives: tuple[str, ...] = ()  # names of the outputs, for boards on a bus

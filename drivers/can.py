@@ -85,7 +85,8 @@ class CanBoard(Board):
     def __init__(self, settings: CanSettings, wiring: Wiring, rate: float, bus: socket.socket | None = None) -> None:
         super().__init__(wiring)
         self.settings = settings
-        self._given, self._socket = bus, None
+        self._given = bus
+        self._socket: socket.socket | None = None
         self._patience = round(0.5 * SECOND / rate)
         check(settings, wiring)
         of = settings.nodes, settings.sensors
@@ -144,8 +145,12 @@ class CanBoard(Board):
         took = []
         for _ in range(TRIES if self.settings.ask else 1):  # a computer that is busy for a moment is no late node
             begun = time.monotonic_ns()
+            self._received(
+                can.sample(self._bus, self._nodes, self._wanted, int(self.settings.ask), round(HELLO * SECOND))
+            )
             while (late := self._missing(begun)) and time.monotonic_ns() - begun < HELLO * SECOND:
-                self._received(can.sample(self._bus, self._nodes, self._wanted, int(self.settings.ask), self._patience))
+                self._received(can.sample(self._bus, self._nodes, self._wanted, 0, 0))
+                time.sleep(1e-3)
             if late:
                 n, command = late[0]
                 how = "answers no request for" if self.settings.ask else "does not send"

@@ -168,7 +168,7 @@ class SerialBoard(Board):
         if age > limit:
             garbled = int(line["garbled"])
             seen = f"; {garbled} frames came garbled: check baud, ground and cable" if garbled else ""
-            what = (f"has not answered for {silent:.0f} ms" if silent > limit
+            what = (f"has not answered for {age:.0f} ms" if silent > limit / 2
                     else f"answers late: its newest sample is for outputs of {age:.0f} ms ago")  # fmt: skip
             raise BoardError(f"{self.name}: the device {what}, and driver.timeout is {limit:g} ms{seen}")
         if line["fault"]:

