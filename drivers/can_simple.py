@@ -13,7 +13,6 @@ import numpy as np
 
 from rtctl.drivers import posix
 from rtctl.idiom import state, tick
-from rtctl.tick import clock
 
 HEARTBEAT, SET_AXIS_STATE, ENCODER, CONTROLLER_MODE = 0x01, 0x07, 0x09, 0x0B
 INPUT_VELOCITY, INPUT_TORQUE, IQ, CLEAR_ERRORS, TORQUES = 0x0D, 0x0E, 0x14, 0x18, 0x1C
@@ -126,7 +125,7 @@ def drain(bus, nodes):
         if n <= 0:
             return n if n < 0 else posix.GONE
         if n == SIZE:
-            take(bus, nodes, clock.now())
+            take(bus, nodes, posix.now(bus.wait))
     return 0
 
 
@@ -146,7 +145,7 @@ def sample(bus, nodes, wanted, asked, patience):
 
     Waits `patience` ns at most. Returns 0, or -errno.
     """
-    begun = clock.now()
+    begun = posix.now(bus.wait)
     result = drain(bus, nodes)
     if asked != 0:
         for i in range(len(wanted)):
@@ -157,7 +156,7 @@ def sample(bus, nodes, wanted, asked, patience):
         for i in range(len(wanted)):
             if came(nodes[wanted[i, 0]], wanted[i, 1]) < begun:
                 missing += 1
-        left = begun + patience - clock.now()
+        left = begun + patience - posix.now(bus.wait)
         if missing == 0 or left <= 0:
             break
         posix.wait(bus.wait, bus.fd, left)

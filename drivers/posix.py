@@ -1,9 +1,10 @@
 """Reads and writes of a file descriptor that never block, from compiled code. What fails returns -errno.
 
-Source: read(2), write(2), ppoll(2), errno(3).
+Source: read(2), write(2), ppoll(2), clock_gettime(2), errno(3).
 """
 
 import errno
+from typing import Any
 
 from numba import carray, types
 
@@ -13,13 +14,22 @@ POLLIN = 1
 AGAIN = -errno.EAGAIN
 GONE = -errno.EPIPE  # a stream that has ended
 SECOND = 1_000_000_000
+CLOCK_MONOTONIC = 1
 
-_read = types.ExternalFunction("read", types.intp(types.int32, types.intp, types.uintp))
-_write = types.ExternalFunction("write", types.intp(types.int32, types.intp, types.uintp))
-_ppoll = types.ExternalFunction("ppoll", types.int32(types.intp, types.uintp, types.intp, types.intp))
-_errno = types.ExternalFunction("__errno_location", types.CPointer(types.int32)())
+_read: Any = types.ExternalFunction("read", types.intp(types.int32, types.intp, types.uintp))
+_write: Any = types.ExternalFunction("write", types.intp(types.int32, types.intp, types.uintp))
+_ppoll: Any = types.ExternalFunction("ppoll", types.int32(types.intp, types.uintp, types.intp, types.intp))
+_clock: Any = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.uintp))
+_errno: Any = types.ExternalFunction("__errno_location", types.CPointer(types.int32)())
 
 WAIT_STATE = state(polled=(int, 1), spec=(int, 2))  # pollfd and timespec
+
+
+@tick
+def now(s):
+    """Time in ns of CLOCK_MONOTONIC, as rtctl.tick.clock, which is a floor above, and as time.monotonic_ns."""
+    _clock(CLOCK_MONOTONIC, s.spec.ctypes.data)
+    return s.spec[0] * SECOND + s.spec[1]
 
 
 @tick

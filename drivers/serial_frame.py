@@ -14,7 +14,6 @@ import numpy as np
 
 from rtctl.drivers import posix
 from rtctl.idiom import state, tick
-from rtctl.tick import clock
 
 SYNC, VERSION = 0xA5, 1
 HELLO, HELLO_BACK, OUTPUTS, SAMPLE = 0x01, 0x81, 0x02, 0x82
@@ -97,7 +96,7 @@ def drive(line, on, lines):
         bits = int(np.float32(line.outputs[n]).view(np.uint32))
         for i in range(4):
             line.out[6 + 4 * n + i] = bits >> (8 * i) & 0xFF
-    line.sent_at[line.number] = clock.now()
+    line.sent_at[line.number] = posix.now(line.wait)
     return ship(line, OUTPUTS, 3 + 4 * line.writes)
 
 
@@ -119,7 +118,7 @@ def accept(line):
         for n in range(line.counters):
             line.counts[n] = word(line, HEAD + 3 + 4 * n)
         line.answered, line.fault, line.lines = int(line.frame[3]), int(line.frame[4]), int(line.frame[5])
-        line.answered_at, line.heard_at = max(line.answered_at, line.sent_at[line.answered]), clock.now()
+        line.answered_at, line.heard_at = max(line.answered_at, line.sent_at[line.answered]), posix.now(line.wait)
     else:
         line.garbled += 1
 
@@ -167,10 +166,10 @@ def drain(line):
 @tick
 def sample(line, patience):
     """Wait for the answer to the newest outputs, `patience` ns at most; returns 0, or -errno."""
-    end = clock.now() + patience
+    end = posix.now(line.wait) + patience
     result = drain(line)
     while result == 0 and line.answered != line.number:
-        left = end - clock.now()
+        left = end - posix.now(line.wait)
         if left <= 0:
             break
         if posix.wait(line.wait, line.fd, left) > 0:

@@ -37,9 +37,9 @@ def import_recording(
     uneven: bool = False,
     text: Mapping[str, Any] | None = None,
 ) -> Bundle:
-    """Bundle made in `out` of a file of another program, as `rtctl import` makes it: csv, mat, npz, parquet, json, mcap,
-    mf4, tdms, hdf5.
+    """Bundle made in `out` of a file of another program, as `rtctl import` makes it.
 
+    file: csv, mat, npz, parquet, json, mcap, mf4, tdms or hdf5.
     machine: description of the machine (YAML), or plant: axis, ivu, ldu. columns: our name -> theirs. units: our name
     -> unit in the file. parameters, case: of case.json, `{"drive": {"newton_per_volt": 35.15}}`. text: where what
     stands in a file of text, `{"decimal": ","}`. What was assumed is told as warnings of the category Note.

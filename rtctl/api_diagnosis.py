@@ -36,7 +36,7 @@ class Diagnosis:
     """What recordings say that their owner's model lacks.
 
     `verdict` is named, ambiguous, unnamed or nothing; `headline` says it in words. `effects` have `name`, `node`,
-    `confidence` (0 to 1) and `parameters` with `value`, `low` and `high`, SI. `experiment` would tell two answers apart.
+    `confidence` (0 to 1) and `parameters` with `value`, `low` and `high`, SI. `experiment` tells two answers apart.
     `found` is the whole of it, whose fields may change.
     """
 

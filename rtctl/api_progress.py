@@ -8,7 +8,7 @@ from html import escape
 from typing import Any
 
 Stage = Callable[[str], None]
-BAR = "<progress value='{share:.3f}' max='1' style='width:16em;vertical-align:middle'></progress> {seconds:.0f} s &ensp;{text}"
+BAR = "<progress value='{share:.3f}' max='1' style='width:16em'></progress> {seconds:.0f} s &ensp;{text}"
 
 
 @contextmanager

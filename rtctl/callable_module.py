@@ -1,4 +1,4 @@
-"""A package that is called as a function of its name: `rtctl.diagnose(...)` while `rtctl.diagnose.answer` stays importable."""
+"""A package that is called as a function of its name: `rtctl.diagnose(...)` beside `rtctl.diagnose.answer`."""
 
 import importlib
 import sys

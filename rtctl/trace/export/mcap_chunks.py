@@ -124,8 +124,13 @@ class ChunkFile:
             message_start_time=self._start, message_end_time=self._end, schema_count=1,
         )  # fmt: skip
         schema, channel = self._told
-        groups: dict[Opcode, list[Any]] = {Opcode.SCHEMA: [schema], Opcode.CHANNEL: [channel], Opcode.STATISTICS: [told],
-                  Opcode.CHUNK_INDEX: self._chunks, **self._summary}  # fmt: skip
+        groups: dict[Opcode, list[Any]] = {
+            Opcode.SCHEMA: [schema],
+            Opcode.CHANNEL: [channel],
+            Opcode.STATISTICS: [told],
+            Opcode.CHUNK_INDEX: self._chunks,
+            **self._summary,
+        }
         began, summary, offsets = self._at, b"", []
         for opcode, found in groups.items():
             part = _bytes(*found)
