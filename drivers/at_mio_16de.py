@@ -4,7 +4,7 @@ Loop and plant exchange codes only, as over the bus of the PC: `volts_to_codes` 
 the loop, `output_step` and `input_step` to the board in the plant.
 
 Outputs: bipolar -V_ref..V_ref in two's complement, one code is V_ref/2048; unipolar 0..V_ref, one code is V_ref/4096.
-Inputs: bipolar +-5 V/gain, unipolar 0..10 V/gain, 4096 codes over either.
+Inputs: bipolar +-5 V/gain, unipolar 0..10 V/gain, 4096 codes over either. Converters of other cards have other `bits`.
 
 Source: thesis 7.1.1 and appendix D (mdlCheckParameters); National Instruments, AT-MIO E Series User Manual.
 Erratum: 500 kS/s is the AT-MIO-16E-2 of the same manual; comedi's board table (ni_atmio.c) has 2 us a conversion for
@@ -29,6 +29,8 @@ SETTLING = 3e-6  # s, of both outputs
 CONVERSION = 2e-6  # s between two inputs of a scan, at 500 kS/s
 GAINS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 DITHER_CODES = 0.5  # rms
+BITS = 12  # of this board's converters
+MOST_BITS = 24  # of a card's converter
 
 
 class AnalogOutputSettings(Settings):
@@ -36,6 +38,7 @@ class AnalogOutputSettings(Settings):
     polarity: Literal["bipolar", "unipolar"] = Field("bipolar", description="-V_ref..V_ref or 0..V_ref")
     reference: Literal["internal", "external"] = Field("internal", description="+10 V, or the EXTREF pin")
     external_volts: float | None = quantity(None, unit="V", help="voltage at the EXTREF pin, -11 to 11 V")
+    bits: int = Field(BITS, ge=8, le=MOST_BITS, description="bits of the converter; 12 on the AT-MIO-16DE-10")
 
     @model_validator(mode="after")
     def _check(self) -> "AnalogOutputSettings":
@@ -51,6 +54,7 @@ class AnalogInputSettings(Settings):
     gain: float = quantity(1.0, unit="", help="0.5, 1, 2, 5, 10, 20, 50 or 100")
     mode: Literal["differential", "rse", "nrse"] = Field("rse", description="what the input is measured against")
     polarity: Literal["bipolar", "unipolar"] = Field("bipolar", description="+-5 V/gain or 0..10 V/gain")
+    bits: int = Field(BITS, ge=8, le=MOST_BITS, description="bits of the converter; 12 on the AT-MIO-16DE-10")
 
     @model_validator(mode="after")
     def _check(self) -> "AnalogInputSettings":
@@ -118,9 +122,10 @@ def build_output(settings: AnalogOutputSettings, dt: float, write_order: int | N
                          f"{(delay + SETTLING) * 1e6:g} us")  # fmt: skip
     volts = settings.external_volts if settings.reference == "external" else INTERNAL_VOLTS
     assert volts is not None
+    codes = 1 << settings.bits
     if settings.polarity == "bipolar":
-        return AnalogOutputParams(volts / 2048, -2048, 2047, order, delay, SETTLING)
-    return AnalogOutputParams(volts / 4096, 0, 4095, order, delay, SETTLING)
+        return AnalogOutputParams(volts / (codes // 2), -codes // 2, codes // 2 - 1, order, delay, SETTLING)
+    return AnalogOutputParams(volts / codes, 0, codes - 1, order, delay, SETTLING)
 
 
 def build_input(
@@ -132,8 +137,9 @@ def build_input(
     """
     if dt < (scan_index + 1) * CONVERSION:
         raise ValueError(f"a period of {dt * 1e6:g} us is too short for {scan_index + 1} inputs of 2 us each")
-    volts_per_code = INTERNAL_VOLTS / settings.gain / 4096
-    code_min, code_max = (-2048, 2047) if settings.polarity == "bipolar" else (0, 4095)
+    codes = 1 << settings.bits
+    volts_per_code = INTERNAL_VOLTS / settings.gain / codes
+    code_min, code_max = (-codes // 2, codes // 2 - 1) if settings.polarity == "bipolar" else (0, codes - 1)
     own_seed = (seed * 0x2545F491 + (settings.channel + 1) * 0x9E3779B1) & 0x7FFF_FFFF_FFFF_FFFF
     return AnalogInputParams(volts_per_code, code_min, code_max, int(dither), scan_index * CONVERSION, own_seed)
 

@@ -1,8 +1,12 @@
 """What every board is asked for, emulated or real: samples in, codes out, and zero whenever something is wrong.
 
-A board speaks the frame of the link: codes of the AT-MIO-16DE-10 (12 bits), counts modulo 2^24, digital lines as bits.
-`Board` checks and converts, and takes the outputs to 0 V at open, at close and at every error; a card's own file only
-fills in `_open`, `_read_volts`, `_read_counts`, `_write_code`, `_write_lines` and `_close`.
+A board speaks the frame of the link: codes of the machine's converters, whatever their bits, counts modulo 2^24,
+digital lines as bits. `Board` checks and converts, and takes the outputs to zero at open, at close and at every error;
+a card's own file only fills in `_open`, `_read_volts`, `_read_counts`, `_write_code`, `_write_lines` and `_close`, and
+`enable` where its drives have a switch of their own.
+
+An output or input is a channel of a card (volts), or a `Quantity` of a described machine (units of a drive's command,
+SI of a sensor), which boards on a bus carry as a number.
 
 Source: thesis 7.1.1 and appendix D for the order of the calls: mdlStart, mdlOutputs, mdlTerminate.
 """
@@ -30,13 +34,30 @@ class EmulatedSettings(Settings):
     kind: Literal["emulated"] = Field("emulated", description="the machine and its board are emulated")
 
 
+class Quantity(NamedTuple):
+    """A code of the frame that is no channel of a card: a drive's command, or a number that a sensor shows."""
+
+    name: str
+    unit: str
+    params: Any  # AnalogOutputParams or AnalogInputParams; "volts" are of `unit`
+
+    @property
+    def channel(self) -> str:
+        """What it is called in a message."""
+        return self.name
+
+
 class Wiring(NamedTuple):
     """Which channels a machine uses, in the order of the frame's codes."""
 
-    outputs: tuple[mio.AnalogOutputSettings, ...]
-    inputs: tuple[mio.AnalogInputSettings, ...] = ()
+    outputs: tuple[Any, ...]  # AnalogOutputSettings of a card's channel, or a Quantity
+    inputs: tuple[Any, ...] = ()  # AnalogInputSettings, or a Quantity
     counters: int = 1  # counters 0 to n - 1 hold encoders
     lines: tuple[int, ...] = ()  # digital lines that the loop writes; the others are inputs
+    drives: tuple[str, ...] = ()  # names of the outputs, for boards on a bus
+    sensors: tuple[str, ...] = ()  # names of the counters, then of the inputs
+    measures: tuple[str, ...] = ()  # position, speed, current, force: what each sensor shows
+    turns: tuple[float | None, ...] = ()  # counts or SI units of each sensor for a turn of its body, where known
 
     @property
     def mask(self) -> int:
@@ -53,8 +74,8 @@ class Board(ABC):
 
     def __init__(self, wiring: Wiring) -> None:
         self.wiring = wiring
-        self.outputs = [mio.build_output(o, DT, 0) for o in wiring.outputs]
-        self.inputs = [mio.build_input(i, DT) for i in wiring.inputs]
+        self.outputs = [o.params if isinstance(o, Quantity) else mio.build_output(o, DT, 0) for o in wiring.outputs]
+        self.inputs = [i.params if isinstance(i, Quantity) else mio.build_input(i, DT) for i in wiring.inputs]
         self.is_open = False
         self.failed: BoardError | None = None  # the first error since it was opened
 
@@ -115,6 +136,9 @@ class Board(ABC):
                 troubles.append(str(error))
         if troubles:
             raise BoardError("; ".join(troubles))
+
+    def enable(self, on: bool) -> None:  # noqa: B027  most cards have no such switch
+        """Power of the drives on or off, where the board switches it; called when the machine is switched on or off."""
 
     def close(self) -> None:
         """Outputs to zero, then let go of the card."""

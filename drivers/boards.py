@@ -1,18 +1,31 @@
 """Which driver stands between loop and machine: `driver:` in the config."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
+from rtctl.drivers import can, serial
 from rtctl.drivers.board import Board, EmulatedSettings, Wiring
+from rtctl.drivers.can import CanBoard, CanSettings
 from rtctl.drivers.comedi import ComediCard, ComediSettings
 from rtctl.drivers.nidaqmx import NidaqmxCard, NidaqmxSettings
+from rtctl.drivers.serial import SerialBoard, SerialSettings
 
-DriverSettings = Annotated[EmulatedSettings | ComediSettings | NidaqmxSettings, Field(discriminator="kind")]
+DriverSettings = Annotated[
+    EmulatedSettings | ComediSettings | NidaqmxSettings | CanSettings | SerialSettings, Field(discriminator="kind")
+]
+BusSettings = Annotated[EmulatedSettings | CanSettings | SerialSettings, Field(discriminator="kind")]
 
 
-def make(settings: EmulatedSettings | ComediSettings | NidaqmxSettings, wiring: Wiring, rate: float) -> Board:
-    """The card that the config names, not open yet; `rate` (Hz) is that of its samples."""
+def make(settings: Any, wiring: Wiring, rate: float) -> Board:
+    """The board that the config's `driver` names, not open yet; `rate` (Hz) is that of its samples.
+
+    Raises UserError where a bus lacks a drive or a sensor of the machine.
+    """
+    if isinstance(settings, CanSettings):
+        return CanBoard(settings, wiring, rate)
+    if isinstance(settings, SerialSettings):
+        return SerialBoard(settings, wiring, rate)
     if isinstance(settings, ComediSettings):
         return ComediCard(settings, wiring)
     if isinstance(settings, NidaqmxSettings):
@@ -20,3 +33,11 @@ def make(settings: EmulatedSettings | ComediSettings | NidaqmxSettings, wiring: 
     from rtctl.drivers.emulated import EmulatedCard
 
     return EmulatedCard(wiring)
+
+
+def check(settings: Any, wiring: Wiring) -> None:
+    """Raise UserError where a bus lacks a drive or a sensor of the machine; of a card that shows when it is opened."""
+    if isinstance(settings, CanSettings):
+        can.check(settings, wiring)
+    if isinstance(settings, SerialSettings):
+        serial.check(wiring)

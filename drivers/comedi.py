@@ -64,6 +64,11 @@ class ComediSettings(Settings):
     rate: float | None = quantity(None, unit="Hz", gt=0, le=50e3, help="samples a second; as the loop's if absent")
     library: str | None = Field(None, description="path of libcomedi; searched for if absent")
 
+    @property
+    def place(self) -> str:
+        """Where it is, for people."""
+        return self.device
+
 
 class Range(ctypes.Structure):
     """comedi_range."""

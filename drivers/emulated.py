@@ -20,7 +20,8 @@ class EmulatedCard(Board):
 
     def __init__(self, wiring: Wiring, card: nidaq.EmulatedBoard | None = None, dither: bool = False) -> None:
         super().__init__(wiring)
-        self.card = card or nidaq.EmulatedBoard(DEVICE)
+        bits = max(channel.bits for channel in (*wiring.outputs, *wiring.inputs))
+        self.card = card or nidaq.EmulatedBoard(DEVICE, bits=bits)
         self._dither = dither
 
     @property

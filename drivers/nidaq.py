@@ -83,10 +83,13 @@ class _Counter:
 
 
 class EmulatedBoard:
-    """One AT-MIO-16DE-10. `dt` (s) is the period that its outputs have to settle, `seed` that of its dither."""
+    """One AT-MIO-16DE-10, or a card of its family with converters of other `bits`.
 
-    def __init__(self, device: int = 1, dt: float = 0.002, seed: int = 0) -> None:
-        self.device, self.dt, self.seed = device, dt, seed
+    `dt` (s) is the period that its outputs have to settle, `seed` that of its dither.
+    """
+
+    def __init__(self, device: int = 1, dt: float = 0.002, seed: int = 0, bits: int = mio.BITS) -> None:
+        self.device, self.dt, self.seed, self.bits = device, dt, seed, bits
         self._reset()
 
     def _reset(self) -> None:
@@ -148,7 +151,9 @@ class EmulatedBoard:
                      f"gain {gain:g} of input {chan}; -1 (for 0.5), 1, 2, 5, 10, 20, 50 and 100 exist")  # fmt: skip
             mode, polarity = self.inputs[chan]
             _require(real != 0.5 or polarity == "bipolar", "badRPGError", f"input {chan}: gain 0.5 is bipolar only")
-            settings.append(mio.AnalogInputSettings(channel=chan, gain=real, mode=mode, polarity=polarity))
+            settings.append(
+                mio.AnalogInputSettings(channel=chan, gain=real, mode=mode, polarity=polarity, bits=self.bits)
+            )
         try:
             mio.check_inputs(settings)
         except ValueError as error:
@@ -173,6 +178,7 @@ class EmulatedBoard:
                 "polarity": POLARITIES[polarity],
                 "reference": "external" if ext_ref else "internal",
                 "external_volts": volts if ext_ref else None,
+                "bits": self.bits,
             }
         )
         self.outputs[chan] = mio.build_output(settings, self.dt)

@@ -40,6 +40,11 @@ class NidaqmxSettings(Settings):
     )
     rate: float | None = quantity(None, unit="Hz", gt=0, le=50e3, help="samples a second; as the loop's if absent")
 
+    @property
+    def place(self) -> str:
+        """Where it is, for people."""
+        return self.device
+
 
 class NidaqmxCard(Board):
     """A card by its DAQmx name. `rate` (Hz) is the sample clock's with `timing: hardware`."""

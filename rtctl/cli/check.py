@@ -163,7 +163,7 @@ def _stands(config: Any) -> str:
     if fmu_of(config) is not None:
         return f"the FMU {config.plant.fmu.file}"
     driver = config.driver
-    return "emulated" if driver.kind == "emulated" else f"{driver.device} by {driver.kind}"
+    return "emulated" if driver.kind == "emulated" else f"{driver.place} by {driver.kind}"
 
 
 def _reference(machine: Any) -> str:

@@ -9,6 +9,8 @@ from rtctl.cli import common
 from rtctl.cli.common import JsonOption
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from rtctl.diagnose.answer.comparison import Comparison
 
 app = typer.Typer(add_completion=False)
@@ -73,7 +75,9 @@ def simulate(
             if not (result.closed and INPUT in warning):
                 typer.echo(f"note: {warning}", err=True)
     if plot is not None:
-        _draw(result, plot)
+        from rtctl.trace.plot import save
+
+        save(figure(result), plot)
     if json:
         common.print_json(result.as_json())
     else:
@@ -90,16 +94,15 @@ def _table(result: "Comparison") -> list[str]:
     return lines
 
 
-def _draw(result: "Comparison", path: Path) -> None:
+def figure(result: "Comparison") -> "Figure":
+    """Recorded, simulated and error of every channel."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    from rtctl.trace.plot import save
-
     count = len(result.channels)
-    figure = Figure(figsize=(11, 1.0 + 2.4 * count), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(2 * count, 1, sharex=True, squeeze=False, height_ratios=[2, 1] * count)[:, 0]
+    made = Figure(figsize=(11, 1.0 + 2.4 * count), dpi=110, layout="constrained")
+    FigureCanvasAgg(made)
+    panels = made.subplots(2 * count, 1, sharex=True, squeeze=False, height_ratios=[2, 1] * count)[:, 0]
     every = max(1, len(result.t) // MOST_POINTS)
     t = result.t[::every]
     for i, (name, channel) in enumerate(result.channels.items()):
@@ -116,4 +119,4 @@ def _draw(result: "Comparison", path: Path) -> None:
     panels[0].legend(loc="upper left", fontsize=9, ncols=2)
     panels[0].set_title(f"Free run, {result.mode}", loc="left", fontsize=12, fontweight="bold")
     panels[-1].set_xlabel("time [s]")
-    save(figure, path)
+    return made

@@ -182,7 +182,9 @@ def recover(
 @app.command()
 def export(
     bundle: BundleArgument,
-    to: Annotated[str, typer.Option("--to", metavar="FORMAT", help="csv, mat, parquet, mcap, mf4 or tdms.")],
+    to: Annotated[
+        str, typer.Option("--to", metavar="FORMAT", help="csv, mat, parquet, mcap, mcap-json, rrd, mf4 or tdms.")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="The file; BUNDLE/trace.* if not given.")
     ] = None,
@@ -196,7 +198,8 @@ def export(
 ) -> None:
     """Write a bundle as a file for another program and print where it is.
 
-    mcap opens in Foxglove and PlotJuggler; layouts are in docs/plotjuggler. mf4 and tdms need the extra of that name.
+    mcap opens in Foxglove, PlotJuggler and Rerun; layouts are in docs/plotjuggler. rrd, mf4 and tdms need the extra of
+    that name.
     The column t always comes along.
 
     Examples:

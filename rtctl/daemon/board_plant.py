@@ -30,6 +30,7 @@ class BoardPlant:
         self._status = status
         self.end = LinkEnd(link, status, out, inp)
         self._codes = [0] * len(self.board.outputs)
+        self._on = False  # whether the drives have power
         self.board.open()
 
     def run(self) -> None:
@@ -59,6 +60,11 @@ class BoardPlant:
         """Newest outputs to the card, a sample to the loop."""
         self.end.newest()
         codes, lines = self.due()
+        state = self.end.tx["state"]  # as `due` left it
+        on = bool(state in (safety.ARMED, safety.RUNNING) or (state == safety.TRIPPED and any(codes)))
+        if on != self._on:
+            self._on = on
+            self.board.enable(on)
         self.board.write(codes, lines)
         self._codes = codes
         self.board.read(self.end.rx)

@@ -12,3 +12,7 @@ Data flow through the folders one way; each imports from those before it (tests/
 Beside them: many bundles (bundles, folder), hidden effects (conceal, seal), and the numbers that a verdict hangs on
 (calibration).
 """
+
+from rtctl.callable_module import called
+
+called(__name__, "rtctl.api_diagnosis:diagnose")

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rtctl.config.load import Widen
+from rtctl.drivers import boards
 from rtctl.laws import excitation, reference
 from rtctl.machines import axis, described, ivu, ldu, own_plant
 from rtctl.machines.base import DESCRIBED, Column, Diagram, MachineSettings, PlantDiagram, Signals
@@ -130,13 +131,18 @@ def emulated(config: Any) -> bool:
 
 
 def check_plant(config: Any) -> None:
-    """Raise ValueError where the board or the plant of a config cannot run in its time."""
+    """Raise ValueError where the board or the plant of a config cannot run in its time, UserError where a bus lacks a
+    drive or a sensor of the machine."""
     real, fmu, mode = config.driver.kind != "emulated", fmu_of(config) is not None, config.loop.mode
     if real and fmu:
         raise ValueError(f"plant.fmu and driver.kind {config.driver.kind}: a machine is real or a model; drop one")
     if real and mode != "real":
         raise ValueError(f"driver.kind {config.driver.kind}: a real board keeps real time; set loop.mode to real "
                          f"(--mode real), or driver.kind to emulated for {mode}")  # fmt: skip
+    if real:
+        from rtctl.machines.wiring import wiring  # reads the profiles, which read this package
+
+        boards.check(config.driver, wiring(config))
     if fmu and mode != "lockstep":
         raise ValueError(f"plant.fmu: an FMU runs in lockstep only, and loop.mode is {mode}; use --mode lockstep")
     if fmu and config.plant.physics:

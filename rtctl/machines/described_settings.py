@@ -15,6 +15,7 @@ from rtctl.config.errors import nearest
 from rtctl.config.unit_change import with_units
 from rtctl.config.units import to_si
 from rtctl.drivers.board import EmulatedSettings
+from rtctl.drivers.boards import BusSettings
 from rtctl.idiom import Settings, quantity
 from rtctl.laws.bumpless import BumplessSettings
 from rtctl.laws.excitation import ExcitationSettings, NoneSettings
@@ -64,7 +65,9 @@ class DescribedConfig(MachineSettings):
     """Any machine: bodies, joints, drives and sensors, and one loop around them."""
 
     machine: Description
-    driver: EmulatedSettings = Field(default=EmulatedSettings(), description="the board, emulated with the machine")
+    driver: BusSettings = Field(  # a description names no channels of a card
+        default=EmulatedSettings(), description="the board: emulated with the machine, or drives on a bus"
+    )
     law: DescribedLawSettings = DescribedLawSettings()
     reference: ReferenceSettings = ReferenceSettings()
     excitation: ExcitationSettings = NoneSettings()

@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 
 from rtctl import counted
 from rtctl.drivers import daq_stc
-from rtctl.drivers.at_mio_16de import AnalogOutputParams
+from rtctl.drivers.at_mio_16de import AnalogInputParams, AnalogOutputParams
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.tick import frames
 
@@ -157,6 +157,8 @@ def build(settings: FaultSettings, dt: float, now: int = 0, blocks: Sequence[Any
             raise ValueError(f"link.delay: {size * dt:g} s is {size:.0f} ticks; {DEPTH - 1} is the most")
     begin = now + round(settings.at / dt)
     end = FOR_EVER if settings.lasts is None else begin + max(round(settings.lasts / dt), 1)
+    if settings.fault == "adc.open":
+        size = float(_rail(settings.channel, blocks))
     made = Fault(kind.number, settings.channel, begin, end, size, *_codes(blocks))
     if settings.fault == "dac.stuck":
         bits = bits_of(made)
@@ -170,6 +172,14 @@ def build(settings: FaultSettings, dt: float, now: int = 0, blocks: Sequence[Any
 def bits_of(fault: Fault) -> int:
     """Bits of the analog output that a fault is at."""
     return (fault.highest[fault.channel] - fault.lowest[fault.channel]).bit_length()
+
+
+def _rail(channel: int, blocks: Sequence[Any]) -> int:
+    """Code of an open analog input, half of its converter's codes up; of 12 bits where it has none."""
+    inputs = [b.params for b in blocks if isinstance(b.params, AnalogInputParams)]
+    if channel >= len(inputs):
+        return CODES - 1
+    return (inputs[channel].code_max - inputs[channel].code_min + 1) // 2 - 1
 
 
 def _codes(blocks: Sequence[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -294,7 +304,8 @@ def misread(c, f, rx, k):
         rx.counter_codes[n] = daq_stc.wrapped(rx.counter_codes[n] - int(f.missed[n]) + jump)
     for j in range(c.faulty):
         if c.faults[j].kind == ADC_OPEN and active(c.faults[j], k):
-            rx.ai_codes[c.faults[j].channel] = CODES - 1
+            size = int(c.faults[j].size)
+            rx.ai_codes[c.faults[j].channel] = size if size > 0 else CODES - 1  # 0: an order of an older recording
 
 
 @tick

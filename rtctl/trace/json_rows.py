@@ -11,6 +11,7 @@ from typing import Any
 
 from rtctl.machines.base import Column
 
+PACKAGE = "rtctl"
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -20,7 +21,7 @@ def topic(kind: str) -> str:
 
 
 def schema_name(kind: str) -> str:
-    return f"rtctl.{kind}"
+    return f"{PACKAGE}.{kind}"
 
 
 def schema(name: str, columns: Sequence[Column]) -> dict[str, Any]:

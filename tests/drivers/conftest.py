@@ -35,6 +35,14 @@ def comedi_library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.fixture(scope="session")
+def serial_library(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The C of examples/serial_board/."""
+    import serial_device
+
+    return serial_device.library(tmp_path_factory.mktemp("serial"))
+
+
 @pytest.fixture
 def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """`rig("comedi", wiring)`: a card of a kind, not open yet, with its wires."""
@@ -45,6 +53,10 @@ def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Call
     def make(kind: str, wiring: Wiring = WIRING, **settings: Any) -> Any:
         if kind == "emulated":
             found = rigs.emulated(wiring)
+        elif kind == "can":
+            found = rigs.can(wiring, **settings)
+        elif kind == "serial":
+            found = rigs.serial(wiring, request.getfixturevalue("serial_library"), **settings)
         elif kind.startswith("comedi"):
             library = request.getfixturevalue("comedi_library")
             number = int(kind == "comedi of 16 bits")
@@ -54,9 +66,10 @@ def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Call
         else:
             pytest.importorskip("nidaqmx", reason="nidaqmx is not installed")
             found = rigs.daqmx(wiring, monkeypatch, **settings)
-        made.append(found.card)
+        made.append(found)
         return found
 
     yield make
-    for card in made:
-        card.close()
+    for found in made:
+        found.card.close()
+        found.end()

@@ -1,4 +1,4 @@
-"""The three kinds of card on a rig: the same wires, whoever drives them."""
+"""The kinds of board on a rig: the same wires, whoever drives them."""
 
 import ctypes
 from collections.abc import Callable
@@ -21,6 +21,7 @@ class Rig(NamedTuple):
     line: Callable[[int], int]
     fail: Callable[[str], None]  # "inputs", "counters", "outputs" or "lines" do not work from now on
     step: float  # V, what the card's inputs resolve
+    end: Callable[[], None] = lambda: None  # of what stands at the other end
 
 
 def emulated(wiring: Wiring) -> Rig:
@@ -81,3 +82,99 @@ def daqmx(wiring: Wiring, patch: Any, **settings: Any) -> Rig:
         card, lambda c, v: below.volts.__setitem__(c, v), below.pulses, lambda c: below.out[c],
         lambda n: below.lines >> n & 1, fail, STEP,
     )  # fmt: skip
+
+
+def can(wiring: Wiring, **settings: Any) -> Rig:
+    """Two nodes on a bus: torque in Nm for volts, position in turns of 8192 counts, current in A for volts."""
+    from odrive_nodes import Nodes, pair
+
+    from rtctl.drivers.can import CanBoard, CanSettings
+
+    ours, theirs = pair()
+    ids = [1 + o.channel for o in wiring.outputs]
+    wiring = wiring._replace(
+        lines=(),
+        drives=tuple(f"output {o.channel}" for o in wiring.outputs),
+        sensors=(*(f"counter {n}" for n in range(wiring.counters)), *(f"input {i.channel}" for i in wiring.inputs)),
+        measures=("position",) * wiring.counters + ("current",) * len(wiring.inputs),
+        turns=(8192.0,) * wiring.counters + (None,) * len(wiring.inputs),
+    )
+    of = [ids[n] for n in range(wiring.counters)] + [1 + i.channel for i in wiring.inputs]
+    given = {
+        "nodes": {name: {"id": node} for name, node in zip(wiring.drives, ids, strict=True)},
+        "sensors": {name: {"id": node} for name, node in zip(wiring.sensors, of, strict=True)},
+        "timeout": 0.5,  # a busy machine's
+        **settings,
+    }
+    nodes = Nodes(theirs, *sorted({*ids, *of}))
+    card = CanBoard(CanSettings.model_validate(given), wiring, 2.0, ours)  # patient: an answer may take 0.25 s
+
+    def pulse(counter: int, pulses: int) -> None:
+        nodes.nodes[of[counter]].position += pulses / 8192
+
+    def fail(what: str) -> None:
+        if what == "inputs":
+            for node in nodes.nodes.values():
+                node.short.add(0x14)
+        elif what == "counters":
+            nodes.nodes[ids[0]].error = 0x20
+            nodes.heartbeat(ids[0])
+        else:
+            nodes.close()
+
+    rig = Rig(
+        card,
+        lambda c, v: setattr(nodes.nodes[1 + c], "current", v),
+        pulse,
+        lambda c: nodes[1 + c].torque,
+        lambda n: 0,
+        fail,
+        2e-6,
+        lambda: (nodes.close(), ours.close()),  # type: ignore[arg-type, return-value]
+    )
+    card.nodes = nodes  # type: ignore[attr-defined]  # for tests of its own
+    return rig
+
+
+def serial(wiring: Wiring, lib: Any, **settings: Any) -> Rig:
+    """A microcontroller whose floats are volts."""
+    from serial_device import Device
+
+    from rtctl.drivers.serial import SerialBoard, SerialSettings
+
+    device = Device(lib, len(wiring.outputs), len(wiring.inputs), wiring.counters, wiring.mask)
+    card = SerialBoard(SerialSettings(**{"port": device.port, "timeout": 0.5, **settings}), wiring, 2.0)
+    place = {o.channel: n for n, o in enumerate(wiring.outputs)}
+    seen = {i.channel: n for n, i in enumerate(wiring.inputs)}
+
+    # a sample is of when the outputs that it answers came: what changes afterwards shows in the next
+
+    def set_input(channel: int, volts: float) -> None:
+        device.board.input[seen[channel]] = volts
+        card.unread = False
+
+    def pulse(counter: int, pulses: int) -> None:
+        card.unread = False
+        device.board.counter[counter] = (device.board.counter[counter] + pulses) & 0xFFFFFFFF
+
+    def fail(what: str) -> None:
+        if what == "outputs":
+            device.unplug()
+        else:
+            device.board.fault, card.unread = 7, False
+
+    def told() -> Any:
+        return device.told(int(card._line["number"]))
+
+    rig = Rig(
+        card,
+        set_input,
+        pulse,
+        lambda c: float(told().output[place[c]]),
+        lambda n: told().lines_out >> n & 1,
+        fail,
+        2e-6,
+        device.close,
+    )
+    card.device = device  # type: ignore[attr-defined]
+    return rig

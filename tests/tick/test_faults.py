@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from rtctl.drivers import daq_stc
-from rtctl.drivers.at_mio_16de import AnalogOutputParams
+from rtctl.drivers.at_mio_16de import AnalogInputSettings, AnalogOutputParams, build_input
 from rtctl.faults.cases import COMMON, STANDS
 from rtctl.faults.drives import Inside
 from rtctl.loop import generate, mailbox
@@ -164,6 +164,16 @@ def test_an_open_input_reads_its_rail_and_the_other_does_not() -> None:
     line.board[0]["ai_codes"] = 100
     line.tick()
     assert line.rx[0]["ai_codes"][:3].tolist() == [100, 2047, 100]
+
+
+@pytest.mark.parametrize(("polarity", "bits", "rail"), [("bipolar", 12, 2047), ("unipolar", 16, 32767)])
+def test_the_rail_is_that_of_the_inputs_own_converter(polarity: str, bits: int, rail: int) -> None:
+    wire = AnalogInputSettings.model_validate({"channel": 0, "polarity": polarity, "bits": bits})
+    blocks = [Block("input1", build_input(wire, 0.01), None)]
+    made = faults.build(faults.FaultSettings(fault="adc.open"), 0.01, 0, blocks)
+    line = Line(made)
+    line.tick()
+    assert line.rx[0]["ai_codes"][0] == rail
 
 
 # outputs

@@ -13,7 +13,7 @@ from trace_rows import CASE, COLUMNS, ROW, make
 
 from rtctl.config.errors import UserError
 from rtctl.trace.bundle import save_case
-from rtctl.trace.export import FORMATS, Selection, export, source
+from rtctl.trace.export import FORMATS, Selection, export, mcap_file, source
 from rtctl.trace.export.mat_file import names
 from rtctl.trace.export.source import Source
 from rtctl.trace.recorder import Recorder
@@ -21,6 +21,7 @@ from rtctl.trace.rotation import Rotation
 
 ROWS = 700
 BEGAN = "2026-11-21T10:44:28+00:00"
+BEGAN_NS = 1795257868 * 10**9
 UNITS = {"tick": "1", "t": "s", "ref": "rad", "u1": "V", "state": "1"}
 NAMES = ["t", "tick", "ref", "u1", "state"]  # the clock first
 
@@ -38,6 +39,7 @@ def bundle(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def small_batches(monkeypatch):
     monkeypatch.setattr(source, "ROW_GROUP", 90)
+    monkeypatch.setattr(mcap_file, "ROWS", 40)
 
 
 def same(columns, ticks=None):
@@ -97,8 +99,61 @@ def test_parquet_in_duckdb(bundle, tmp_path):
 
 
 def test_mcap(bundle, tmp_path):
-    reader = pytest.importorskip("mcap.reader")
+    """With mcap's reader and protobuf's own decoder, checksums and the summary checked."""
+    decoder = pytest.importorskip("mcap_protobuf.decoder")
+    from mcap.reader import make_reader
+
     with export(bundle, "mcap", tmp_path / "a.mcap").path.open("rb") as file:
+        opened = make_reader(file, validate_crcs=True, decoder_factories=[decoder.DecoderFactory()])
+        found = list(opened.iter_decoded_messages())
+        summary = opened.get_summary()
+        attached = {a.name: json.loads(a.data) for a in opened.iter_attachments()}
+        told = {m.name: m.metadata for m in opened.iter_metadata()}
+        some = [m for *_, m in opened.iter_messages()][500:503]
+    schema, channel, message, _ = found[0]
+    assert (channel.topic, channel.message_encoding, schema.encoding) == ("/ivu", "protobuf", "protobuf")
+    assert (schema.name, message.sequence) == ("rtctl.ivu", 0) and [m.sequence for m in some] == [500, 501, 502]
+    assert same({name: [getattr(row, name) for *_, row in found] for name in NAMES})
+    assert all(m.log_time == m.publish_time for _, _, m, _ in found)
+    assert [m.log_time - BEGAN_NS for _, _, m, _ in found] == [2_000_000 * k for k in range(ROWS)]
+    assert attached["case.json"]["plant"] == "ivu" and told == {"rtctl.units": UNITS}
+    counted = summary.statistics
+    assert (counted.message_count, counted.channel_message_counts) == (ROWS, {1: ROWS})
+    assert (counted.message_start_time, counted.message_end_time) == (BEGAN_NS, BEGAN_NS + 2_000_000 * (ROWS - 1))
+    assert (counted.attachment_count, counted.metadata_count) == (1, 1)
+    assert len(summary.chunk_indexes) == counted.chunk_count > 1
+
+
+def test_mcap_of_many_columns_of_every_type(tmp_path):
+    """Tags of two and three bytes, names that protobuf does not allow, and gaps, read back by protobuf and by us."""
+    decoder = pytest.importorskip("mcap_protobuf.decoder")
+    from mcap.reader import make_reader
+
+    from rtctl.trace.imports import read
+
+    columns = {"t": [0.0, 1.0], "position.d": [1.5, np.nan], "position_d": [3.5, 4.5], "1st": [5.0, 6.0]}
+    kinds = (np.int8, np.int16, np.int32, np.int64, np.uint8, np.uint16, np.uint32, np.uint64, np.float32, np.bool_)
+    for kind in kinds:
+        most = 1 if kind is np.bool_ else np.finfo(kind).max if kind is np.float32 else np.iinfo(kind).max
+        columns[kind.__name__] = np.array([0, most], kind)
+    columns |= {f"c{n}": np.array([n, -n], float) for n in range(2100)}
+    columns["some"] = pa.array([7, None], pa.int64())
+    path = export(written(tmp_path / "b", columns), "mcap").path
+    with path.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+        *_, first, last = (row for *_, row in reader.iter_decoded_messages())
+    assert (first.position_d, first.position_d_2, last.x1st, first.some) == (1.5, 3.5, 6.0, 7.0) and np.isnan(last.some)
+    assert all(getattr(last, kind.__name__) == columns[kind.__name__][1] for kind in kinds)
+    assert [getattr(last, f"c{n}") for n in range(2100)] == [-n for n in range(2100)]
+    table = read(path)
+    assert all(np.array_equal(table.columns[name], np.array(values, float), equal_nan=True)
+               for name, values in columns.items() if name not in (k.__name__ for k in kinds))  # fmt: skip
+    assert all(np.array_equal(table.columns[k.__name__], columns[k.__name__]) for k in kinds)
+
+
+def test_mcap_json(bundle, tmp_path):
+    reader = pytest.importorskip("mcap.reader")
+    with export(bundle, "mcap-json", tmp_path / "a.mcap").path.open("rb") as file:
         opened = reader.make_reader(file)
         found = list(opened.iter_messages())
         attached = {a.name: json.loads(a.data) for a in opened.iter_attachments()}
@@ -110,8 +165,7 @@ def test_mcap(bundle, tmp_path):
     rows = [json.loads(message.data) for _, _, message in found]
     assert same({name: [row[name] for row in rows] for name in NAMES})
     assert all(message.log_time == message.publish_time for _, _, message in found)
-    began = 1795257868 * 10**9
-    assert [m.log_time - began for _, _, m in found] == [2_000_000 * k for k in range(ROWS)]
+    assert [m.log_time - BEGAN_NS for _, _, m in found] == [2_000_000 * k for k in range(ROWS)]
     assert attached["case.json"]["plant"] == "ivu"
 
 
@@ -158,17 +212,18 @@ def test_what_was_not_measured(tmp_path):
     pytest.importorskip("mcap")
     from mcap.reader import make_reader
 
-    with export(folder, "mcap").path.open("rb") as file:
+    with export(folder, "mcap-json").path.open("rb") as file:
         rows = [json.loads(message.data) for _, _, message in make_reader(file).iter_messages()]
     assert rows == [{"t": 0.0, "on": True}, {"t": 1.0, "ref": 1.5, "on": False}, {"t": 2.0, "on": True}]
 
 
-def test_a_clock_that_starts_below_zero(tmp_path):
+@pytest.mark.parametrize("to", ["mcap", "mcap-json"])
+def test_a_clock_that_starts_below_zero(tmp_path, to):
     pytest.importorskip("mcap")
     from mcap.reader import make_reader
 
     folder = written(tmp_path / "b", {"t": [-1.5, -0.5]})
-    with export(folder, "mcap").path.open("rb") as file:
+    with export(folder, to).path.open("rb") as file:
         assert [m.log_time for _, _, m in make_reader(file).iter_messages()] == [500_000_000, 1_500_000_000]
 
 
@@ -176,7 +231,7 @@ def test_a_clock_that_starts_below_zero(tmp_path):
     ("to", "selection", "words"),
     [
         ("csw", Selection(), "no format 'csw'; did you mean 'csv'"),
-        ("hdf", Selection(), "there is csv, mat, parquet, mcap, mf4, tdms"),
+        ("hdf", Selection(), "there is csv, mat, parquet, mcap, mcap-json, rrd, mf4, tdms"),
         ("csv", Selection(("reff",)), "no column 'reff'; is it 'ref'"),
         ("csv", Selection((), 5.0, 6.0), r"holds no rows from 5 s to 6 s; its column t runs from 0 s to 1.398 s"),
     ],
@@ -203,7 +258,7 @@ def test_refuses_what_is_no_bundle_and_what_cannot_be_written(bundle, tmp_path):
 
 @pytest.mark.parametrize(
     ("to", "package", "how"),
-    [("mf4", "asammdf", r"'rtctl\[mf4\]'"), ("tdms", "nptdms", r"'rtctl\[tdms\]'"), ("mcap", "mcap", "'mcap'")],
+    [("mf4", "asammdf", r"'rtctl\[mf4\]'"), ("tdms", "nptdms", r"'rtctl\[tdms\]'"), ("mcap-json", "mcap", "'mcap'")],
 )
 def test_a_missing_package_is_told_with_what_installs_it(bundle, tmp_path, monkeypatch, to, package, how):
     for name in [*sys.modules, package]:

@@ -42,15 +42,70 @@ def test_csv(recording):
         header = next(csv.reader(file))
     root = layout(f"{kind}_csv")
     assert set(curves(root)) <= set(header)
-    assert root.find("Plugins/plugin/default").get("time_axis") == header[0]
+    assert root.find("Plugins/plugin/parameters").get("time_axis") == header[0]  # 3.x
+    assert root.find("Plugins/plugin/default").get("time_axis") == header[0]  # before
 
 
 def test_mcap(recording):
-    reader = pytest.importorskip("mcap.reader")
+    decoder = pytest.importorskip("mcap_protobuf.decoder")
+    from mcap.reader import make_reader
+
     kind, folder = recording
     with export(folder, "mcap").path.open("rb") as file:
+        opened = make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+        _, channel, _, row = next(iter(opened.iter_decoded_messages()))
+    assert set(curves(layout(kind))) <= {f"{channel.topic}/{field.name}" for field in row.DESCRIPTOR.fields}
+
+
+def test_mcap_json(recording):
+    reader = pytest.importorskip("mcap.reader")
+    kind, folder = recording
+    with export(folder, "mcap-json").path.open("rb") as file:
         _, channel, message = next(iter(reader.make_reader(file).iter_messages()))
     assert set(curves(layout(kind))) <= {f"{channel.topic}/{name}" for name in json.loads(message.data)}
+
+
+# What PlotJuggler 3.17 reads of a layout: mainwindow.cpp, tabbedplotwidget.cpp, plot_docker.cpp, plotwidget.cpp and
+# dataload_csv.cpp. Element -> attributes.
+READ = {
+    "root": set(),
+    "tabbed_widget": {"name", "parent"},
+    "Tab": {"tab_name", "containers"},
+    "Container": set(),
+    "DockSplitter": {"orientation", "count", "sizes"},
+    "DockArea": {"name"},
+    "plot": {"style", "mode", "line_width", "flip_x", "flip_y"},
+    "range": {"left", "right", "top", "bottom"},
+    "limitY": {"min", "max"},
+    "curve": {"name", "color"},
+    "currentTabIndex": {"index"},
+    "use_relative_time_offset": {"enabled"},
+    "Plugins": set(),
+    "plugin": {"ID"},
+    "parameters": {"time_axis", "delimiter", "skip_rows", "date_format"},
+    "default": {"time_axis", "delimiter"},
+    "previouslyLoaded_Datafiles": set(),
+    "customMathEquations": set(),
+    "snippets": set(),
+}
+VALUES = {
+    ("tabbed_widget", "parent"): {"main_window"},
+    ("DockSplitter", "orientation"): {"-", "|"},
+    ("plot", "style"): {"Lines", "Dots", "LinesAndDots", "Sticks", "Steps", "StepsInv"},
+    ("plot", "mode"): {"TimeSeries", "XYPlot"},
+    ("plot", "line_width"): {"1.0", "1.5", "2.0", "3.0"},
+    ("plugin", "ID"): {"DataLoad CSV", "DataLoad MCAP"},
+}
+
+
+@pytest.mark.parametrize("name", ["ivu", "ivu_csv", "ldu", "ldu_csv"])
+def test_the_program_knows_every_element_and_value(name):
+    for element in layout(name).iter():
+        if not isinstance(element.tag, str):  # a comment
+            continue
+        assert set(element.attrib) <= READ[element.tag], element.tag
+        for key, value in element.attrib.items():
+            assert value in VALUES.get((element.tag, key), {value}), (element.tag, key, value)
 
 
 @pytest.mark.parametrize("name", ["ivu", "ivu_csv", "ldu", "ldu_csv"])

@@ -7,6 +7,7 @@ import lzma
 
 import numpy as np
 import pytest
+from mcap import writer as mcap_writer
 
 from rtctl.config.errors import UserError
 from rtctl.trace.bundle import load_bundle
@@ -192,7 +193,7 @@ def test_mcap_that_is_cut_off_gives_what_is_whole(mcap, tmp_path, compression):
 
 def test_mcap_in_cdr_says_what_it_is(mcap):
     with pytest.raises(UserError, match=(
-        r"a.mcap has no JSON messages, which can be read; it has /JointState: 5 messages in cdr, schema "
+        r"a.mcap has no messages in JSON or protobuf, which can be read; it has /JointState: 5 messages in cdr, schema "
         r"sensor_msgs/msg/JointState \(ros2msg\); decode them with mcap-ros2-support"
     )):  # fmt: skip
         read(mcap({"/JointState": ("cdr", [b"\0" * 20] * 5)}))
@@ -203,6 +204,70 @@ def test_topics_that_are_no_json_are_named_beside_those_that_are(mcap):
     assert table.notes == ("/tf is no column: 3 messages in protobuf, schema sensor_msgs/msg/tf (ros2msg)",)
     with pytest.raises(UserError, match=r"'/tf' .* is no column: 3 messages in protobuf"):
         table.has("/tf", "x")
+
+
+def tree(fields):
+    """Descriptor of `pkg.Row` from (name, type, number, more) and a nested `Vec`."""
+    from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Field
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+
+    found = FileDescriptorSet()
+    file = found.file.add(name="row.proto", package="pkg", syntax="proto3")
+    row, vec = file.message_type.add(name="Row"), file.message_type.add(name="Vec")
+    vec.field.add(name="x", number=1, type=Field.TYPE_INT32, label=Field.LABEL_OPTIONAL)
+    for number, (name, kind, more) in enumerate(fields, 1):
+        label = Field.LABEL_REPEATED if more == "list" else Field.LABEL_OPTIONAL
+        of = {"type_name": ".pkg.Vec"} if kind == "MESSAGE" else {}
+        row.field.add(name=name, number=number, type=getattr(Field, f"TYPE_{kind}"), label=label, **of)
+    return found.SerializeToString()
+
+
+@pytest.fixture
+def protobuf_mcap(tmp_path):
+    def write(fields, rows, spoil=lambda data: data):
+        from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+        descriptor = tree(fields)
+        pool = descriptor_pool.DescriptorPool()
+        pool.Add(descriptor_pb2.FileDescriptorSet.FromString(descriptor).file[0])
+        kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("pkg.Row"))
+        path = tmp_path / "a.mcap"
+        with path.open("wb") as file:
+            writer = mcap_writer.Writer(file)
+            writer.start()
+            channel = writer.register_channel(
+                "/row", "protobuf", writer.register_schema("pkg.Row", "protobuf", spoil(descriptor))
+            )
+            for k, row in enumerate(rows):
+                writer.add_message(channel, k * 10**7, kind(**row).SerializeToString(), 0, k)
+            writer.finish()
+        return path
+
+    return write
+
+
+def test_protobuf_messages_of_any_shape(protobuf_mcap):
+    fields = [
+        ("a", "DOUBLE", ""),
+        ("n", "INT64", ""),
+        ("v", "MESSAGE", ""),
+        ("p", "FLOAT", "list"),
+        ("s", "STRING", ""),
+    ]
+    path = protobuf_mcap(fields, [{"a": k / 3, "n": -k, "v": {"x": k}, "p": [k, 2 * k], "s": "on"} for k in range(N)])
+    table = read(path)
+    assert table.columns["a"].tolist() == [k / 3 for k in range(N)] and table.columns["n"].tolist() == [
+        -k for k in range(N)
+    ]
+    assert table.columns["v.x"].tolist() == list(range(N)) and table.columns["p.2"].tolist() == [
+        2.0 * k for k in range(N)
+    ]
+    assert table.left == {"s": "text ('on')"} and table.clock == "log_time"
+
+
+def test_protobuf_that_is_damaged(protobuf_mcap):
+    with pytest.raises(UserError, match=r"the descriptor of /row gives no message pkg.Row"):
+        read(protobuf_mcap([("a", "DOUBLE", "")], [{"a": 1.0}], spoil=lambda data: data[:-9]))
 
 
 def test_units_and_stamps_of_mcap(mcap, tmp_path):

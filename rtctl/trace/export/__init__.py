@@ -27,7 +27,9 @@ FORMATS = {
     "csv": Format("csv_file", ".csv", "spreadsheets, PlotJuggler"),
     "mat": Format("mat_file", ".mat", "MATLAB, Octave, scipy"),
     "parquet": Format("parquet_file", ".parquet", "pandas, DuckDB, Polars"),
-    "mcap": Format("mcap_file", ".mcap", "Foxglove, PlotJuggler", "mcap"),
+    "mcap": Format("mcap_file", ".mcap", "Foxglove, PlotJuggler, Rerun", "mcap"),
+    "mcap-json": Format("mcap_json_file", ".mcap", "readers of MCAP that know JSON alone", "mcap"),
+    "rrd": Format("rrd_file", ".rrd", "Rerun", "rerun", "rerun"),
     "mf4": Format("mf4_file", ".mf4", "CANape, asammdf", "asammdf", "mf4"),
     "tdms": Format("tdms_file", ".tdms", "LabVIEW, DIAdem", "nptdms", "tdms"),
 }
@@ -55,7 +57,7 @@ def format_of(name: str) -> Format:
 
 
 def export(folder: Path | str, to: str, out: Path | str | None = None, selection: Selection = ALL) -> Exported:
-    """Write the bundle in `folder` as `to` (csv, mat, parquet, mcap, mf4, tdms) into `out`, `trace.*` in it if None.
+    """Write the bundle in `folder` as `to`, a name of FORMATS, into `out`, `trace.*` in it if None.
 
     The file is there whole or not at all. Raises UserError where the bundle, the selection or the place is wrong, or
     where the format's package is not installed.

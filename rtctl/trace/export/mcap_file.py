@@ -1,53 +1,55 @@
-"""MCAP, which Foxglove and PlotJuggler open: one topic, named as the machine, a JSON message for each row.
+"""MCAP, which Foxglove, PlotJuggler and Rerun open: one topic, named as the machine, a protobuf message for each row.
 
 Log time and publish time are one: when the recording began, plus `t`, to the nanosecond. `t` itself and every other
-number are in the message with all their digits; what was not measured is left out of it. Units are in the schema, and
-case.json is attached.
+number are in the message to the bit; what was not measured is nan, and a column of integers with gaps is one of
+doubles. Units are in the schema's comments and in the metadata `rtctl.units`; case.json is attached.
 
-Memory: one batch of rows as Python's numbers.
+Memory: one batch of rows, and one chunk of messages.
 """
 
-import json
-import math
-from collections.abc import Iterator
 from pathlib import Path
 
-from mcap.writer import CompressionType, Writer
+import numpy as np
 
 from rtctl import __version__
-from rtctl.trace import json_rows
+from rtctl.trace import json_rows, protobuf_rows
 from rtctl.trace.bundle import CASE, as_json
+from rtctl.trace.export.mcap_chunks import ChunkFile
+from rtctl.trace.export.mcap_json_file import UNITS
 from rtctl.trace.export.source import Source
 
-SLICE = 4096  # rows that are Python's numbers at a time
+ROWS = 16384  # messages in a chunk
 
 
 def write(source: Source, path: Path) -> None:
     """Write the rows of `source` to `path`. Raises OSError."""
-    began = source.started
-    epoch = int(began.timestamp() // 1) * 1_000_000_000 + began.microsecond * 1000 if began else 0
-    epoch = max(epoch, math.ceil(-source.span[0]) * 1_000_000_000)  # MCAP has no time before its zero
+    epoch = source.epoch
+    found = protobuf_rows.fields(source.columns, _dtypes(source))
+    package, message = json_rows.PACKAGE, protobuf_rows.identifier(source.name)
+    schema = (f"{package}.{message}", protobuf_rows.ENCODING, protobuf_rows.descriptor(package, message, found))
     with path.open("wb") as file:
-        writer = Writer(file, compression=CompressionType.ZSTD)
-        writer.start(profile="", library=f"rtctl {__version__}")
-        name = json_rows.schema_name(source.name)
-        text = json.dumps(json_rows.schema(name, source.columns))
-        schema = writer.register_schema(name, "jsonschema", text.encode())
-        channel = writer.register_channel(json_rows.topic(source.name), "json", schema)
-        units = {c.name: c.unit for c in source.columns if c.unit}
-        writer.add_metadata("rtctl.units", units)
-        writer.add_attachment(epoch, epoch, CASE, "application/json", as_json(source.case, indent=1).encode())
-        for number, (t, message) in enumerate(_messages(source)):
-            at = epoch + round(t * 1e9)
-            writer.add_message(channel, at, message, at, number & 0xFFFFFFFF)
-        writer.finish()
+        made = ChunkFile(file, f"rtctl {__version__}", json_rows.topic(source.name), schema, protobuf_rows.dtype(found))
+        made.metadata(UNITS, {c.name: c.unit for c in source.columns if c.unit})
+        made.attachment(epoch, CASE, "application/json", as_json(source.case, indent=1).encode())
+        rows = made.records(ROWS)  # filled anew for each chunk; the tags stay
+        for n, field in enumerate(found):
+            rows["message"][f"tag{n}"] = np.void(field.tag)
+        for batch in source.batches():
+            columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
+            for start in range(0, batch.num_rows, ROWS):
+                part = [values[start : start + ROWS] for values in columns]
+                chunk = rows[: len(part[0])]
+                for n, values in enumerate(part):
+                    chunk["message"][f"value{n}"] = values
+                made.rows(chunk, np.uint64(epoch) + np.rint(part[0] * 1e9).astype(np.int64).view(np.uint64))
+        made.finish()
 
 
-def _messages(source: Source) -> Iterator[tuple[float, bytes]]:
-    """(t, message) of each row."""
-    for batch in source.batches():
-        names = batch.schema.names
-        for start in range(0, batch.num_rows, SLICE):
-            columns = [column.slice(start, SLICE).to_numpy(zero_copy_only=False).tolist() for column in batch.columns]
-            for row in zip(*columns, strict=True):
-                yield row[0], json_rows.message(names, row).encode()
+def _dtypes(source: Source) -> list[np.dtype]:
+    """What each column is in a message."""
+    gaps = source.gaps
+    kinds = [np.dtype(source.schema.field(column.name).type.to_pandas_dtype()) for column in source.columns]
+    return [
+        np.dtype(float) if column.name in gaps and kind.kind in "iub" else kind
+        for column, kind in zip(source.columns, kinds, strict=True)
+    ]

@@ -60,6 +60,27 @@ class Source:
         return found if found.tzinfo else found.astimezone()
 
     @property
+    def epoch(self) -> int:
+        """Time of `t` = 0, ns since 1970; as late as keeps every row at or after 1970."""
+        began = self.started
+        epoch = int(began.timestamp() // 1) * 1_000_000_000 + began.microsecond * 1000 if began else 0
+        return max(epoch, math.ceil(-self.span[0]) * 1_000_000_000)
+
+    @property
+    def gaps(self) -> set[str]:
+        """Columns with a value that is missing: null, not nan."""
+        found: set[str] = set()
+        for path in self.paths:
+            with _reading(path) as file:
+                for group in range(file.metadata.num_row_groups):
+                    columns = file.metadata.row_group(group)
+                    for n in range(columns.num_columns):
+                        one = columns.column(n)
+                        if one.statistics is None or one.statistics.null_count != 0:  # None: nobody has counted them
+                            found.add(one.path_in_schema)
+        return found
+
+    @property
     def rate(self) -> float | None:
         """Rows a second of the selection, as the case says; None where the clock is uneven."""
         rate = self.case.get("sample_rate")

@@ -1,4 +1,4 @@
-"""MCAP with JSON messages. With one topic a column is a field, `ref`, with several it is `/topic/ref`.
+"""MCAP with JSON or protobuf messages. With one topic a column is a field, `ref`, with several it is `/topic/ref`.
 
 Where no field is the time, the log time is, in seconds from the first message on: the column `log_time`. A file that is
 cut off gives the messages that are whole.
@@ -16,22 +16,57 @@ from rtctl.config.errors import UserError
 from rtctl.trace.imports.mcap_records import Cut, records
 from rtctl.trace.imports.messages import Messages
 from rtctl.trace.imports.nested import notes_of, unit_text
+from rtctl.trace.imports.protobuf_messages import ProtobufRows
 from rtctl.trace.imports.table import Table
+from rtctl.trace.protobuf_rows import ENCODING
 
 TIME = "log_time"
-DECODERS = {"cdr": "mcap-ros2-support", "ros1": "mcap-ros1-support", "protobuf": "mcap-protobuf-support"}
+DECODERS = {"cdr": "mcap-ros2-support", "ros1": "mcap-ros1-support"}
 
 
-class _Topic:
+class _JsonRows(Messages):
     """JSON messages of one topic."""
 
     def __init__(self, path: Path, topic: str, schema: Schema | None) -> None:
-        self.rows, self.times = Messages(path, f"messages of {topic}"), []  # type: ignore[var-annotated]
-        self.units = dict(_units(schema.data if schema else b"{}"))
+        super().__init__(path, f"messages of {topic}")
+        self._topic, self._schema = topic, schema.data if schema else b"{}"
+
+    def add(self, message: bytes) -> None:
+        try:
+            super().add(json.loads(message))
+        except (ValueError, RecursionError):
+            raise UserError(
+                f"{self.path}: message {self.rows + 1} of {self._topic} is no JSON: {message[:30]!r}"
+            ) from None
+
+    def units(self) -> dict[str, str]:
+        return dict(_units(self._schema))
+
+
+class _Topic:
+    """Messages of one topic and their log times."""
+
+    def __init__(self, path: Path, topic: str, encoding: str, schema: Schema | None) -> None:
+        self.times: list[int] = []
+        self.rows: _JsonRows | ProtobufRows
+        if encoding == ENCODING and schema is not None:
+            self.rows = ProtobufRows(path, topic, schema.name, schema.data)
+        else:
+            self.rows = _JsonRows(path, topic, schema)
+
+    def add(self, message: Message) -> None:
+        self.rows.add(message.data)
+        self.times.append(message.log_time)
+
+
+def _readable(channel: Channel, schema: Schema | None) -> bool:
+    """Whether messages of a channel can be read: JSON, or protobuf with its descriptor."""
+    described = schema is not None and schema.encoding == ENCODING
+    return channel.message_encoding == "json" or (channel.message_encoding == ENCODING and described)
 
 
 def read(path: Path) -> Table:
-    """The columns of all JSON topics. Raises UserError, OSError."""
+    """The columns of all topics in JSON or protobuf. Raises UserError, OSError."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     topics: dict[str, _Topic] = {}
@@ -48,12 +83,13 @@ def read(path: Path) -> Table:
                     cut = record
                 elif record.channel_id in channels:
                     channel = channels[record.channel_id]
-                    if channel.message_encoding != "json":
+                    schema = schemas.get(channel.schema_id)
+                    if not _readable(channel, schema):
                         others[channel.id] = others.get(channel.id, 0) + 1
                         continue
                     if channel.topic not in topics:
-                        topics[channel.topic] = _Topic(path, channel.topic, schemas.get(channel.schema_id))
-                    _add(path, channel.topic, topics[channel.topic], record)
+                        topics[channel.topic] = _Topic(path, channel.topic, channel.message_encoding, schema)
+                    topics[channel.topic].add(record)
     except (OSError, UserError):
         raise
     except Exception:  # whatever a damaged file makes of the reader
@@ -66,14 +102,6 @@ def read(path: Path) -> Table:
     return _table(path, topics, notes, left)
 
 
-def _add(path: Path, name: str, topic: _Topic, message: Message) -> None:
-    try:
-        topic.rows.add(json.loads(message.data))
-    except (ValueError, RecursionError):
-        raise UserError(f"{path}: message {len(topic.times) + 1} of {name} is no JSON: {message.data[:30]!r}") from None
-    topic.times.append(message.log_time)
-
-
 def _table(path: Path, topics: dict[str, _Topic], notes: list[str], left: dict[str, str]) -> Table:
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
@@ -81,14 +109,15 @@ def _table(path: Path, topics: dict[str, _Topic], notes: list[str], left: dict[s
     for name, topic in topics.items():
         before = "" if len(topics) == 1 else f"{name}/"
         found, gaps, texts = topic.rows.columns()
+        known = topic.rows.units()
         notes += gaps
         words |= {before + key: why for key, why in texts.items()}
         times = np.array(topic.times, np.uint64)
         order = np.argsort(times, kind="stable")
         for key, values in found.items():
             columns[before + key] = values[order]
-            if key in topic.units:
-                units[before + key] = topic.units[key]
+            if key in known:
+                units[before + key] = known[key]
         columns[before + TIME] = (times[order] - times[order][0]).astype(np.int64) / 1e9
         units[before + TIME] = "s"
         stamps = [before + key for key, values in found.items() if values.dtype.kind == "m"]
@@ -117,7 +146,8 @@ def _nothing(
     kinds = sorted({channels[k].message_encoding for k in others})
     tools = ", ".join(sorted({DECODERS[kind] for kind in kinds if kind in DECODERS}))
     way = f"decode them with {tools} (pip)" if tools else "decode them"
-    return f"{path} has no JSON messages, which can be read{cause}; it has {told}; {way} and write csv, parquet or JSON"
+    return (f"{path} has no messages in JSON or protobuf, which can be read{cause}; it has {told}; {way} "
+            "and write csv, parquet or JSON")  # fmt: skip
 
 
 def _units(schema: bytes) -> list[tuple[str, str]]:

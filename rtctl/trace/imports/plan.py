@@ -113,11 +113,15 @@ def with_options(
     }
     update |= {"plant": plant} if plant is not None else {}
     update |= {"rate": _number(rate)} if rate is not None else {}
-    data = {**plan.model_dump(), **update}
+    return plan_of({**plan.model_dump(), **update}, _option)
+
+
+def plan_of(data: Mapping[str, Any], where: Callable[[tuple], str] | None = None) -> Plan:
+    """The plan of plain data; `where` says how a key is called in a message. Raises UserError."""
     try:
         return Plan.model_validate(data)
     except ValidationError as error:
-        raise UserError(sentences(error, Plan, data, _option)) from None
+        raise UserError(sentences(error, Plan, dict(data), where or (lambda at: ".".join(map(str, at))))) from None
 
 
 def _option(at: tuple) -> str:
