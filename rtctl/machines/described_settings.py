@@ -23,6 +23,7 @@ from rtctl.laws.reference import ReferenceSettings
 from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
 from rtctl.machines.base import COMMON_COLUMNS, MachineSettings
+from rtctl.machines.compensation import CompensationSettings, ModelFeedforwardSettings
 from rtctl.machines.ldu import PdLawSettings, PositionSettings
 from rtctl.machines.physics import PhysicsTerm
 from rtctl.plants.graph.description import Description
@@ -50,6 +51,7 @@ class DescribedLawSettings(Settings):
     limit: LimitSettings = LimitSettings()
     bumpless: BumplessSettings = BumplessSettings()
     velocity: VelocitySettings = VelocitySettings()
+    compensation: CompensationSettings = CompensationSettings()
 
 
 class DescribedPlantSettings(Settings):
@@ -84,6 +86,10 @@ class DescribedConfig(MachineSettings):
         _check_columns(machine)
         for i, term in enumerate(self.plant.physics):
             check_node(machine, f"plant.physics.{i}.node", term.term, term.node)
+        feedforward = law.compensation.feedforward
+        for i, entry in enumerate(feedforward.effects if feedforward is not None else ()):
+            path = f"law.compensation.feedforward.effects.{i}.effect.node"
+            check_node(machine, path, entry.effect.term, entry.effect.node)
         return self
 
 
@@ -133,6 +139,7 @@ def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
     limits, laws = with_units(LimitSettings, symbols), with_units(DescribedLawSettings, symbols)
     shaper = DescribedLawSettings.model_fields["shaper"]  # its bandwidth is in rad/s, of whatever machine
     fields: dict[str, Any] = {"limit": (limits, limits(high=full)), "shaper": (ShaperSettings, shaper)}
+    fields["compensation"] = _compensation(symbols)
     law: Any = create_model("DescribedLawSettings", __base__=laws, __module__=__name__, __doc__=laws.__doc__, **fields)
     safety, reference = with_units(SafetySettings, symbols), with_units(ReferenceSettings, symbols)
     played = with_units(DescribedConfig, symbols).model_fields["excitation"]
@@ -146,6 +153,17 @@ def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
         "DescribedConfig", __base__=DescribedConfig, __module__=__name__, __doc__=DescribedConfig.__doc__, **fields
     )
     return made
+
+
+def _compensation(symbols: dict[str, str]) -> tuple[Any, Any]:
+    """Compensation in the units of a machine; effects keep the units of `plant.physics`."""
+    own = CompensationSettings.model_fields["feedforward"]
+    base = with_units(CompensationSettings, symbols)
+    kept: Any = create_model(
+        "CompensationSettings", __base__=base, __module__=__name__, __doc__=base.__doc__,
+        feedforward=(ModelFeedforwardSettings | None, own),
+    )  # fmt: skip
+    return kept, kept()
 
 
 def _closable(machine: Description) -> list[str]:

@@ -1,0 +1,184 @@
+"""Compensation around the position law: settings, and the blocks and lines that they bring into a machine's tick.
+
+    error     e = ref + shift - feedback                           shift: what springs and late sensors take
+    law       u = law(e) + integral + feedforward + observer + learned + repeated
+    limit     u -> inverse of the drive's curve -> limit
+
+A setting that is absent brings no line: the tick of a config without compensation is what it was.
+"""
+
+from typing import Any, NamedTuple
+
+from pydantic import Field, model_validator
+
+from rtctl.idiom import Settings, quantity
+from rtctl.laws import (
+    disturbance_observer,
+    integral,
+    inverse_curve,
+    model_feedforward,
+)
+from rtctl.laws.disturbance_observer import DisturbanceObserverSettings
+from rtctl.laws.integral import IntegralSettings
+from rtctl.laws.inverse_curve import InverseCurveSettings
+from rtctl.machines.base import Block, physics_lines
+from rtctl.machines.physics import PhysicsTerm
+from rtctl.machines.reference_motion import Mechanics, params
+from rtctl.plants.physics import TERMS
+
+ACTS = ("command", "force", "last")  # sites of what a feedforward can act against
+
+
+class EffectSettings(Settings):
+    """An effect that is fed forward."""
+
+    effect: PhysicsTerm = Field(description="the effect as in plant.physics; `rtctl physics` lists them")
+    share: float = quantity(1.0, unit="", ge=0, le=1.5, help="part of it that is compensated; 0 switches it off")
+
+
+class ModelFeedforwardSettings(Settings):
+    """The command that the model needs to move along the reference."""
+
+    inertia: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of the inertia; the shaper has to be on")
+    friction: float = quantity(0.9, unit="", ge=0, le=1, help="share of the description's dry friction, below breakaway")
+    viscous: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of its viscous friction and of its springs")
+    lead: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time until a command acts; the reference is taken then")
+    behind: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time by which the sensor shows the position late")
+    through: str | None = Field(
+        default=None, description="body behind springs that shall follow the reference, the feedback running ahead"
+    )
+    effects: list[EffectSettings] = Field(default=[], max_length=12, description="effects that are compensated")
+
+    @model_validator(mode="after")
+    def _acts(self) -> "ModelFeedforwardSettings":
+        for i, entry in enumerate(self.effects):
+            if not any(site.partition(":")[0] in ACTS for site in TERMS[entry.effect.term].act):
+                raise ValueError(
+                    f"effects.{i}.effect: {entry.effect.term} neither pushes nor changes a command; a feedforward does "
+                    "nothing against it"
+                )
+        return self
+
+
+class CompensationSettings(Settings):
+    """What is put against the machine's known and unknown errors; `rtctl improve` proposes it from a diagnosis."""
+
+    feedforward: ModelFeedforwardSettings | None = Field(default=None, description="by the model; none if absent")
+    integral: IntegralSettings | None = Field(default=None, description="integral with dead zone; none if absent")
+    observer: DisturbanceObserverSettings | None = Field(
+        default=None, description="disturbance observer; none if absent"
+    )
+    inverse: InverseCurveSettings | None = Field(default=None, description="of the drive's curve; none if absent")
+
+
+class Lines(NamedTuple):
+    """What compensation brings into a tick."""
+
+    uses: tuple[str, ...] = ()
+    blocks: tuple[Block, ...] = ()
+    reset: tuple[str, ...] = ()  # where outputs come on
+    reference: tuple[str, ...] = ()  # once the shaped reference is known
+    shift: str = ""  # added to the reference where the error is made
+    law: tuple[str, ...] = ()  # into `extra`, V to add to the command
+    extra: str = ""  # added to the command
+    inverse: tuple[str, ...] = ()  # after the limit's input is known
+    track: tuple[str, ...] = ()  # after the limit
+
+
+class Signals(NamedTuple):
+    """Names of the signals in a machine's tick."""
+
+    error: str
+    feedback: str
+    wanted: str  # command before the limit
+    written: str  # after it
+    channel: dict[int, float]  # of each drive: share of the command; none where drives are shared out otherwise
+
+
+def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: Any, dt: float) -> Lines:
+    """Blocks and lines for a tick of `dt` s; `mechanics()` gives the machine's, for those that need them."""
+    uses: list[str] = []
+    blocks: list[Block] = []
+    reset: list[str] = []
+    reference: list[str] = []
+    law: list[str] = []
+    track: list[str] = []
+    inverse: list[str] = []
+    extra: list[str] = []
+    shift = ""
+    if settings.feedforward is not None:
+        found = _feedforward(settings.feedforward, names, kind, mechanics(), dt)
+        uses += found.uses
+        blocks += found.blocks
+        reset += found.reset
+        reference += found.reference
+        shift = found.shift
+        extra.append("u_model")
+    if settings.integral is not None:
+        uses.append("rtctl.laws.integral")
+        blocks.append(Block("integral", integral.build(settings.integral, dt), integral.INTEGRAL_STATE))
+        reset.append("integral.reset(p.integral, s.integral)")
+        law.append(f"u_integral = integral.step(p.integral, s.integral, {names.error})")
+        track.append(f"integral.track(p.integral, s.integral, {names.wanted}, {names.written})")
+        extra.append("u_integral")
+    if settings.observer is not None:
+        known = "s.model_feedforward.known" if settings.feedforward is not None else "0.0"
+        made = disturbance_observer.build(settings.observer, dt)
+        uses.append("rtctl.laws.disturbance_observer")
+        blocks.append(Block("observer", made, disturbance_observer.DISTURBANCE_OBSERVER_STATE))
+        reset.append("disturbance_observer.reset(p.observer, s.observer)")
+        law.append(f"u_observer = disturbance_observer.step(p.observer, s.observer, {names.feedback})")
+        track.append(f"disturbance_observer.track(p.observer, s.observer, {names.written}, {known})")
+        extra.append("u_observer")
+    if settings.inverse is not None:
+        uses.append("rtctl.laws.inverse_curve")
+        blocks.append(Block("inverse", inverse_curve.build(settings.inverse, dt), None))
+        inverse.append("inverse_curve.step(p.inverse, {u})")
+    return Lines(
+        tuple(uses), tuple(blocks), tuple(reset), tuple(reference), shift, tuple(law),
+        "".join(f" + {name}" for name in extra), tuple(inverse), tuple(track),
+    )  # fmt: skip
+
+
+def _feedforward(
+    settings: ModelFeedforwardSettings, names: Signals, kind: str, mechanics: Mechanics, dt: float
+) -> Lines:
+    """The model's record moved along the reference, with the effects' own lines acting on it."""
+    made = params(mechanics, settings, dt)
+    uses = ["rtctl.laws.model_feedforward"]
+    blocks = [Block("model_feedforward", made, model_feedforward.MODEL_FEEDFORWARD_STATE)]
+    state, record = "s.model_feedforward", "s.model_feedforward.m"
+    head = f"p.model_feedforward, {state}"
+    out = [f"a_model = model_feedforward.begin({head}, y.ref, s.shaper.speed, s.shaper.acceleration)"]
+    drives: list[str] = []
+    order = sorted(enumerate(settings.effects), key=lambda item: TERMS[item[1].effect.term].order)
+    for number, entry in order:
+        prefix = f"effect{number}_"
+        found = physics_lines([entry.effect], kind, dt, mechanics.place_of, record, prefix)
+        uses += found.uses
+        blocks += [*found.blocks, Block(f"{prefix}share", ShareParams(entry.share), None)]
+        if found.force:
+            share = f"p.{prefix}share.share"
+            out += [f"model_feedforward.keep({state})", *found.force, f"model_feedforward.blend({state}, {share})"]
+        if found.command and names.channel:
+            drives.append(number)  # type: ignore[arg-type]
+            at, factor = next(iter(names.channel.items()))
+            asked = f"{factor!r} * u_model"
+            out_of = [f"{record}.volts[{at}] = {asked}", *found.command]
+            drives[-1] = "\n".join(
+                [*out_of, f"u_model += p.{prefix}share.share * ({asked} - {record}.volts[{at}]) / {factor!r}"]
+            )
+    out.append(f"u_model = model_feedforward.finish({head}, a_model)")
+    for text in drives:
+        out += text.split("\n")
+    return Lines(
+        uses=tuple(dict.fromkeys(uses)),
+        blocks=tuple(blocks),
+        reset=(f"model_feedforward.reset({head})",),
+        reference=tuple(out),
+        shift=f" + {state}.shift",
+    )
+
+
+class ShareParams(NamedTuple):
+    share: float
