@@ -16,7 +16,7 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.config.errors import UserError
-from rtctl.laws import allocation, gain_schedule
+from rtctl.laws import allocation, disturbance_observer, gain_schedule
 from rtctl.machines import described
 from rtctl.machines.profile import Model
 from rtctl.machines.profiles import profile_of
@@ -128,7 +128,20 @@ def law_response(parts: Loop, f: np.ndarray, path: str = "feedback") -> np.ndarr
         if path == "feedback":
             v = parts.blocks["velocity"]
             K = K + p.velocity_gain * difference(v.a, v.dt, back)
-    return parts.factor * K
+    return compensated(parts, parts.factor * K, f, path)
+
+
+def compensated(parts: Loop, K: np.ndarray, f: np.ndarray, path: str) -> np.ndarray:
+    """Response (n,) of a law `K` (n,) with the filter, the integral and the disturbance observer around it."""
+    blocks, back = parts.blocks, np.exp(-2j * np.pi * np.atleast_1d(np.asarray(f, float)) * parts.dt)
+    if "filter" in blocks:
+        K = K * np.prod([biquad_response(section, back) for section in blocks["filter"]], axis=0)
+    if "integral" in blocks:
+        K = K + blocks["integral"].gain / (1 - back)
+    if "observer" in blocks:
+        to_y, to_u = disturbance_observer.response(blocks["observer"], f)
+        K = (K + to_y if path == "feedback" else K) / (1 - to_u)
+    return np.asarray(K)
 
 
 def printed_law(parts: Loop, f: np.ndarray) -> np.ndarray:

@@ -14,13 +14,17 @@ from pydantic import Field, model_validator
 from rtctl.idiom import Settings, quantity
 from rtctl.laws import (
     disturbance_observer,
+    error_table,
     integral,
     inverse_curve,
     model_feedforward,
+    sections,
 )
 from rtctl.laws.disturbance_observer import DisturbanceObserverSettings
+from rtctl.laws.error_table import ErrorTableSettings
 from rtctl.laws.integral import IntegralSettings
 from rtctl.laws.inverse_curve import InverseCurveSettings
+from rtctl.laws.sections import SectionsSettings
 from rtctl.machines.base import Block, physics_lines
 from rtctl.machines.physics import PhysicsTerm
 from rtctl.machines.reference_motion import Mechanics, params
@@ -42,6 +46,7 @@ class ModelFeedforwardSettings(Settings):
     inertia: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of the inertia; the shaper has to be on")
     friction: float = quantity(0.9, unit="", ge=0, le=1, help="share of the description's dry friction, below breakaway")
     viscous: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of its viscous friction and of its springs")
+    velocity: float = quantity(1.0, unit="", ge=0, le=1, help="share of the velocity feedback that the reference takes off")
     lead: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time until a command acts; the reference is taken then")
     behind: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time by which the sensor shows the position late")
     through: str | None = Field(
@@ -68,6 +73,12 @@ class CompensationSettings(Settings):
     observer: DisturbanceObserverSettings | None = Field(
         default=None, description="disturbance observer; none if absent"
     )
+    filter: SectionsSettings | None = Field(
+        default=None, description="notches and filters behind the position law; none if absent"
+    )
+    correction: ErrorTableSettings | None = Field(
+        default=None, description="table of what is to be added to the feedback, by the feedback; none if absent"
+    )
     inverse: InverseCurveSettings | None = Field(default=None, description="of the drive's curve; none if absent")
 
 
@@ -76,8 +87,10 @@ class Lines(NamedTuple):
 
     uses: tuple[str, ...] = ()
     blocks: tuple[Block, ...] = ()
+    read: tuple[str, ...] = ()  # once the feedback is read
     reset: tuple[str, ...] = ()  # where outputs come on
     reference: tuple[str, ...] = ()  # once the shaped reference is known
+    filter: tuple[str, ...] = ()  # of the position law's output
     shift: str = ""  # added to the reference where the error is made
     law: tuple[str, ...] = ()  # into `extra`, V to add to the command
     extra: str = ""  # added to the command
@@ -88,6 +101,7 @@ class Lines(NamedTuple):
 class Signals(NamedTuple):
     """Names of the signals in a machine's tick."""
 
+    law: str  # what the position law gives
     error: str
     feedback: str
     wanted: str  # command before the limit
@@ -105,6 +119,8 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
     track: list[str] = []
     inverse: list[str] = []
     extra: list[str] = []
+    filtered: list[str] = []
+    read: list[str] = []
     shift = ""
     if settings.feedforward is not None:
         found = _feedforward(settings.feedforward, names, kind, mechanics(), dt)
@@ -114,6 +130,11 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         reference += found.reference
         shift = found.shift
         extra.append("u_model")
+    if settings.filter is not None:
+        uses.append("rtctl.laws.sections")
+        blocks.append(Block("filter", sections.build(settings.filter, dt), sections.SECTIONS_STATE))
+        reset.append("sections.reset(p.filter, s.filter, 0.0)")
+        filtered.append(f"{names.law} = sections.step(p.filter, s.filter, {names.law})")
     if settings.integral is not None:
         uses.append("rtctl.laws.integral")
         blocks.append(Block("integral", integral.build(settings.integral, dt), integral.INTEGRAL_STATE))
@@ -130,12 +151,16 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         law.append(f"u_observer = disturbance_observer.step(p.observer, s.observer, {names.feedback})")
         track.append(f"disturbance_observer.track(p.observer, s.observer, {names.written}, {known})")
         extra.append("u_observer")
+    if settings.correction is not None:
+        uses.append("rtctl.laws.error_table")
+        blocks.append(Block("correction", error_table.build(settings.correction, dt), None))
+        read.append(f"{names.feedback} = error_table.step(p.correction, {names.feedback})")
     if settings.inverse is not None:
         uses.append("rtctl.laws.inverse_curve")
         blocks.append(Block("inverse", inverse_curve.build(settings.inverse, dt), None))
         inverse.append("inverse_curve.step(p.inverse, {u})")
     return Lines(
-        tuple(uses), tuple(blocks), tuple(reset), tuple(reference), shift, tuple(law),
+        tuple(uses), tuple(blocks), tuple(read), tuple(reset), tuple(reference), tuple(filtered), shift, tuple(law),
         "".join(f" + {name}" for name in extra), tuple(inverse), tuple(track),
     )  # fmt: skip
 

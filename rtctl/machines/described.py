@@ -23,7 +23,7 @@ from rtctl.tick import safety
 
 __all__ = [
     "DescribedConfig", "config_class", "diagram", "metres_per_unit", "parts_of", "plant_diagram", "radius", "shares_of",
-    "signals", "unit",
+    "mechanics", "signals", "unit",
 ]  # fmt: skip
 
 SETTLE_FLOOR = 0.0  # two percent of the step say it all
@@ -82,7 +82,7 @@ def diagram(config: Any, dt: float) -> Diagram:
     }  # fmt: skip
     position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": "y.u_c", "u_written": "u"})
     names = compensation.Signals(
-        "y.position_error", "y.feedback", "y.u_c", "u", {number: float(shares_of(config)[number])}
+        "u_fb", "y.position_error", "y.feedback", "y.u_c", "u", {number: float(shares_of(config)[number])}
     )  # fmt: skip
     more = compensation.lines(law.compensation, names, config.kind, lambda: mechanics(config, dt), dt)
     asked = more.inverse[0].format(u="y.u_c") if more.inverse else "y.u_c"
@@ -119,6 +119,7 @@ def diagram(config: Any, dt: float) -> Diagram:
                     for n, (name, sensor) in enumerate(machine.sensors.items())
                 ),
                 f"y.feedback = p.machine.per_column * y.{read}",
+                *more.read,
             ),
         ),
         (
@@ -148,6 +149,7 @@ def diagram(config: Any, dt: float) -> Diagram:
                 f"{rate} = velocity.step(p.velocity, s.velocity, y.feedback)",
                 *(("y.speed = y.feedback",) if parts.is_speed else ()),
                 *position.step,
+                *more.filter,
                 "changed = c.gains != s.machine.gains",
                 "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",
                 "s.machine.gains = c.gains",

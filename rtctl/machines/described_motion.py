@@ -29,8 +29,7 @@ def mechanics(config: Any, dt: float) -> Mechanics:
         raise ValueError(
             "law.compensation.feedforward: machine.mechanics is a file; a feedforward is made of joints and bodies alone"
         )
-    settings = config.law.compensation.feedforward
-    machine, _ = sprung(config.machine, [entry.effect for entry in settings.effects])
+    machine, _ = sprung(config.machine, config.plant.physics)
     layout, values, graph = graph_of(machine, dt)
     A, B = state_space(graph)
     command = B @ shares_of(config)[: B.shape[1]]

@@ -93,7 +93,7 @@ def params(mechanics: Mechanics, settings: Any, dt: float) -> ModelFeedforwardPa
         minus=float(made.phi @ made.minus),
         lead=settings.lead,
         behind=settings.behind,
-        k_v=mechanics.k_v,
+        k_v=settings.velocity * mechanics.k_v,
         shaped=int(mechanics.shaped),
         shift=_wide(shift),
         bend=_square(bend),

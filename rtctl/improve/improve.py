@@ -1,0 +1,194 @@
+"""Improvement: every remedy is tried alone on the emulated fitted model, and kept where it proves itself.
+
+A remedy is kept where the rms of the tracking error falls, where it does not rise at either end of the interval of the
+effect's size, and where the loop keeps its margins: 6 dB and 45 degrees, or what it had before. All that were kept are
+checked together once more. A wrong name therefore either does no harm or is left out.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtctl import machines
+from rtctl.config.errors import NoAnswer, UserError
+from rtctl.config.load import set_paths
+from rtctl.design.margins import Margins
+from rtctl.improve import margins, played
+from rtctl.improve.found import Found, with_size
+from rtctl.improve.played import Figures, Judge, Played
+from rtctl.improve.proposals import Ground, data_of, proposals
+from rtctl.improve.remedy import BASE, Remedy, Tried, neutral, written
+from rtctl.machines.reference_motion import motion
+
+LEAST = (6.0, 45.0)  # dB and degrees
+GAIN = 0.005  # share by which the error must fall
+WORSE = 0.01  # share by which it may rise at an end of an interval
+Progress = Callable[[str], None]
+
+
+class Improved(NamedTuple):
+    """An improved config, and the proof on the emulated fitted model."""
+
+    found: Found
+    config: Any
+    judge: Judge
+    tried: tuple[Tried, ...]
+    before: Played
+    after: Played
+    margins_before: Margins | None
+    margins_after: Margins | None
+
+    @property
+    def reduction(self) -> float:
+        """Share by which the rms of the tracking error falls."""
+        return 1.0 - self.after.figures.rms / self.before.figures.rms
+
+
+def improve(found: Found, body: str | None = None, progress: Progress = lambda _: None) -> Improved:
+    """Propose, try and keep remedies. Raises NoAnswer where the machine does not run with the law that it has."""
+    found = found._replace(config=played.with_reference(found.config))
+    config = found.config
+    judge = played.judge_of(config, body)
+    seconds = played.seconds_of(config)
+    before = played.play(config, config, seconds, judge)
+    if before.figures.tripped:
+        raise NoAnswer(
+            f"the emulated machine trips with the law that it has ({before.figures.tripped}): there is nothing to compare "
+            "with; let `rtctl tune` find a law that holds it"
+        )
+    at_first = margins.of_config(config)
+    ground = Ground(found, judge, at_first, acceleration(config), (float(before.ref.min()), float(before.ref.max())))
+    plan = proposals(ground)
+    trial = Trial(found, judge, seconds, before, at_first, ground, plan)
+    tried = []
+    for remedy in plan:
+        progress(f"trying {remedy.title} against {remedy.against}")
+        tried.append(trial.of(remedy))
+    made = set_paths(config, written(trial.values, data_of(config)))
+    after = played.play(made, config, seconds, judge, before.ref)
+    if after.figures.tripped or after.figures.rms > before.figures.rms:
+        raise NoAnswer("all remedies together are worse than none; the config stays as it is")
+    return Improved(found, made, judge, tuple(tried), before, after, at_first, margins.of_config(made))
+
+
+def acceleration(config: Any) -> float:
+    """Acceleration of the feedback for one unit of command, in its unit; 0 where no feedforward can be made."""
+    try:
+        mechanics = mechanics_of(config)
+        made = motion(mechanics)
+    except (ValueError, UserError):
+        return 0.0
+    return float(0.5 * made.phi @ (made.plus + made.minus) / (made.phi @ (made.M * made.phi)))
+
+
+def mechanics_of(config: Any) -> Any:
+    """Mechanics of a config's machine. Raises ValueError where no feedforward can be made for it."""
+    machine = machines.build(config)
+    module = machines.module_of(config.kind)
+    if not hasattr(module, "mechanics"):
+        raise ValueError(f"{config.kind} has no feedforward by its model")
+    return module.mechanics(config, machine.dt)
+
+
+class Trial:
+    """Trials of remedies, one after the other, on top of those that were kept."""
+
+    def __init__(
+        self, found: Found, judge: Judge, seconds: float, before: Played, at_first: Margins | None, ground: Ground,
+        plan: list[Remedy],
+    ):  # fmt: skip
+        self.judge, self.seconds, self.asked, self.at_first = judge, seconds, before.ref, at_first
+        kinds = {remedy.kind for remedy in plan}
+        config = found.config
+        acts = {e.number for e in found.effects if "feedforward" in e.term.remedies}
+        shares = {path.split(".")[4] for r in plan for way in r.ways for path in way if ".effects." in path}
+        fed = tuple(entry for i, entry in enumerate(data_of(config)) if i in acts and str(i) in shares)
+        self.order = {str(i): n for n, i in enumerate(sorted(int(s) for s in shares))}
+        base = neutral(fed, ground.gain != 0.0, "curve" in kinds, "table" in kinds)
+        self.base = set_paths(config, {BASE: base})
+        self.effects = {effect.words: effect for effect in found.effects}
+        self.values: dict[str, Any] = {}
+        self.rms = before.figures.rms
+        self.figures = before.figures
+        self.plant = config
+
+    def of(self, remedy: Remedy) -> Tried:
+        """Try every way of a remedy, and keep the best where it passes."""
+        best: tuple[float, Mapping[str, Any], Figures] | None = None
+        reason = ""
+        for way in remedy.ways:
+            try:
+                config = self.config(way)
+                if not self.holds(config):
+                    reason = reason or self.margins_words(config)
+                    continue
+                run = played.play(config, self.plant, self.seconds, self.judge, self.asked)
+            except (UserError, ValueError, NoAnswer) as error:
+                reason = str(error)
+                continue
+            if run.figures.tripped:
+                reason = f"the emulated machine trips: {run.figures.tripped}"
+                continue
+            if best is None or run.figures.rms < best[0]:
+                best = run.figures.rms, way, run.figures
+        before = self.rms
+        if best is None:
+            return Tried(remedy, {}, before, np.inf, reason or "no setting of it passes", None, None)
+        after, way, figures = best
+        if after > (1.0 - GAIN) * before:
+            change = 100 * (after / before - 1)
+            return Tried(remedy, {}, before, after, f"the error does not fall by it ({change:+.1f} %)", figures, None)
+        worse = self.worse_at_ends(remedy, way)
+        if worse:
+            return Tried(remedy, {}, before, after, worse, figures, None)
+        self.values |= way
+        self.rms, self.figures = after, figures
+        return Tried(remedy, way, before, after, "", figures, margins.of_config(self.config({})))
+
+    def config(self, way: Mapping[str, Any]) -> Any:
+        """The trial config with what was kept and this way. Raises UserError where it does not fit."""
+        return set_paths(self.base, {self._path(path): value for path, value in {**self.values, **way}.items()})
+
+    def _path(self, path: str) -> str:
+        """Effects of the trial are counted among those that are fed forward."""
+        parts = path.split(".")
+        if "effects" in parts:
+            parts[4] = str(self.order[parts[4]])
+        return ".".join(parts)
+
+    def holds(self, config: Any) -> bool:
+        """Whether the loop has its margins, or those that it had before."""
+        now, least = margins.of_config(config), self.least
+        return now is None or bool(now.stable and now.GM >= least[0] and now.PM >= least[1])
+
+    @property
+    def least(self) -> tuple[float, float]:
+        """Margins that must be kept, dB and degrees."""
+        if self.at_first is None:
+            return LEAST
+        return min(LEAST[0], self.at_first.GM - 1e-6), min(LEAST[1], self.at_first.PM - 1e-6)
+
+    def margins_words(self, config: Any) -> str:
+        """Why the margins are not enough."""
+        now, least = margins.of_config(config), self.least
+        if now is None or not now.stable:
+            return "the loop would be unstable"
+        return f"{now.GM:.1f} dB and {now.PM:.0f} degrees would be left, {least[0]:.1f} and {least[1]:.0f} are asked for"
+
+    def worse_at_ends(self, remedy: Remedy, way: Mapping[str, Any]) -> str:
+        """Why a remedy is left out at an end of the interval of the effect that it is against; "" where it is not."""
+        effect = self.effects.get(remedy.against)
+        for end in effect.ends if effect is not None else ():
+            plant = with_size(self.plant, effect, end)
+            try:
+                without, with_it = (
+                    played.play(self.config(values), plant, self.seconds, self.judge, self.asked).figures
+                    for values in ({}, way)
+                )
+            except (UserError, ValueError):
+                continue  # a machine like that cannot be built
+            if with_it.rms > (1.0 + WORSE) * without.rms:
+                name, value = next(iter(end.items()))
+                return f"at {name} = {value:.4g}, an end of its interval, the error would rise"
+        return ""

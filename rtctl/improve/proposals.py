@@ -1,0 +1,206 @@
+"""Remedies proposed for a machine: of its description, of each effect by the kinds that its term declares, of the rest."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+
+from rtctl import machines
+from rtctl.config.load import written as plain
+from rtctl.design.margins import Margins
+from rtctl.improve import curve, sensor_table
+from rtctl.improve.found import Effect, Found
+from rtctl.improve.margins import delay
+from rtctl.improve.played import Judge
+from rtctl.improve.remedy import BASE, Remedy
+from rtctl.machines.profiles import profile_of
+
+BELOW = 0.9  # share of dry friction that is compensated: above it the machine creeps on by itself
+SHARES = (0.9, 1.0, 0.75, 0.5)  # of any other effect
+BANDS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # bandwidth of the observer in crossovers
+SLOWER = (0.8, 0.6)  # bandwidth of the reference
+INTEGRALS = (0.5, 0.25, 0.1)  # crossovers at which the integral meets the gain
+GRAINS = 2.0  # steps of the sensor within which the integral rests
+FEED = f"{BASE}.feedforward"
+
+
+class Ground(NamedTuple):
+    """What proposals are made from."""
+
+    found: Found
+    judge: Judge
+    margins: Margins | None
+    gain: float  # acceleration of the feedback for one unit of command; 0 where no feedforward can be made
+    travel: tuple[float, float]  # of the feedback
+
+
+def proposals(g: Ground) -> list[Remedy]:
+    """Every remedy in the order in which it is tried."""
+    out = list(description(g)) if g.gain else []
+    kinds = sorted(MAKERS, key=list(MAKERS).index)
+    for kind in kinds:
+        for effect in g.found.effects:
+            if kind in effect.term.remedies and (made := MAKERS[kind](g, effect)) is not None:
+                out.append(made)
+    merged: dict[tuple[str, str], Remedy] = {}
+    for remedy in (*out, *rest(g)):  # one table, one curve, one joint: they hold all effects at once
+        merged.setdefault((remedy.kind, remedy.against), remedy)
+    return list(merged.values())
+
+
+def description(g: Ground) -> list[Remedy]:
+    """Feedforward of what the description has: inertia, friction, weight, and what the velocity feedback takes."""
+    config = g.found.config
+    machine = machines.build(config)
+    lead = machine.dt * (0.5 + (config.loop.write == "next_tick"))
+    values = {f"{FEED}.lead": lead, f"{FEED}.velocity": 1.0, f"{FEED}.viscous": 1.0, f"{FEED}.friction": BELOW}
+    inertia = {f"{FEED}.inertia": 1.0} if config.law.shaper.bandwidth is not None else {}
+    own = profile_of(config.kind).feedforward
+    off = dict.fromkeys(own, 0.0)
+    ways = [{**values, **inertia, **off}]
+    if own:
+        ways.append({**values, f"{FEED}.friction": 0.0})
+    size = f"inertia, weight, viscous friction and {BELOW:g} of the dry friction of the description"
+    return [Remedy("description", "feedforward of the description", "the motion itself", size, tuple(ways))]
+
+
+def feedforward(g: Ground, effect: Effect) -> Remedy | None:
+    """The effect's own law along the reference."""
+    if not g.gain:
+        return None
+    path = f"{FEED}.effects.{effect.number}.share"
+    shares = (BELOW, 0.7) if any("{m}.dry" in line for line in effect.term.act.values()) else SHARES
+    ways = tuple({path: share} for share in shares)
+    note = "" if effect.term.axis not in ("position", "angle") else PLACE
+    return Remedy("feedforward", "feedforward of its own law", effect.words, effect.interval, ways, note)
+
+
+def static_curve(g: Ground, effect: Effect) -> Remedy | None:
+    """Inverse of the curve of all static effects of the drive."""
+    points = curve.inverse(g.found)
+    if points is None:
+        return None
+    return Remedy(
+        "curve", "inverse of the drive's curve", effect.words, effect.interval, ({f"{BASE}.inverse.points": points},)
+    )
+
+
+def joint(g: Ground, effect: Effect) -> Remedy | None:
+    """Reference through the joint."""
+    if not g.gain or not hasattr(g.found.config.machine, "bodies"):
+        return None
+    ways = ({f"{FEED}.through": g.judge.words},)
+    return Remedy("joint", f"reference of {g.judge.words} through the joint", effect.words, effect.interval, ways)
+
+
+def ahead(g: Ground, effect: Effect) -> Remedy | None:
+    """Reference taken ahead by the delay of the command."""
+    extra = delay(effect.entry, "command", g.found.config)
+    if not g.gain or extra <= 0.0:
+        return None
+    base = machines.build(g.found.config).dt * (0.5 + (g.found.config.loop.write == "next_tick"))
+    return Remedy(
+        "lead", "reference ahead by the delay", effect.words, effect.interval, ({f"{FEED}.lead": base + extra},)
+    )
+
+
+def behind(g: Ground, effect: Effect) -> Remedy | None:
+    """Reference of the time that the sensor shows."""
+    late = delay(effect.entry, "reading", g.found.config)
+    if not g.gain or late <= 0.0:
+        return None
+    return Remedy(
+        "behind", "reference of the time that the sensor shows", effect.words, effect.interval,
+        ({f"{FEED}.behind": late},),
+    )  # fmt: skip
+
+
+def table(g: Ground, effect: Effect) -> Remedy | None:
+    """Table of the sensor's error."""
+    made = sensor_table.of(g.found, g.travel)
+    if made is None:
+        return None
+    values, anchored = made
+    note = "" if anchored else ANCHOR
+    return Remedy(
+        "table", "table of the sensor's error", effect.words, effect.interval, ({f"{BASE}.correction": values},), note
+    )
+
+
+def limits(g: Ground, effect: Effect) -> Remedy | None:
+    """Slower reference."""
+    bandwidth = g.found.config.law.shaper.bandwidth
+    if bandwidth is None:
+        return None
+    ways = tuple({"law.shaper.bandwidth": float(f"{share * bandwidth:.3g}")} for share in SLOWER)
+    return Remedy("limits", "slower reference", effect.words, effect.interval, ways)
+
+
+def notch(g: Ground, effect: Effect) -> Remedy | None:
+    """Notch where the effect's motion rings."""
+    hertz = getattr(effect.entry, "f_Hz", None)
+    if not isinstance(hertz, float) or not 0.0 < hertz < 0.45 * g.found.config.loop.rate:
+        return None
+    ways = tuple(
+        {f"{BASE}.filter.sections": [{"kind": "notch", "frequency": hertz, "zeta_z": depth, "zeta_p": width}]}
+        for depth, width in ((0.1, 0.5), (0.1, 0.3))
+    )
+    return Remedy("notch", f"notch at {hertz:.3g} Hz", effect.words, effect.interval, ways)
+
+
+def rest(g: Ground) -> list[Remedy]:
+    """What needs no name: integral and disturbance observer."""
+    config, out = g.found.config, []
+    crossover = g.margins.f_PM if g.margins is not None else 0.01 * config.loop.rate
+    gain = float(getattr(config.law.position, "gain", 0.0) or 0.0)
+    against = "what has no name" if g.found.unnamed else "what is left"
+    if g.gain and gain > 0.0:
+        ways = tuple(
+            {
+                f"{BASE}.observer.bandwidth": float(f"{band * crossover:.3g}"),
+                f"{BASE}.observer.acceleration": float(f"{abs(g.gain):.5g}"),
+                f"{BASE}.observer.share": 1.0,
+                f"{BASE}.observer.delay": int(config.loop.write == "next_tick"),
+            }
+            for band in BANDS
+        )
+        out.append(Remedy("observer", "disturbance observer", against, "bandwidth by the margins", ways))
+    if gain > 0.0 and getattr(config.law.position, "tau_i", None) is None:
+        zone = GRAINS * step_of(config)
+        ways = tuple(
+            {
+                f"{BASE}.integral.gain": float(f"{gain * share * crossover:.4g}"),
+                f"{BASE}.integral.dead_zone": float(f"{zone:.4g}"),
+            }
+            for share in INTEGRALS
+        )
+        size = f"rests within {zone:.3g} {machines.build(config).unit} of the reference"
+        out.append(Remedy("integral", "integral with a dead zone", against, size, ways))
+    return out
+
+
+def step_of(config: Any) -> float:
+    """One step of the feedback's sensor in the unit of the reference; 0 where nobody knows it."""
+    profile = profile_of(config.kind)
+    if profile.counts is not None:
+        return 1.0 / profile.counts(config)
+    from rtctl.machines.described_parts import parts_of
+
+    parts = parts_of(config)
+    sensor = parts.machine.sensors[parts.feedback]
+    return abs(sensor.grain / sensor.scale)
+
+
+def data_of(config: Any) -> list[dict[str, Any]]:
+    """Entries of `plant.physics` as plain data."""
+    return [dict(entry) for entry in plain(config).get("plant", {}).get("physics", [])]
+
+
+MAKERS: dict[str, Callable[[Ground, Effect], Remedy | None]] = {
+    "feedforward": feedforward, "curve": static_curve, "joint": joint, "lead": ahead, "behind": behind, "table": table,
+    "notch": notch, "limits": limits,
+}  # fmt: skip
+PLACE = "counts from where the counter is 0: start from the same place, or from an index mark"
+ANCHOR = (
+    "the sensor has no absolute zero: without an index mark the table has to be made anew at every start, and a table "
+    "of a wrong phase makes the error larger"
+)
