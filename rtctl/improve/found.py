@@ -109,7 +109,9 @@ def _effect(number: int, entry: Any, sizes: dict[tuple[str, str], Any]) -> Effec
         interval = told[name]
         low, high = _number(interval.get("low"), low), _number(interval.get("high"), high)
         unit, said = str(interval.get("unit", "")), "90 %"
-        factor = value / interval["value"] if interval.get("value") else 1.0  # units of the report to those of the entry
+        factor = (
+            value / interval["value"] if interval.get("value") else 1.0
+        )  # units of the report to those of the entry
         low, high = low * factor, high * factor
     ends = tuple({name: end} for end in (low, high) if _allowed(entry, name, end))
     words = f"{name} {value:.4g}, {said} {low:.4g} to {high:.4g} {unit}".rstrip()

@@ -8,6 +8,7 @@ speed or place (friction, cogging) has no linear model and is left out, as dry f
 Source: Pintelon & Schoukens, System Identification (2012), 2.2 (response by an impulse).
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -29,22 +30,17 @@ def of_config(config: Any) -> Margins | None:
 
     None where the loop gain crosses 1 nowhere.
     """
-    found = []
+    found, chain = [], Chain(config)
     for motor in (1, 2):
         parts = response.take(config, motor)
         high = margins.HIGH / parts.dt
-        chain = Chain(config)
         L, forward = margins.loops(parts)
         try:
-            found.append(_points(lambda f, L=L: L(f) * chain(f), lambda f, F=forward: F(f) * chain(f), high))
+            f = margins.refined(chain.behind(L), margins.LOW, high)
+            found.append(margins.points(f, chain(f) * L(f), chain(f) * forward(f)))
         except NoAnswer:
             return None
     return min(found, key=lambda m: (m.stable, min(m.GM / 6.0, m.PM / 45.0)))
-
-
-def _points(L: Any, forward: Any, high: float) -> Margins:
-    f = margins.refined(L, margins.LOW, high)
-    return margins.points(f, L(f), forward(f))
 
 
 class Chain:
@@ -60,6 +56,10 @@ class Chain:
             if TERMS[entry.term].axis == "frequency"
             and (found := pulse_response(entry, site, config.kind, self.h)) is not None
         ]
+
+    def behind(self, L: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
+        """A loop with these responses in it."""
+        return lambda f: self(f) * L(f)
 
     def __call__(self, f: np.ndarray) -> np.ndarray:
         total = np.ones(len(f), complex)

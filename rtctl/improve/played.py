@@ -60,7 +60,9 @@ def judge_of(config: Any, body: str | None = None) -> Judge:
     truth = machine.signals.truth
     if config.kind != DESCRIBED:
         if body is not None:
-            raise UserError(f"--body {body}: the body that follows is that of {truth}; --body is for a described machine")
+            raise UserError(
+                f"--body {body}: the body that follows is that of {truth}; --body is for a described machine"
+            )
         return Judge(truth, 1.0, truth.removeprefix("truth_"))
     described = config.machine
     moving = [name for name in described.bodies if not described.is_frame(name)]
@@ -124,9 +126,7 @@ def play(law: Any, plant: Any, seconds: float, judge: Judge, asked: np.ndarray |
     return Played(_figures(t, rows["target"][:n], wanted, y, outputs, tripped), t, ref[:n], y, outputs[0])
 
 
-def _figures(
-    t: np.ndarray, target: np.ndarray, ref: np.ndarray, y: np.ndarray, u: np.ndarray, tripped: str
-) -> Figures:
+def _figures(t: np.ndarray, target: np.ndarray, ref: np.ndarray, y: np.ndarray, u: np.ndarray, tripped: str) -> Figures:
     error = ref - y
     if not np.isfinite(error).all() or tripped:
         return Figures(np.inf, np.inf, np.inf, np.inf, np.inf, np.inf, tripped or "not a number")

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 
 from rtctl import machines
 from rtctl.config.load import written as plain
@@ -20,6 +21,9 @@ BANDS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # bandwidth of the observer in crosso
 SLOWER = (0.8, 0.6)  # bandwidth of the reference
 INTEGRALS = (0.5, 0.25, 0.1)  # crossovers at which the integral meets the gain
 GRAINS = 2.0  # steps of the sensor within which the integral rests
+LESS = (1.0, 0.8, 0.6, 0.45, 0.3)  # of the gains, where the margins ask for it
+GAINS = ("gain", "velocity_gain")  # of a position law, in proportion to which the loop gain is
+LEAST = (6.0, 45.0)  # dB and degrees
 FEED = f"{BASE}.feedforward"
 
 
@@ -35,7 +39,7 @@ class Ground(NamedTuple):
 
 def proposals(g: Ground) -> list[Remedy]:
     """Every remedy in the order in which it is tried."""
-    out = list(description(g)) if g.gain else []
+    out = margins_first(g) + (description(g) if g.gain else [])
     kinds = sorted(MAKERS, key=list(MAKERS).index)
     for kind in kinds:
         for effect in g.found.effects:
@@ -45,6 +49,37 @@ def proposals(g: Ground) -> list[Remedy]:
     for remedy in (*out, *rest(g)):  # one table, one curve, one joint: they hold all effects at once
         merged.setdefault((remedy.kind, remedy.against), remedy)
     return list(merged.values())
+
+
+def margins_first(g: Ground) -> list[Remedy]:
+    """Notch where the gain margin is least, or less gain, where the loop has not the margins that are asked for."""
+    found, law = g.margins, g.found.config.law.position
+    if found is None or (found.GM >= LEAST[0] and found.PM >= LEAST[1]):
+        return []
+    gains = {name: getattr(law, name) for name in GAINS if getattr(law, name, None)}
+    rate = g.found.config.loop.rate
+    notches: list[dict[str, Any]] = [{}]
+    if np.isfinite(found.f_GM) and found.f_GM < 0.4 * rate:
+        notches = [
+            {f"{BASE}.filter.sections": [notch_at(found.f_GM * shift, depth, width)]}
+            for depth, width in ((0.2, 0.4), (0.1, 0.5), (0.1, 0.8))
+            for shift in (1.0, 1.07)
+        ]
+    ways = [
+        {**notch, **{f"law.position.{name}": float(f"{share * value:.4g}") for name, value in gains.items()}}
+        for share in LESS
+        for notch in (*notches, {})
+    ]
+    size = f"the loop has {found.GM:.1f} dB and {found.PM:.0f} degrees"
+    ways = [way for way in ways if way]
+    return [Remedy("margins", "notch and gains for the margins", "the loop's margins", size, tuple(ways))]
+
+
+def notch_at(hertz: float, depth: float, width: float) -> dict[str, Any]:
+    """Settings of a notch at `hertz` that takes the gain to `depth` there."""
+    return {
+        "kind": "notch", "frequency": float(f"{hertz:.4g}"), "zeta_z": float(f"{depth * width:.4g}"), "zeta_p": width,
+    }  # fmt: skip
 
 
 def description(g: Ground) -> list[Remedy]:
@@ -141,8 +176,7 @@ def notch(g: Ground, effect: Effect) -> Remedy | None:
     if not isinstance(hertz, float) or not 0.0 < hertz < 0.45 * g.found.config.loop.rate:
         return None
     ways = tuple(
-        {f"{BASE}.filter.sections": [{"kind": "notch", "frequency": hertz, "zeta_z": depth, "zeta_p": width}]}
-        for depth, width in ((0.1, 0.5), (0.1, 0.3))
+        {f"{BASE}.filter.sections": [notch_at(hertz, depth, width)]} for depth, width in ((0.1, 0.5), (0.1, 0.3))
     )
     return Remedy("notch", f"notch at {hertz:.3g} Hz", effect.words, effect.interval, ways)
 

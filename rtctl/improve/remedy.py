@@ -73,7 +73,9 @@ def written(values: Mapping[str, Any], effects: list[dict[str, Any]]) -> dict[st
     if feedforward is not None:
         shares = feedforward.pop("effects", {})
         kept = [
-            {"effect": effects[int(i)], "share": share["share"]} for i, share in sorted(shares.items()) if share["share"]
+            {"effect": effects[int(i)], "share": share["share"]}
+            for i, share in sorted(shares.items())
+            if share["share"]
         ]
         for key in ("inertia", "friction", "viscous", "velocity"):
             feedforward.setdefault(key, 0.0)

@@ -25,9 +25,13 @@ MOST_DELAY = 8  # ticks
 
 class DisturbanceObserverSettings(Settings):
     bandwidth: float = quantity(unit="Hz", gt=0, help="of the estimate, w / 2 pi")
-    acceleration: float = quantity(unit="rad/s^2/V", gt=0, help="K, acceleration of the feedback for one unit of command")
+    acceleration: float = quantity(
+        unit="rad/s^2/V", gt=0, help="K, acceleration of the feedback for one unit of command"
+    )
     damping: float = quantity(0.0, unit="1/s", ge=0, help="B, viscous friction over inertia")
-    share: float = quantity(1.0, unit="", ge=0, le=1, help="part of the estimate that is compensated; 0 switches it off")
+    share: float = quantity(
+        1.0, unit="", ge=0, le=1, help="part of the estimate that is compensated; 0 switches it off"
+    )
     delay: int = quantity(1, unit="", ge=0, le=MOST_DELAY, help="ticks until a command acts")
 
 

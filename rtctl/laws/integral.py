@@ -34,7 +34,8 @@ def build(settings: IntegralSettings, dt: float) -> IntegralParams:
     """Coefficients for a tick of `dt` s. Raises ValueError where the tracking time is shorter than the tick."""
     if settings.tau_t < dt:
         raise ValueError(f"tau_t {settings.tau_t:g} s is shorter than the tick {dt:g} s; the integral would oscillate")
-    return IntegralParams(settings.gain * dt, settings.dead_zone, dt / settings.tau_t)
+    tracking = dt / settings.tau_t if settings.gain > 0 else 0.0  # an integral that is off stays at zero
+    return IntegralParams(settings.gain * dt, settings.dead_zone, tracking)
 
 
 @tick

@@ -9,8 +9,9 @@ A setting that is absent brings no line: the tick of a config without compensati
 
 from typing import Any, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
+from rtctl.config.unit_change import with_units
 from rtctl.idiom import Settings, quantity
 from rtctl.laws import (
     disturbance_observer,
@@ -44,9 +45,13 @@ class ModelFeedforwardSettings(Settings):
     """The command that the model needs to move along the reference."""
 
     inertia: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of the inertia; the shaper has to be on")
-    friction: float = quantity(0.9, unit="", ge=0, le=1, help="share of the description's dry friction, below breakaway")
+    friction: float = quantity(
+        0.9, unit="", ge=0, le=1, help="share of the description's dry friction, below breakaway"
+    )
     viscous: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of its viscous friction and of its springs")
-    velocity: float = quantity(1.0, unit="", ge=0, le=1, help="share of the velocity feedback that the reference takes off")
+    velocity: float = quantity(
+        1.0, unit="", ge=0, le=1, help="share of the velocity feedback that the reference takes off"
+    )
     lead: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time until a command acts; the reference is taken then")
     behind: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time by which the sensor shows the position late")
     through: str | None = Field(
@@ -82,6 +87,16 @@ class CompensationSettings(Settings):
     inverse: InverseCurveSettings | None = Field(default=None, description="of the drive's curve; none if absent")
 
 
+def in_units(symbols: dict[str, str]) -> Any:
+    """The settings class with other units; effects keep those of `plant.physics`."""
+    own = CompensationSettings.model_fields["feedforward"]
+    base = with_units(CompensationSettings, symbols)
+    return create_model(
+        "CompensationSettings", __base__=base, __module__=__name__, __doc__=base.__doc__,
+        feedforward=(ModelFeedforwardSettings | None, own),
+    )  # fmt: skip
+
+
 class Lines(NamedTuple):
     """What compensation brings into a tick."""
 
@@ -96,6 +111,9 @@ class Lines(NamedTuple):
     extra: str = ""  # added to the command
     inverse: tuple[str, ...] = ()  # after the limit's input is known
     track: tuple[str, ...] = ()  # after the limit
+
+
+NONE = Lines()
 
 
 class Signals(NamedTuple):

@@ -22,8 +22,17 @@ from rtctl.plants.linear import MOST_DRIVES
 from rtctl.tick import safety
 
 __all__ = [
-    "DescribedConfig", "config_class", "diagram", "metres_per_unit", "parts_of", "plant_diagram", "radius", "shares_of",
-    "mechanics", "signals", "unit",
+    "DescribedConfig",
+    "config_class",
+    "diagram",
+    "mechanics",
+    "metres_per_unit",
+    "parts_of",
+    "plant_diagram",
+    "radius",
+    "shares_of",
+    "signals",
+    "unit",
 ]  # fmt: skip
 
 SETTLE_FLOOR = 0.0  # two percent of the step say it all

@@ -23,7 +23,7 @@ from rtctl.laws.reference import ReferenceSettings
 from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
 from rtctl.machines.base import COMMON_COLUMNS, MachineSettings
-from rtctl.machines.compensation import CompensationSettings, ModelFeedforwardSettings
+from rtctl.machines.compensation import CompensationSettings, in_units
 from rtctl.machines.ldu import PdLawSettings, PositionSettings
 from rtctl.machines.physics import PhysicsTerm
 from rtctl.plants.graph.description import Description
@@ -139,7 +139,8 @@ def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
     limits, laws = with_units(LimitSettings, symbols), with_units(DescribedLawSettings, symbols)
     shaper = DescribedLawSettings.model_fields["shaper"]  # its bandwidth is in rad/s, of whatever machine
     fields: dict[str, Any] = {"limit": (limits, limits(high=full)), "shaper": (ShaperSettings, shaper)}
-    fields["compensation"] = _compensation(symbols)
+    around = in_units(symbols)
+    fields["compensation"] = (around, around())
     law: Any = create_model("DescribedLawSettings", __base__=laws, __module__=__name__, __doc__=laws.__doc__, **fields)
     safety, reference = with_units(SafetySettings, symbols), with_units(ReferenceSettings, symbols)
     played = with_units(DescribedConfig, symbols).model_fields["excitation"]
@@ -153,17 +154,6 @@ def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
         "DescribedConfig", __base__=DescribedConfig, __module__=__name__, __doc__=DescribedConfig.__doc__, **fields
     )
     return made
-
-
-def _compensation(symbols: dict[str, str]) -> tuple[Any, Any]:
-    """Compensation in the units of a machine; effects keep the units of `plant.physics`."""
-    own = CompensationSettings.model_fields["feedforward"]
-    base = with_units(CompensationSettings, symbols)
-    kept: Any = create_model(
-        "CompensationSettings", __base__=base, __module__=__name__, __doc__=base.__doc__,
-        feedforward=(ModelFeedforwardSettings | None, own),
-    )  # fmt: skip
-    return kept, kept()
 
 
 def _closable(machine: Description) -> list[str]:

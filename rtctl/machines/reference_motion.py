@@ -64,7 +64,9 @@ def motion(mechanics: Mechanics) -> Motion:
     phi = _constrained(K, M, c)[:nq, nq]
     plus, minus = (M * b for b in forces)
     if abs(phi @ plus) < 1e-12 * np.linalg.norm(phi) * np.linalg.norm(plus):
-        raise ValueError("the command does not move the feedback along its reference; a feedforward has nothing to act by")
+        raise ValueError(
+            "the command does not move the feedback along its reference; a feedforward has nothing to act by"
+        )
     return Motion(phi, M, D, K, plus, minus)
 
 
