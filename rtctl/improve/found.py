@@ -1,4 +1,4 @@
-"""What a diagnosis found, as an improvement takes it: the machine as it is, its law, and every effect with its interval.
+"""What a diagnosis found, as an improvement takes it: machine, law, and every effect with its interval.
 
 A model is a config: `model.yaml` of `rtctl diagnose`, or one of the user's own with effects in `plant.physics`. A
 diagnosis is the folder with diagnosis.json and model.yaml, or the bundle that holds it.

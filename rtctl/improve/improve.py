@@ -31,7 +31,8 @@ class Improved(NamedTuple):
     """An improved config, and the proof on the emulated fitted model."""
 
     found: Found
-    config: Any
+    config: Any  # fused, with the reference that was played
+    mode: str  # loop.mode that the config had
     judge: Judge
     tried: tuple[Tried, ...]
     before: Played
@@ -47,6 +48,7 @@ class Improved(NamedTuple):
 
 def improve(found: Found, body: str | None = None, progress: Progress = lambda _: None) -> Improved:
     """Propose, try and keep remedies. Raises NoAnswer where the machine does not run with the law that it has."""
+    mode = found.config.loop.mode
     found = found._replace(config=played.with_reference(found.config))
     config = found.config
     judge = played.judge_of(config, body)
@@ -54,8 +56,8 @@ def improve(found: Found, body: str | None = None, progress: Progress = lambda _
     before = played.play(config, config, seconds, judge)
     if before.figures.tripped:
         raise NoAnswer(
-            f"the emulated machine trips with the law that it has ({before.figures.tripped}): there is nothing to compare "
-            "with; let `rtctl tune` find a law that holds it"
+            f"the emulated machine trips with the law that it has ({before.figures.tripped}): there is nothing to "
+            "compare with; let `rtctl tune` find a law that holds it"
         )
     at_first = margins.of_config(config)
     ground = Ground(found, judge, at_first, acceleration(config), (float(before.ref.min()), float(before.ref.max())))
@@ -69,7 +71,7 @@ def improve(found: Found, body: str | None = None, progress: Progress = lambda _
     after = played.play(made, config, seconds, judge, before.ref)
     if after.figures.tripped or after.figures.rms > before.figures.rms:
         raise NoAnswer("all remedies together are worse than none; the config stays as it is")
-    return Improved(found, made, judge, tuple(tried), before, after, at_first, margins.of_config(made))
+    return Improved(found, made, mode, judge, tuple(tried), before, after, at_first, margins.of_config(made))
 
 
 def acceleration(config: Any) -> float:
@@ -151,7 +153,9 @@ class Trial:
     def of_margins(self, remedy: Remedy) -> Tried:
         """Keep the first way, that of the highest gain, that gives the margins for a little of the error."""
         before = self.rms
-        reason = f"no notch and no lower gain gives {LEAST[0]:g} dB and {LEAST[1]:g} degrees for {GIVEN:.0%} of the error"
+        reason = (
+            f"no notch and no lower gain gives {LEAST[0]:g} dB and {LEAST[1]:g} degrees for {GIVEN:.0%} of the error"
+        )
         for way in remedy.ways:
             config = self.config(way)
             now = margins.of_config(config)

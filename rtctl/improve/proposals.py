@@ -1,4 +1,4 @@
-"""Remedies proposed for a machine: of its description, of each effect by the kinds that its term declares, of the rest."""
+"""Remedies proposed for a machine: of its description, of each effect as its term declares, of the rest."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

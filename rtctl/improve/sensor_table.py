@@ -1,4 +1,4 @@
-"""Table of a sensor's error over its travel, by the effects' own lines: what is to be added to what the sensor shows."""
+"""Table of a sensor's error over its travel, by the effects' own lines: what is to be added to what it shows."""
 
 from typing import Any
 

@@ -3,7 +3,7 @@
     q = phi r,  v = phi r',  a = phi r''               reference motion of every coordinate, rigid
     F = f(q, v) - dry(q, v) sign(r') - D v - K q - M a         effects by their own laws, and the description
     u = -phi' F / g + k_v r'                           g: force along the motion for one unit of command
-    shift = c C F                                      how far springs let the feedback run ahead of the body behind them
+    shift = c C F                                      how far the feedback runs ahead of the body behind springs
 
 The reference is taken `lead` s ahead, the time until a command acts. Dry friction keeps the sign of the last motion at
 rest and is compensated by a share below breakaway. k_v r' is what a velocity feedback takes from the command.
@@ -39,6 +39,7 @@ class ModelFeedforwardParams(NamedTuple):
     behind: float  # s
     k_v: float  # V s per unit
     shaped: int  # 1: speed and acceleration come from the shaper
+    inputs: np.ndarray  # (MOST_DRIVES,) of each drive for one unit of command
     shift: np.ndarray  # c C, (MOST_BODIES,) unit per force
     bend: np.ndarray  # C, (MOST_BODIES, MOST_BODIES), deflection of each coordinate
     dt: float  # s
@@ -56,6 +57,7 @@ def begin(p, s, ref, v, a):
     m = s.m
     if s.primed == 0:
         plant.prepare(p.graph, m)
+        plant.assemble(p.graph, m)
         s.ref = ref
         s.primed = 1
         s.m.t = 0.0
@@ -83,6 +85,8 @@ def begin(p, s, ref, v, a):
         m.f[i] = -p.viscous[i] * v - p.stiff[i] * ahead
         m.dry_base[i] = p.dry[i]
         m.dry[i] = p.dry[i]
+    for j in range(m.nu):
+        m.u[j] = p.inputs[j] * s.u
     for j in range(m.nl):
         m.link_T[j] = 0.0
         m.link_e[j] = 0.0
@@ -103,8 +107,11 @@ def keep(s):
 def blend(s, share):
     """Take a share of what an effect has added since `keep`."""
     for i in range(s.m.nq):
-        s.m.f[i] = s.f[i] + share * (s.m.f[i] - s.f[i])
-        s.m.dry[i] = s.dry[i] + share * (s.m.dry[i] - s.dry[i])
+        if share == 0.0:  # whatever it has added
+            s.m.f[i], s.m.dry[i] = s.f[i], s.dry[i]
+        else:
+            s.m.f[i] = s.f[i] + share * (s.m.f[i] - s.f[i])
+            s.m.dry[i] = s.dry[i] + share * (s.m.dry[i] - s.dry[i])
 
 
 @tick
@@ -136,5 +143,6 @@ def reset(p, s):
     s.primed = 0
     s.direction = 0.0
     s.shift = 0.0
+    s.u = 0.0
     for i in range(MOST_BODIES):
         s.f[i] = 0.0

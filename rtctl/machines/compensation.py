@@ -122,8 +122,9 @@ class Signals(NamedTuple):
     law: str  # what the position law gives
     error: str
     feedback: str
-    wanted: str  # command before the limit
-    written: str  # after it
+    wanted: str  # command before the limit, and before the inverse of the drive's curve
+    asked: str  # what the limit is asked for
+    written: str  # what it lets through
     channel: dict[int, float]  # of each drive: share of the command; none where drives are shared out otherwise
 
 
@@ -158,7 +159,7 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         blocks.append(Block("integral", integral.build(settings.integral, dt), integral.INTEGRAL_STATE))
         reset.append("integral.reset(p.integral, s.integral)")
         law.append(f"u_integral = integral.step(p.integral, s.integral, {names.error})")
-        track.append(f"integral.track(p.integral, s.integral, {names.wanted}, {names.written})")
+        track.append(f"integral.track(p.integral, s.integral, {names.asked}, {names.written})")
         extra.append("u_integral")
     if settings.observer is not None:
         known = "s.model_feedforward.known" if settings.feedforward is not None else "0.0"
@@ -167,7 +168,8 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         blocks.append(Block("observer", made, disturbance_observer.DISTURBANCE_OBSERVER_STATE))
         reset.append("disturbance_observer.reset(p.observer, s.observer)")
         law.append(f"u_observer = disturbance_observer.step(p.observer, s.observer, {names.feedback})")
-        track.append(f"disturbance_observer.track(p.observer, s.observer, {names.written}, {known})")
+        acting = names.written if settings.inverse is None else f"{names.wanted} + ({names.written} - {names.asked})"
+        track.append(f"disturbance_observer.track(p.observer, s.observer, {acting}, {known})")
         extra.append("u_observer")
     if settings.correction is not None:
         uses.append("rtctl.laws.error_table")
@@ -176,7 +178,7 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
     if settings.inverse is not None:
         uses.append("rtctl.laws.inverse_curve")
         blocks.append(Block("inverse", inverse_curve.build(settings.inverse, dt), None))
-        inverse.append("inverse_curve.step(p.inverse, {u})")
+        inverse.append(f"{names.asked} = inverse_curve.step(p.inverse, {names.wanted})")
     return Lines(
         tuple(uses), tuple(blocks), tuple(read), tuple(reset), tuple(reference), tuple(filtered), shift, tuple(law),
         "".join(f" + {name}" for name in extra), tuple(inverse), tuple(track),

@@ -89,12 +89,11 @@ def diagram(config: Any, dt: float) -> Diagram:
         "e": "y.position_error", "x": "y.feedback", "v": rate, "ref": "y.ref", "v_ref": "s.shaper.speed",
         "a_ref": "s.shaper.acceleration", "u": f"p.machine.shares[{number}] * y.{column}",
     }  # fmt: skip
-    position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": "y.u_c", "u_written": "u"})
-    names = compensation.Signals(
-        "u_fb", "y.position_error", "y.feedback", "y.u_c", "u", {number: float(shares_of(config)[number])}
-    )  # fmt: skip
+    asked = "y.u_c" if law.compensation.inverse is None else "asked"
+    position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": asked, "u_written": "u"})
+    share = {number: float(shares_of(config)[number])}
+    names = compensation.Signals("u_fb", "y.position_error", "y.feedback", "y.u_c", asked, "u", share)
     more = compensation.lines(law.compensation, names, config.kind, lambda: mechanics(config, dt), dt)
-    asked = more.inverse[0].format(u="y.u_c") if more.inverse else "y.u_c"
     blocks = (
         Block("machine", _params(config, dt), DESCRIBED_STATE),
         Block("safety", safety.build(config.safety, dt), safety.SAFETY_STATE),
@@ -164,6 +163,7 @@ def diagram(config: Any, dt: float) -> Diagram:
                 "s.machine.gains = c.gains",
                 *more.law,
                 f"y.u_c = s.machine.u_fb + y.w{more.extra}",
+                *more.inverse,
                 f"u = limit.step(p.limit, s.limit, {asked})",
                 *position.track,
                 *more.track,

@@ -22,12 +22,12 @@ def mechanics(config: Any, dt: float) -> Mechanics:
     parts = parts_of(config)
     if parts.is_speed:
         raise ValueError(
-            f"law.compensation.feedforward: the loop closes on a speed, that of {parts.feedback}; a feedforward along the "
-            "reference takes a position"
+            f"law.compensation.feedforward: the loop closes on a speed, that of {parts.feedback}; a feedforward "
+            "along the reference takes a position"
         )
     if code_of(config.machine) is not None:
         raise ValueError(
-            "law.compensation.feedforward: machine.mechanics is a file; a feedforward is made of joints and bodies alone"
+            "law.compensation.feedforward: machine.mechanics is a file; a feedforward is made of joints and bodies"
         )
     machine, _ = sprung(config.machine, config.plant.physics)
     layout, values, graph = graph_of(machine, dt)
@@ -44,6 +44,7 @@ def mechanics(config: Any, dt: float) -> Mechanics:
         plus=command,
         minus=command,
         c=sensor_row(machine, graph, parts.feedback),
+        inputs=shares_of(config),
         rows=rows,
         place_of=lambda entry: place_of(layout, values, entry),
         k_v=float(getattr(config.law.position, "velocity_gain", 0.0)),

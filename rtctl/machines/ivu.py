@@ -197,9 +197,8 @@ LAW_SIGNALS = {
     "e": "y.capstan_error", "x": "y.capstan", "v": "y.capstan_speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
     "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
 }  # fmt: skip
-NAMES = compensation.Signals(
-    "u_pd", "y.capstan_error", "y.capstan", "y.u_c", "min(max(y.u_c, p.limit.low), p.limit.high)", {}
-)
+WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
+NAMES = compensation.Signals("u_pd", "y.capstan_error", "y.capstan", "y.u_c", "y.u_c", WRITTEN, {})
 STAGES = (
     (
         "read",
@@ -362,7 +361,7 @@ def stages(
         READ: more.read,
         REFERENCE: more.reference,
         ERROR: (f"y.capstan_error = y.ref{more.shift} - y.capstan",),
-        COMMAND: (*more.law, f"y.u_c = {more.inverse[0].format(u=command) if more.inverse else command}"),
+        COMMAND: (*more.law, f"y.u_c = {command}", *more.inverse),
         TRACK: more.track,
     }
     return tuple((name, tuple(part for line in body for part in put.get(line, (line,)))) for name, body in STAGES)

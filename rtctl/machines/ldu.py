@@ -229,16 +229,12 @@ LAW_SIGNALS = {
     "e": "y.position_error", "x": "y.position", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
     "a_ref": "s.shaper.acceleration", "u": "y.u",
 }  # fmt: skip
-TRACKED = {"u_wanted": "u_c", "u_written": "u"}
-
-
-NAMES = compensation.Signals("u_fb", "y.position_error", "y.position", "u_c", "u", {0: 1.0})
 
 
 def stages(config: LduConfig, more: compensation.Lines = compensation.NONE) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Lines of the tick for the law, the feedback and the compensation of this config."""
-    asked = more.inverse[0].format(u="u_c") if more.inverse else "u_c"
-    law = own_law.lines(config.law.position, "u_fb", LAW_SIGNALS, TRACKED)
+    asked = "asked" if more.inverse else "u_c"
+    law = own_law.lines(config.law.position, "u_fb", LAW_SIGNALS, {"u_wanted": asked, "u_written": "u"})
     encoder = position = "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
     if config.sensors.feedback == "scale":
         position = "y.scale"
@@ -290,6 +286,7 @@ def stages(config: LduConfig, more: compensation.Lines = compensation.NONE) -> t
                 "u_ff += p.inertia.volts * s.shaper.acceleration",
                 *more.law,
                 f"u_c = s.machine.u_fb + u_ff + y.w{more.extra}",
+                *more.inverse,
                 f"u = limit.step(p.limit, s.limit, {asked})",
                 *law.track,
                 *more.track,
@@ -341,7 +338,9 @@ def play(t, s, c, k):
 def diagram(config: LduConfig, dt: float) -> Diagram:
     """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
     law = config.law
-    more = compensation.lines(law.compensation, NAMES, config.kind, lambda: mechanics(config, dt), dt)
+    asked = "u_c" if law.compensation.inverse is None else "asked"
+    names = compensation.Signals("u_fb", "y.position_error", "y.position", "u_c", asked, "u", {0: 1.0})
+    more = compensation.lines(law.compensation, names, config.kind, lambda: mechanics(config, dt), dt)
     position = own_law.law_of(law.position)
     output = at_mio_16de.build_output(config.board.output, dt)
     volts = law.friction.F_c / law.friction.newton_per_volt

@@ -25,4 +25,4 @@ def mechanics(config: Any, dt: float) -> Mechanics:
     """Linear model by its parts."""
     p = plant.build(config.plant, dt, (2 * np.pi * config.plant.bandwidth, config.plant.damping))
     found = model(config, p, {}, 1)
-    return listed(config, p, found, found)
+    return listed(config, p, found, found, [ldu_amplifier.AMPERE_PER_VOLT])

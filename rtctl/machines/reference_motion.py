@@ -13,7 +13,7 @@ import numpy as np
 
 from rtctl.laws.model_feedforward import ModelFeedforwardParams
 from rtctl.plants.graph.params import GraphParams
-from rtctl.plants.linear import MOST_BODIES
+from rtctl.plants.linear import MOST_BODIES, MOST_DRIVES
 
 
 class Mechanics(NamedTuple):
@@ -24,6 +24,7 @@ class Mechanics(NamedTuple):
     plus: np.ndarray  # (nx,) of a positive command
     minus: np.ndarray  # (nx,) of a negative command
     c: np.ndarray  # (nx,) feedback by state
+    inputs: np.ndarray  # (nu,) of each drive for one unit of command
     rows: dict[str, np.ndarray]  # (nq,) position of each body by coordinate
     place_of: Callable[[Any], Any]  # entry of a physics list -> Spot
     k_v: float  # velocity feedback of the law, command per unit and s
@@ -74,13 +75,14 @@ def params(mechanics: Mechanics, settings: Any, dt: float) -> ModelFeedforwardPa
     """Params of the feedforward for a tick of `dt` s. Raises ValueError where a setting does not fit the machine."""
     made, g = motion(mechanics), mechanics.graph
     nq = g.nq
-    bend, shift = np.zeros((nq, nq)), np.zeros(nq)
+    shift, row = np.zeros(nq), mechanics.c[:nq]
     if settings.through is not None:
-        row = mechanics.rows.get(settings.through)
-        if row is None:
+        if settings.through not in mechanics.rows:
             known = ", ".join(mechanics.rows) or "none"
             raise ValueError(f"feedforward.through: there is no body '{settings.through}'; there is {known}")
-        bend = _constrained(made.K, made.M, row)[:nq, :nq]
+        row = mechanics.rows[settings.through]
+    bend = _constrained(made.K, made.M, row)[:nq, :nq]
+    if settings.through is not None:
         shift = mechanics.c[:nq] @ bend
     free = g._replace(winds=0)
     return ModelFeedforwardParams(
@@ -97,6 +99,7 @@ def params(mechanics: Mechanics, settings: Any, dt: float) -> ModelFeedforwardPa
         behind=settings.behind,
         k_v=settings.velocity * mechanics.k_v,
         shaped=int(mechanics.shaped),
+        inputs=np.pad(mechanics.inputs, (0, MOST_DRIVES - len(mechanics.inputs))),
         shift=_wide(shift),
         bend=_square(bend),
         dt=dt,
