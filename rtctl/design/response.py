@@ -138,6 +138,10 @@ def compensated(parts: Loop, K: np.ndarray, f: np.ndarray, path: str) -> np.ndar
         K = K * np.prod([biquad_response(section, back) for section in blocks["filter"]], axis=0)
     if "integral" in blocks:
         K = K + blocks["integral"].gain / (1 - back)
+    if "predictor" in blocks and path == "feedback":
+        p, v = blocks["predictor"], blocks["velocity"]
+        ahead = 1 + p.n * p.dt * difference(v.a, v.dt, back)
+        K = K * ahead / (1 + K * sum(p.K * p.dt**2 * (n - 0.5) * back**n for n in range(1, p.n + 1)))
     if "observer" in blocks:
         to_y, to_u = disturbance_observer.response(blocks["observer"], f)
         K = (K + to_y if path == "feedback" else K) / (1 - to_u)

@@ -5,6 +5,7 @@ diagnosis is the folder with diagnosis.json and model.yaml, or the bundle that h
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from rtctl.machines import OWN, class_of
 from rtctl.plants.physics import TERMS
 
 MODEL, RESULT, FOLDER = "model.yaml", "diagnosis.json", "diagnosis"
+NOTHING: Mapping[str, Any] = {}
 UNSURE = 0.1  # share of a size by which it may be off where no interval is known
 
 
@@ -56,9 +58,14 @@ def load(path: Path, config: str | None, reference: str | None) -> Found:
         assert model is not None
         made = made.model_copy(update={"reference": load_settings(find(reference), model, [])})
     told = json.loads(result.read_text("utf-8")) if result is not None else {}
+    return of_config(made, str(path), told)
+
+
+def of_config(config: Any, source: str, told: Mapping[str, Any] = NOTHING) -> Found:
+    """What a config holds in `plant.physics`, with the intervals of a diagnosis `told` as in diagnosis.json."""
     sizes = {(e["name"], e["node"]): e["parameters"] for e in told.get("effects", ())}
-    effects = tuple(_effect(i, entry, sizes) for i, entry in enumerate(made.plant.physics))
-    return Found(made, effects, told.get("verdict") == "unnamed", str(path))
+    effects = tuple(_effect(i, entry, sizes) for i, entry in enumerate(config.plant.physics))
+    return Found(config, effects, told.get("verdict") == "unnamed", source)
 
 
 def _files(path: Path) -> tuple[Path, Path | None]:

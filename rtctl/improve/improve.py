@@ -204,7 +204,9 @@ class Trial:
     def worse_at_ends(self, remedy: Remedy, way: Mapping[str, Any]) -> str:
         """Why a remedy is left out at an end of the interval of the effect that it is against; "" where it is not."""
         effect = self.effects.get(remedy.against)
-        for end in effect.ends if effect is not None else ():
+        if effect is None:
+            return ""
+        for end in effect.ends:
             plant = with_size(self.plant, effect, end)
             try:
                 without, with_it = (

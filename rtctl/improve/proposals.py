@@ -13,6 +13,7 @@ from rtctl.improve.found import Effect, Found
 from rtctl.improve.margins import delay
 from rtctl.improve.played import Judge
 from rtctl.improve.remedy import BASE, Remedy
+from rtctl.laws import predictor
 from rtctl.machines.profiles import profile_of
 
 BELOW = 0.9  # share of dry friction that is compensated: above it the machine creeps on by itself
@@ -21,6 +22,9 @@ BANDS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # bandwidth of the observer in crosso
 SLOWER = (0.8, 0.6)  # bandwidth of the reference
 INTEGRALS = (0.5, 0.25, 0.1)  # crossovers at which the integral meets the gain
 GRAINS = 2.0  # steps of the sensor within which the integral rests
+REPEATS = (1.0, 0.3)  # crossovers at which the integral of a part of the turn meets the gain
+TURNS = 1.5  # turns that the reference must make for what comes back with them
+SLOW = 0.02  # of the travel, per second, below which nothing is learned
 LESS = (1.0, 0.8, 0.6, 0.45, 0.3)  # of the gains, where the margins ask for it
 GAINS = ("gain", "velocity_gain")  # of a position law, in proportion to which the loop gain is
 LEAST = (6.0, 45.0)  # dB and degrees
@@ -149,6 +153,16 @@ def behind(g: Ground, effect: Effect) -> Remedy | None:
     )  # fmt: skip
 
 
+def predicted(g: Ground, effect: Effect) -> Remedy | None:
+    """Law closed on the position after the delay."""
+    late, dt = delay(effect.entry, "command", g.found.config), machines.build(g.found.config).dt
+    ticks = round(late / dt) + (g.found.config.loop.write == "next_tick")
+    if not g.gain or late <= 0.0 or not 1 <= ticks <= predictor.MOST:
+        return None
+    ways = ({f"{BASE}.predictor": {"delay": ticks, "acceleration": float(f"{abs(g.gain):.5g}")}},)
+    return Remedy("delay", f"predictor over {ticks} ticks", effect.words, effect.interval, ways)
+
+
 def table(g: Ground, effect: Effect) -> Remedy | None:
     """Table of the sensor's error."""
     made = sensor_table.of(g.found, g.travel)
@@ -198,6 +212,19 @@ def rest(g: Ground) -> list[Remedy]:
             for band in BANDS
         )
         out.append(Remedy("observer", "disturbance observer", against, "bandwidth by the margins", ways))
+    turn = turn_of(config)
+    if gain > 0.0 and turn is not None and g.travel[1] - g.travel[0] > TURNS * turn and _comes_back(g):
+        fast = (g.travel[1] - g.travel[0]) * SLOW
+        ways = tuple(
+            {
+                f"{BASE}.repetitive": {
+                    "period": turn, "gain": float(f"{gain * share * crossover:.4g}"), "slow": float(f"{fast:.3g}"),
+                    "lead": machines.build(config).dt * (0.5 + (config.loop.write == "next_tick")),
+                }
+            }
+            for share in REPEATS
+        )  # fmt: skip
+        out.append(Remedy("repetitive", "repetitive control over a turn", against, "learns while it moves", ways))
     if gain > 0.0 and getattr(config.law.position, "tau_i", None) is None:
         zone = GRAINS * step_of(config)
         ways = tuple(
@@ -210,6 +237,19 @@ def rest(g: Ground) -> list[Remedy]:
         size = f"rests within {zone:.3g} {machines.build(config).unit} of the reference"
         out.append(Remedy("integral", "integral with a dead zone", against, size, ways))
     return out
+
+
+def _comes_back(g: Ground) -> bool:
+    """Whether what is left may come back with the turn: it has no name, or goes with the angle."""
+    return g.found.unnamed or any(effect.term.axis == "angle" for effect in g.found.effects)
+
+
+def turn_of(config: Any) -> float | None:
+    """Travel of the reference for a turn of what it is measured at; None where nothing turns, or on a speed."""
+    machine = machines.build(config)
+    if machine.unit == "rad":
+        return 2.0 * np.pi
+    return 2.0 * np.pi * machine.radius if machine.unit == "m" and machine.radius else None
 
 
 def step_of(config: Any) -> float:
@@ -230,7 +270,7 @@ def data_of(config: Any) -> list[dict[str, Any]]:
 
 
 MAKERS: dict[str, Callable[[Ground, Effect], Remedy | None]] = {
-    "feedforward": feedforward, "curve": static_curve, "joint": joint, "lead": ahead, "behind": behind, "table": table,
+    "feedforward": feedforward, "curve": static_curve, "joint": joint, "lead": ahead, "behind": behind, "delay": predicted, "table": table,
     "notch": notch, "limits": limits,
 }  # fmt: skip
 PLACE = "counts from where the counter is 0: start from the same place, or from an index mark"

@@ -18,13 +18,21 @@ from rtctl.laws import (
     error_table,
     integral,
     inverse_curve,
+    iterative_learning,
+    map_feedforward,
     model_feedforward,
+    predictor,
+    repetitive,
     sections,
 )
 from rtctl.laws.disturbance_observer import DisturbanceObserverSettings
 from rtctl.laws.error_table import ErrorTableSettings
 from rtctl.laws.integral import IntegralSettings
 from rtctl.laws.inverse_curve import InverseCurveSettings
+from rtctl.laws.iterative_learning import IterativeLearningSettings
+from rtctl.laws.map_feedforward import MapFeedforwardSettings
+from rtctl.laws.predictor import PredictorSettings
+from rtctl.laws.repetitive import RepetitiveSettings
 from rtctl.laws.sections import SectionsSettings
 from rtctl.machines.base import Block, physics_lines
 from rtctl.machines.physics import PhysicsTerm
@@ -81,6 +89,18 @@ class CompensationSettings(Settings):
     filter: SectionsSettings | None = Field(
         default=None, description="notches and filters behind the position law; none if absent"
     )
+    map: MapFeedforwardSettings | None = Field(
+        default=None, description="command over angle or place, from a table; none if absent"
+    )
+    learning: IterativeLearningSettings | None = Field(
+        default=None, description="command over the time of the move, learned run by run; none if absent"
+    )
+    repetitive: RepetitiveSettings | None = Field(
+        default=None, description="learns while it moves what comes back with every turn; none if absent"
+    )
+    predictor: PredictorSettings | None = Field(
+        default=None, description="the law closes on the position after the delay; none if absent"
+    )
     correction: ErrorTableSettings | None = Field(
         default=None, description="table of what is to be added to the feedback, by the feedback; none if absent"
     )
@@ -107,6 +127,7 @@ class Lines(NamedTuple):
     reference: tuple[str, ...] = ()  # once the shaped reference is known
     filter: tuple[str, ...] = ()  # of the position law's output
     shift: str = ""  # added to the reference where the error is made
+    closed: str = ""  # position that the law closes on, where it is not the feedback
     law: tuple[str, ...] = ()  # into `extra`, V to add to the command
     extra: str = ""  # added to the command
     inverse: tuple[str, ...] = ()  # after the limit's input is known
@@ -122,6 +143,7 @@ class Signals(NamedTuple):
     law: str  # what the position law gives
     error: str
     feedback: str
+    speed: str  # measured, of the tick before where the machine has it later
     wanted: str  # command before the limit, and before the inverse of the drive's curve
     asked: str  # what the limit is asked for
     written: str  # what it lets through
@@ -171,6 +193,31 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         acting = names.written if settings.inverse is None else f"{names.wanted} + ({names.written} - {names.asked})"
         track.append(f"disturbance_observer.track(p.observer, s.observer, {acting}, {known})")
         extra.append("u_observer")
+    if settings.map is not None:
+        uses.append("rtctl.laws.map_feedforward")
+        blocks.append(Block("map", map_feedforward.build(settings.map, dt), None))
+        law.append("u_map = map_feedforward.step(p.map, y.ref, s.shaper.speed)")
+        extra.append("u_map")
+    if settings.learning is not None:
+        uses.append("rtctl.laws.iterative_learning")
+        blocks.append(Block("learning", iterative_learning.build(settings.learning, dt), None))
+        now = "s.reference.mode, k - s.reference.k0, t.reference.period"
+        law.append(f"u_learned = iterative_learning.step(p.learning, {now})")
+        extra.append("u_learned")
+    if settings.repetitive is not None:
+        uses.append("rtctl.laws.repetitive")
+        blocks.append(Block("repetitive", repetitive.build(settings.repetitive, dt), repetitive.REPETITIVE_STATE))
+        reset.append("repetitive.reset(p.repetitive, s.repetitive)")
+        now = f"{names.feedback}, s.shaper.speed, {names.error}"
+        law.append(f"u_repeated = repetitive.step(p.repetitive, s.repetitive, {now})")
+        extra.append("u_repeated")
+    closed = names.feedback
+    if settings.predictor is not None:
+        uses.append("rtctl.laws.predictor")
+        blocks.append(Block("predictor", predictor.build(settings.predictor, dt), predictor.PREDICTOR_STATE))
+        reset.append("predictor.reset(p.predictor, s.predictor)")
+        track.append(f"predictor.track(p.predictor, s.predictor, {names.written})")
+        closed = f"predictor.step(p.predictor, s.predictor, {names.feedback}, {names.speed})"
     if settings.correction is not None:
         uses.append("rtctl.laws.error_table")
         blocks.append(Block("correction", error_table.build(settings.correction, dt), None))
@@ -180,9 +227,19 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         blocks.append(Block("inverse", inverse_curve.build(settings.inverse, dt), None))
         inverse.append(f"{names.asked} = inverse_curve.step(p.inverse, {names.wanted})")
     return Lines(
-        tuple(uses), tuple(blocks), tuple(read), tuple(reset), tuple(reference), tuple(filtered), shift, tuple(law),
-        "".join(f" + {name}" for name in extra), tuple(inverse), tuple(track),
-    )  # fmt: skip
+        uses=tuple(uses),
+        blocks=tuple(blocks),
+        read=tuple(read),
+        reset=tuple(reset),
+        reference=tuple(reference),
+        filter=tuple(filtered),
+        shift=shift,
+        closed=closed,
+        law=tuple(law),
+        extra="".join(f" + {name}" for name in extra),
+        inverse=tuple(inverse),
+        track=tuple(track),
+    )
 
 
 def _feedforward(

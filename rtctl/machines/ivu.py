@@ -198,7 +198,7 @@ LAW_SIGNALS = {
     "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
 }  # fmt: skip
 WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
-NAMES = compensation.Signals("u_pd", "y.capstan_error", "y.capstan", "y.u_c", "y.u_c", WRITTEN, {})
+NAMES = compensation.Signals("u_pd", "y.capstan_error", "y.capstan", "y.capstan_speed", "y.u_c", "y.u_c", WRITTEN, {})
 STAGES = (
     (
         "read",
@@ -360,7 +360,7 @@ def stages(
         RESET: tuple(f"    {line}" for line in (*position.reset, *more.reset)),
         READ: more.read,
         REFERENCE: more.reference,
-        ERROR: (f"y.capstan_error = y.ref{more.shift} - y.capstan",),
+        ERROR: (f"y.capstan_error = y.ref{more.shift} - {more.closed or 'y.capstan'}",),
         COMMAND: (*more.law, f"y.u_c = {command}", *more.inverse),
         TRACK: more.track,
     }
