@@ -5,8 +5,8 @@
 The machines are the reel unit, the linear drive, the belt axis and the arm in turn, each with one effect that a seed
 draws (which, where, how large). A recording of its ordinary reference is diagnosed without knowledge of the effect. The
 improved law then runs on the concealed machine, beside the law that it had, with the same reference; the error is that
-of the emulator's truth. Margins are those of the fitted model. Results of each machine are kept in --out: a run that was
-stopped goes on where it was.
+of the emulator's truth. Margins are those of the fitted model. Results of each machine are kept in --out: a run that
+was stopped goes on where it was.
 
 Prints {"machines", "median_rms_reduction", "improved_share", "worse_share", "least_gain_margin_db",
 "least_phase_margin_deg"}; a machine that nothing improves counts as a reduction of 0. Margins are the least of those

@@ -39,9 +39,9 @@ def improve(
     json: JsonOption = False,
 ) -> None:
     """Propose a remedy for each effect that a diagnosis found, try it on the emulated fitted model, and keep it where
-    the machine follows its reference better, at both ends of the interval of the effect's size and with 6 dB and 45 degrees
-    of margin. Writes the improved config, which `rtctl run` takes as it is, and a report of before and after, of what
-    was given up and of what was left out and why.
+    the machine follows its reference better, at both ends of the interval of the effect's size and with 6 dB and 45
+    degrees of margin. Writes the improved config, which `rtctl run` takes as it is, and a report of before and after,
+    of what was given up, and of what was left out and why.
 
     Exit code 3 where there is nothing to compare with: the emulated machine trips with the law that it has.
 

@@ -270,9 +270,16 @@ def data_of(config: Any) -> list[dict[str, Any]]:
 
 
 MAKERS: dict[str, Callable[[Ground, Effect], Remedy | None]] = {
-    "feedforward": feedforward, "curve": static_curve, "joint": joint, "lead": ahead, "behind": behind, "delay": predicted, "table": table,
-    "notch": notch, "limits": limits,
-}  # fmt: skip
+    "feedforward": feedforward,
+    "curve": static_curve,
+    "joint": joint,
+    "lead": ahead,
+    "behind": behind,
+    "delay": predicted,
+    "table": table,
+    "notch": notch,
+    "limits": limits,
+}
 PLACE = "counts from where the counter is 0: start from the same place, or from an index mark"
 ANCHOR = (
     "the sensor has no absolute zero: without an index mark the table has to be made anew at every start, and a table "

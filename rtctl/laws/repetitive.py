@@ -7,8 +7,8 @@ Each part of the turn has an integral of its own, so that it needs no model of w
 loop follows: a ripple of higher frequency than the crossover takes a lower gain, or a lower speed to learn at. The
 table counts from where the counter is 0; with an index mark it can be kept for the next start.
 
-Source: Hara, Yamamoto, Omata & Nakano, Repetitive control system, IEEE TAC 33 (1988); over position by Hillerstrom, IEEE
-Trans. Control Systems Technology 4 (1996).
+Source: Hara, Yamamoto, Omata & Nakano, Repetitive control system, IEEE TAC 33 (1988); over position by Hillerstrom,
+IEEE Trans. Control Systems Technology 4 (1996).
 """
 
 from math import floor
