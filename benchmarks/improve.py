@@ -142,14 +142,11 @@ def concealed(kind: str, seed: int) -> tuple[Any, Any, dict[str, Any]]:
 
 def improved(base: Any, truth: Any, place: Path, known: bool) -> dict[str, Any]:
     """Improvement by the model that a diagnosis finds, judged on the truth."""
+    from rtctl.config.errors import NoAnswer, UserError
     from rtctl.improve import found as model
     from rtctl.improve import played
     from rtctl.improve.improve import improve
 
-    judge, seconds = played.judge_of(base), played.seconds_of(base)
-    before = played.play(base, truth, seconds, judge)
-    if before.figures.tripped:
-        return {"why": f"trips as it is: {before.figures.tripped}"}
     if known:
         start = model.of_config(truth, "told")
         verdict = "told"
@@ -160,12 +157,19 @@ def improved(base: Any, truth: Any, place: Path, known: bool) -> dict[str, Any]:
         d = answer.diagnose(place)
         files.write(d, place / model.FOLDER, report=False)
         start, verdict = model.load(place, None, None), d.verdict
-    r = improve(start)
-    after = played.play(r.config, truth, seconds, judge, before.ref)
+    told_of = {"verdict": verdict, "named": [effect.words for effect in start.effects]}
+    try:
+        r = improve(start, written_too=False)
+    except (NoAnswer, UserError) as error:
+        return {**told_of, "why": str(error)}
+    judge, seconds = played.judge_of(base), played.seconds_of(base)
+    before = played.play(r.without, truth, seconds, judge)
+    if before.figures.tripped:
+        return {**told_of, "why": f"trips as it is: {before.figures.tripped}"}
+    after = played.play(r.trial, truth, seconds, judge, before.ref)
     m = r.margins_after
     return {
-        "verdict": verdict,
-        "named": [effect.words for effect in start.effects],
+        **told_of,
         "reduction": 1.0 - after.figures.rms / before.figures.rms,
         "before": before.figures._asdict(),
         "after": after.figures._asdict(),

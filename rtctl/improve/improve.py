@@ -32,6 +32,8 @@ class Improved(NamedTuple):
 
     found: Found
     config: Any  # fused, with the reference that was played
+    trial: Any  # the same law with every block that was tried, those that were left out doing nothing
+    without: Any  # the law as it was, with the same blocks doing nothing
     mode: str  # loop.mode that the config had
     judge: Judge
     tried: tuple[Tried, ...]
@@ -46,32 +48,38 @@ class Improved(NamedTuple):
         return 1.0 - self.after.figures.rms / self.before.figures.rms
 
 
-def improve(found: Found, body: str | None = None, progress: Progress = lambda _: None) -> Improved:
-    """Propose, try and keep remedies. Raises NoAnswer where the machine does not run with the law that it has."""
+def improve(
+    found: Found, body: str | None = None, progress: Progress = lambda _: None, written_too: bool = True
+) -> Improved:
+    """Propose, try and keep remedies; with `written_too` the config as it is written is played as well.
+
+    Raises NoAnswer where the machine does not run with the law that it has.
+    """
     mode = found.config.loop.mode
     found = found._replace(config=played.with_reference(found.config))
     config = found.config
     judge = played.judge_of(config, body)
-    seconds = played.seconds_of(config)
-    before = played.play(config, config, seconds, judge)
-    if before.figures.tripped:
-        raise NoAnswer(
-            f"the emulated machine trips with the law that it has ({before.figures.tripped}): there is nothing to "
-            "compare with; let `rtctl tune` find a law that holds it"
-        )
     at_first = margins.of_config(config)
-    ground = Ground(found, judge, at_first, acceleration(config), (float(before.ref.min()), float(before.ref.max())))
-    plan = proposals(ground)
-    trial = Trial(found, judge, seconds, before, at_first, ground, plan)
+    ground = Ground(found, judge, at_first, acceleration(config), travel(config))
+    trial = Trial(ground, proposals(ground))
     tried = []
-    for remedy in plan:
+    for remedy in trial.plan:
         progress(f"trying {remedy.title} against {remedy.against}")
         tried.append(trial.of(remedy))
+    progress("checking all that were kept together")
     made = set_paths(config, written(trial.values, data_of(config)))
-    after = played.play(made, config, seconds, judge, before.ref)
-    if after.figures.tripped or after.figures.rms > before.figures.rms:
+    after = played.play(made if written_too else trial.config({}), config, trial.seconds, judge, trial.asked)
+    if after.figures.tripped or after.figures.rms > trial.before.figures.rms:
         raise NoAnswer("all remedies together are worse than none; the config stays as it is")
-    return Improved(found, made, mode, judge, tuple(tried), before, after, at_first, margins.of_config(made))
+    laws = made, trial.config({}), trial.base
+    return Improved(found, *laws, mode, judge, tuple(tried), trial.before, after, at_first, margins.of_config(made))
+
+
+def travel(config: Any) -> tuple[float, float]:
+    """Lowest and highest value of the reference."""
+    table = machines.build(config).reference
+    values = table.r[: table.n]
+    return float(values.min()), float(values.max())
 
 
 def acceleration(config: Any) -> float:
@@ -96,24 +104,28 @@ def mechanics_of(config: Any) -> Any:
 class Trial:
     """Trials of remedies, one after the other, on top of those that were kept."""
 
-    def __init__(
-        self, found: Found, judge: Judge, seconds: float, before: Played, at_first: Margins | None, ground: Ground,
-        plan: list[Remedy],
-    ):  # fmt: skip
-        self.judge, self.seconds, self.asked, self.at_first = judge, seconds, before.ref, at_first
+    def __init__(self, ground: Ground, plan: list[Remedy]):
+        found, self.judge, self.plan = ground.found, ground.judge, plan
+        config = self.plant = found.config
         kinds = {remedy.kind for remedy in plan}
-        config = found.config
-        acts = {e.number for e in found.effects if "feedforward" in e.term.remedies}
-        shares = {path.split(".")[4] for r in plan for way in r.ways for path in way if ".effects." in path}
-        fed = tuple(entry for i, entry in enumerate(data_of(config)) if i in acts and str(i) in shares)
-        self.order = {str(i): n for n, i in enumerate(sorted(int(s) for s in shares))}
-        base = neutral(fed, ground.gain != 0.0, "curve" in kinds, "table" in kinds)
+        shares = sorted(
+            {int(path.split(".")[4]) for r in plan for way in r.ways for path in way if ".effects." in path}
+        )
+        self.order = {str(number): n for n, number in enumerate(shares)}
+        entries = data_of(config)
+        base = neutral(tuple(entries[i] for i in shares), ground.gain != 0.0, "curve" in kinds, "table" in kinds)
         self.base = set_paths(config, {BASE: base})
         self.effects = {effect.words: effect for effect in found.effects}
         self.values: dict[str, Any] = {}
-        self.rms = before.figures.rms
-        self.figures = before.figures
-        self.plant = config
+        self.seconds, self.at_first = played.seconds_of(config), ground.margins
+        self.before = played.play(self.base, config, self.seconds, self.judge)
+        if self.before.figures.tripped:
+            raise NoAnswer(
+                f"the emulated machine trips with the law that it has ({self.before.figures.tripped}): there is "
+                "nothing to compare with; let `rtctl tune` find a law that holds it"
+            )
+        self.asked = self.before.ref
+        self.rms, self.figures = self.before.figures.rms, self.before.figures
 
     def of(self, remedy: Remedy) -> Tried:
         """Try every way of a remedy, and keep the best where it passes."""

@@ -147,6 +147,7 @@ class Signals(NamedTuple):
     wanted: str  # command before the limit, and before the inverse of the drive's curve
     asked: str  # what the limit is asked for
     written: str  # what it lets through
+    known: str  # V of the command that the machine's own feedforward puts against friction
     channel: dict[int, float]  # of each drive: share of the command; none where drives are shared out otherwise
 
 
@@ -184,7 +185,9 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         track.append(f"integral.track(p.integral, s.integral, {names.asked}, {names.written})")
         extra.append("u_integral")
     if settings.observer is not None:
-        known = "s.model_feedforward.known" if settings.feedforward is not None else "0.0"
+        known = names.known
+        if settings.feedforward is not None:
+            known = f"{known} + s.model_feedforward.known"
         made = disturbance_observer.build(settings.observer, dt)
         uses.append("rtctl.laws.disturbance_observer")
         blocks.append(Block("observer", made, disturbance_observer.DISTURBANCE_OBSERVER_STATE))

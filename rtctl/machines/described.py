@@ -92,7 +92,7 @@ def diagram(config: Any, dt: float) -> Diagram:
     asked = "y.u_c" if law.compensation.inverse is None else "asked"
     position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": asked, "u_written": "u"})
     share = {number: float(shares_of(config)[number])}
-    names = compensation.Signals("u_fb", "y.position_error", "y.feedback", "y.speed", "y.u_c", asked, "u", share)
+    names = compensation.Signals("u_fb", "y.position_error", "y.feedback", "y.speed", "y.u_c", asked, "u", "0.0", share)
     more = compensation.lines(law.compensation, names, config.kind, lambda: mechanics(config, dt), dt)
     blocks = (
         Block("machine", _params(config, dt), DESCRIBED_STATE),

@@ -198,7 +198,9 @@ LAW_SIGNALS = {
     "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
 }  # fmt: skip
 WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
-NAMES = compensation.Signals("u_pd", "y.capstan_error", "y.capstan", "y.capstan_speed", "y.u_c", "y.u_c", WRITTEN, {})
+NAMES = compensation.Signals(
+    "u_pd", "y.capstan_error", "y.capstan", "y.capstan_speed", "y.u_c", "y.u_c", WRITTEN, "s.hand_over.u", {}
+)
 STAGES = (
     (
         "read",

@@ -339,7 +339,7 @@ def diagram(config: LduConfig, dt: float) -> Diagram:
     """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
     law = config.law
     asked = "u_c" if law.compensation.inverse is None else "asked"
-    names = compensation.Signals("u_fb", "y.position_error", "y.position", "y.speed", "u_c", asked, "u", {0: 1.0})
+    names = compensation.Signals("u_fb", "y.position_error", "y.position", "y.speed", "u_c", asked, "u", OWN, {0: 1.0})
     more = compensation.lines(law.compensation, names, config.kind, lambda: mechanics(config, dt), dt)
     position = own_law.law_of(law.position)
     output = at_mio_16de.build_output(config.board.output, dt)
