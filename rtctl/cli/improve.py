@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rtctl.cli.common import JsonOption, ReferenceOption
+from rtctl.cli.common import JsonOption, ReferenceOption, load_config
 
 app = typer.Typer(add_completion=False)
 
@@ -34,6 +34,17 @@ def improve(
             "--body", metavar="BODY", help="Body that shall follow; the last one that no drive acts on if absent."
         ),
     ] = None,
+    closed_loop: Annotated[
+        str | None,
+        typer.Option(
+            "--closed-loop",
+            metavar="CONFIG",
+            help="Run the machine that this config reaches, before and after; recordings go beside FILE.yaml.",
+        ),
+    ] = None,
+    learn: Annotated[
+        int, typer.Option("--learn", metavar="N", min=0, max=50, help="With --closed-loop: runs that learn the move.")
+    ] = 0,
     report: Annotated[bool, typer.Option(help="Write FILE.html beside the config.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
     json: JsonOption = False,
@@ -43,6 +54,9 @@ def improve(
     degrees of margin. Writes the improved config, which `rtctl run` takes as it is, and a report of before and after,
     of what was given up, and of what was left out and why.
 
+    With --closed-loop the machine that runs is tried as well, by its own sensor: the law that it had, the improved one,
+    and with --learn N as many runs more, each learning the move from the one before.
+
     Exit code 3 where there is nothing to compare with: the emulated machine trips with the law that it has.
 
     Examples:
@@ -50,6 +64,8 @@ def improve(
       rtctl improve runs/belt-20250102-101500 -o better.yaml
 
       rtctl improve model.yaml --config ivu.yaml --reference steps -o better.yaml
+
+      rtctl improve model.yaml --closed-loop bench.yaml --learn 6 -o better.yaml
     """
     from rtctl.cli.diagnose_console import DiagnoseConsole
     from rtctl.cli.tune import check_files, write
@@ -63,24 +79,40 @@ def improve(
     check_files(file, [file.with_suffix(".png")], force)
     if report and page.exists() and not force:
         raise UserError(f"--out {file}: {page} exists; give another name, or --force")
+    if learn and closed_loop is None:
+        raise UserError("--learn: goes with --closed-loop CONFIG; a move is learned on the machine that runs")
+    machine = None if closed_loop is None else load_config(closed_loop, None)
+    proof: Any = None
     with DiagnoseConsole(json).stages() as progress:
         r = improved(start, body, progress)
+        if machine is not None:
+            from rtctl.improve.closed_loop import prove
+
+            proof = prove(r, machine, file.with_suffix(""), learn, progress)
+            r = r._replace(config=r.config.model_copy(update={"law": proof.config.law}))
+    running = None if proof is None else words.rows(r.config, proof.before, proof.after)
     write(file, text(r))
     if report:
         from rtctl.improve.report import html
 
-        write(page, html(r))
+        write(page, html(r, running))
     if json:
         from rtctl.cli.common import print_json
         from rtctl.diagnose.answer.results import finite
 
-        print_json(finite({"config": str(file), "report": str(page) if report else None, **words.as_json(r)}))
+        found_words = {"config": str(file), "report": str(page) if report else None, **words.as_json(r)}
+        if proof is not None:
+            runs = zip(proof.names, proof.bundles, proof.figures, strict=True)
+            found_words["closed_loop"] = [
+                {"run": name, "bundle": str(bundle), **figures._asdict()} for name, bundle, figures in runs
+            ]
+        print_json(finite(found_words))
         return
     from rich.console import Console
 
     from rtctl.improve.report import terminal
 
-    Console(highlight=False).print(terminal(r))
+    Console(highlight=False).print(terminal(r, running))
     typer.echo("  ".join(map(str, [file, *([page] if report else [])])))
 
 

@@ -123,10 +123,13 @@ def play(law: Any, plant: Any, seconds: float, judge: Judge, asked: np.ndarray |
     outputs = np.array([rows[name][:n] for name in machine.signals.outputs])
     tripped = run.tripped
     t = rows["t"][:n] - rows["t"][0]
-    return Played(_figures(t, rows["target"][:n], wanted, y, outputs, tripped), t, ref[:n], y, outputs[0])
+    return Played(figures_of(t, rows["target"][:n], wanted, y, outputs, tripped), t, ref[:n], y, outputs[0])
 
 
-def _figures(t: np.ndarray, target: np.ndarray, ref: np.ndarray, y: np.ndarray, u: np.ndarray, tripped: str) -> Figures:
+def figures_of(
+    t: np.ndarray, target: np.ndarray, ref: np.ndarray, y: np.ndarray, u: np.ndarray, tripped: str
+) -> Figures:
+    """Figures of a run (n,) by its target, reference, position and commands (drives, n); infinite where it tripped."""
     error = ref - y
     if not np.isfinite(error).all() or tripped:
         return Figures(np.inf, np.inf, np.inf, np.inf, np.inf, np.inf, tripped or "not a number")

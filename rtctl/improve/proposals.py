@@ -22,6 +22,7 @@ BANDS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # bandwidth of the observer in crosso
 SLOWER = (0.8, 0.6)  # bandwidth of the reference
 INTEGRALS = (0.5, 0.25, 0.1)  # crossovers at which the integral meets the gain
 GRAINS = 2.0  # steps of the sensor within which the integral rests
+FILTERED = 3.0  # crossovers at which the speed of a predictor is filtered
 REPEATS = (1.0, 0.3)  # crossovers at which the integral of a part of the turn meets the gain
 TURNS = 1.5  # turns that the reference must make for what comes back with them
 SLOW = 0.02  # of the travel, per second, below which nothing is learned
@@ -159,7 +160,9 @@ def predicted(g: Ground, effect: Effect) -> Remedy | None:
     ticks = round(late / dt) + (g.found.config.loop.write == "next_tick")
     if not g.gain or late <= 0.0 or not 1 <= ticks <= predictor.MOST:
         return None
-    ways = ({f"{BASE}.predictor": {"delay": ticks, "acceleration": float(f"{abs(g.gain):.5g}")}},)
+    made = {f"{BASE}.predictor": {"delay": ticks, "acceleration": float(f"{abs(g.gain):.5g}")}}
+    crossover = g.margins.f_PM if g.margins is not None else 0.01 * g.found.config.loop.rate
+    ways = ({**made, "law.velocity.filter": float(f"{FILTERED * crossover:.3g}")}, made)
     return Remedy("delay", f"predictor over {ticks} ticks", effect.words, effect.interval, ways)
 
 

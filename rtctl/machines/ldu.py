@@ -231,6 +231,9 @@ LAW_SIGNALS = {
 }  # fmt: skip
 
 
+OWN = "p.friction.volts * s.friction.direction"  # V of the friction compensation
+
+
 def stages(config: LduConfig, more: compensation.Lines = compensation.NONE) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Lines of the tick for the law, the feedback and the compensation of this config."""
     asked = "asked" if more.inverse else "u_c"
