@@ -87,17 +87,12 @@ def one(task: tuple[int, int, str, bool]) -> dict[str, Any]:
         return json.loads(file.read_text())
     began = time.monotonic()
     place.mkdir(parents=True, exist_ok=True)
-    base, truth, effect = concealed(kind, seed + k)
-    found = {
-        "machine": kind,
-        "effect": effect,
-        "verdict": "",
-        "named": [],
-        "reduction": 0.0,
-        "margins": None,
-        "why": "",
-    }
+    found: dict[str, Any] = {
+        "machine": kind, "effect": {"term": "", "node": ""}, "verdict": "", "named": [], "reduction": 0.0,
+        "margins": None, "why": "",
+    }  # fmt: skip
     try:
+        base, truth, found["effect"] = concealed(kind, seed + k)
         found |= improved(base, truth, place, known)
     except Exception as error:  # counts as not improved, with the reason
         found["why"] = f"{type(error).__name__}: {str(error)[:200]}"

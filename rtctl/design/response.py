@@ -33,6 +33,7 @@ class Loop(NamedTuple):
     dt: float  # s
     delay: int  # ticks until a command is written
     factor: float  # of the gain schedule
+    motor: int = 1  # that pulls, where one pulls at a time
 
 
 def take(config: Any, motor: int = 1) -> Loop:
@@ -56,6 +57,7 @@ def take(config: Any, motor: int = 1) -> Loop:
         dt=machine.dt,
         delay=int(config.loop.write == "next_tick"),
         factor=_factor(config, plant, blocks, motor) if "gain_schedule" in blocks else 1.0,
+        motor=motor,
     )
 
 
@@ -143,7 +145,7 @@ def compensated(parts: Loop, K: np.ndarray, f: np.ndarray, path: str) -> np.ndar
         ahead = 1 + p.n * p.dt * difference(v.a, v.dt, back)
         K = K * ahead / (1 + K * sum(p.K * p.dt**2 * (n - 0.5) * back**n for n in range(1, p.n + 1)))
     if "observer" in blocks:
-        to_y, to_u = disturbance_observer.response(blocks["observer"], f)
+        to_y, to_u = disturbance_observer.response(blocks["observer"], f, parts.motor == 2)
         K = (K + to_y if path == "feedback" else K) / (1 - to_u)
     return np.asarray(K)
 

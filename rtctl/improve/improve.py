@@ -82,14 +82,15 @@ def travel(config: Any) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def acceleration(config: Any) -> float:
-    """Acceleration of the feedback for one unit of command, in its unit; 0 where no feedforward can be made."""
+def acceleration(config: Any) -> tuple[float, float] | None:
+    """Acceleration of the feedback for one unit of positive and of negative command, in its unit; None where no
+    feedforward can be made."""
     try:
-        mechanics = mechanics_of(config)
-        made = motion(mechanics)
+        made = motion(mechanics_of(config))
     except (ValueError, UserError):
-        return 0.0
-    return float(0.5 * made.phi @ (made.plus + made.minus) / (made.phi @ (made.M * made.phi)))
+        return None
+    inertia = made.phi @ (made.M * made.phi)
+    return float(made.phi @ made.plus / inertia), float(made.phi @ made.minus / inertia)
 
 
 def mechanics_of(config: Any) -> Any:
@@ -113,7 +114,7 @@ class Trial:
         )
         self.order = {str(number): n for n, number in enumerate(shares)}
         entries = data_of(config)
-        base = neutral(tuple(entries[i] for i in shares), ground.gain != 0.0, "curve" in kinds, "table" in kinds)
+        base = neutral(tuple(entries[i] for i in shares), ground.gain is not None, "curve" in kinds, "table" in kinds)
         self.base = set_paths(config, {BASE: base})
         self.effects = {effect.words: effect for effect in found.effects}
         self.values: dict[str, Any] = {}

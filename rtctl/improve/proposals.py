@@ -7,6 +7,7 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.config.load import written as plain
+from rtctl.design.feedforward import INERTIA
 from rtctl.design.margins import Margins
 from rtctl.improve import curve, sensor_table
 from rtctl.improve.found import Effect, Found
@@ -38,7 +39,7 @@ class Ground(NamedTuple):
     found: Found
     judge: Judge
     margins: Margins | None
-    gain: float  # acceleration of the feedback for one unit of command; 0 where no feedforward can be made
+    gain: tuple[float, float] | None  # acceleration for one unit of positive and negative command; None: no feedforward
     travel: tuple[float, float]  # of the feedback
 
 
@@ -95,10 +96,11 @@ def description(g: Ground) -> list[Remedy]:
     values = {f"{FEED}.lead": lead, f"{FEED}.velocity": 1.0, f"{FEED}.viscous": 1.0, f"{FEED}.friction": BELOW}
     inertia = {f"{FEED}.inertia": 1.0} if config.law.shaper.bandwidth is not None else {}
     own = profile_of(config.kind).feedforward
-    off = dict.fromkeys(own, 0.0)
-    ways = [{**values, **inertia, **off}]
-    if own:
-        ways.append({**values, f"{FEED}.friction": 0.0})
+    ways = [{**values, **inertia, **dict.fromkeys(own, 0.0)}]
+    if own:  # beside the machine's own feedforward, or in the place of its friction compensation
+        rest = {f"{FEED}.inertia": 1.0 - INERTIA} if inertia else {}
+        friction = dict.fromkeys((key for key in own if not key.startswith("law.inertia")), 0.0)
+        ways += [{**values, **rest, f"{FEED}.friction": 0.0}, {**values, **rest, **friction}]
     size = f"inertia, weight, viscous friction and {BELOW:g} of the dry friction of the description"
     return [Remedy("description", "feedforward of the description", "the motion itself", size, tuple(ways))]
 
@@ -160,7 +162,7 @@ def predicted(g: Ground, effect: Effect) -> Remedy | None:
     ticks = round(late / dt) + (g.found.config.loop.write == "next_tick")
     if not g.gain or late <= 0.0 or not 1 <= ticks <= predictor.MOST:
         return None
-    made = {f"{BASE}.predictor": {"delay": ticks, "acceleration": float(f"{abs(g.gain):.5g}")}}
+    made = {f"{BASE}.predictor": {"delay": ticks, "acceleration": float(f"{abs(g.gain[0]):.5g}")}}
     crossover = g.margins.f_PM if g.margins is not None else 0.01 * g.found.config.loop.rate
     ways = ({**made, "law.velocity.filter": float(f"{FILTERED * crossover:.3g}")}, made)
     return Remedy("delay", f"predictor over {ticks} ticks", effect.words, effect.interval, ways)
@@ -205,10 +207,13 @@ def rest(g: Ground) -> list[Remedy]:
     gain = float(getattr(config.law.position, "gain", 0.0) or 0.0)
     against = "what has no name" if g.found.unnamed else "what is left"
     if g.gain and gain > 0.0:
+        two = abs(g.gain[0] - g.gain[1]) > 1e-6 * abs(g.gain[0])
+        back = {f"{BASE}.observer.acceleration_back": float(f"{abs(g.gain[1]):.5g}")} if two else {}
         ways = tuple(
             {
                 f"{BASE}.observer.bandwidth": float(f"{band * crossover:.3g}"),
-                f"{BASE}.observer.acceleration": float(f"{abs(g.gain):.5g}"),
+                f"{BASE}.observer.acceleration": float(f"{abs(g.gain[0]):.5g}"),
+                **back,
                 f"{BASE}.observer.share": 1.0,
                 f"{BASE}.observer.delay": int(config.loop.write == "next_tick"),
             }

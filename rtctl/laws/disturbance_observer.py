@@ -28,6 +28,9 @@ class DisturbanceObserverSettings(Settings):
     acceleration: float = quantity(
         unit="rad/s^2/V", gt=0, help="K, acceleration of the feedback for one unit of command"
     )
+    acceleration_back: float | None = quantity(
+        None, unit="rad/s^2/V", gt=0, help="K of negative commands, where another drive pulls; the same if absent"
+    )
     damping: float = quantity(0.0, unit="1/s", ge=0, help="B, viscous friction over inertia")
     share: float = quantity(
         1.0, unit="", ge=0, le=1, help="part of the estimate that is compensated; 0 switches it off"
@@ -40,6 +43,7 @@ class DisturbanceObserverParams(NamedTuple):
     v: float  # 1/s
     d: float  # 1/s^2
     K: float  # unit/s^2/V
+    K_back: float  # of negative commands
     B: float  # 1/s
     share: float
     delay: int
@@ -55,8 +59,8 @@ def build(settings: DisturbanceObserverSettings, dt: float) -> DisturbanceObserv
     """Gains for a tick of `dt` s."""
     z = exp(-2 * pi * settings.bandwidth * dt)
     return DisturbanceObserverParams(
-        1 - z**3, 1.5 * (1 - z) ** 2 * (1 + z) / dt, (1 - z) ** 3 / dt**2, settings.acceleration, settings.damping,
-        settings.share, settings.delay, dt,
+        1 - z**3, 1.5 * (1 - z) ** 2 * (1 + z) / dt, (1 - z) ** 3 / dt**2, settings.acceleration,
+        settings.acceleration_back or settings.acceleration, settings.damping, settings.share, settings.delay, dt,
     )  # fmt: skip
 
 
@@ -70,7 +74,7 @@ def step(p, s, y):
     s.x += p.x * r
     s.v += p.v * r
     s.d += p.d * r
-    return -p.share * s.d / p.K
+    return -p.share * s.d / (p.K_back if s.d > 0.0 else p.K)
 
 
 @tick
@@ -79,7 +83,8 @@ def track(p, s, u_written, u_known):
     for i in range(p.delay, 0, -1):
         s.u[i] = s.u[i - 1]
     s.u[0] = u_written - u_known
-    a = p.K * s.u[p.delay] - p.B * s.v + s.d
+    u = s.u[p.delay]
+    a = (p.K if u > 0.0 else p.K_back) * u - p.B * s.v + s.d
     s.x += p.dt * (s.v + 0.5 * p.dt * a)
     s.v += p.dt * a
 
@@ -94,18 +99,19 @@ def reset(p, s):
         s.u[i] = 0.0
 
 
-def response(p: DisturbanceObserverParams, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def response(p: DisturbanceObserverParams, f: np.ndarray, back: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Responses (n,) of the voltage against the disturbance to the negative position and to the command written, at
-    `f` (n,) Hz."""
+    `f` (n,) Hz, for positive commands or with `back` for negative ones."""
+    K = p.K_back if back else p.K
     z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(f, float)) * p.dt)
     move = np.array([[1, p.dt, p.dt**2 / 2], [0, 1 - p.B * p.dt, p.dt], [0, 0, 1.0]])
     move[0, 1] -= p.B * p.dt**2 / 2
-    push = p.K * np.array([p.dt**2 / 2, p.dt, 0.0])
+    push = K * np.array([p.dt**2 / 2, p.dt, 0.0])
     gain = np.array([p.x, p.v, p.d])
     seen = np.eye(3) - np.outer(gain, [1.0, 0, 0])
     A = move @ seen  # of the prediction x(k+1|k)
     inverse = np.linalg.inv(z[:, None, None] * np.eye(3) - A)
-    out = -p.share / p.K * np.array([0, 0, 1.0])
+    out = -p.share / K * np.array([0, 0, 1.0])
     to_y = out @ gain + np.einsum("i,nij,j->n", out @ seen, inverse, move @ gain)
     to_u = np.einsum("i,nij,j->n", out @ seen, inverse, push) * z ** (-p.delay)
     return -to_y, to_u

@@ -197,6 +197,10 @@ LAW_SIGNALS = {
     "e": "y.capstan_error", "x": "y.capstan", "v": "y.capstan_speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
     "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
 }  # fmt: skip
+KNOWN = (  # friction compensation, less what the inertia feedforward gives besides the command, both as a command
+    "s.hand_over.u - p.inertia.volts * s.shaper.acceleration * "
+    "(1.0 / y.R1 + y.R1 / (y.R2 * y.R2) if y.u_c > 0.0 else 1.0 / y.R2 + y.R2 / (y.R1 * y.R1))"
+)
 WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
 NAMES = compensation.Signals(
     "u_pd", "y.capstan_error", "y.capstan", "y.capstan_speed", "y.u_c", "y.u_c", WRITTEN, "s.hand_over.u", {}

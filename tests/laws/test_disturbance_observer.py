@@ -76,6 +76,19 @@ def test_response_to_the_command_is_that_of_the_ticks():
     assert observer.response(P, np.array([f]))[1][0] == pytest.approx(seen, rel=1e-3)
 
 
+def test_two_drives_may_pull_with_different_strength():
+    settings = SETTINGS.model_copy(update={"acceleration_back": 0.5 * K, "delay": 0})
+    p, s = observer.build(settings, DT), np.zeros(1, observer.DISTURBANCE_OBSERVER_STATE)[0]
+    x = v = 0.0
+    for _ in range(4000):
+        u = -20.0 * x - 1.5 * v + observer.step(p, s, x)
+        observer.track(p, s, u, 0.0)
+        a = (K if u > 0 else 0.5 * K) * u + 8.0
+        x, v = x + DT * v + 0.5 * DT * DT * a, v + DT * a
+    assert s["d"] == pytest.approx(8.0, rel=1e-6)
+    assert abs(x) < 1e-8
+
+
 def test_reset_forgets(zero):
     _, s = held(0.4, 300)
     observer.reset(P, s)
