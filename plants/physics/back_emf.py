@@ -40,6 +40,7 @@ def back_emf(p, u, v):
 
 BACK_EMF = Term(
     name="drive.back_emf",
+    remedies=("feedforward",),
     words="the faster it turns, the less it pushes: a voltage drive, not one that holds the current",
     equation="tau = K u - b v",
     source="Krishnan 2001, 2.3",

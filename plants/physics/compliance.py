@@ -42,6 +42,7 @@ def joint(settings: ComplianceSettings) -> dict[str, float]:
 
 COMPLIANCE = Term(
     name="structure.compliance",
+    remedies=("joint", "notch"),
     words="a joint that should be rigid gives like a spring",
     equation="T = c (q_to - n q_from) + c tau (q_to' - n q_from')",
     source="Spong 1987",

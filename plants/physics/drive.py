@@ -228,6 +228,7 @@ def supply_sag(p, s, volts, c):
 
 OFFSET = Term(
     name="drive.offset",
+    remedies=("curve",),
     words="a push that is always there: the drive gives something when nothing is asked for",
     equation="u_out = u + offset",
     source="Krishnan 2001",
@@ -260,6 +261,7 @@ OFFSET = Term(
 )
 DEADBAND = Term(
     name="drive.deadband",
+    remedies=("curve",),
     words="a dead zone: small commands do nothing, the drive wakes up only beyond them",
     equation="u_out = sign(u) max(|u| - band, 0)",
     source="Slotine & Li 1991, 5.2",
@@ -292,6 +294,7 @@ DEADBAND = Term(
 )
 GAIN_ASYMMETRY = Term(
     name="drive.gain_asymmetry",
+    remedies=("curve",),
     words="stronger one way than the other: the same command gives more in one direction",
     equation="u_out = (1 + a sign(u)) u",
     source="Krishnan 2001",
@@ -321,6 +324,7 @@ GAIN_ASYMMETRY = Term(
 )
 SATURATION = Term(
     name="drive.saturation",
+    remedies=("limits", "curve"),
     words="it runs out of push: beyond some command there is no more, or it cannot follow fast",
     equation="|u_out| <= limit, |u_out'| <= 1/rise; or u/(1 + (u/limit)^p)^(1/p)",
     source="Slotine & Li 1991, 5.2; Rapp 1991",
@@ -354,6 +358,7 @@ SATURATION = Term(
 )
 SUPPLY_SAG = Term(
     name="drive.supply_sag",
+    remedies=("feedforward", "limits"),
     words="a weak supply: the more all motors draw, the less each of them gets",
     equation="u_out,i = u_i (1 - k sum_j |u_j|)",
     source="Krishnan 2001",

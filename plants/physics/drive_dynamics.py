@@ -148,6 +148,7 @@ BY_NAME = (  # of a plant whose nodes are motors as well as drives
 )
 LAG = Term(
     name="drive.lag",
+    remedies=("feedforward", "lead"),
     words="it comes late and soft: the drive needs a moment to build up what is asked for",
     equation="tau y' = u - y, or tau^2 y'' + 2 zeta tau y' + y = u",
     source="Astrom & Wittenmark 1997, 2.3",
@@ -180,6 +181,7 @@ LAG = Term(
 )
 THERMAL = Term(
     name="drive.thermal",
+    remedies=("feedforward", "observer"),
     words="it changes as it warms: after hard work the same command gives another push, or the grease runs easier",
     equation="gain exp(-a h), 1 - a h, or 1/(1 + a h); tau h' = (u/V_ref)^2 - h",
     source="Krishnan 2001, 2.8",

@@ -144,6 +144,7 @@ def stribeck(p, F_C, v):
 
 COULOMB = Term(
     name="friction.coulomb",
+    remedies=("feedforward", "integral"),
     words="dry friction: it takes a fixed force to move, whatever the speed",
     equation="|F| <= F_C at rest, F = -F_C sign(v) in motion",
     source="Coulomb 1785; Armstrong-Helouvry 1994",
@@ -173,6 +174,7 @@ COULOMB = Term(
 )
 VISCOUS = Term(
     name="friction.viscous",
+    remedies=("feedforward",),
     words="viscous friction: a brake that grows in proportion to speed, as of grease or eddy currents",
     equation="F = -B v",
     source="Armstrong-Helouvry 1994",
@@ -200,6 +202,7 @@ VISCOUS = Term(
 )
 QUADRATIC = Term(
     name="friction.quadratic",
+    remedies=("feedforward",),
     words="drag by the square of speed, as of a fan or of churned oil",
     equation="F = -Q |v| v",
     source="Hoerner 1965",
@@ -227,6 +230,7 @@ QUADRATIC = Term(
 )
 STRIBECK = Term(
     name="friction.stribeck",
+    remedies=("feedforward", "integral"),
     words="sticking: it takes more to start moving than to keep moving",
     equation="F = (F_C + (F_s - F_C) exp(-(v/v_s)^2)) sign(v)",
     source="thesis (8.3); Bo & Pavelescu 1982; Hess & Soom 1990",

@@ -52,6 +52,7 @@ def asymmetry(p, v, dry, r, viscous):
 
 ASYMMETRY = Term(
     name="friction.asymmetry",
+    remedies=("feedforward", "integral"),
     words="it drags more one way than the other",
     equation="|F| <= F_C (1 + a sign(v)) + B_a v",
     source="Armstrong-Helouvry 1994; EMPS, Janot, Gautier & Brunot 2019",

@@ -104,6 +104,7 @@ def pressed(p, m, i, j, k):
 
 LOAD = Term(
     name="friction.load",
+    remedies=("feedforward", "integral"),
     words="dry friction that grows with load: the tighter the tape or the harder the push, the more it drags",
     equation="|F| <= mu |T| R",
     source="Armstrong-Helouvry 1994, section 2",

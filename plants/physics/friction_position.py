@@ -48,6 +48,7 @@ def along(p, x):
 
 POSITION = Term(
     name="friction.position",
+    remedies=("feedforward", "integral"),
     words="it rubs more at one end or in the middle of the way than elsewhere",
     equation="|F| <= F_C + slope x + A sin(2 pi x / length + phi)",
     source="Armstrong-Helouvry et al. 1994, 2.3",

@@ -123,6 +123,7 @@ def turn_at(p, m, i):
 
 RADIUS_CHANGE = Term(
     name="geometry.radius_change",
+    remedies=("feedforward",),
     words="the reel fills or empties: its radius and its inertia change as the tape moves",
     equation="R = R_0 + d q / 2 pi, J = J_0 + (pi/2) rho_h (R^4 - R_0^4)",
     source="thesis (4.1)-(4.8)",

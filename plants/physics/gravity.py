@@ -50,6 +50,7 @@ def gravity(p, q):
 
 GRAVITY = Term(
     name="load.gravity",
+    remedies=("feedforward", "integral"),
     words="its weight pulls at it: an arm wants to hang down, a slide wants to run down",
     equation="tau = -A sin(q + phi), or F = -A",
     source="Craig 2005, 6.8",

@@ -123,6 +123,7 @@ def dirt(p, x):
 
 THICKNESS = Term(
     name="guide.thickness",
+    remedies=("table",),
     words="a strip or rail of uneven thickness: the carriage is a little off, in waves along the guide",
     equation="e = A sin(n x + phi) + A2 sin(2 n x + phi2) + A3 sin(3 n x + phi3) less that at 0, n = 2 pi / wavelength",
     source="thesis 11.1, figure 11.7",
@@ -163,6 +164,7 @@ THICKNESS = Term(
 )
 STRIP = Term(
     name="guide.strip",
+    remedies=("table",),
     words="a wavy strip: the way along it is longer than the straight line",
     equation="l = integral of sqrt(1 + y'(x)^2) dx",
     source="thesis (11.6)",
@@ -193,6 +195,7 @@ STRIP = Term(
 )
 DIRT = Term(
     name="guide.dirt",
+    remedies=("table",),
     words="dirt on the strip: at one place the carriage is a little off, before and behind it is right",
     equation="e = A exp(-((x - at)/width)^2 / 2)",
     source="thesis 11.1",

@@ -81,6 +81,7 @@ def hysteresis(p, s, m, j):
 
 HYSTERESIS = Term(
     name="transmission.hysteresis",
+    remedies=("feedforward", "joint"),
     words="it gives and comes back another way: on reversal a part of the push is lost first, at any speed",
     equation="T = F_h w, w' = e' (1 - |w|^n sign(w e')) / z_h",
     source="Dahl 1968; Wen 1976; Tjahjowidodo et al. 2013",

@@ -180,6 +180,7 @@ def bump(p, m, i, r):
 
 SPRING = Term(
     name="load.spring",
+    remedies=("feedforward",),
     words="something pulls it back like a spring: a cable chain, a hose, a tilted rail that bends",
     equation="F = -k (x - x0), times or by sqrt(1 + |bend| (x - x0)^2)",
     source="Altintas 2011",
@@ -212,6 +213,7 @@ SPRING = Term(
 )
 CABLE_CHAIN = Term(
     name="load.cable_chain",
+    remedies=("feedforward",),
     words="a cable chain: it pulls by position and drags behind on reversal",
     equation="F = -k (x - x0) - F_h w, w' = v (1 - sign(v) w) / z_h",
     source="Altintas 2011; Dahl 1968",
@@ -239,6 +241,7 @@ CABLE_CHAIN = Term(
 )
 IMBALANCE = Term(
     name="load.imbalance",
+    remedies=("feedforward",),
     words="heavy on one side: once a turn it helps, once a turn it hinders",
     equation="F = A sin(theta + phi)",
     source="Altintas 2011",
@@ -275,6 +278,7 @@ IMBALANCE = Term(
 )
 BUMP = Term(
     name="load.bump",
+    remedies=("feedforward",),
     words="a tight spot: at one place it takes more force to pass",
     equation="|F| <= F exp(-((x - at)/width)^2 / 2) more",
     source="thesis 11.2; Altintas 2011",

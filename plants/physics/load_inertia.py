@@ -75,6 +75,7 @@ def turned(p, m, i, r):
 
 INERTIA = Term(
     name="load.inertia",
+    remedies=("feedforward",),
     words="it is heavier to turn at some angles than at others, like a crank",
     equation="((J + D) v)' - D' v^2 / 2 = torque, D = A cos(n q + phi)",
     source="Goldstein 2002, 1.6; Waldron & Kinzel 2004, ch. 14",

@@ -119,6 +119,7 @@ def bristles(w, F_last, F_C, z, tau, v, vm, gain, h):
 
 PRESLIDING = Term(
     name="friction.presliding",
+    remedies=("feedforward", "integral"),
     words="it gives like a spring before it slides, and springs back a little when let go",
     equation="F = -F_C (w + tau_s w'), w' = v (1 - sign(v) w) / z_s",
     source="Dahl 1968; Canudas de Wit et al. 1995; thesis 12.6",

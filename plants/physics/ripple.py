@@ -120,6 +120,7 @@ def shown(p, y, q, speed):
 
 COGGING = Term(
     name="ripple.cogging",
+    remedies=("feedforward",),
     words="a notchy motor: turned slowly by hand it catches at even angles",
     equation="tau = A sin(n theta + phi) + A2 sin(2 n theta + phi2) + A3 sin(3 n theta + phi3)",
     source="Hanselman 2003, ch. 4",
@@ -158,6 +159,7 @@ COGGING = Term(
 )
 ENCODER = Term(
     name="ripple.encoder",
+    remedies=("table",),
     words="a disc or coupling off centre: the reading runs ahead and behind once a turn though the shaft turns evenly",
     equation="y = theta + A sin(theta + phi) + A2 sin(2 theta + phi2) + A3 sin(3 theta + phi3)",
     source="thesis (11.5), (11.7)",

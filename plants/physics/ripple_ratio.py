@@ -107,6 +107,7 @@ def levered(p, m, j, i, r):
 
 RATIO = Term(
     name="ripple.ratio",
+    remedies=("feedforward", "joint"),
     words="a pulley, gear or screw that is out of true: the far end runs ahead and behind once a turn",
     equation="e = q_b - n q_a + A sin(q + phi) + A2 sin(2 q + phi2) + A3 sin(3 q + phi3)",
     source="Tuttle & Seering 1996; Smith 2003, ch. 2",

@@ -149,6 +149,7 @@ def capstan_arm(p, m, i):
 
 REEL = Term(
     name="ripple.reel",
+    remedies=("feedforward",),
     words="a reel off centre: once a turn it pulls the tape taut and lets it go again",
     equation="l = R q + e (sin(q + phi) - sin(phi)), arm R + e cos(q + phi)",
     source="Shelton 1986",
@@ -184,6 +185,7 @@ REEL = Term(
 )
 CAPSTAN = Term(
     name="ripple.capstan",
+    remedies=("feedforward", "table"),
     words="a capstan out of round or off its bearings: once a turn it moves a little too much and too little",
     equation="x = R_c theta + a (sin(theta + phi) - sin(phi))",
     source="thesis (11.3), (11.4)",

@@ -57,6 +57,7 @@ def torque(p, m, c, i, r):
 
 TORQUE = Term(
     name="ripple.torque",
+    remedies=("feedforward",),
     words="a motor that is stronger at some angles than at others: it pulses under load, and turns evenly without",
     equation="u_out = u (1 + A sin(n theta + phi) + A2 sin(2 n theta + phi2) + A3 sin(3 n theta + phi3))",
     source="Jahns & Soong 1996; Hanselman 2003, ch. 4",

@@ -163,6 +163,7 @@ X = {"": "{r} * {m}.x[{i}]", ":ivu": "{m}.x[ivu.CAPSTAN]"}  # position at the se
 READING = "{m}.y[{c}], {m}.y_speed[{c}]"
 MISSED_COUNTS = Term(
     name="sensor.missed_counts",
+    remedies=("sensor",),
     words="counts get lost: the reading jumps and the jump stays",
     equation="y = x + size times the sum of share_k after at_k, or x + each times the passages of a mark",
     source="Heidenhain 2023; thesis 7.1.1",
@@ -202,6 +203,7 @@ MISSED_COUNTS = Term(
 )
 RECTIFIED = Term(
     name="sensor.rectified",
+    remedies=("sensor",),
     words="it cannot tell direction: it counts up on the way out and on the way back",
     equation="y = integral of |x'| dt; of a sensor of speed y = |v|",
     source="thesis 7.1.3",
@@ -244,6 +246,7 @@ RECTIFIED = Term(
 )
 SCALE = Term(
     name="sensor.scale",
+    remedies=("table",),
     words="a wrong factor: every distance reads too long or too short by the same share",
     equation="y = (1 + relative) x",
     source="thesis 11.2",

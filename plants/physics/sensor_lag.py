@@ -59,6 +59,7 @@ def show(p, s, x, t):
 
 SENSOR_LAG = Term(
     name="sensor.lag",
+    remedies=("behind",),
     words="the reading comes late and soft: it stays behind while the body moves, and is right at rest",
     equation="tau y' = x - y",
     source="Astrom & Wittenmark 1997, 2.3",

@@ -66,6 +66,7 @@ def bent(z, t):
 
 SLEW = Term(
     name="drive.slew",
+    remedies=("limits",),
     words="it follows in ramps: a large step takes longer than a small one",
     equation="|y'| <= rate; or y' = rate tanh((u - y) / (rate tau))",
     source="Slotine & Li 1991, 5.2; Solomon 1974",

@@ -112,6 +112,7 @@ def stiffening(p, e, v):
 
 RESONANCE = Term(
     name="structure.resonance",
+    remedies=("notch", "feedforward"),
     words="something on it shakes: a mass on a spring that rings at its own frequency",
     equation="m x_a'' = -k (x_a - x) - b (x_a' - x'), F = -m x_a''",
     source="Den Hartog 1956; thesis 12.3",
@@ -148,6 +149,7 @@ RESONANCE = Term(
 )
 STIFFENING = Term(
     name="structure.stiffening",
+    remedies=("joint",),
     words="a spring that grows stiffer the further it bends",
     equation="T = c e + k e' + c2 e^2 + c3 e^3 + b2 e^2 e'; or c3 bend^2 (|e| / bend)^power e",
     source="Kovacic & Brennan 2011; Elliott, Ghandchi Tehrani & Langley 2015",

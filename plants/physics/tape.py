@@ -110,6 +110,7 @@ def let_go(p, m, j, k):
 
 VISCOELASTIC = Term(
     name="tape.viscoelastic",
+    remedies=("joint",),
     words="the tape gives way slowly: held taut it relaxes, let go it comes back late",
     equation="T_b = c_branch (e - z), z' = (e - z) / tau",
     source="Ferry 1980",
@@ -144,6 +145,7 @@ VISCOELASTIC = Term(
 )
 SLACK = Term(
     name="tape.slack",
+    remedies=("limits",),
     words="slack: the tape pulls and cannot push",
     equation="T = max(0, c e + k e')",
     source="Shelton 1986",

@@ -36,6 +36,20 @@ from rtctl.plants.physics.search import Choice, Part
 from rtctl.plants.physics.story import NOTHING, Draw, Needs, Phrase
 
 SITES = ("command", "force", "last", "reading")
+REMEDIES = {  # kind of remedy -> what it is; rtctl/improve/ makes each
+    "feedforward": "its own law along the reference, before it acts",
+    "integral": "integral with a dead zone in the error, for what a feedforward leaves at rest",
+    "curve": "inverse of the drive's static curve",
+    "joint": "reference through the joint: the feedback runs ahead by what the joint gives way",
+    "notch": "notch at its frequency",
+    "table": "table of the sensor's error over a turn or the travel",
+    "lead": "reference taken ahead by the time until a command acts",
+    "delay": "gains for the true delay",
+    "behind": "reference of the time that the sensor shows",
+    "limits": "slower reference, so that it does not happen",
+    "observer": "disturbance observer",
+    "sensor": "none in a law: the sensor is to be repaired",
+}
 Node = Annotated[str, Field(description="where it acts; `rtctl physics TERM` lists the nodes of each machine")]
 
 
@@ -95,6 +109,9 @@ class Term:
     friction: str = ""  # it is this friction of a body, at its first size: "dry", "viscous"
     falls_to: str = ""  # friction of its node to which its own falls with speed: "dry"
     replaces: str = ""  # friction of its node whose place it takes: "dry"
+
+    # what is put against it, in the order in which it is tried; see REMEDIES
+    remedies: tuple[str, ...] = ()
 
     # how large one is hidden by `plant --conceal`
     draws: Mapping[str, Draw] = field(default_factory=dict)  # ranges in place of the typical ones

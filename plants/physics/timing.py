@@ -139,6 +139,7 @@ def jitter_axis(p, m):
 
 DELAY = Term(
     name="timing.delay",
+    remedies=("lead", "delay"),
     words="it acts late: what the controller writes reaches the motor later than it is said to",
     equation="u_out(t) = u(t - extra)",
     source="Astrom & Wittenmark 1997, 2.3",
@@ -174,6 +175,7 @@ DELAY = Term(
 )
 JITTER = Term(
     name="timing.jitter",
+    remedies=("observer",),
     words="an unsteady clock: readings are taken a little early or late, which shows when it moves fast",
     equation="y_k = y(t_k + delta_k), delta_k of standard deviation sigma",
     source="Cervin et al. 2003",

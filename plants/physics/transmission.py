@@ -142,6 +142,7 @@ def shown(p, s, y, j):
 
 BACKLASH = Term(
     name="transmission.backlash",
+    remedies=("joint", "table"),
     words="play: on reversal the motor turns a little before anything follows",
     equation="T = c d(e), d = 0 for |e| < gap/2, e -+ gap/2 beyond",
     source="Nordin & Gutman 2002",

@@ -16,7 +16,7 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.config.errors import UserError
-from rtctl.laws import allocation, gain_schedule
+from rtctl.laws import allocation, disturbance_observer, gain_schedule
 from rtctl.machines import described
 from rtctl.machines.profile import Model
 from rtctl.machines.profiles import profile_of
@@ -33,6 +33,7 @@ class Loop(NamedTuple):
     dt: float  # s
     delay: int  # ticks until a command is written
     factor: float  # of the gain schedule
+    motor: int = 1  # that pulls, where one pulls at a time
 
 
 def take(config: Any, motor: int = 1) -> Loop:
@@ -56,6 +57,7 @@ def take(config: Any, motor: int = 1) -> Loop:
         dt=machine.dt,
         delay=int(config.loop.write == "next_tick"),
         factor=_factor(config, plant, blocks, motor) if "gain_schedule" in blocks else 1.0,
+        motor=motor,
     )
 
 
@@ -128,7 +130,24 @@ def law_response(parts: Loop, f: np.ndarray, path: str = "feedback") -> np.ndarr
         if path == "feedback":
             v = parts.blocks["velocity"]
             K = K + p.velocity_gain * difference(v.a, v.dt, back)
-    return parts.factor * K
+    return compensated(parts, parts.factor * K, f, path)
+
+
+def compensated(parts: Loop, K: np.ndarray, f: np.ndarray, path: str) -> np.ndarray:
+    """Response (n,) of a law `K` (n,) with the filter, the integral and the disturbance observer around it."""
+    blocks, back = parts.blocks, np.exp(-2j * np.pi * np.atleast_1d(np.asarray(f, float)) * parts.dt)
+    if "filter" in blocks:
+        K = K * np.prod([biquad_response(section, back) for section in blocks["filter"]], axis=0)
+    if "integral" in blocks:
+        K = K + blocks["integral"].gain / (1 - back)
+    if "predictor" in blocks and path == "feedback":
+        p, v = blocks["predictor"], blocks["velocity"]
+        ahead = 1 + p.n * p.dt * difference(v.a, v.dt, back)
+        K = K * ahead / (1 + K * sum(p.K * p.dt**2 * (n - 0.5) * back**n for n in range(1, p.n + 1)))
+    if "observer" in blocks:
+        to_y, to_u = disturbance_observer.response(blocks["observer"], f, parts.motor == 2)
+        K = (K + to_y if path == "feedback" else K) / (1 - to_u)
+    return np.asarray(K)
 
 
 def printed_law(parts: Loop, f: np.ndarray) -> np.ndarray:

@@ -200,10 +200,18 @@ class RatioParams(NamedTuple):
     ratio: float  # what a node moves for one unit of its coordinate
 
 
-def physics_lines(terms: list[Any], kind: str, dt: float, place_of: Callable[[str], Any] | None = None) -> PhysicsLines:
+def physics_lines(
+    terms: list[Any],
+    kind: str,
+    dt: float,
+    place_of: Callable[[str], Any] | None = None,
+    record: str = "s.plant.m",
+    prefix: str = "term",
+) -> PhysicsLines:
     """Modules, blocks and lines of the plant's terms, in the order in which they act.
 
     `place_of` gives the place of an entry on a described machine (plants/graph/elements.py); by `kind` where absent.
+    `record` is the machine's record; the names of the blocks begin with `prefix`.
     """
     from rtctl.plants.physics import TERMS, ordered, place
     from rtctl.plants.physics.term import SITES
@@ -214,7 +222,7 @@ def physics_lines(terms: list[Any], kind: str, dt: float, place_of: Callable[[st
     moves: list[str] = []
     for number, settings in enumerate(ordered(terms)):
         term = TERMS[settings.term]
-        name = f"term{number}"
+        name = f"{prefix}{number}"
         if place_of is None:
             spot = place(kind, settings.node)
             ratio = f"p.plant.{spot.factor}" if spot.factor else "1.0"
@@ -227,7 +235,7 @@ def physics_lines(terms: list[Any], kind: str, dt: float, place_of: Callable[[st
             act = term.act_at(site, kind)
             if act is not None:
                 line = act.format(
-                    p=f"p.{name}", s=f"s.{name}", m="s.plant.m", i=spot.node, l=spot.link, c=spot.channel,
+                    p=f"p.{name}", s=f"s.{name}", m=record, i=spot.node, l=spot.link, c=spot.channel,
                     k=getattr(spot, "other", -1), r=ratio,
                 )  # fmt: skip
                 lines[site] += line.split("\n")

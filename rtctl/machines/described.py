@@ -10,7 +10,9 @@ import numpy as np
 from rtctl.drivers import daq_stc
 from rtctl.idiom import state, tick
 from rtctl.laws import bumpless, limit, reference, shaper, velocity
+from rtctl.machines import compensation
 from rtctl.machines.base import STATE_LINES, TRACE_LINES, Block, Diagram, PlantDiagram
+from rtctl.machines.described_motion import mechanics
 from rtctl.machines.described_parts import columns, metres_per_unit, parts_of, radius, shares_of, signals, unit
 from rtctl.machines.described_plant import converter, is_counter, readout_of, wires
 from rtctl.machines.described_plant import plant_diagram as described_plant
@@ -20,8 +22,17 @@ from rtctl.plants.linear import MOST_DRIVES
 from rtctl.tick import safety
 
 __all__ = [
-    "DescribedConfig", "config_class", "diagram", "metres_per_unit", "parts_of", "plant_diagram", "radius", "shares_of",
-    "signals", "unit",
+    "DescribedConfig",
+    "config_class",
+    "diagram",
+    "mechanics",
+    "metres_per_unit",
+    "parts_of",
+    "plant_diagram",
+    "radius",
+    "shares_of",
+    "signals",
+    "unit",
 ]  # fmt: skip
 
 SETTLE_FLOOR = 0.0  # two percent of the step say it all
@@ -78,7 +89,11 @@ def diagram(config: Any, dt: float) -> Diagram:
         "e": "y.position_error", "x": "y.feedback", "v": rate, "ref": "y.ref", "v_ref": "s.shaper.speed",
         "a_ref": "s.shaper.acceleration", "u": f"p.machine.shares[{number}] * y.{column}",
     }  # fmt: skip
-    position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": "y.u_c", "u_written": "u"})
+    asked = "y.u_c" if law.compensation.inverse is None else "asked"
+    position = own_law.lines(law.position, "u_fb", signals, {"u_wanted": asked, "u_written": "u"})
+    share = {number: float(shares_of(config)[number])}
+    names = compensation.Signals("u_fb", "y.position_error", "y.feedback", "y.speed", "y.u_c", asked, "u", "0.0", share)
+    more = compensation.lines(law.compensation, names, config.kind, lambda: mechanics(config, dt), dt)
     blocks = (
         Block("machine", _params(config, dt), DESCRIBED_STATE),
         Block("safety", safety.build(config.safety, dt), safety.SAFETY_STATE),
@@ -95,6 +110,7 @@ def diagram(config: Any, dt: float) -> Diagram:
         Block("bumpless", bumpless.build(law.bumpless, dt), bumpless.BUMPLESS_STATE),
         Block("limit", limit.build(law.limit, dt), limit.LIMIT_STATE),
         *(Block(f"drive{n}", converter(config, n), None) for n in range(len(machine.drives))),
+        *more.blocks,
     )
     stages = (
         (
@@ -111,6 +127,7 @@ def diagram(config: Any, dt: float) -> Diagram:
                     for n, (name, sensor) in enumerate(machine.sensors.items())
                 ),
                 f"y.feedback = p.machine.per_column * y.{read}",
+                *more.read,
             ),
         ),
         (
@@ -119,7 +136,7 @@ def diagram(config: Any, dt: float) -> Diagram:
                 *STATE_LINES,
                 "if s.safety.on != 0:",
                 *(f"    {line}" for line in SWITCH_ON),
-                *(f"    {line}" for line in position.reset),
+                *(f"    {line}" for line in (*position.reset, *more.reset)),
                 "machine.settle(p.machine, s.machine, s.safety, k)",
             ),
         ),
@@ -129,22 +146,27 @@ def diagram(config: Any, dt: float) -> Diagram:
                 "machine.play(t.reference, s.machine, s.safety, c, s.reference, k)",
                 "y.target = reference.step(t.reference, s.reference, c.setpoint, k)",
                 "y.ref = shaper.step(p.shaper, s.shaper, y.target)",
+                *more.reference,
                 "y.w = excitation.step(t.excitation, k - s.machine.k_run) if s.safety.state == safety.RUNNING else 0.0",
             ),
         ),
         (
             "law",
             (
-                "y.position_error = y.ref - y.feedback",
+                f"y.position_error = y.ref{more.shift} - {more.closed or 'y.feedback'}",
                 f"{rate} = velocity.step(p.velocity, s.velocity, y.feedback)",
                 *(("y.speed = y.feedback",) if parts.is_speed else ()),
                 *position.step,
+                *more.filter,
                 "changed = c.gains != s.machine.gains",
                 "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",
                 "s.machine.gains = c.gains",
-                "y.u_c = s.machine.u_fb + y.w",
-                "u = limit.step(p.limit, s.limit, y.u_c)",
+                *more.law,
+                f"y.u_c = s.machine.u_fb + y.w{more.extra}",
+                *more.inverse,
+                f"u = limit.step(p.limit, s.limit, {asked})",
                 *position.track,
+                *more.track,
             ),
         ),
         (
@@ -172,7 +194,7 @@ def diagram(config: Any, dt: float) -> Diagram:
             ),
         ),
     )
-    return Diagram((*USES, position.uses), blocks, columns(config), stages)
+    return Diagram((*USES, *more.uses, position.uses), blocks, columns(config), stages)
 
 
 SWITCH_ON = (  # the tick in which outputs come on: every law starts from where the machine stands

@@ -24,6 +24,7 @@ from rtctl.laws.reference import ReferenceSettings
 from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
 from rtctl.machines.base import COMMON_COLUMNS, MachineSettings
+from rtctl.machines.compensation import CompensationSettings, in_units
 from rtctl.machines.ldu import PdLawSettings, PositionSettings
 from rtctl.machines.physics import PhysicsTerm
 from rtctl.plants.graph.description import Description
@@ -51,6 +52,7 @@ class DescribedLawSettings(Settings):
     limit: LimitSettings = LimitSettings()
     bumpless: BumplessSettings = BumplessSettings()
     velocity: VelocitySettings = VelocitySettings()
+    compensation: CompensationSettings = CompensationSettings()
 
 
 class DescribedPlantSettings(Settings):
@@ -87,6 +89,10 @@ class DescribedConfig(MachineSettings):
         _check_columns(machine)
         for i, term in enumerate(self.plant.physics):
             check_node(machine, f"plant.physics.{i}.node", term.term, term.node)
+        feedforward = law.compensation.feedforward
+        for i, entry in enumerate(feedforward.effects if feedforward is not None else ()):
+            path = f"law.compensation.feedforward.effects.{i}.effect.node"
+            check_node(machine, path, entry.effect.term, entry.effect.node)
         return self
 
 
@@ -136,6 +142,8 @@ def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
     limits, laws = with_units(LimitSettings, symbols), with_units(DescribedLawSettings, symbols)
     shaper = DescribedLawSettings.model_fields["shaper"]  # its bandwidth is in rad/s, of whatever machine
     fields: dict[str, Any] = {"limit": (limits, limits(high=full)), "shaper": (ShaperSettings, shaper)}
+    around = in_units(symbols)
+    fields["compensation"] = (around, around())
     law: Any = create_model("DescribedLawSettings", __base__=laws, __module__=__name__, __doc__=laws.__doc__, **fields)
     safety, reference = with_units(SafetySettings, symbols), with_units(ReferenceSettings, symbols)
     played = with_units(DescribedConfig, symbols).model_fields["excitation"]

@@ -28,6 +28,7 @@ from rtctl.laws import (
     velocity,
 )
 from rtctl.laws.velocity import VelocitySettings
+from rtctl.machines import compensation
 from rtctl.machines.base import (
     COMMON_COLUMNS,
     STATE_LINES,
@@ -37,12 +38,13 @@ from rtctl.machines.base import (
     Diagram,
     Signals,
 )
+from rtctl.machines.ivu_motion import mechanics
 from rtctl.machines.ivu_plant import plant_diagram, substeps
 from rtctl.machines.ivu_settings import IvuConfig
 from rtctl.own import law as own_law
 from rtctl.tick import safety
 
-__all__ = ["IvuConfig", "diagram", "plant_diagram", "substeps"]
+__all__ = ["IvuConfig", "diagram", "mechanics", "plant_diagram", "substeps"]
 
 PLANT_RATE = 2000.0  # Hz, of the free-running emulator: a sample is at most half a millisecond old
 UNIT = "rad"
@@ -189,10 +191,20 @@ COLUMNS = (
 )
 
 STEP, RESET = "<step of the position law>", "<reset of the position law>"  # lines that depend on the config
+READ, REFERENCE, ERROR = "<compensation once read>", "<compensation along the reference>", "<error>"
+COMMAND, TRACK = "<command>", "<compensation after the limits>"
 LAW_SIGNALS = {
     "e": "y.capstan_error", "x": "y.capstan", "v": "y.capstan_speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
     "a_ref": "s.shaper.acceleration", "u": "y.u_c", "R1": "y.R1", "R2": "y.R2",
 }  # fmt: skip
+KNOWN = (  # friction compensation, less what the inertia feedforward gives besides the command, both as a command
+    "s.hand_over.u - p.inertia.volts * s.shaper.acceleration * "
+    "(1.0 / y.R1 + y.R1 / (y.R2 * y.R2) if y.u_c > 0.0 else 1.0 / y.R2 + y.R2 / (y.R1 * y.R1))"
+)
+WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
+NAMES = compensation.Signals(
+    "u_pd", "y.capstan_error", "y.capstan", "y.capstan_speed", "y.u_c", "y.u_c", WRITTEN, "s.hand_over.u", {}
+)
 STAGES = (
     (
         "read",
@@ -200,6 +212,7 @@ STAGES = (
             "y.watchdog = safety.board_watchdog(s.safety, rx, tx)",
             "y.capstan_counts = daq_stc.counter_position(s.capstan, rx.counter_codes[0])",
             "y.capstan = ls7084.radians(p.capstan, y.capstan_counts)",
+            READ,
             "y.reel1_counts = optical_sensor.count("
             "p.reel1, s.reel1, at_mio_16de.codes_to_input_volts(p.input1, rx.ai_codes[0]))",
             "y.reel2_counts = optical_sensor.count("
@@ -237,6 +250,7 @@ STAGES = (
             "machine.play(t, s, c, k)",
             "y.target = reference.step(t.reference, s.reference, c.setpoint, k)",
             "y.ref = shaper.step(p.shaper, s.shaper, y.target)",
+            REFERENCE,
             "speed = velocity.step(p.reference_speed, s.reference_speed, y.ref)",
             "running = s.safety.state == safety.RUNNING",
             "y.w = excitation.step(t.excitation, k - s.machine.k_run) if running else 0.0",
@@ -245,7 +259,7 @@ STAGES = (
     (
         "law",
         (
-            "y.capstan_error = y.ref - y.capstan",
+            ERROR,
             STEP,
             "y.gain_factor = gain_schedule.step(p.gain_schedule, s.gain_schedule, y.R1, y.R2, u_pd)",
             "changed = c.gains != s.machine.gains",
@@ -255,7 +269,7 @@ STAGES = (
             "u_f2 = friction_feedforward.step(p.friction2, s.friction2, y.ref)",
             "forward = s.friction1.direction > 0.0",
             "hand_over.step(p.machine, s.hand_over, u_f1, u_f2, forward, speed, y.R1, y.R2)",
-            "y.u_c = s.machine.u_fb + y.w + s.hand_over.u",
+            COMMAND,
             "tension.step(p.tension, s.tension, y.R1, y.R2)",
             "inertia_feedforward.step(p.inertia, s.inertia, s.shaper.acceleration, y.R1, y.R2)",
             "T1 = s.tension.V1 + s.inertia.u1 + s.hand_over.u1",
@@ -264,6 +278,7 @@ STAGES = (
             "measuring = p.machine.measure != 0 and s.safety.state == safety.ARMED and s.machine.prepared == 0",
             "u1 = limit.step(p.limit, s.limit1, s.reel_radius.u1 if measuring else s.allocation.u1)",
             "u2 = limit.step(p.limit, s.limit2, s.reel_radius.u2 if measuring else s.allocation.u2)",
+            TRACK,
         ),
     ),
     (
@@ -298,6 +313,7 @@ def diagram(config: IvuConfig, dt: float) -> Diagram:
     """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
     law, radius = config.law, config.radius
     position = own_law.lines(law.position, "u_pd", LAW_SIGNALS)
+    more = compensation.lines(law.compensation, NAMES, config.kind, lambda: mechanics(config, dt), dt)
     at_mio_16de.check_inputs([config.board.reel1, config.board.reel2])
     blocks = (
         Block("machine", _machine_params(config, dt), IVU_STATE),
@@ -335,13 +351,25 @@ def diagram(config: IvuConfig, dt: float) -> Diagram:
         Block("drive", DriveParams(law.tension.amp_per_volt), None),
         Block("output1", at_mio_16de.build_output(config.board.output1, dt), None),
         Block("output2", at_mio_16de.build_output(config.board.output2, dt), None),
+        *more.blocks,
     )  # fmt: skip
-    return Diagram((*USES, position.uses), blocks, COLUMNS, stages(position))
+    return Diagram((*USES, *more.uses, position.uses), blocks, COLUMNS, stages(position, more))
 
 
-def stages(position: own_law.LawLines) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Lines of the tick, with those of its position law."""
-    put = {STEP: position.step, RESET: tuple(f"    {line}" for line in position.reset)}
+def stages(
+    position: own_law.LawLines, more: compensation.Lines = compensation.NONE
+) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Lines of the tick, with those of its position law and of the compensation around it."""
+    command = "s.machine.u_fb + y.w + s.hand_over.u" + more.extra
+    put = {
+        STEP: (*position.step, *more.filter),
+        RESET: tuple(f"    {line}" for line in (*position.reset, *more.reset)),
+        READ: more.read,
+        REFERENCE: more.reference,
+        ERROR: (f"y.capstan_error = y.ref{more.shift} - {more.closed or 'y.capstan'}",),
+        COMMAND: (*more.law, f"y.u_c = {command}", *more.inverse),
+        TRACK: more.track,
+    }
     return tuple((name, tuple(part for line in body for part in put.get(line, (line,)))) for name, body in STAGES)
 
 

@@ -7,16 +7,15 @@ import numpy as np
 
 from rtctl.drivers import at_mio_16de, daq_stc, l292, ls7084, optical_sensor
 from rtctl.drivers.board import Wiring
-from rtctl.laws import allocation
 from rtctl.machines import ivu, ivu_plant
 from rtctl.machines.base import Block
 from rtctl.machines.ivu_duty import DUTY
 from rtctl.machines.ivu_exchange import EXCHANGE
+from rtctl.machines.ivu_motion import model
 from rtctl.machines.profile import (
     REELS,
     Columns,
     Friction,
-    Model,
     OwnBlocks,
     Profile,
     Range,
@@ -25,19 +24,10 @@ from rtctl.machines.profile import (
     Terminals,
     Usual,
 )
-from rtctl.machines.told import given, position, unit_row
+from rtctl.machines.told import given, position
 from rtctl.plants import ivu as plant
 
 EACH = ("J_m1", "J_m2", "c1", "c2", "k1", "k2", "c_m1", "c_m2", "k_m1", "k_m2")  # for both motors at two pairs of radii
-
-
-def model(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    """Volts to the angle of the capstan, `motor` (1 or 2) pulling where one pulls at a time."""
-    A, B = plant.state_space(p)
-    one, two = B[:, 0], -B[:, 1]  # what a positive command does through either motor
-    pulls = {allocation.DIFFERENTIAL: (one + two) / 2, allocation.MOTOR1: one, allocation.MOTOR2: two}
-    b = pulls.get(blocks["allocation"].kind, one if motor == 1 else two)
-    return Model(A, b, unit_row(len(A), plant.CAPSTAN))
 
 
 def drive(config: Any, f: np.ndarray) -> np.ndarray:

@@ -26,6 +26,7 @@ from rtctl.laws.velocity import VelocitySettings
 from rtctl.machines.base import (
     MachineSettings,
 )
+from rtctl.machines.compensation import CompensationSettings
 from rtctl.machines.physics import PhysicsTerm, check_nodes
 from rtctl.plants import ivu as plant_ivu
 from rtctl.plants.fmu import FmuSettings
@@ -88,6 +89,7 @@ class IvuLawSettings(Settings):
     bumpless: BumplessSettings = BumplessSettings()
     velocity: VelocitySettings = VelocitySettings(filter=30.0)
     tension_estimate: TensionEstimateSettings = TensionEstimateSettings()
+    compensation: CompensationSettings = CompensationSettings()
 
 
 class IvuPlantSettings(plant_ivu.IvuSettings):

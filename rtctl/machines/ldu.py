@@ -34,6 +34,7 @@ from rtctl.laws.reference import MetreReferenceSettings
 from rtctl.laws.sections import SectionsSettings
 from rtctl.laws.shaper import ShaperSettings
 from rtctl.laws.velocity import VelocitySettings
+from rtctl.machines import compensation
 from rtctl.machines.base import (
     COMMON_COLUMNS,
     STATE_LINES,
@@ -44,6 +45,7 @@ from rtctl.machines.base import (
     MachineSettings,
     Signals,
 )
+from rtctl.machines.ldu_motion import mechanics
 from rtctl.machines.ldu_plant import plant_diagram, substeps
 from rtctl.machines.physics import PhysicsTerm, check_nodes
 from rtctl.own import law as own_law
@@ -51,7 +53,7 @@ from rtctl.plants import ldu as plant_ldu
 from rtctl.plants.fmu import FmuSettings
 from rtctl.tick import safety
 
-__all__ = ["LduConfig", "diagram", "plant_diagram", "substeps"]
+__all__ = ["LduConfig", "diagram", "mechanics", "plant_diagram", "substeps"]
 
 UNIT = "m"
 SETTLE_FLOOR = 4e-6  # in that unit: 4 um are "more than allowed" (11.1); smaller steps need not settle closer
@@ -120,6 +122,9 @@ class ComputedTorqueParams(NamedTuple):
     volts: float
 
 
+MetreCompensationSettings: Any = compensation.in_units({"rad": "m"})
+
+
 class LduLawSettings(Settings):
     """The law, block by block in the order of the tick."""
 
@@ -130,6 +135,7 @@ class LduLawSettings(Settings):
     limit: LimitSettings = LimitSettings(high=3.0)
     bumpless: BumplessSettings = BumplessSettings()
     velocity: VelocitySettings = VelocitySettings(filter=200.0)
+    compensation: MetreCompensationSettings = MetreCompensationSettings()
 
 
 class LduPlantSettings(plant_ldu.LduSettings):
@@ -223,12 +229,15 @@ LAW_SIGNALS = {
     "e": "y.position_error", "x": "y.position", "v": "y.speed", "ref": "y.ref", "v_ref": "s.shaper.speed",
     "a_ref": "s.shaper.acceleration", "u": "y.u",
 }  # fmt: skip
-TRACKED = {"u_wanted": "u_c", "u_written": "u"}
 
 
-def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Lines of the tick for the law and the feedback of this config."""
-    law = own_law.lines(config.law.position, "u_fb", LAW_SIGNALS, TRACKED)
+OWN = "p.friction.volts * s.friction.direction"  # V of the friction compensation
+
+
+def stages(config: LduConfig, more: compensation.Lines = compensation.NONE) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Lines of the tick for the law, the feedback and the compensation of this config."""
+    asked = "asked" if more.inverse else "u_c"
+    law = own_law.lines(config.law.position, "u_fb", LAW_SIGNALS, {"u_wanted": asked, "u_written": "u"})
     encoder = position = "p.machine.R_c * ls7084.radians(p.encoder, y.encoder_counts)"
     if config.sensors.feedback == "scale":
         position = "y.scale"
@@ -243,6 +252,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
                 "y.scale_counts = daq_stc.counter_position(s.scale, rx.counter_codes[1])",
                 "y.scale = linear_scale.metres(p.scale, y.scale_counts)",
                 f"y.position = {position}",
+                *more.read,
             ),
         ),
         (
@@ -251,7 +261,7 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
                 *STATE_LINES,
                 "if s.safety.on != 0:",
                 "    machine.switch_on(p, s, y.position)",
-                *(f"    {line}" for line in law.reset),
+                *(f"    {line}" for line in (*law.reset, *more.reset)),
                 "machine.prepare(p, s, c, k)",
             ),
         ),
@@ -261,23 +271,28 @@ def stages(config: LduConfig) -> tuple[tuple[str, tuple[str, ...]], ...]:
                 "machine.play(t, s, c, k)",
                 "y.target = reference.step(t.reference, s.reference, c.setpoint, k)",
                 "y.ref = shaper.step(p.shaper, s.shaper, y.target)",
+                *more.reference,
                 "y.w = excitation.step(t.excitation, k - s.machine.k_run) if s.safety.state == safety.RUNNING else 0.0",
             ),
         ),
         (
             "law",
             (
-                "y.position_error = y.ref - y.position",
+                f"y.position_error = y.ref{more.shift} - {more.closed or 'y.position'}",
                 "y.speed = velocity.step(p.velocity, s.velocity, y.position)",
                 *law.step,
+                *more.filter,
                 "changed = c.gains != s.machine.gains",
                 "s.machine.u_fb = bumpless.step(p.bumpless, s.bumpless, u_fb, changed, s.machine.u_fb)",
                 "s.machine.gains = c.gains",
                 "u_ff = friction_feedforward.step(p.friction, s.friction, y.ref)",
                 "u_ff += p.inertia.volts * s.shaper.acceleration",
-                "u_c = s.machine.u_fb + u_ff + y.w",
-                "u = limit.step(p.limit, s.limit, u_c)",
+                *more.law,
+                f"u_c = s.machine.u_fb + u_ff + y.w{more.extra}",
+                *more.inverse,
+                f"u = limit.step(p.limit, s.limit, {asked})",
                 *law.track,
+                *more.track,
                 "y.u_c = u_c",
             ),
         ),
@@ -326,6 +341,9 @@ def play(t, s, c, k):
 def diagram(config: LduConfig, dt: float) -> Diagram:
     """Blocks and lines of the loop's tick. Raises ValueError with the key at fault in the sentence."""
     law = config.law
+    asked = "u_c" if law.compensation.inverse is None else "asked"
+    names = compensation.Signals("u_fb", "y.position_error", "y.position", "y.speed", "u_c", asked, "u", OWN, {0: 1.0})
+    more = compensation.lines(law.compensation, names, config.kind, lambda: mechanics(config, dt), dt)
     position = own_law.law_of(law.position)
     output = at_mio_16de.build_output(config.board.output, dt)
     volts = law.friction.F_c / law.friction.newton_per_volt
@@ -351,9 +369,10 @@ def diagram(config: LduConfig, dt: float) -> Diagram:
         Block("limit", limit.build(law.limit, dt), limit.LIMIT_STATE),
         Block("amplifier", ldu_amplifier.build(config.amplifier, dt, output.volts_per_code), None),
         Block("output", output, None),
+        *more.blocks,
     )
-    uses = (*USES, position.module.__name__, *(["rtctl.laws.error_table"] if corrections else []))
-    return Diagram(uses, blocks, COLUMNS, stages(config))
+    uses = (*USES, *more.uses, position.module.__name__, *(["rtctl.laws.error_table"] if corrections else []))
+    return Diagram(uses, blocks, COLUMNS, stages(config, more))
 
 
 USES = (

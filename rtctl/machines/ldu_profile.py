@@ -10,12 +10,12 @@ from rtctl.machines import ldu, ldu_plant
 from rtctl.machines.base import Block
 from rtctl.machines.ldu_duty import DUTY
 from rtctl.machines.ldu_exchange import EXCHANGE
+from rtctl.machines.ldu_motion import model
 from rtctl.machines.profile import (
     AMPLIFIER,
     SCALE,
     Columns,
     Friction,
-    Model,
     OwnBlocks,
     Profile,
     Range,
@@ -24,17 +24,8 @@ from rtctl.machines.profile import (
     Terminals,
     Usual,
 )
-from rtctl.machines.told import given, position, unit_row
+from rtctl.machines.told import given, position
 from rtctl.plants import ldu as plant
-
-
-def model(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    """Volts to the sensor that feeds back."""
-    A, B = plant.state_space(p)
-    c = config.sensors.R_c * unit_row(len(A), plant.ENCODER)
-    if config.sensors.feedback == "scale":
-        c = p.R_c * unit_row(len(A), plant.CAPSTAN)
-    return Model(A, ldu_amplifier.AMPERE_PER_VOLT * B[:, 0], c)
 
 
 def drive(config: Any, f: np.ndarray) -> np.ndarray:

@@ -3,6 +3,8 @@
 from math import pi
 from typing import Any
 
+from rtctl.machines import described_duty
+from rtctl.machines.base import DESCRIBED
 from rtctl.machines.duty import Duty, Use
 from rtctl.machines.profiles import profile_of
 
@@ -35,7 +37,9 @@ def use(node: str, config: Any) -> Use:
 
 
 def duty_of(config: Any) -> Duty:
-    """Ordinary use of a config's machine, which declares one."""
+    """Ordinary use of a config's machine, which declares one, or by its reference where its config describes it."""
+    if config.kind == DESCRIBED:
+        return described_duty.duty(config)
     found = profile_of(config.kind).duty
     assert found is not None  # that is asked before
     return found

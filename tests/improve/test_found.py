@@ -1,0 +1,51 @@
+"""Models and diagnoses as an improvement reads them."""
+
+import json
+
+import pytest
+
+from rtctl.config.errors import UserError
+from rtctl.config.load import to_yaml
+from rtctl.improve import found
+
+
+def test_a_model_is_read_with_its_effects(with_sizes, tmp_path):
+    (tmp_path / "any.yaml").write_text(to_yaml(with_sizes(dry=3.0)))
+    read = found.load(tmp_path / "any.yaml", None, None)
+    assert [effect.entry.term for effect in read.effects] == ["drive.deadband", "friction.coulomb", "load.spring"]
+    dry = read.effects[1]
+    assert dry.ends == ({"F_C": pytest.approx(2.7)}, {"F_C": pytest.approx(3.3)})
+    assert not read.unnamed
+
+
+def test_a_diagnosis_gives_the_intervals(with_sizes, tmp_path):
+    folder = tmp_path / "bundle" / "diagnosis"
+    folder.mkdir(parents=True)
+    (folder / "model.yaml").write_text(to_yaml(with_sizes(dry=3.0)))
+    size = {"value": 3.0, "low": 2.5, "high": 3.2, "unit": "N"}
+    told = {
+        "verdict": "named",
+        "effects": [{"name": "friction.coulomb", "node": "carriage", "parameters": {"F_C": size}}],
+    }
+    (folder / "diagnosis.json").write_text(json.dumps(told))
+    for path in (tmp_path / "bundle", folder, folder / "model.yaml"):
+        effect = found.load(path, None, None).effects[1]
+        assert effect.ends == ({"F_C": 2.5}, {"F_C": 3.2})
+        assert effect.interval == "F_C 3, 90 % 2.5 to 3.2 N"
+
+
+def test_the_law_of_another_config_is_taken(with_sizes, tmp_path):
+    (tmp_path / "model.yaml").write_text(to_yaml(with_sizes(dry=3.0)))
+    read = found.load(tmp_path / "model.yaml", "configs/machines/belt.yaml", None)
+    assert read.config.law.position.gain == 4.55 and len(read.effects) == 3
+    with pytest.raises(UserError, match="is of another kind of machine"):
+        found.load(tmp_path / "model.yaml", "ivu", None)
+
+
+@pytest.mark.parametrize(("name", "match"), [
+    ("nowhere", "no such file or folder"), ("empty", r"no model\.yaml in it; `rtctl diagnose"),
+])  # fmt: skip
+def test_what_is_no_model_is_told(name, match, tmp_path):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UserError, match=match):
+        found.load(tmp_path / name, None, None)
