@@ -13,6 +13,7 @@ from rtctl.reproduce.run import FOLDER, Result
 PAGE = "reproduction.md"
 WIDTH = 120
 TITLES = {
+    3: "Chapter 3: redesign concept",
     4: "Chapter 4: modelling",
     5: "Chapter 5: controller design",
     6: "Chapter 6: simulation",
