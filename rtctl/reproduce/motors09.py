@@ -93,11 +93,15 @@ def figure_9_2(short: bool) -> Picture:
     fig.legend(axes, fontsize=6)
     fig.title(axes, "behind the gear; x: moves, bare motor")
     table.axis("off")
+    table.plot([0.0, 1.0], [0.0, 0.0], color=fig.GREY, linewidth=0.6)
     cells = []
     for motor in every:
         found = fits(motor)
-        cells.append([motor.name, f"{1e3 * motor.friction:.3g}", f"{motor.friction / SMALL:.3g}",
-                      f"{max(one.current for one in found.values()):.2f}", f"{good(motor)} of {len(MOVES)}"])  # fmt: skip
+        most = max(one.current for one in found.values())
+        fitting = f"{good(motor)} of {len(MOVES)}"
+        cells.append(
+            [motor.name, f"{1e3 * motor.friction:.3g}", f"{motor.friction / SMALL:.3g}", f"{most:.2f}", fitting]
+        )
     made = table.table(cells, colLabels=["motor", "friction\n[mNm]", "turned\nback [N]", "most\n[A]", "moves"],
                        loc="center", colWidths=[0.38, 0.16, 0.16, 0.15, 0.15])  # fmt: skip
     made.auto_set_font_size(False)
