@@ -18,7 +18,7 @@ from rtctl.reproduce.rows import Part, Picture, Row, under
 PRINTS = 12  # images for the coherence: ink, paper and scanner are others in each
 LINES = {"capstan": 18.75e-3, "150": 150e-3, "300": 300e-3}  # m, bins of the text
 NAMES = {"capstan": "18.75", "150": "150", "300": "300"}
-FAR = (5e-3, 15e-3)  # m, where the error has nothing
+FAR = (25e-3, 120e-3)  # m, where the error has no line
 DEVIATION = "The color spectrum of this print shows large deviation and a periodic pattern in this error"
 CLEARLY = "This figure clearly shows the effect of the mechanical errors"
 NO_EFFECT = "have no effect on the position error"
@@ -41,7 +41,7 @@ COLOR = under(
             remark=f"no number in the text; its abstract has a large coherence at three wavelengths. {PRINTS} prints")
         for name, words in NAMES.items()
     ),
-    Row("11.coherence_else", "median of it from 5 to 15 mm, where there is no error", "11.2, figure 11.9", None, "",
+    Row("11.coherence_else", "median of it from 25 to 120 mm, where no line is", "11.2, figure 11.9", None, "",
         bound="at most", expected=0.3, quote=CLEARLY, remark="no number in the text; noise alone gives 1 / prints"),
     law=ch.PRESENT_LAW, set=SET, filter=ch.VELOCITY,
 )  # fmt: skip

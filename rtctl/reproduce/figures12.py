@@ -9,7 +9,7 @@ from rtctl.plants import ldu
 from rtctl.plants.ldu import LduParameters, LduSettings
 from rtctl.reproduce import chapter12 as ch
 from rtctl.reproduce import figures as fig
-from rtctl.reproduce import heads12
+from rtctl.reproduce import heads12, stroke12
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Picture
 
@@ -192,4 +192,5 @@ PARTS = (
     Part("present controller", ch.PRESENT, ch.present, {"12.8": figure_12_8}),
     Part("lead-lag controller", ch.SHAPED, ch.optimised, {"12.9": figure_12_9}),
     heads12.PART,
+    stroke12.PART,
 )

@@ -13,7 +13,7 @@ NAMES = [(i, row.name) for i, part in enumerate(PARTS) for row in part.rows]
 FIGURES = [(i, number) for i, part in enumerate(PARTS) for number in part.figures]
 WANTED = (
     "3.1 4.2 4.3 5.2 6.1 6.2 7.4 8.2 8.3 8.4 8.5 8.6 9.1 9.2 11.2 11.3 11.4 11.5 11.6 11.7 11.8 11.9 11.10 11.11 "
-    "12.2 12.3 12.4 12.5 12.6 12.8 12.9 12.11"
+    "12.2 12.3 12.4 12.5 12.6 12.8 12.9 12.11 12.12"
 )
 
 
