@@ -33,6 +33,7 @@ TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
         "span": "a length of tape, or held by one",
         "contact": "passes on force by friction",
         "rigid": "has no spring in the equations",
+        "path": "a sensor looks through it at what the tape carries",
         "ground": "ends at the frame",
         "turning": "its first end turns",
         "turned": "its far end turns",

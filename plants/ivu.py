@@ -16,6 +16,8 @@ The machine runs as ivu.yaml describes it, by the kernel of all machines (plants
 
 Source: thesis chapter 4 and appendix A. Erratum: appendix A prints the identified R_c as 1.25e-3, it is 1.25e-2 m;
 the simulation set has J_m twice too small for its own process gain; its 250 Hz mode needs J_10 of 3.2e-5.
+Erratum: K_m = 61 mNm/A of both columns is that of a rotor of appendix E, and so is the identified friction, about; the
+set appendix_e has both behind the gear of 150.4. A tape cannot turn that gear back: 0.22 Nm are 11 N at 20 mm.
 """
 
 from collections.abc import Mapping, Sequence
@@ -101,13 +103,17 @@ SETS = {
         "c_m1": 80.0, "c_m2": 80.0, "k_m1": 1e-5, "k_m2": 1e-5, "c1": 100.0, "c2": 100.0, "k1": 10.0, "k2": 10.0,
         "tau_F1": 1e-3, "tau_F2": 1e-3, "tau_Fc": 0.0,
     },
+    "appendix_e": {  # behind the gear of 150.4: K = 150.4 x 61 mNm/A, friction of 24 mA without load
+        "J_m1": 1.5e-3, "J_m2": 1.5e-3, "K_m1": 9.174, "K_m2": 9.174, "tau_F1": 0.22, "tau_F2": 0.22,
+    },
 }  # fmt: skip
 
 
 class IvuSettings(Settings):
     kind: Literal["ivu"] = "ivu"
-    set: Literal["identified", "simulation"] = Field(
-        default="identified", description="parameters where none are given: chapter 8, or chapter 6"
+    set: Literal["identified", "simulation", "appendix_e"] = Field(
+        default="identified",
+        description="parameters where none are given: chapter 8, chapter 6, or motors behind the gear of 150.4",
     )
     parameters: IvuParameters = IvuParameters()
 

@@ -136,6 +136,21 @@ def _check_place(machine: "Description", path: str, element: Any) -> None:
                 f"{path}.joint: {name} is rigid, so its ends do not move against each other; give "
                 f"joints.{name}.stiffness, or a body"
             )
+    _check_through(machine, path, element)
+
+
+def _check_through(machine: "Description", path: str, sensor: Any) -> None:
+    """A sensor looks through a span that ends at its body."""
+    span = getattr(sensor, "through", None)
+    if span is None:
+        return
+    at = [n for n, j in machine.joints.items() if j.span is not None and sensor.body in (getattr(j, "from"), j.to)]
+    if not at:
+        raise ValueError(f"{path}.through: no span of tape ends at {sensor.body}; leave it out, or describe the span")
+    _known(f"{path}.through", span, at, f"span at {sensor.body}")
+    other = next((n for n, s in machine.sensors.items() if s.through == span and not path.endswith(f".{n}")), None)
+    if other is not None:
+        raise ValueError(f"{path}.through: {other} looks through {span} already; one sensor can")
 
 
 def _check_columns(machine: "Description") -> None:

@@ -53,6 +53,7 @@ class Body(Settings):
     mass: float | None = Field(None, gt=0, description="mass, kg; the body slides")
     dry: float = Field(0.0, ge=0, description="dry friction to the frame, Nm or N")
     viscous: float = Field(0.0, ge=0, description="viscous friction to the frame, Nms/rad or Ns/m")
+    pull: float | None = Field(None, description="constant torque or force on it, Nm or N, as of a slip coupling")
     gravity: Gravity | list[Gravity] | None = Field(None, description="weight that acts along the coordinate")
     fixed: bool = Field(False, description="the body is the frame")
     radius: float | None = Field(None, gt=0, description="at which tape, belt or rope runs on the body, m")
@@ -176,6 +177,10 @@ class Sensor(Settings):
     body: str | None = Field(None, description="body that is looked at")
     joint: str | None = Field(None, description="joint: its elongation, or the force in it")
     drive: str | None = Field(None, description="drive: its current")
+    through: str | None = Field(
+        None,
+        description="span between the body and a mark on the tape that the sensor sees; its length is in the reading",
+    )
     measures: Literal["position", "speed", "acceleration", "force", "current"] = "position"
     column: str = Field(description="column of the recording")
     counts_per_unit: float | None = Field(None, description="counts for one rad or m (or unit of what is measured)")
@@ -200,6 +205,8 @@ class Sensor(Settings):
             raise ValueError("give one of body, joint, drive: what the sensor looks at")
         where = "body" if self.body is not None else "joint" if self.joint is not None else "drive"
         check_place("", where, self.measures)
+        if self.through is not None and (where != "body" or self.measures != "position"):
+            raise ValueError("through: a length of tape is in the position of a body; give body and measures: position")
         if self.scale == 0.0:
             raise ValueError("counts_per_unit or per_unit: 0 shows nothing; give column units for one SI unit")
         if not self.direction and (self.measures != "position" or self.counts_per_unit is None):

@@ -58,6 +58,7 @@ def elements(layout: Layout) -> tuple[Element, ...]:
         traits = ["general", "rigid"] if joint.stiffness is None else ["general", "spring"]
         if joint.stiffness is not None:
             traits += ["span" if joint.span is not None else "shaft"]
+            traits += ["path"] if _seen_through(machine, name) is not None else []
             traits += ["ground"] if any(machine.is_frame(end) for end in ends_of(joint)) else []
         traits += ["turning"] if machine.turns(getattr(joint, "from")) else []
         traits += ["turned"] if machine.turns(joint.to) else []
@@ -187,6 +188,11 @@ def _beside(layout: Layout, span: str) -> int:
     return NOWHERE
 
 
+def _seen_through(machine: Description, span: str) -> str | None:
+    """Sensor that looks through a span; None where none does."""
+    return next((name for name, sensor in machine.sensors.items() if sensor.through == span), None)
+
+
 def check_node(machine: Description, path: str, term: str, node: str) -> None:
     """Raise ValueError, which begins with `path`, where a term cannot stand at a node."""
     allowed = nodes(TERMS[term], elements(layout_of(machine)))
@@ -224,6 +230,11 @@ def spot(term: Term, settings: Any, layout: Layout, there: tuple[Element, ...], 
     if kind == "joint":
         end = getattr(machine.joints[node], getattr(settings, "end", "to"))
         other = _beside(layout, node) if "span" in found[0].needs else NOWHERE
+        eye = _seen_through(machine, node) if "path" in found[0].needs else None
+        if eye is not None:
+            body = str(machine.sensors[eye].body)
+            at = layout.links[node]
+            return Spot(layout.coordinate(body), at, layout.sensors[eye], layout.ratio(body, values), other)
         return Spot(layout.coordinate(end), layout.links.get(node, NOWHERE), 0, layout.ratio(end, values), other)
     if kind == "drive":
         i, a, _, _ = place(layout, machine.drives[node], values)

@@ -181,7 +181,19 @@ def _weights(layout: Layout, values: dict[str, float], a: dict[str, np.ndarray])
             else:
                 a["weight_force"][n] = values[f"bodies.{name}.mass"] * G_N * np.sin(values[f"{path}.incline"])
             n += 1
+        if body.pull is not None and layout.bodies[name].coordinate != NOWHERE:
+            n = _put_pull(layout, values, a, n, name)
     return n
+
+
+def _put_pull(layout: Layout, values: dict[str, float], a: dict[str, np.ndarray], n: int, name: str) -> int:
+    """A constant force is a weight that does not turn with its body."""
+    path = f"bodies.{name}.pull"
+    if n >= MOST_WEIGHTS:
+        raise ValueError(f"{path}: {MOST_WEIGHTS} weights and pulls are the most that one machine can have")
+    a["weight_i"][n], a["weight_a"][n] = layout.coordinate(name), layout.ratio(name, values)
+    a["weight_force"][n] = -values[path]
+    return n + 1
 
 
 def _reels(layout: Layout, values: dict[str, float], a: dict[str, np.ndarray]) -> int:

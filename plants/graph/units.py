@@ -9,7 +9,7 @@ from rtctl.config.units import to_si
 TURNS, SLIDES = "rad", "m"
 BODY = {  # key -> unit where the body turns, and where it slides
     "inertia": ("kg*m^2", "kg*m^2"), "mass": ("kg", "kg"), "dry": ("Nm", "N"), "viscous": ("Nm*s/rad", "N*s/m"),
-    "radius": ("m", "m"),
+    "radius": ("m", "m"), "pull": ("Nm", "N"),
 }  # fmt: skip
 REEL = {"core": "m", "thickness": "m", "density": "kg/m^3", "width": "m"}
 GRAVITY = {"mass": "kg", "arm": "m", "angle": "rad", "incline": "rad"}

@@ -40,7 +40,7 @@ def anywhere(term: Term) -> dict[str, tuple[str, ...]]:
 
 
 def _general(element: Element) -> Element:
-    alone = {"single"} if element.kind == "body" else set()
+    alone = {"single"} if element.kind == "body" else {"path"} if "span" in element.traits else set()
     return element._replace(traits=element.traits | {GENERAL} | alone)
 
 

@@ -21,7 +21,7 @@ def new(
             "--like",
             metavar="MACHINE",
             help="Machine to start from: belt, arm, screw, torsion, pendulum, hoist, spindle, gantry, two-motor, axis, "
-            "furuta, cart-pole.",
+            "furuta, cart-pole, ivu-old.",
         ),
     ] = "belt",
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder; made where it is missing.")] = Path(),

@@ -1,12 +1,16 @@
 """Gain schedule: a factor on the controller's output that follows the reel radii.
 
     off      1
-    model    K_p(reference radii) / K_p(R_drive, R_other): the loop gain K_p G stays at its design value
+    model    K_p(reference radii) / K_p(R_drive, R_other), but no less than `floor`: the loop gain K_p G stays at its
+             design value, or is above it
     margin   from a table over (R_drive, R_other), interpolated: for tables that keep a stability margin
 
 The process gain (`process_gain`) says what one motor does to the capstan; the other direction swaps the reels, since
 the unit is symmetric. A fixed gain that has 5.2 dB of gain margin at 38/22 mm has 1.2 dB at 40/40 and 20.9 dB at
 20/20: low-frequency gain alone does not set the margin, so `margin` takes a table designed on the full model.
+
+Dry friction of a motor leaves an error of tau / (G K_m): it grows where the factor is below 1, whatever the process
+gain is. So the floor is 1, and the schedule only adds gain where the larger reel of a pair pulls.
 
 Source: thesis chapter 9 (gain scheduling recommended), process gain of 4.1-4.17. The loop gain is
 smaller where the larger reel of a pair pulls, as chapter 9 says, and largest where both reels are full.
@@ -36,6 +40,9 @@ class GainScheduleSettings(Settings):
     mode: Literal["off", "model", "margin"] = Field(default="off", description="what the factor follows")
     R1_reference: float = quantity(0.038, unit="m", gt=0, help="driving reel for which the gain was designed")
     R2_reference: float = quantity(0.022, unit="m", gt=0, help="other reel for which the gain was designed")
+    floor: float = quantity(
+        1.0, unit="", ge=0, help="least factor of mode model; below 1 the error by dry friction grows at full reels"
+    )
     process: ProcessGainSettings = ProcessGainSettings()
     table: RadiusTableSettings | None = Field(default=None, description="factors, for mode margin")
 
@@ -43,6 +50,7 @@ class GainScheduleSettings(Settings):
 class GainScheduleParams(NamedTuple):
     mode: int
     K_reference: float  # rad/s^2/V
+    floor: float
     process: ProcessGainParams
     n_drive: int
     n_other: int
@@ -65,7 +73,9 @@ def build(settings: GainScheduleSettings, dt: float) -> GainScheduleParams:
         n_drive, n_other = _fill(settings.table, R_drive, R_other, factor)
     elif settings.mode == "margin":
         raise ValueError("mode margin takes a table of factors; give one under 'table', or take mode model")
-    return GainScheduleParams(MODES[settings.mode], K_reference, process, n_drive, n_other, R_drive, R_other, factor)
+    return GainScheduleParams(
+        MODES[settings.mode], K_reference, settings.floor, process, n_drive, n_other, R_drive, R_other, factor
+    )
 
 
 def _fill(table: RadiusTableSettings, R_drive: Any, R_other: Any, factor: Any) -> tuple[int, int]:
@@ -101,7 +111,7 @@ def step(p, s, R1, R2, direction):
 @tick
 def _one(p, R_drive, R_other):
     if p.mode == MODEL:
-        return p.K_reference / process_gain.step(p.process, R_drive, R_other)
+        return max(p.K_reference / process_gain.step(p.process, R_drive, R_other), p.floor)
     if p.mode == MARGIN:
         return _interpolate(p, R_drive, R_other)
     return 1.0

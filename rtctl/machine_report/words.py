@@ -61,6 +61,8 @@ def _drag(body: Body) -> Iterator[str]:
         yield f"dry friction {si(body.dry, force)}"
     if body.viscous:
         yield f"viscous friction {si(body.viscous, f'{force} s/{way}')}"
+    if body.pull is not None:
+        yield f"pulled by {si(body.pull, force)}"
 
 
 def _weight(body: Body) -> Iterator[str]:

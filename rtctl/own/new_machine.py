@@ -7,7 +7,7 @@ from pathlib import Path
 from rtctl.config.errors import UserError, nearest
 from rtctl.config.files import write_text
 
-MECHANICS = re.compile(r"^    kind: \./(\w+\.py):", re.MULTILINE)  # the file that a machine's YAML names
+BESIDE = re.compile(r"^[^#\n]*\bkind: \./(\w+\.py):", re.MULTILINE)  # a file that a machine's YAML names
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
@@ -20,7 +20,8 @@ def examples() -> list[str]:
 def write_machine(name: str, like: str, folder: Path) -> Path:
     """Write NAME.yaml, a described machine like one that comes with rtctl, into a folder; returns its path.
 
-    The file of its mechanics, where it has one, is written beside it; one that is there with the same text stays.
+    The file of its mechanics or of its law, where it has one, is written beside it; one that is there with the same
+    text stays.
 
     Raises UserError, and writes nothing, where it is there already or a name does not do.
     """
@@ -36,7 +37,7 @@ def write_machine(name: str, like: str, folder: Path) -> Path:
         raise UserError(f"{path}: there already, and nothing is overwritten; take another name or --into DIR")
     shipped = resources.files("rtctl.configs") / "machines"
     text = (shipped / f"{like}.yaml").read_text(encoding="utf-8")
-    beside = {path.parent / name: (shipped / name).read_text(encoding="utf-8") for name in MECHANICS.findall(text)}
+    beside = {path.parent / name: (shipped / name).read_text(encoding="utf-8") for name in BESIDE.findall(text)}
     for file, code in beside.items():
         if file.exists() and file.read_text(encoding="utf-8", errors="replace") != code:
             raise UserError(f"{file}: there already, with another text, and nothing is overwritten; take --into DIR")

@@ -6,6 +6,7 @@ import numpy as np
 
 from rtctl.design import schedule
 from rtctl.identify import bench, steps
+from rtctl.reproduce import accuracy09, motors09
 from rtctl.reproduce.chapter08 import SLACK
 from rtctl.reproduce.played import reels
 from rtctl.reproduce.rows import Part, Row, under
@@ -69,4 +70,4 @@ def scheduled(short: bool) -> dict[str, float]:
     }
 
 
-PARTS = (Part("gain schedule", SCHEDULE, scheduled),)
+PARTS = (Part("gain schedule", SCHEDULE, scheduled), accuracy09.PART, motors09.PART)

@@ -33,7 +33,7 @@ LISTS = {
     "resonance_2": "and a resonance at  $f = 286$  [Hz]",
     "resonance_3": r"thus this system introduces a resonance, at  $f = 2.1 \cdot 10^3$  [Hz]",
 }
-HEADS = "the text has several damped resonances from 50 to 220 Hz beside, as of its print heads; the emulator has one"
+HEADS = "the text has several damped resonances from 50 to 220 Hz beside, as of its print heads; this set has one"
 MEASURING = "PD 1e3 (1 + 0.1 s) V/m, 5 mm/s"
 RADII = (
     r"the capstan radius should be increased to  $R_c = 6.2 \cdot 10^{-3}$  [m] and the transmission wheel radius "
@@ -309,9 +309,9 @@ def shaped() -> shaping.Shaped:
     return shaping.of_points(frf.f, frf.H, frf.dt, None)
 
 
-def depths() -> list[float]:
-    """Depth in dB of each notch of the shaped loop at its frequency (12.5)."""
-    notches = [section for section in shaped().law.sections if section.kind == "notch"]
+def depths(made: shaping.Shaped | None = None) -> list[float]:
+    """Depth in dB of each notch of a shaped loop at its frequency (12.5)."""
+    notches = [section for section in (made or shaped()).law.sections if section.kind == "notch"]
     return [float(-20 * np.log10(notch.zeta_z / notch.zeta_p)) for notch in notches]
 
 

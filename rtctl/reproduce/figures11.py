@@ -8,6 +8,7 @@ import numpy as np
 from rtctl.design import mechanics
 from rtctl.identify import luminance
 from rtctl.reproduce import chapter11 as ch
+from rtctl.reproduce import color11
 from rtctl.reproduce import figures as fig
 from rtctl.reproduce.rows import Part, Picture
 
@@ -187,4 +188,5 @@ PARTS = (
     Part("luminance of a grey image", ch.LUMINANCE, ch.by_luminance,
          {"11.8": figure_11_8, "11.9": figure_11_9, "11.10": figure_11_10}),
     Part("error tables", ch.TABLE, ch.tables),
+    color11.PART,
 )  # fmt: skip

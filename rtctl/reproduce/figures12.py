@@ -9,6 +9,7 @@ from rtctl.plants import ldu
 from rtctl.plants.ldu import LduParameters, LduSettings
 from rtctl.reproduce import chapter12 as ch
 from rtctl.reproduce import figures as fig
+from rtctl.reproduce import heads12, stroke12
 from rtctl.reproduce.played import config
 from rtctl.reproduce.rows import Part, Picture
 
@@ -104,7 +105,7 @@ def figure_12_5(short: bool) -> Picture:
         "Sensitivity by noise, and the response of the linear drive by a multisine, set figure_12_2: a mass up to 50 "
         f"Hz with {ch.identification(short)['12.process_gain']:.2f} m/s^2/A, and its mode at 114 Hz; the model has no "
         "delay. The resonances of print heads and other features, which the text shows from 50 to 220 Hz, are not in "
-        "the emulator."
+        "this set; figure 12.11 has them."
     )
     return Picture("12.5", sentence, figure)
 
@@ -155,8 +156,8 @@ def figure_12_9(short: bool) -> Picture:
     sentence = (
         "Lead-lag, notches and low-pass, found by optimisation for 11 dB and 60 deg on the measured response: "
         f"{reached.bandwidth:.0f} Hz, {reached.GM:.1f} dB and {reached.PM:.0f} deg measured while it runs. Of the two "
-        f"notches one acts, by {first:.0f} dB; the other takes away {second:.1f} dB, for the emulator has none of the "
-        "resonances of the print heads."
+        f"notches one acts, by {first:.0f} dB; the other takes away {second:.1f} dB, for this set has none of the "
+        "resonances of the print heads; figure 12.11 has them."
     )
     return Picture("12.9", sentence, figure)
 
@@ -190,4 +191,6 @@ PARTS = (
     Part("friction", ch.FRICTION, ch.friction),
     Part("present controller", ch.PRESENT, ch.present, {"12.8": figure_12_8}),
     Part("lead-lag controller", ch.SHAPED, ch.optimised, {"12.9": figure_12_9}),
+    heads12.PART,
+    stroke12.PART,
 )

@@ -13,6 +13,7 @@ from rtctl.reproduce.run import FOLDER, Result
 PAGE = "reproduction.md"
 WIDTH = 120
 TITLES = {
+    3: "Chapter 3: redesign concept",
     4: "Chapter 4: modelling",
     5: "Chapter 5: controller design",
     6: "Chapter 6: simulation",
@@ -49,6 +50,8 @@ the text. What follows the name of a parameter set was put in here.
 - `simulation` is that column of appendix A.
 - `identified` is the other one, with R_c = 12.5 mm. Friction of 2.6 mNm at motor 2 and 0.1 mNm at the capstan is
   chosen here.
+- `ivu-old` is the unit of chapter 2. Its torque, window, speed and radii are of the text; its motor, its camera and
+  the guides of its path are chosen here.
 - `appendix_f` is as listed, `figure_12_2` has k_s, k_c and M chosen here. The text has no damping; it is chosen here.
 
 The emulated machines have these parameters. So a row that identifies one of them shows that the experiment finds what

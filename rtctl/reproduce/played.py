@@ -8,13 +8,16 @@ import numpy as np
 from rtctl import machines
 from rtctl.config.errors import NoAnswer
 from rtctl.config.load import load_settings, set_paths
-from rtctl.config.yaml_file import find
+from rtctl.config.yaml_file import find, load_yaml
 from rtctl.loop.fused import Run, run
 
 
 def config(name: str, changes: Mapping[str, Any] | None = None) -> Any:
     """A shipped config in fused mode, with other values at dotted keys. Raises UserError for a wrong key."""
-    made = load_settings(find(name), machines.CONFIGS[name.partition("_")[0]])
+    file = find(name)
+    model = machines.class_of(load_yaml(file).data)
+    assert model is not None, name
+    made = load_settings(file, model, widen=machines.OWN)
     return set_paths(made, {"loop.mode": "fused", **(changes or {})})
 
 

@@ -13,8 +13,8 @@ from rtctl.config.files import made_in
 from rtctl.reproduce.rows import Part, Row, measured
 
 MODULES = {  # module that holds the parts of a chapter
-    4: "chapter04", 5: "chapter05", 6: "chapter06", 7: "chapter07", 8: "figures08", 9: "chapter09", 10: "chapter10",
-    11: "figures11", 12: "figures12",
+    3: "chapter03", 4: "chapter04", 5: "chapter05", 6: "chapter06", 7: "chapter07", 8: "figures08", 9: "chapter09",
+    10: "chapter10", 11: "figures11", 12: "figures12",
 }  # fmt: skip
 FOLDER = "images/reproduction"  # of the figures, beside the page
 

@@ -13,7 +13,7 @@ def built(**choices):
     return gain_schedule.build(gain_schedule.GainScheduleSettings(**choices), 0.002)
 
 
-OFF, MODEL, MARGIN = built(), built(mode="model"), built(mode="margin", table=TABLE)
+OFF, MODEL, MARGIN = built(), built(mode="model", floor=0.0), built(mode="margin", table=TABLE)
 
 
 def factor(p, R1, R2, direction=1.0):
@@ -30,6 +30,13 @@ def test_model_keeps_the_loop_gain_at_its_design_value(R1, R2):
     design = process_gain.step(MODEL.process, 0.038, 0.022)
     assert factor(MODEL, R1, R2, 1.0) * process_gain.step(MODEL.process, R1, R2) == pytest.approx(design)
     assert factor(MODEL, R1, R2, -1.0) * process_gain.step(MODEL.process, R2, R1) == pytest.approx(design)
+
+
+@settings(deadline=None)
+@given(radius, radius)
+def test_model_takes_no_gain_away(R1, R2):
+    p = built(mode="model")
+    assert factor(p, R1, R2) == max(factor(MODEL, R1, R2), 1.0)
 
 
 @settings(deadline=None)

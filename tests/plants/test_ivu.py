@@ -342,3 +342,11 @@ def test_a_substep_allocates_nothing(allocations):
     record, s = plant(built())
     s.m.u[:2] = 0.3
     assert allocations(run, record, s, 1000) == allocations(run, record, s, 1)
+
+
+def test_motors_behind_their_gear():
+    """Appendix E: 61 mNm/A and 24 mA without load, times 150.4."""
+    p = ivu.parameters(ivu.IvuSettings(set="appendix_e"))
+    assert p.K_m1 == p.K_m2 == pytest.approx(150.4 * 61e-3, rel=1e-3)
+    assert p.tau_F1 == p.tau_F2 == pytest.approx(150.4 * 61e-3 * 24e-3, rel=2e-3)
+    assert p.tau_F1 / p.R_min > 10.0  # N, with which a tape would turn it back

@@ -46,6 +46,10 @@ REFUSED = {  # change -> what is said
     "symbols": ({"k": ["joints.belt.stifness"]}, r"symbols.k: .*did you mean 'joints.belt.stiffness'\?"),
 }
 REFUSED_TAPE = {
+    "sensors.encoder.through": (
+        "tap",
+        "sensors.encoder.through: there is no span at capstan 'tap'; did you mean 'tape'?",
+    ),
     "bodies.capstan.radius": (None, "joints.tape.from: capstan has no radius for the tape"),
     "bodies.reel.radius": (0.01, "bodies.reel.radius: 0.01 m is less than the core of 0.02 m"),
     "bodies.reel.reel.density": (

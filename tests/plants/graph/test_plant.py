@@ -222,3 +222,15 @@ def test_a_substep_allocates_nothing(allocations):
     p = reels()
     s = started(p)
     assert allocations(run, p, s, 1000) == allocations(run, p, s, 1)
+
+
+def test_a_constant_pull_is_a_force_that_goes_with_nothing():
+    """v = F t / m, and half of it through a ratio of two."""
+    for ratio in (1.0, 2.0):
+        p = params(
+            1e-3, bodies={"a": {"mass": 2.0}, "b": {"mass": 3.0, "pull": 0.7}},
+            joints={"rod": {"from": "a", "to": "b", "ratio": ratio}},
+        )  # fmt: skip
+        s = started(p)
+        run(p, s, 500)
+        assert s.m.x[1] == pytest.approx(0.7 * ratio * 0.5 / (2.0 + 3.0 * ratio**2), rel=1e-9)

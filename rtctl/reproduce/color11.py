@@ -1,0 +1,136 @@
+"""Chapter 11, colour: the difference that the position error makes in a grey image, before and after each cure, and the
+coherence of the two at the three wavelengths."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from rtctl.config.load import set_paths
+from rtctl.design import error_table
+from rtctl.identify import bench, color, luminance, scale_error
+from rtctl.identify.color import Colors
+from rtctl.reproduce import chapter11 as ch
+from rtctl.reproduce import figures as fig
+from rtctl.reproduce.played import config
+from rtctl.reproduce.rows import Part, Picture, Row, under
+
+PRINTS = 12  # images for the coherence: ink, paper and scanner are others in each
+LINES = {"capstan": 18.75e-3, "150": 150e-3, "300": 300e-3}  # m, bins of the text
+NAMES = {"capstan": "18.75", "150": "150", "300": "300"}
+FAR = (25e-3, 120e-3)  # m, where the error has no line
+DEVIATION = "The color spectrum of this print shows large deviation and a periodic pattern in this error"
+CLEARLY = "This figure clearly shows the effect of the mechanical errors"
+NO_EFFECT = "have no effect on the position error"
+REDUCED = "these errors could be reduced"
+INKS = "four inks, their places and the coverage chosen here"
+SET = f"{ch.PRINTER}, print heads, {INKS}"
+
+COLOR = under(
+    Row("11.color_before", "colour difference dE of the grey image, root of the mean square", "10", None, "",
+        bound="at least", expected=0.3, quote=DEVIATION, remark="no number in the text; an eye just sees a dE of 1"),
+    Row("11.color_table", "the same with an error table from the scale, over that before", "11.3, (11.12)", None, "",
+        bound="at most", expected=0.5, quote=REDUCED,
+        remark="no number in the text; the guide's waves and dirt are left"),
+    Row("11.color_direct", "the same with direct measurement, over that before", "11.3", None, "", bound="at most",
+        expected=0.2, quote=NO_EFFECT, law=ch.PRESENT_LAW + ", feedback by the scale",
+        remark="no number in the text; what is left is the tracking error of the loop"),
+    *(
+        Row(f"11.coherence_{name}", f"coherence of error and luminance at {words} mm", "11.2, figure 11.9", None, "",
+            bound="at least", expected=0.5, quote=CLEARLY,
+            remark=f"no number in the text; its abstract has a large coherence at three wavelengths. {PRINTS} prints")
+        for name, words in NAMES.items()
+    ),
+    Row("11.coherence_else", "median of it from 25 to 120 mm, where no line is", "11.2, figure 11.9", None, "",
+        bound="at most", expected=0.3, quote=CLEARLY, remark="no number in the text; noise alone gives 1 / prints"),
+    law=ch.PRESENT_LAW, set=SET, filter=ch.VELOCITY,
+)  # fmt: skip
+WAYS: dict[str, dict[str, Any]] = {"before": {}, "direct": {"sensors.feedback": "scale"}}
+
+
+@cache
+def way(which: str) -> tuple[np.ndarray, np.ndarray]:
+    """Positions that are asked for (n,) and the error of the carriage there (n,), both m, filtered as (11.2) is."""
+    changes = WAYS.get(which)
+    if changes is None:
+        changes = {"sensors.correction": {"period": ch.TURN, "values": list(table())}}
+    made = scale_error.scale_config(set_paths(config("ldu_printer"), changes), ch.TRAVEL, ch.SPEEDS[0])
+    record = bench.play(made)
+    (one,) = scale_error.passes(record)
+    t, ref, x = record.t, record["ref"], record["truth_x"]
+    inside = (ref > one.start) & (ref < one.start + ch.LENGTH) & (np.gradient(ref, t) > 0.5 * ch.SPEEDS[0])
+    every = max(1, round(1.0 / (scale_error.RATE * float(t[1] - t[0]))))
+    e = smooth((x - ref)[inside], float(t[1] - t[0]))[::every]
+    return ref[inside][::every], e - e[0]
+
+
+def smooth(e: np.ndarray, dt: float) -> np.ndarray:
+    """Second-order Butterworth of 50 Hz, forwards and backwards."""
+    from scipy.signal import butter, sosfiltfilt
+
+    return np.asarray(sosfiltfilt(butter(2, scale_error.CUTOFF, fs=1.0 / dt, output="sos"), e))
+
+
+@cache
+def table() -> tuple[float, ...]:
+    """Error table from the scale."""
+    one = ch.printer(ch.SPEEDS[0])
+    return tuple(error_table.from_scale(one.x, one.e, ch.TURN).settings.values)
+
+
+@cache
+def image(which: str) -> Colors:
+    """Grey image of a pass."""
+    return color.printed(*way(which))
+
+
+@cache
+def coherence() -> tuple[np.ndarray, np.ndarray]:
+    """Wavelengths (k,) m and coherence (k,) of error and luminance, of prints of one pass."""
+    one = ch.printer(ch.SPEEDS[0])
+    at = np.linspace(0.0, ch.LENGTH, ch.N, endpoint=False)
+    images = []
+    for seed in range(1, PRINTS + 1):
+        made = luminance.printed(one.x, one.e, luminance.PrintSettings(seed=seed))
+        images.append(np.interp(at, made.x - made.x[0], made.L))
+    e = np.interp(at, one.x - one.x[0], one.e)
+    return color.coherence([e] * PRINTS, images, at, ch.N)
+
+
+def colors(short: bool) -> dict[str, float]:
+    """Colour differences, and coherence."""
+    before = image("before").rms
+    length, C = coherence()
+    at = {f"11.coherence_{name}": float(C[np.argmin(np.abs(length - line))]) for name, line in LINES.items()}
+    return {
+        "11.color_before": before,
+        "11.color_table": image("table").rms / before,
+        "11.color_direct": image("direct").rms / before,
+        **at,
+        "11.coherence_else": float(np.median(C[(length > FAR[0]) & (length < FAR[1])])),
+    }
+
+
+def figure_11_11(short: bool) -> Picture:
+    """Colour difference over the position, and coherence over the wavelength."""
+    figure, (E, C) = fig.panels(2, height=1.9)
+    for which, shade in (("before", fig.BLUE), ("table", fig.GREEN), ("direct", fig.ORANGE)):
+        found = image(which)
+        fig.line(E, 1e3 * found.x, found.dE, shade, linewidth=0.8, label=which)
+    E.set(xlabel="position [mm]", ylabel="dE")
+    fig.legend(E, ncols=3)
+    length, value = coherence()
+    C.semilogx(1e3 * length, value, color=fig.BLUE, linewidth=0.7)
+    for line in LINES.values():
+        C.axvline(1e3 * line, color=fig.GREY, linewidth=0.6, linestyle=":")
+    C.set(xlabel="wavelength [mm]", ylabel="coherence", ylim=(0, 1.05))
+    got = colors(short)
+    sentence = (
+        f"Not in the text: colour difference of CIE 1976 of a grey image, {INKS}: {got['11.color_before']:.2f} as the "
+        f"printer is, {got['11.color_table']:.2f} of it with an error table and {got['11.color_direct']:.2f} measured "
+        f"directly; below, the coherence of position error and luminance over {PRINTS} prints."
+    )
+    return Picture("11.11", sentence, figure)
+
+
+PART = Part("colour", COLOR, colors, {"11.11": figure_11_11})
