@@ -25,13 +25,19 @@ OF_A_PACE = 60  # windows in motion for each pace at which the band is known
 PACES = 4  # of them, at most
 MOVES = 0.3  # share of the blocks of a window in motion that counts
 FASTER = 1.25  # times the fastest window that was learned: a faster one is not judged
+LATE, LATER = 0.1, 1.5  # of a tick, and times nine in ten of the learned windows: an error of time that is usual
 HUBER = 1.5  # standard deviations, beyond which a block weighs less
 ROUNDS = 10
 OUTLYING = 9.0  # times its expectation: a square of a measure beyond counts no more
 LEAST = 1e-3  # of the mean square of a measure: its power at rest, at least
 ALONG = ("push", "direction", "speed", "acceleration")  # what a missing force may be proportional to
 FAINT = 0.1  # of the usual speed or acceleration: less in a window tells nothing of a force in proportion to it
+EVEN = 0.1  # of the usual speed and acceleration: changes of an even motion
+LEAST_WEIGHT = 0.1
 PER_DAY = 1.0  # false alarms in eight hours of motion
+
+
+Before = tuple[np.ndarray, int]  # mean speed (followed,) of the window before, and how many were as even
 
 
 class Measure(NamedTuple):
@@ -53,12 +59,14 @@ class Band(NamedTuple):
     units: np.ndarray  # (2, followed) usual speed and acceleration
     whitening: list[np.ndarray]  # of each sensor
     usual: np.ndarray  # (signals, len(ALONG)) what the model lacks on the healthy machine
+    late: float  # s, error of the time of a row, beyond which a window is not judged
     jolt: float  # acceleration of the window that was learned with the highest, in units of the usual one
     paces: np.ndarray  # (paces,) of the windows by which location and spread are known, in units of the usual speed
     growth: np.ndarray  # (3, measures) power of each measure: a constant, and what speed and acceleration add
     location: np.ndarray  # (paces, measures)
     spread: np.ndarray  # (paces, measures)
     sigma: np.ndarray  # (sensors,) innovations of the healthy machine, SI
+    slow_sigma: np.ndarray  # (sensors,) residual of a slow block of the healthy machine, SI
     limits: Thresholds
 
     @property
@@ -84,9 +92,14 @@ class Band(NamedTuple):
         return (np.abs(batch.v) > self.grain).any(axis=2) | (np.abs(batch.asked) > self.asked)
 
     def counts(self, batch: Batch) -> np.ndarray:
-        """Windows (n,) in motion, no faster than those that were learned."""
+        """Windows (n,) in motion whose rows came in time, no faster than those that were learned."""
         slow = (self.pace(batch) <= FASTER * self.paces[-1]) & (self.pace(batch, 1) <= FASTER * self.jolt)
-        return self.in_motion(batch) & slow
+        return self.in_motion(batch) & slow & ~self.untimely(batch)
+
+    def untimely(self, batch: Batch) -> np.ndarray:
+        """Windows (n,) with rows that came later than those that were learned: they would show an error of the clock
+        as one of the machine."""
+        return np.asarray(batch.late > self.late)
 
     def in_motion(self, batch: Batch) -> np.ndarray:
         """Windows (n,) in motion."""
@@ -99,6 +112,17 @@ class Band(NamedTuple):
     def grown(self, batch: Batch) -> np.ndarray:
         """What the power of a measure grows with (windows, 3)."""
         return np.stack([np.ones(len(batch)), self.pace(batch) ** 2, self.pace(batch, 1) ** 2], axis=1)
+
+    def weights(self, batch: Batch, before: "Before | None" = None) -> tuple[np.ndarray, "Before"]:
+        """Weights (n,) of windows, and what the next ones need. A window whose motion goes on evenly repeats the one
+        before: the n-th of them counts 1/n, as far as LEAST_WEIGHT."""
+        mean = batch.v.mean(axis=1) / self.units[0]
+        out, last, count = np.ones(len(batch)), *(before or (np.full(mean.shape[1], np.inf), 0))
+        even = self.pace(batch, 1) < EVEN
+        for k, v in enumerate(mean):
+            count = count + 1 if even[k] and (np.abs(v - last) < EVEN).all() else 1
+            out[k], last = max(1.0 / count, LEAST_WEIGHT), v
+        return out, (last, count)
 
     def signals(self, batch: Batch) -> np.ndarray:
         """Slow signals (windows, BLOCKS, signals): forces, and residuals of the other sensors about their means."""
@@ -116,9 +140,7 @@ class Band(NamedTuple):
 
     def innovations(self, batch: Batch) -> np.ndarray:
         """Standard deviation of the innovations (windows, sensors) of each window, SI."""
-        return np.stack(
-            [np.std(filtered(a, batch.e[:, :, k].T), axis=0) for k, a in enumerate(self.whitening)], axis=1
-        )
+        return np.stack([np.std(filtered(a, batch.e[:, :, k].T), axis=0) for k, a in enumerate(self.whitening)], axis=1)
 
     def missing(self, batch: Batch) -> np.ndarray:
         """Signals (windows, BLOCKS, signals) less what the healthy machine shows in the same motion."""
@@ -166,12 +188,27 @@ def learn(batch: Batch, shape: Shape, sensors: list[str], followed: list[int], g
     asked = np.abs(batch.asked)
     some = asked[asked > 0.0]
     band = Band(
-        shape, tuple(sensors), tuple(followed), STEPS * np.maximum(grain, 1e-12) / slow,
-        SLIGHT * float(np.sqrt(np.mean(some**2))) if len(some) else np.inf, np.ones((2, len(followed))),
-        [np.ones(1)] * len(sensors), np.zeros((len(followed) + len(sensors) - len(followed), len(ALONG))),
-        1.0, np.ones(1), np.zeros((3, 0)), np.zeros((1, 0)), np.ones((1, 0)), np.ones(len(sensors)), Thresholds(np.ones(0), per_day),
-    )  # fmt: skip
-    batch = batch.some(band.in_motion(batch))
+        shape=shape,
+        sensors=tuple(sensors),
+        followed=tuple(followed),
+        grain=STEPS * np.maximum(grain, 1e-12) / slow,
+        asked=SLIGHT * float(np.sqrt(np.mean(some**2))) if len(some) else np.inf,
+        units=np.ones((2, len(followed))),
+        whitening=[np.ones(1)] * len(sensors),
+        usual=np.zeros((len(sensors), len(ALONG))),
+        late=np.inf,
+        jolt=1.0,
+        paces=np.ones(1),
+        growth=np.zeros((3, 0)),
+        location=np.zeros((1, 0)),
+        spread=np.ones((1, 0)),
+        sigma=np.ones(len(sensors)),
+        slow_sigma=np.ones(len(sensors)),
+        limits=Thresholds(np.ones(0), per_day),
+    )
+    late = max(LATER * float(np.quantile(batch.late, 0.9)), LATE * shape.dt)
+    band = band._replace(late=min(late, shape.dt))
+    batch = batch.some(band.in_motion(batch) & ~band.untimely(batch))
     if len(batch) < FEWEST:
         raise NoAnswer(
             f"the machine moved in {len(batch)} windows of {shape.seconds:g} s while the band was to be learned; "
@@ -187,11 +224,17 @@ def learn(batch: Batch, shape: Shape, sensors: list[str], followed: list[int], g
     ]))  # fmt: skip
     grown = band.grown(batch)
     band = band._replace(
-        jolt=float(band.pace(batch, 1).max()), growth=np.stack([_power(grown, raw) for raw in band.raw(batch).T], axis=1)
+        jolt=float(band.pace(batch, 1).max()),
+        growth=np.stack([_power(grown, raw) for raw in band.raw(batch).T], axis=1),
     )
     band = _paced(band, batch)
-    band = band._replace(sigma=np.median(band.innovations(batch), axis=0))
-    return band._replace(limits=thresholds(band.scores(batch), shape.seconds, per_day))
+    n, blocks = batch.v.shape[:2]
+    slow_blocks = batch.e.reshape(n, blocks, -1, len(sensors)).mean(axis=2)
+    band = band._replace(
+        sigma=np.maximum(np.median(band.innovations(batch), axis=0), 1e-300),
+        slow_sigma=np.maximum(1.4826 * np.median(np.abs(slow_blocks), axis=(0, 1)), 1e-300),
+    )
+    return band._replace(limits=thresholds(band.scores(batch), band.weights(batch)[0], shape.seconds, per_day))
 
 
 def _whitening(e: np.ndarray) -> np.ndarray:
@@ -243,6 +286,4 @@ def _paced(band: Band, batch: Batch) -> Band:
         paces.append(top)
         location.append(location[-1])
         spread.append(spread[-1])
-    return band._replace(
-        paces=np.array(paces), location=np.array(location), spread=np.maximum(np.array(spread), LEAST)
-    )
+    return band._replace(paces=np.array(paces), location=np.array(location), spread=np.maximum(np.array(spread), LEAST))

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 
 DRIFT = 0.6  # standard deviations: half the least shift that is to be noticed at once
 BOUND = 4.0  # standard deviations, of a score
+MARGIN = 1.25  # of the thresholds: for tails that a learned sample is too short to show
 LONG = 16  # windows of the sums by which the correlation of scores is measured
 MOST = 2.0  # of theta: no learned sample is long enough to promise a steeper tail
 DAY = 8 * 3600.0  # s of motion
@@ -27,13 +28,14 @@ class Thresholds(NamedTuple):
     per_day: float  # false alarms in eight hours of motion, at most, by theory
 
 
-def exponent(scores: np.ndarray) -> float:
-    """Rate theta at which the chance of a false alarm falls with the threshold, by scores (n,) of a healthy machine.
+def exponent(scores: np.ndarray, weights: np.ndarray) -> float:
+    """Rate theta at which the chance of a false alarm falls with the threshold, by scores (n,) of a healthy machine and
+    their weights (n,).
 
     The smaller of that of the distribution of single scores and that of the variance of long sums. Zero where the
     scores do not fall on the average.
     """
-    x = np.clip(scores, -BOUND, BOUND) - DRIFT
+    x = weights * (np.clip(scores, -BOUND, BOUND) - DRIFT)
     if x.mean() >= 0.0:
         return 0.0
     if x.max() <= 0.0:
@@ -51,13 +53,15 @@ def exponent(scores: np.ndarray) -> float:
     return float(min(single, -2.0 * x.mean() / spread, MOST))
 
 
-def thresholds(scores: np.ndarray, seconds: float, per_day: float) -> Thresholds:
-    """Thresholds for scores (n, k) of a healthy machine in windows of `seconds`: at most `per_day` false alarms of all
-    sums together in eight hours of motion."""
+def thresholds(scores: np.ndarray, weights: np.ndarray, seconds: float, per_day: float) -> Thresholds:
+    """Thresholds for scores (n, k) and weights (n,) of a healthy machine in windows of `seconds`.
+
+    All sums together make at most `per_day` false alarms in eight hours of motion.
+    """
     windows = DAY / seconds
     odds = np.log(windows * scores.shape[1] / per_day)
-    theta = np.array([exponent(column) for column in scores.T])
-    return Thresholds(odds / np.maximum(theta, 1e-3), per_day)
+    theta = np.array([exponent(column, weights) for column in scores.T])
+    return Thresholds(MARGIN * odds / np.maximum(theta, 1e-3), per_day)
 
 
 class Sums:
@@ -77,10 +81,12 @@ class Sums:
         """Shares (k,) of the thresholds that are reached."""
         return np.asarray(self.value / self.limits.h)
 
-    def step(self, score: np.ndarray) -> int | None:
-        """Take in the scores (k,) of a window; the number of the sum that is furthest beyond its threshold, None where
-        none is."""
-        self.value = np.maximum(self.value + np.clip(score, -BOUND, BOUND) - DRIFT, 0.0)
+    def step(self, score: np.ndarray, weight: float) -> int | None:
+        """Take in the scores (k,) of a window and its weight.
+
+        Returns the number of the sum that is furthest beyond its threshold, None where none is.
+        """
+        self.value = np.maximum(self.value + weight * (np.clip(score, -BOUND, BOUND) - DRIFT), 0.0)
         self.rising = np.where(self.value > 0.0, self.rising + 1, 0)
         share = self.share
         top = int(np.argmax(share))

@@ -74,7 +74,9 @@ class Readings:
 
     def _readings(self, columns: Columns) -> np.ndarray:
         sensors = self._case.machine.sensors
-        return np.stack([np.asarray(columns[sensors[n].column], float) / sensors[n].scale for n in self.sensors], axis=1)
+        return np.stack(
+            [np.asarray(columns[sensors[n].column], float) / sensors[n].scale for n in self.sensors], axis=1
+        )
 
     def _whole(self, k: int, y: np.ndarray, scale: float) -> np.ndarray:
         """Readings (n,) of a counter without wraps, the rows before taken into account."""

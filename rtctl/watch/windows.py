@@ -44,6 +44,7 @@ class Batch(NamedTuple):
     v: np.ndarray  # (windows, BLOCKS, followed) speed of the followed readings, SI
     a: np.ndarray  # (windows, BLOCKS, followed) their acceleration
     asked: np.ndarray  # (windows, BLOCKS) change of the reference in each block, its unit; 0 where nobody knows it
+    late: np.ndarray  # (windows,) s, largest error of the time of a row or of the age of its sample
 
     def __len__(self) -> int:
         return len(self.t)
@@ -83,21 +84,24 @@ class Cutter:
         self._left = self._settle
         self._end: tuple[np.ndarray, np.ndarray, float] | None = None  # last mean reading, last speed, last reference
 
-    def feed(self, t: np.ndarray, u: np.ndarray, y: np.ndarray, ref: np.ndarray) -> Batch | None:
+    def feed(
+        self, t: np.ndarray, u: np.ndarray, y: np.ndarray, ref: np.ndarray, late: np.ndarray | float = 0.0
+    ) -> Batch | None:
         """Windows that are whole by now, None where there is none; times (n,), commands (n, drives), readings (n,
-        sensors) and reference (n,) follow those before."""
-        self._parts.append((t, u, y, ref))
+        sensors), reference (n,) and errors of time (n,) in s follow those before."""
+        self._parts.append((t, u, y, ref, np.broadcast_to(np.asarray(late, float), t.shape)))
         self._waiting += len(t)
         length = self.shape.window
         count = self._waiting // length
         if not count:
             return None
-        t, u, y, ref = (np.concatenate(part) for part in zip(*self._parts, strict=True))
+        t, u, y, ref, late = (np.concatenate(part) for part in zip(*self._parts, strict=True))
         whole = count * length
-        self._parts = [tuple(part[whole:] for part in (t, u, y, ref))]
+        self._parts = [tuple(part[whole:] for part in (t, u, y, ref, late))]
         self._waiting -= whole
         e, push = self._observer.step(u[:whole], y[:whole])
-        batch = self._cut(t[:whole], e, push, y[:whole], ref[:whole], count)
+        worst = np.abs(late[:whole]).reshape(count, length).max(axis=1)
+        batch = self._cut(t[:whole], e, push, y[:whole], ref[:whole], worst)
         keep = np.isfinite(batch.e).all(axis=(1, 2))
         if not keep.all():
             self.away += 1
@@ -109,9 +113,9 @@ class Cutter:
         return batch.some(keep) if keep.any() else None
 
     def _cut(
-        self, t: np.ndarray, e: np.ndarray, push: np.ndarray, y: np.ndarray, ref: np.ndarray, count: int
+        self, t: np.ndarray, e: np.ndarray, push: np.ndarray, y: np.ndarray, ref: np.ndarray, late: np.ndarray
     ) -> Batch:
-        shape = self.shape
+        shape, count = self.shape, len(late)
         e = e.reshape(count, shape.window // shape.mean, shape.mean, -1).mean(axis=2)
         force = push.reshape(count, BLOCKS, shape.slow, -1).mean(axis=2)
         mean = y[:, self._followed].reshape(count * BLOCKS, shape.slow, -1).mean(axis=1)
@@ -125,5 +129,6 @@ class Cutter:
         self._end = mean[-1], v[-1], float(asked[-1])
         pieces = (count, BLOCKS, mean.shape[1])
         return Batch(
-            t.reshape(count, -1)[:, -1], e, force, v.reshape(pieces), a.reshape(pieces), change.reshape(count, BLOCKS)
-        )
+            t.reshape(count, -1)[:, -1], e, force, v.reshape(pieces), a.reshape(pieces), change.reshape(count, BLOCKS),
+            late,
+        )  # fmt: skip
