@@ -32,7 +32,7 @@ def watch(
     ] = None,
     learn: Annotated[
         str, typer.Option("--learn", metavar="T", help="Time in motion from which the band is learned.")
-    ] = "5min",
+    ] = "10min",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="DIR", help="Folder for captures of alarms; runs if absent.")
     ] = None,

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 DRIFT = 0.6  # standard deviations: half the least shift that is to be noticed at once
 BOUND = 4.0  # standard deviations, of a score
-MARGIN = 1.25  # of the thresholds: for tails that a learned sample is too short to show
+MARGIN = 1.5  # of the thresholds: for tails that a learned sample is too short to show
 LONG = 16  # windows of the sums by which the correlation of scores is measured
 MOST = 2.0  # of theta: no learned sample is long enough to promise a steeper tail
 DAY = 8 * 3600.0  # s of motion

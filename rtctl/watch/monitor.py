@@ -22,7 +22,7 @@ from rtctl.watch.readings import Readings
 from rtctl.watch.windows import Batch, Cutter, Shape, joined
 from rtctl.watch.words import sentence
 
-LEARN = 300.0  # s in motion, from which the band is learned
+LEARN = 600.0  # s in motion, from which the band is learned
 FIRST = 10.0  # s in one stretch, after which a record is tried
 LONGEST = 120.0  # s of a first record; where it supports nothing, its older half is dropped
 JUMP = 0.25  # s by which the clock of a row is off from its tick, from one row to the next: it has jumped
