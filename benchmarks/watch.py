@@ -1,6 +1,6 @@
 """The model beside a running machine (`rtctl watch`): false alarms, what it notices, what it costs.
 
-    python benchmarks/watch.py [--json] [--machine ivu|ldu] [--days N] [--trials N] [--learn S] [--rounds N] [--page FILE]
+    python benchmarks/watch.py [--json] [--machine ivu|ldu] [--days N] [--trials N] [--learn S] [--rounds N]
 
 false_alarms_per_day   simulated days of eight hours on virtual time, each with random moves of its own and a band that
                        was learned from moves before it

@@ -15,8 +15,8 @@ def watch(
     machine: Annotated[
         str | None,
         typer.Argument(
-            metavar="[CONFIG|NAME]",
-            help="The machine's `name`, or its config file, where several run.",
+            metavar="[CONFIG|NAME|BUNDLE]",
+            help="The machine's `name`, or its config file, where several run; or the folder of a recording.",
             autocompletion=complete.machines,
         ),
     ] = None,
@@ -44,7 +44,8 @@ def watch(
     in eight hours of motion judges each second. An alarm is captured with the ten seconds before it and diagnosed in
     the background; it is told here, in `rtctl status`, on the scope, in the daemon's log and to Prometheus.
 
-    It reads the rows of a machine of this computer and this user, and cannot hold up the loop.
+    It reads the rows of a machine of this computer and this user, and cannot hold up the loop. Of a recording it judges
+    all rows, in bounded memory; exit code 1 where the machine departs from its model.
 
     Examples:
 
@@ -53,11 +54,19 @@ def watch(
       rtctl watch ivu --band ivu.band.json
 
       rtctl watch ivu.yaml --model runs/ivu-20250102-101500/diagnosis/model.yaml
-    """
-    from rtctl.watch.watch import Watch
 
+      rtctl watch runs/monday --band ivu.band.json
+    """
     seconds = common.seconds(learn, "--learn")
     assert seconds is not None
+    if machine is not None and Path(machine).is_dir():
+        from rtctl.watch.recorded import watch_bundle
+
+        if watch_bundle(Path(machine), typer.echo, model, band, seconds):
+            raise typer.Exit(1)
+        return
+    from rtctl.watch.watch import Watch
+
     with common.client(_name(machine)) as client:
         found = common.first_status(client)
         if found["mode"] != "real":
@@ -67,7 +76,7 @@ def watch(
                 f"{found['name']} runs in mode {found['mode']}; watch is for a machine on the wall clock (--mode real)"
             )
         typer.echo(f"{found['name']}: the model runs beside it")
-        running = Watch(client, lambda line: typer.echo(line), model, band, seconds, out, diagnose)
+        running = Watch(client, typer.echo, model, band, seconds, out, diagnose)
         if machine is not None and _is_file(machine):
             _compare(machine, running.source.case, running.say)
         running.run()

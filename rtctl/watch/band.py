@@ -116,8 +116,8 @@ class Band(NamedTuple):
     def weights(self, batch: Batch, before: "Before | None" = None) -> tuple[np.ndarray, "Before"]:
         """Weights (n,) of windows, and what the next ones need. A window whose motion goes on evenly repeats the one
         before: the n-th of them counts 1/n, as far as LEAST_WEIGHT."""
-        mean = batch.v.mean(axis=1) / self.units[0]
-        out, last, count = np.ones(len(batch)), *(before or (np.full(mean.shape[1], np.inf), 0))
+        mean, out = batch.v.mean(axis=1) / self.units[0], np.ones(len(batch))
+        last, count = before if before is not None else (np.full(mean.shape[1], np.inf), 0)
         even = self.pace(batch, 1) < EVEN
         for k, v in enumerate(mean):
             count = count + 1 if even[k] and (np.abs(v - last) < EVEN).all() else 1

@@ -15,7 +15,6 @@ from rtctl.watch.windows import Shape
 
 FORMAT = 1
 MODEL = ("plant", "machine", "parameters", "sensors", "drive", "physics", "sample_rate", "delay_samples", "problem")
-LISTS = ("sensors", "followed")
 
 
 def identity(case: dict[str, Any], model: Path | None) -> str:
@@ -45,10 +44,10 @@ def load_band(path: Path, said: str) -> Band:
             raise ValueError(f"format {found['format']}; {FORMAT} is known")
         limits = Thresholds(np.array(data["limits"][0], float), float(data["limits"][1]))
         shape = Shape(int(data["shape"][0]), int(data["shape"][1]), float(data["shape"][2]))
-        kept = {"limits": limits, "shape": shape, "sensors": tuple(map(str, data["sensors"])),
+        kept: dict[str, Any] = {"limits": limits, "shape": shape, "sensors": tuple(map(str, data["sensors"])),
                 "followed": tuple(map(int, data["followed"])),
                 "whitening": [np.array(a, float) for a in data["whitening"]]}  # fmt: skip
-        rest = {
+        rest: dict[str, Any] = {
             name: float(value) if isinstance(value, int | float) else np.array(value, float)
             for name, value in data.items()
             if name not in kept

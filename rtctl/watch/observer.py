@@ -10,7 +10,7 @@ import numpy as np
 from rtctl.config.errors import UserError
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import GraphModel
-from rtctl.diagnose.model.prepare import ABSENT, ready
+from rtctl.diagnose.model.prepare import ABSENT, Ready, ready
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.simulate import Simulator
 
@@ -37,7 +37,7 @@ class Observer:
         self._spread = np.array([max(float(np.ptp(record.y[name])), record.grain[name]) for name in self.sensors])
         self._late = int(record.case.delay_samples)
         self._before: np.ndarray | None = None  # (late, drives) last commands
-        self._start = None
+        self._start: Ready | None = None
 
     def restart(self) -> None:
         """Begin anew at the next row, from standstill."""
@@ -74,9 +74,9 @@ class Observer:
         """A state at rest where the first row has the followed sensors."""
         first, self.sim.watched = self.sim.watched, seen
         try:
-            self._start = ready(self.sim, self.model, TRACK)
+            start = self._start = ready(self.sim, self.model, TRACK)
         finally:
             self.sim.watched = first
-        job = self._start.job
+        job = start.job
         job["delay"] -= self._late * int(job["substeps"][0])
         self._before = np.repeat(u[:1], self._late, axis=0)

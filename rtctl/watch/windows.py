@@ -49,8 +49,8 @@ class Batch(NamedTuple):
     def __len__(self) -> int:
         return len(self.t)
 
-    def some(self, which: np.ndarray) -> "Batch":
-        """The windows of a mask or of indices."""
+    def some(self, which: np.ndarray | slice) -> "Batch":
+        """The windows of a mask, of indices or of a slice."""
         return Batch(*(part[which] for part in self))
 
 
