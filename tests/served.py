@@ -11,6 +11,7 @@ from rtctl.config.bounds import Bounds
 from rtctl.daemon.answers import Answers
 from rtctl.daemon.commands import Commands
 from rtctl.daemon.server import CommandServer
+from rtctl.daemon.watched import Watched
 
 
 class Served(Answers):
@@ -24,6 +25,7 @@ class Served(Answers):
         self.status, self.mailbox, self.reader = bench.status, bench.mailbox, bench.reader
         self.lacks: list[str] = []
         self.faults = SimpleNamespace(told=[])
+        self.watched = Watched()
         self.recorder: Any = None
         self.last_row: Any = None
         self.changes: list[tuple[str, Any]] = []

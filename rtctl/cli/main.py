@@ -22,6 +22,7 @@ COMMANDS = {
     "schema": "schema",
     "status": "status",
     "scope": "scope",
+    "watch": "watch",
     "foxglove": "foxglove",
     "setpoint": "setpoint",
     "capture": "capture",

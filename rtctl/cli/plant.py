@@ -36,6 +36,10 @@ def plant(
     seal: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Where the hidden effect is written, and nowhere else.")
     ] = None,
+    after: Annotated[
+        str | None,
+        typer.Option("--after", metavar="T", help="With --conceal: the effect begins so long after the plant does."),
+    ] = None,
     open_seal: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Check a seal, print what was hidden, and stop.")
     ] = None,
@@ -53,6 +57,8 @@ def plant(
 
       rtctl plant ivu --conceal 7 --seal hidden.json
 
+      rtctl plant ivu --conceal 7 --seal hidden.json --after 20min
+
       rtctl plant --open-seal hidden.json
     """
     from rtctl.config.errors import UserError
@@ -64,7 +70,12 @@ def plant(
         raise UserError("missing argument 'CONFIG'; see rtctl plant --help")
     if (conceal is None) != (seal is None):
         raise UserError("--conceal SEED and --seal FILE go together: what is hidden is written into the file only")
+    onset = common.seconds(after, "--after")
+    if onset is not None and conceal is None:
+        raise UserError("--after is the time at which the effect of --conceal begins; give --conceal and --seal too")
     settings = common.with_loop(common.load_config(config, set_), mode, "zmq")
+    if onset is not None and settings.loop.mode != "real":
+        raise UserError("--after counts on the wall clock; use it with --mode real")
     if settings.loop.mode == "fused":
         raise UserError("a fused run has its plant inside; use --mode real or --mode lockstep")
     machine = common.machine_of(settings)
@@ -72,8 +83,10 @@ def plant(
 
     if conceal is not None and not emulated(settings):
         raise UserError("--conceal: an effect is hidden in the emulator; this plant is a real board or an FMU")
+    later = None
     if conceal is not None and seal is not None:
-        machine = _hide(settings, conceal, seal)
+        hidden = _hide(settings, conceal, seal)
+        machine, later = (hidden, None) if onset is None else (machine, (hidden, onset))
 
     from rtctl.daemon.notify import from_environment
     from rtctl.daemon.plant_process import alone
@@ -91,7 +104,7 @@ def plant(
         service.ready(f"listens at {where}")
 
     try:
-        alone(machine, where, announce)
+        alone(machine, where, announce, later)
     except BoardError as error:
         typer.echo(f"rtctl: {error}; its outputs are off", err=True)
         raise typer.Exit(1) from error

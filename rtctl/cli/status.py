@@ -99,6 +99,10 @@ def table(found: dict[str, Any], units: dict[str, str]) -> Any:
     if found["trip"]:
         trip = found["trip"]
         out.add_row("trip", Text(f"{trip['code']} at tick {trip['tick']}: {trip['why']}", "bold red"))
+    if found.get("model"):
+        from rtctl.daemon.watched import sentence
+
+        out.add_row("model", Text(sentence(found["model"]), "bold red" if found["model"].get("alarm") else ""))
     measured = f", {found['measured_rate_hz']:g} Hz measured" if found["measured_rate_hz"] else ""
     out.add_row("ticks", f"{found['ticks']} at {found['rate_hz']:g} Hz{measured}, {found['mode']}")
     out.add_row("missed", f"{found['missed']} missed, {found['late']} late, {found['overruns']} overruns")

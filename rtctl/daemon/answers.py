@@ -4,6 +4,7 @@ import os
 from typing import Any
 
 from rtctl.daemon import tap
+from rtctl.daemon.watched import Watched
 from rtctl.loop import generate
 from rtctl.loop.histogram import percentiles
 from rtctl.loop.records import STAGES, late_ticks
@@ -27,6 +28,7 @@ class Answers:
     recorder: Recorder | None
     server: Any
     faults: Any
+    watched: Watched
     lacks: list[str]
     failure: Exception | None = None  # why the run ended by itself, once it has
     last_row: Any = None
@@ -63,6 +65,7 @@ class Answers:
             "refused_commands": dict(self.server.refused),
             "lacks": self.lacks,
             "faults": self.faults.told,
+            "model": self.watched.told,
         }
 
     def report(self) -> dict[str, Any]:

@@ -26,7 +26,7 @@ SWITCHED = (
 ORDERS = (  # that are logged
     "arm", "disarm", "reset", "play", "stop", "setpoint", "set", "fault", "capture", "capture_stop",
 )  # fmt: skip
-LOOKS = ("status", "signals", "get", "capture_status")  # who only looks stands in for no commander
+LOOKS = ("status", "signals", "get", "capture_status", "watch")  # who only looks stands in for no commander
 
 
 class Commands:
@@ -197,3 +197,8 @@ class Commands:
 
     def _capture_stop(self, id: str) -> dict[str, Any]:
         return self._of.captures.end(id)
+
+    def _watch(self, **told: Any) -> dict[str, Any]:
+        """What a model beside the machine finds: for `status`, the log and the metrics; nothing else hears it."""
+        self._of.watched.take(told)
+        return {"tick": int(self._of.status["tick"])}

@@ -3,6 +3,7 @@
 Source: prometheus_client's custom collectors; the names follow Prometheus' rules (base units, `_total`).
 """
 
+import platform
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from socketserver import ThreadingMixIn
@@ -13,6 +14,7 @@ from prometheus_client import CollectorRegistry, make_wsgi_app
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from rtctl import __version__
 from rtctl.config.errors import UserError
 from rtctl.loop.histogram import octaves, total
 from rtctl.loop.records import STAGES
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
 ADDRESS = "127.0.0.1"
+BUILD = ["machine", "mode", "version", "python"]  # labels of what runs here
 PLACES = 8  # connections at a time; Prometheus needs one
 PATIENCE = 5.0  # s for a request to come
 COUNTS = {  # field of the status record -> what it counts
@@ -38,8 +41,15 @@ COUNTS = {  # field of the status record -> what it counts
 class MachineCollector(Collector):
     """All counts of one machine, as they stand when they are asked for."""
 
-    def __init__(self, name: str, status: Any, rows: Callable[[], Mapping[str, Any]]):
-        self._name, self._status, self._rows = name, status, rows
+    def __init__(
+        self,
+        name: str,
+        status: Any,
+        rows: Callable[[], Mapping[str, Any]],
+        told: Callable[[], Mapping[str, Any] | None] = lambda: None,
+        mode: str = "",
+    ):
+        self._name, self._status, self._rows, self._told, self._mode = name, status, rows, told, mode
 
     def collect(self) -> Iterator[Metric]:
         """The metrics, one family after the other."""
@@ -69,6 +79,31 @@ class MachineCollector(Collector):
         )
         age.add_metric([self._name], *_buckets(s["age"]))
         yield age
+        yield from self._model()
+        build = GaugeMetricFamily("rtctl_build_info", "1, with the version of the program", labels=BUILD)
+        build.add_metric([self._name, self._mode, __version__, platform.python_version()], 1.0)
+        yield build
+
+    def _model(self) -> Iterator[Metric]:
+        """What a watch finds, while one speaks: a model that nobody runs has neither residual nor alarm."""
+        told = self._told()
+        if told is None or told["silent"]:
+            return
+        residual = GaugeMetricFamily(
+            "rtctl_residual_sigma", "residual of each sensor, in standard deviations of the healthy machine",
+            labels=["machine", "sensor"],
+        )  # fmt: skip
+        for sensor, value in told["residual"].items():
+            residual.add_metric([self._name, sensor], value)
+        yield residual
+        alarm = GaugeMetricFamily("rtctl_model_alarm", "1 while the machine departs from its model", labels=["machine"])
+        alarm.add_metric([self._name], float(told.get("alarm") is not None))
+        yield alarm
+        learned = GaugeMetricFamily(
+            "rtctl_model_learned_ratio", "share of the motion that the model has learned from", labels=["machine"]
+        )
+        learned.add_metric([self._name], told.get("learned", 1.0))
+        yield learned
 
     def _count(self, name: str, words: str, value: int) -> Metric:
         family = CounterMetricFamily(f"rtctl_{name}", words, labels=["machine"])
@@ -111,7 +146,8 @@ class _Server(ThreadingMixIn, WSGIServer):
 def serve(supervisor: "Supervisor", port: int) -> Callable[[], None]:
     """Answer GET /metrics on loopback; returns what ends it. Raises UserError where the port is taken."""
     registry = CollectorRegistry()
-    registry.register(MachineCollector(supervisor.config.name, supervisor.status, supervisor.rows_counted))
+    told = (supervisor.status, supervisor.rows_counted, lambda: supervisor.watched.told)
+    registry.register(MachineCollector(supervisor.config.name, *told, supervisor.config.loop.mode))
     try:
         server = _Server((ADDRESS, port), _Request)
     except OSError as error:

@@ -32,6 +32,7 @@ class Plant:
         p, s = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
         generate.fill(p[0], machine.plant_diagram.blocks)
         self.status = status
+        self.records = (s, frame["tx"], frame["tx_staged"], frame["rx"])  # all that it remembers
         arguments: tuple[Any, ...] = (status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp)
         if machine.config.loop.mode == "lockstep":
             self._entry = made.module.plant_lockstep
@@ -61,13 +62,22 @@ def plant(machine: Machine, made: generate.Generated, link: str, status: Any, ou
     return Plant(machine, made, status, out, inp)
 
 
-def serve(machine: Machine, endpoint: str, status: Any, announce: Any) -> None:
-    """Listen at a ZeroMQ endpoint and emulate; `announce()` is called when it listens."""
+def serve(
+    machine: Machine, endpoint: str, status: Any, announce: Any, later: tuple[Machine, float] | None = None
+) -> None:
+    """Listen at a ZeroMQ endpoint and emulate; `announce()` is called when it listens. `later` is the machine that it
+    becomes, and after how many s."""
     made = generate.generate(machine, "zmq")
     context = zmq.Context()
     link = machine.config.link
     socket = child.link_socket(context, endpoint, True, 1.0, link.keys)
     served = plant(machine, made, "zmq", status, socket.underlying, socket.underlying)
+    if later is not None:
+        from rtctl.daemon.onset import Onset
+
+        other, seconds = later
+        second = Plant(other, generate.generate(other, "zmq"), status, socket.underlying, socket.underlying)
+        served = Onset(served, second, seconds)
     announce()
     if machine.config.loop.mode == "lockstep":
         _wait_for_hello(socket, status)
@@ -113,15 +123,15 @@ def main(argv: list[str]) -> int:
     return 0
 
 
-def alone(machine: Machine, endpoint: str, announce: Any) -> None:
-    """As `rtctl plant`: emulate until interrupted."""
+def alone(machine: Machine, endpoint: str, announce: Any, later: tuple[Machine, float] | None = None) -> None:
+    """As `rtctl plant`: emulate until interrupted; `later` is the machine that it becomes, and after how many s."""
     status = np.zeros(1, PLANT_STATUS)
 
     def stop() -> None:
         status["stop"] = 1
 
     child.watch_parent(lambda: None, stop, interrupt=True)
-    serve(machine, endpoint, status, announce)
+    serve(machine, endpoint, status, announce, later)
 
 
 if __name__ == "__main__":

@@ -108,6 +108,38 @@ class FaultArgs(Args):
     fault: dict[str, Any] | None = None
 
 
+Sentence = Annotated[str, StringConstraints(min_length=1, max_length=2000, pattern=r"^[^\x00-\x1f\x7f]+$")]
+
+
+class LaneArgs(Args):
+    """A signal of a model beside the machine: `values` at the times `t` of the call."""
+
+    unit: Unit | Literal["sigma", ""]
+    values: Annotated[list[float], Field(max_length=400)]
+
+
+class AlarmArgs(Args):
+    """A departure from the model: controller clock in s, the sentence, and what came of it."""
+
+    t: float
+    words: Sentence
+    bundle: Sentence | None = None
+    diagnosis: Sentence | None = None
+    page: Sentence | None = None
+
+
+class WatchArgs(Args):
+    """What a model beside the machine finds: `residual` by sensor in standard deviations, `lanes` by name."""
+
+    state: Literal["waiting", "learning", "watching", "astray"]
+    learned: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    residual: Annotated[dict[Text, float], Field(max_length=32)] = {}
+    t: Annotated[list[float], Field(max_length=400)] = []
+    lanes: Annotated[dict[Text, LaneArgs], Field(max_length=32)] = {}
+    alarm: AlarmArgs | None = None
+    notes: Annotated[list[Sentence], Field(max_length=16)] = []
+
+
 OPS: dict[str, type[Args]] = {
     "ping": NoArgs,
     "status": NoArgs,
@@ -124,6 +156,7 @@ OPS: dict[str, type[Args]] = {
     "capture": CaptureArgs,
     "capture_status": CaptureIdArgs,
     "capture_stop": CaptureIdArgs,
+    "watch": WatchArgs,
 }
 
 

@@ -34,6 +34,7 @@ from rtctl.daemon.outside import Outside
 from rtctl.daemon.reload import reload
 from rtctl.daemon.server import runtime_dir
 from rtctl.daemon.starting import Starting, ended
+from rtctl.daemon.watched import Watched
 from rtctl.loop import generate
 from rtctl.loop.histogram import account
 from rtctl.loop.mailbox import Mailbox
@@ -114,6 +115,7 @@ class Supervisor(Answers):
         if self.armed_at_start:
             self.order(_arm_and_play)  # there before the first tick, so that a virtual run repeats to the bit
         self.faults = Faults(self)
+        self.watched = Watched()
         self.commands = Commands(self)
         self.outside = Outside(config, [column.name for column in made.columns], made.row, self.commands)
         stack.callback(self.outside.close)

@@ -1,0 +1,93 @@
+"""Cumulative sums of bounded scores, with thresholds for a stated rate of false alarms.
+
+A score is a number of standard deviations of a window from what the healthy machine showed. It is bounded, so that no
+single window makes an alarm. Each sum falls by DRIFT a window and rises by the score; it never falls below zero.
+
+Source: Page, Continuous inspection schemes, Biometrika 41 (1954); Siegmund, Sequential Analysis (1985), ch. 2: the
+mean time between false alarms grows as exp(theta h), where theta is the positive root of E exp(theta (score - drift))
+= 1. Of correlated scores the variance in theta is that of long sums.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+DRIFT = 0.6  # standard deviations: half the least shift that is to be noticed at once
+BOUND = 4.0  # standard deviations, of a score
+MARGIN = 1.5  # of the thresholds: for tails that a learned sample is too short to show
+LONG = 16  # windows of the sums by which the correlation of scores is measured
+MOST = 2.0  # of theta: no learned sample is long enough to promise a steeper tail
+DAY = 8 * 3600.0  # s of motion
+
+
+class Thresholds(NamedTuple):
+    """Thresholds (scores,) of the sums, and the rate that they stand for."""
+
+    h: np.ndarray
+    per_day: float  # false alarms in eight hours of motion, at most, by theory
+
+
+def exponent(scores: np.ndarray, weights: np.ndarray) -> float:
+    """Rate theta at which the chance of a false alarm falls with the threshold, by scores (n,) of a healthy machine and
+    their weights (n,).
+
+    The smaller of that of the distribution of single scores and that of the variance of long sums. Zero where the
+    scores do not fall on the average.
+    """
+    x = weights * (np.clip(scores, -BOUND, BOUND) - DRIFT)
+    if x.mean() >= 0.0:
+        return 0.0
+    if x.max() <= 0.0:
+        return MOST
+
+    def excess(theta: float) -> float:
+        return float(np.log(np.mean(np.exp(theta * x))))
+
+    single = brentq(excess, 1e-6, MOST) if excess(MOST) > 0.0 and excess(1e-6) < 0.0 else MOST
+    long = min(LONG, len(x) // 4)
+    if long < 2:
+        return min(single, 2.0 * DRIFT)
+    total = np.convolve(x, np.ones(long), "valid")
+    spread = max(float(np.var(total)) / long, float(np.var(x)))
+    return float(min(single, -2.0 * x.mean() / spread, MOST))
+
+
+def thresholds(scores: np.ndarray, weights: np.ndarray, seconds: float, per_day: float) -> Thresholds:
+    """Thresholds for scores (n, k) and weights (n,) of a healthy machine in windows of `seconds`.
+
+    All sums together make at most `per_day` false alarms in eight hours of motion.
+    """
+    windows = DAY / seconds
+    odds = np.log(windows * scores.shape[1] / per_day)
+    theta = np.array([exponent(column, weights) for column in scores.T])
+    return Thresholds(MARGIN * odds / np.maximum(theta, 1e-3), per_day)
+
+
+class Sums:
+    """The sums (k,) of as many scores."""
+
+    def __init__(self, limits: Thresholds):
+        self.limits = limits
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin at zero."""
+        self.value = np.zeros(len(self.limits.h))
+        self.rising = np.zeros(len(self.limits.h), int)  # windows since each was zero
+
+    @property
+    def share(self) -> np.ndarray:
+        """Shares (k,) of the thresholds that are reached."""
+        return np.asarray(self.value / self.limits.h)
+
+    def step(self, score: np.ndarray, weight: float) -> int | None:
+        """Take in the scores (k,) of a window and its weight.
+
+        Returns the number of the sum that is furthest beyond its threshold, None where none is.
+        """
+        self.value = np.maximum(self.value + weight * (np.clip(score, -BOUND, BOUND) - DRIFT), 0.0)
+        self.rising = np.where(self.value > 0.0, self.rising + 1, 0)
+        share = self.share
+        top = int(np.argmax(share))
+        return top if share[top] >= 1.0 else None
