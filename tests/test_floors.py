@@ -6,8 +6,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 FLOORS = (
-    "cli", "scope", "terminal", "foxglove", "machine_report", "reproduce", "identify", "design", "diagnose", "daemon",
-    "trace", "case", "loop", "machines", "own", "laws", "tick", "plants", "drivers", "config",
+    "cli", "scope", "terminal", "foxglove", "machine_report", "reproduce", "identify", "design", "trend", "diagnose",
+    "daemon", "trace", "case", "loop", "machines", "own", "laws", "tick", "plants", "drivers", "config",
 )  # fmt: skip
 
 

@@ -37,6 +37,7 @@ COMMANDS = {
     "tune": "tune",
     "reproduce": "reproduce",
     "diagnose": "diagnose",
+    "trend": "trend",
     "simulate": "simulate",
     "replay": "replay",
     "prove": "prove",
