@@ -7,7 +7,8 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 FLOORS = (
     "cli", "scope", "terminal", "foxglove", "watch", "machine_report", "reproduce", "improve", "identify", "design",
-    "diagnose", "daemon", "trace", "case", "loop", "machines", "own", "laws", "tick", "plants", "drivers", "config",
+    "trend", "diagnose", "daemon", "trace", "case", "loop", "machines", "own", "laws", "tick", "plants", "drivers",
+    "config",
 )  # fmt: skip
 
 

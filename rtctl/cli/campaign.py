@@ -74,13 +74,14 @@ def run(
         from rtctl.config.errors import UserError
 
         raise UserError("--fail-on regressions: they are against an earlier campaign; name it with --baseline DIR")
-    from rtctl.campaign import campaign, pools
+    from rtctl import workers
+    from rtctl.campaign import campaign
 
     folder = out or common.default_folder(plan.name)
     try:
         with progress(plan.name, "failed") as update:
-            found = campaign.run(plan, folder, jobs or cpus(), scheduler, given, baseline, update)
-    except pools.PoolError as error:
+            found = campaign.run(plan, folder, jobs or workers.cpus(), scheduler, given, baseline, update)
+    except workers.PoolError as error:
         typer.echo(f"rtctl: {error}; go on with --out {folder}", err=True)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
@@ -125,13 +126,6 @@ def list_(
         common.print_json(found)
     else:
         typer.echo("\n".join(words(found)))
-
-
-def cpus() -> int:
-    """CPUs that this process may use."""
-    import os
-
-    return len(os.sched_getaffinity(0))
 
 
 def _words(found: dict[str, Any]) -> list[str]:

@@ -41,6 +41,10 @@ def diagnose(
     limit: Annotated[
         str, typer.Option("--limit", metavar="T", help="Of a folder: longest time for a bundle, e.g. 600s.")
     ] = "600s",
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="tcp://...", help="Of a folder: on the workers of a Dask scheduler."),
+    ] = None,
     again: Annotated[bool, typer.Option("--again", help="Of a folder: also those that are diagnosed already.")] = False,
     together: Annotated[
         bool,
@@ -101,6 +105,8 @@ def diagnose(
 
       rtctl diagnose recordings --jobs 2 --no-report
 
+      rtctl diagnose recordings --scheduler tcp://bench2:8786
+
       rtctl diagnose turns-left turns-right --together
 
       rtctl diagnose --closed-loop ivu --for 25s --reference constant_speed
@@ -141,8 +147,10 @@ def diagnose(
             _refuse("--mechanics and --machine", "go with one bundle, not with a folder of them")
         length = common.seconds(limit, "--limit")
         assert length is not None
-        _folder(console, found, jobs, length, report, again, json)
+        _folder(console, found, jobs, length, report, again, json, scheduler)
     else:
+        if scheduler is not None:
+            _refuse("--scheduler", "goes with a folder of bundles")
         _bundle(console, bundle, heldout, out, report, json)
 
 
@@ -199,22 +207,35 @@ def _bundle(
 
 
 def _folder(
-    console: Any, found: list[Any], jobs: int | None, limit: float, report: bool, again: bool, json: bool
+    console: Any,
+    found: list[Any],
+    jobs: int | None,
+    limit: float,
+    report: bool,
+    again: bool,
+    json: bool,
+    scheduler: str | None,
 ) -> None:
     import os
     import time
 
+    from rtctl.diagnose.elsewhere import diagnose_elsewhere
     from rtctl.diagnose.folder import BAD, OURS, diagnose_all, done
 
     began = time.monotonic()
     jobs = jobs or len(os.sched_getaffinity(0))
-    there = [] if again else [o for o in map(done, found) if o is not None]
-    names = {o.name for o in there}
-    outcomes = list(there)
+    before = [] if again else [o for o in map(done, found) if o is not None]
+    names = {o.name for o in before}
+    outcomes = list(before)
     with console.many(len(found)) as show:
-        for outcome in there:
+        for outcome in before:
             show(outcome)
-        for outcome in diagnose_all([t for t in found if t.name not in names], jobs, limit, report):
+        left = [t for t in found if t.name not in names]
+        if scheduler is None or not left:
+            coming = diagnose_all(left, jobs, limit, report)
+        else:
+            coming = diagnose_elsewhere(left, scheduler, limit, report)
+        for outcome in coming:
             outcomes.append(outcome)
             show(outcome)
     outcomes.sort(key=lambda o: o.name)

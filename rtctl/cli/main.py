@@ -39,6 +39,7 @@ COMMANDS = {
     "reproduce": "reproduce",
     "diagnose": "diagnose",
     "improve": "improve",
+    "trend": "trend",
     "simulate": "simulate",
     "replay": "replay",
     "prove": "prove",

@@ -86,6 +86,11 @@ def load_bundle(folder: Path | str) -> Bundle:
     case = load_case(folder)
     path = paths[0]
     table = _table(paths)
+    return Bundle(columns_of_table(path, table), case, folder, units_of(table.schema))
+
+
+def columns_of_table(path: Path, table: pa.Table) -> dict[str, np.ndarray]:
+    """Columns (n,) by name of rows that were read of the file `path`. Raises UserError where they are no recording."""
     columns = {name: _numbers(path, name, table.column(name)) for name in table.column_names}
     if "t" not in columns:
         hint = nearest("t", columns) or nearest("time", columns)
@@ -94,7 +99,12 @@ def load_bundle(folder: Path | str) -> Bundle:
         raise UserError(f"{path} holds no rows")
     if not np.isfinite(columns["t"]).all():
         raise UserError(f"{path}: column 't' is not finite in row {int(np.argmin(np.isfinite(columns['t'])))}")
-    return Bundle(columns, case, folder, {c.name: c.unit for c in columns_of(table.schema) if c.unit})
+    return columns
+
+
+def units_of(schema: pa.Schema) -> dict[str, str]:
+    """Units of the columns that name theirs."""
+    return {c.name: c.unit for c in columns_of(schema) if c.unit}
 
 
 def part_folders(folder: Path) -> list[Path]:

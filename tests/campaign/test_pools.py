@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from rtctl import workers
 from rtctl.campaign import pools
 from rtctl.campaign.plan import Plan
 from rtctl.config.errors import UserError
@@ -36,7 +37,7 @@ def test_dask_gives_the_same_rows(plan: Make) -> None:
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "smtp://127.0.0.1:1"])
 def test_no_scheduler_there(plan: Make, monkeypatch: pytest.MonkeyPatch, address: str) -> None:
     pytest.importorskip("distributed", reason="Dask (distributed) is not installed")
-    monkeypatch.setattr(pools, "PATIENCE", 0.3)
+    monkeypatch.setattr(workers, "PATIENCE", 0.3)
     with pytest.raises(UserError, match="no Dask scheduler answers"):
         list(pools.compute(plan(), [0], 1, address))
 
@@ -58,6 +59,6 @@ def test_a_worker_that_dies(plan: Make, monkeypatch: pytest.MonkeyPatch) -> None
 
         def shutdown(self, **_: Any) -> None: ...
 
-    monkeypatch.setattr(pools, "ProcessPoolExecutor", Pool)
-    with pytest.raises(pools.PoolError, match="what is done is kept"):
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", Pool)
+    with pytest.raises(workers.PoolError, match="what is done is kept"):
         list(pools.compute(plan(), [0, 1], 2, None))

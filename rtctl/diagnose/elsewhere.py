@@ -1,0 +1,53 @@
+"""A folder of bundles, diagnosed by the workers of a Dask scheduler.
+
+Each worker calls the command that diagnoses one bundle, so that a diagnosis that takes too long can be ended and none
+leaves anything behind in the worker. Bundles and results lie where the workers find them by the same path.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import partial
+
+from rtctl import workers
+from rtctl.config.errors import UserError
+from rtctl.diagnose.folder import OURS, Outcome, Task
+
+
+def diagnose_elsewhere(waiting: list[Task], scheduler: str, limit: float, report: bool) -> Iterator[Outcome]:
+    """Outcomes as they come; a diagnosis that takes longer than `limit` s is ended.
+
+    Raises UserError where there is no such scheduler, or its workers do not see the bundles, PoolError where a worker
+    dies.
+    """
+    found = workers.dask(partial(_one, limit=limit, report=report), [_absolute(task) for task in waiting], scheduler)
+    return (outcome for _, outcome in found)
+
+
+def _absolute(task: Task) -> Task:
+    other = None if task.other is None else task.other.resolve()
+    return task._replace(bundle=task.bundle.resolve(), out=task.out.resolve(), other=other)
+
+
+def _one(task: Task, limit: float, report: bool) -> Outcome:
+    """Diagnose one bundle by a process of its own, in a worker."""
+    if not task.bundle.is_dir():
+        raise UserError(
+            f"a worker of the scheduler does not see {task.bundle}; recordings lie where it finds them by the same "
+            "path, as on a shared disk"
+        )
+    command = [sys.executable, "-m", "rtctl", "diagnose", str(task.bundle), "--out", str(task.out), "--json"]
+    command += [] if task.other is None else ["--heldout", str(task.other)]
+    command += [] if report else ["--no-report"]
+    began = time.monotonic()
+    try:
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
+    except subprocess.TimeoutExpired:
+        return Outcome(task.name, OURS, time.monotonic() - began, message=f"not done within --limit {limit:g} s")
+    seconds = time.monotonic() - began
+    said = " ".join(ran.stderr.split()).removeprefix("rtctl: ")
+    if ran.returncode:
+        return Outcome(task.name, ran.returncode, seconds, message=said or f"exit code {ran.returncode}")
+    return Outcome(task.name, 0, seconds, json.loads(ran.stdout), said)
