@@ -173,9 +173,9 @@ def figure_9_1(short: bool) -> Picture:
             axes.semilogy(range(len(errors)), errors, "o-", color=color, markersize=3, linewidth=0.9, label=law)
         axes.axhline(0.03, color=fig.INK, linewidth=0.8, linestyle=":")
         axes.set_xticks(range(0, len(names), 1 if short else 6), names[:: 1 if short else 6])
-        axes.set(xlabel="R1/R2 [mm]", ylabel="largest error [mm]")
+        axes.set(xlabel="R1/R2 [mm]", ylabel="largest error [mm]", ylim=(5e-3, 1.5))
         fig.title(axes, f"{counts} counts a turn")
-        fig.legend(axes)
+        fig.legend(axes, ncols=2)
     value = accuracy(short)
     sentence = (
         "Not in the text: largest final error of steps of a radian at each pair of radii, by the emulator, tape.slack. "

@@ -84,23 +84,25 @@ def figure_9_2(short: bool) -> Picture:
     """Torque over speed of each motor, the moves, and the table of selection."""
     figure, (axes, table) = fig.panels(1, 2, height=3.4)
     every = (*APPENDIX_E, BARE, BRUSHLESS)
-    for motor, color in zip(every, (*fig.COLORS, fig.GREY, fig.INK, "#8a4f9e"), strict=True):
+    colors = (fig.BLUE, fig.ORANGE, "#4aa3a0", fig.RED, fig.GREY, fig.INK, "#8a4f9e")
+    for motor, color in zip(every, colors, strict=True):
         w = np.linspace(0.0, motor.no_load, 100)
         axes.loglog(w[1:] / RPM, [max(motor.at(x), 1e-4) for x in w[1:]], color=color, linewidth=1.1, label=motor.name)
     for move, R in asked().values():
         axes.plot(move.speed / RPM, motors.fit(BARE, move, R, PAPER).torque, "x", color=fig.INK, markersize=5)
-    axes.set(xlabel="speed [rpm]", ylabel="torque [Nm]", ylim=(1e-3, 2.0), xlim=(1.0, 1e4))
-    fig.legend(axes, fontsize=6)
+    axes.set(xlabel="speed [rpm]", ylabel="torque [Nm]", ylim=(1e-3, 30.0), xlim=(1.0, 1e4))
+    fig.legend(axes, fontsize=6, loc="upper right")
     fig.title(axes, "behind the gear; x: moves, bare motor")
     table.axis("off")
     table.plot([0.0, 1.0], [0.0, 0.0], color=fig.GREY, linewidth=0.6)
+    table.set_ylim(0.0, 1.0)
     cells = []
     for motor in every:
         found = fits(motor)
         most = max(one.current for one in found.values())
         fitting = f"{good(motor)} of {len(MOVES)}"
         cells.append(
-            [motor.name, f"{1e3 * motor.friction:.3g}", f"{motor.friction / SMALL:.3g}", f"{most:.2f}", fitting]
+            [motor.name, f"{1e3 * motor.friction:.4g}", f"{motor.friction / SMALL:.3g}", f"{most:.2f}", fitting]
         )
     made = table.table(cells, colLabels=["motor", "friction\n[mNm]", "turned\nback [N]", "most\n[A]", "moves"],
                        loc="center", colWidths=[0.38, 0.16, 0.16, 0.15, 0.15])  # fmt: skip
