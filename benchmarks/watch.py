@@ -60,15 +60,12 @@ def days(config: Any, moves: Moves, numbers: range, seconds: float, say: Any) ->
     out = []
     for day in numbers:
         shift, rng, monitor = learned(config, moves, day, seconds)
-        alarms, highest = [], 0.0
-        judged = monitor.judged
+        alarms, judged = [], monitor.judged
         for _ in range(round(DAY / PIECE)):
             alarm = monitor.feed(shift.play(moves, rng, PIECE))
-            assert monitor.sums is not None
-            highest = max(highest, float(monitor.sums.share.max()))
             if alarm is not None:
                 alarms.append(f"{alarm.measure} of {alarm.sensor}")
-        out.append({"day": day, "alarms": alarms, "windows": monitor.judged - judged, "highest": round(highest, 2)})
+        out.append({"day": day, "alarms": alarms, "windows": monitor.judged - judged})
         say(json.dumps(out[-1]))
     return out
 

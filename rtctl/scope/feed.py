@@ -14,6 +14,7 @@ from rtctl.daemon.client import Client, listens
 from rtctl.daemon.rows import MESSAGES_WAITING, decode
 from rtctl.daemon.server import find_endpoint
 from rtctl.scope.history import MOST_ROWS, MOST_SECONDS, History
+from rtctl.scope.lanes import Lanes
 
 log = structlog.get_logger()
 TIMEOUT = 1.0  # s for an answer of the daemon
@@ -34,6 +35,7 @@ class Feed:
         self.rate = 0.0
         self.signals: list[dict[str, str]] = []
         self.history: History | None = None
+        self.lanes = Lanes()
         self.status: dict[str, Any] = {}
         self.lateness = np.zeros(len(EDGES_US) + 1, np.int64)
         self._head = b""
@@ -54,14 +56,29 @@ class Feed:
     async def look(self) -> None:
         """Ask for the status; of a daemon that was not there before, for its signals as well."""
         try:
-            self.status = await self.call("status")
+            self.status = self._without_lanes(await self.call("status"))
             if not self.signals:
                 self._follow()
                 self.signals = (await self.call("signals"))["signals"]
+            self._show_lanes()
             self.alive, self.there, self.rate = True, True, float(self.status["rate_hz"])
         except UserError:
             self.alive, self.signals = False, []
             self.there = await asyncio.get_running_loop().run_in_executor(self._thread, self._find)
+
+    def _without_lanes(self, status: dict[str, Any]) -> dict[str, Any]:
+        """A status whose model says no lanes any more: they are taken in."""
+        model = status.get("model")
+        self.lanes.take(model)
+        return status if model is None else {**status, "model": {**model, "t": [], "lanes": {}}}
+
+    def _show_lanes(self) -> None:
+        """Lanes that have come are signals as others are."""
+        known = {signal["name"] for signal in self.signals}
+        new = [signal for signal in self.lanes.signals if signal["name"] not in known]
+        if self.history is not None and new:
+            self.history.extend(tuple(signal["name"] for signal in new))
+            self.signals = [*self.signals, *new]
 
     def drain(self) -> int:
         """Take in the rows that have come; returns how many."""
@@ -100,7 +117,8 @@ class Feed:
         if self.history is None or self._row is None:
             return 0
         rows = np.frombuffer(payload, self._row)
-        self.history.append(rows)
+        beside = [name for name in self.lanes.names if name in self.history.index]
+        self.history.append(rows, self.lanes.at(rows["t"], beside) if beside else None)
         self._count(rows)
         return len(rows)
 
@@ -117,7 +135,7 @@ class Feed:
         pid, self._row = decode(head)
         if pid != self.status.get("pid"):
             self.signals = []  # of the one before; look() asks the new one
-            self.history = None
+            self.history, self.lanes = None, Lanes()
             return
         self._head = head
         capacity = int(min(MOST_ROWS, MOST_SECONDS * self.rate))

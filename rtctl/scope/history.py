@@ -1,5 +1,7 @@
 """The newest seconds of every signal, by the number of the row."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 MOST_ROWS = 300_000  # 30 s at 10 kHz
@@ -26,8 +28,15 @@ class History:
     def first(self) -> int:
         return max(0, self.head - self.capacity)
 
-    def append(self, rows: np.ndarray) -> None:
-        """Take in rows, oldest first."""
+    def extend(self, names: tuple[str, ...]) -> None:
+        """Further signals beside those of the rows, 0 in the rows that are there."""
+        new = tuple(name for name in names if name not in self.index)
+        self.names += new
+        self.index = {name: i for i, name in enumerate(self.names)}
+        self._kept = np.concatenate((self._kept, np.zeros((len(new), self.capacity))))
+
+    def append(self, rows: np.ndarray, beside: Mapping[str, np.ndarray] | None = None) -> None:
+        """Take in rows, oldest first, and the values (n,) of the signals `beside` them."""
         if not len(rows):
             return
         if "tick" in self.index:
@@ -35,11 +44,12 @@ class History:
             steps = np.diff(tick, prepend=tick[0] - 1 if self._tick is None else self._tick)
             self.lost += int(np.maximum(steps - 1, 0).sum())
             self._tick = int(tick[-1])
+        beside = {name: values[-self.capacity :] for name, values in (beside or {}).items()}
         rows, self.head = rows[-self.capacity :], self.head + len(rows)
         end = self.head % self.capacity or self.capacity
         begin = end - len(rows)
         for kept, name in zip(self._kept, self.names, strict=True):
-            values = rows[name]
+            values = beside[name] if name in beside else rows[name]
             if begin >= 0:
                 kept[begin:end] = values
             else:

@@ -65,12 +65,12 @@ class Scope:
                 why = "is in use; choose another, or 0 for any" if taken else str(error)
                 raise UserError(f"--port {port}: {why}") from None
             self.guard.port = runner.addresses[0][1]
+            ready(self)  # at once: a daemon that starts may take a minute to answer
             await self.feed.look()
             ended = asyncio.Event()
             for number in (signal.SIGINT, signal.SIGTERM):
                 with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread
                     asyncio.get_running_loop().add_signal_handler(number, ended.set)
-            ready(self)
             await first_of(self._frames(), self._looks(), self._first_answer(say), ended.wait())
         finally:
             for connection in list(self.connections):

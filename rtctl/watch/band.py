@@ -111,12 +111,12 @@ class Band(NamedTuple):
 
     def grown(self, batch: Batch) -> np.ndarray:
         """What the power of a measure grows with (windows, 3)."""
-        return np.stack([np.ones(len(batch)), self.pace(batch) ** 2, self.pace(batch, 1) ** 2], axis=1)
+        return np.stack([np.ones(batch.size), self.pace(batch) ** 2, self.pace(batch, 1) ** 2], axis=1)
 
     def weights(self, batch: Batch, before: "Before | None" = None) -> tuple[np.ndarray, "Before"]:
         """Weights (n,) of windows, and what the next ones need. A window whose motion goes on evenly repeats the one
         before: the n-th of them counts 1/n, as far as LEAST_WEIGHT."""
-        mean, out = batch.v.mean(axis=1) / self.units[0], np.ones(len(batch))
+        mean, out = batch.v.mean(axis=1) / self.units[0], np.ones(batch.size)
         last, count = before if before is not None else (np.full(mean.shape[1], np.inf), 0)
         even = self.pace(batch, 1) < EVEN
         for k, v in enumerate(mean):
@@ -209,9 +209,9 @@ def learn(batch: Batch, shape: Shape, sensors: list[str], followed: list[int], g
     late = max(LATER * float(np.quantile(batch.late, 0.9)), LATE * shape.dt)
     band = band._replace(late=min(late, shape.dt))
     batch = batch.some(band.in_motion(batch) & ~band.untimely(batch))
-    if len(batch) < FEWEST:
+    if batch.size < FEWEST:
         raise NoAnswer(
-            f"the machine moved in {len(batch)} windows of {shape.seconds:g} s while the band was to be learned; "
+            f"the machine moved in {batch.size} windows of {shape.seconds:g} s while the band was to be learned; "
             f"{FEWEST} are needed"
         )
     units = np.stack([np.sqrt(np.mean(x**2, axis=(0, 1))) for x in (batch.v, batch.a)])
@@ -273,7 +273,7 @@ def _paced(band: Band, batch: Batch) -> Band:
     """The band with location and spread of its measures by pace. The spread is that of the quartiles or, where tails
     are long, of the outermost twentieths, wider by what so few windows leave open."""
     pace, raw = band.pace(batch), band.relative(batch)
-    count = int(np.clip(len(batch) // OF_A_PACE, 1, PACES))
+    count = int(np.clip(batch.size // OF_A_PACE, 1, PACES))
     order = np.argsort(pace, kind="stable")
     paces, location, spread = [], [], []
     for part in np.array_split(order, count):

@@ -238,7 +238,7 @@ class Monitor:
         return np.array([grain[self._observer.sensors[k]] for k in self._observer.followed])
 
     def _judge(self, batch: Batch) -> Alarm | None:
-        self.windows += len(batch)
+        self.windows += batch.size
         self.latest = batch
         if self.band is None:
             self._learned.append(batch)
@@ -252,8 +252,8 @@ class Monitor:
         self.untimely += untimely
         self.faster += int(moving.sum()) - int(counts.sum()) - untimely
         batch = batch.some(counts)
-        self.judged += len(batch)
-        if not len(batch) or self.astray:
+        self.judged += batch.size
+        if not batch.size or self.astray:
             return None
         weights, self._before = band.weights(batch, self._before)
         found: Alarm | None = None

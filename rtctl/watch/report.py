@@ -40,7 +40,7 @@ def lanes(monitor: Monitor) -> dict[str, Any]:
         return out
     size = band.innovations(batch)[-1] / band.sigma
     for k, name in enumerate(band.sensors):
-        blocks = batch.e[:, :, k].reshape(len(batch) * length, -1).mean(axis=1) / band.slow_sigma[k]
+        blocks = batch.e[:, :, k].reshape(batch.size * length, -1).mean(axis=1) / band.slow_sigma[k]
         out["lanes"][f"residual_{name}"] = {"unit": "sigma", "values": blocks.tolist()}
         out["residual"][name] = float(size[k])
     return out

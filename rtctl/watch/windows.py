@@ -46,7 +46,9 @@ class Batch(NamedTuple):
     asked: np.ndarray  # (windows, BLOCKS) change of the reference in each block, its unit; 0 where nobody knows it
     late: np.ndarray  # (windows,) s, largest error of the time of a row or of the age of its sample
 
-    def __len__(self) -> int:
+    @property
+    def size(self) -> int:
+        """Number of windows."""
         return len(self.t)
 
     def some(self, which: np.ndarray | slice) -> "Batch":
@@ -99,7 +101,8 @@ class Cutter:
         whole = count * length
         self._parts = [tuple(part[whole:] for part in (t, u, y, ref, late))]
         self._waiting -= whole
-        e, push = self._observer.step(u[:whole], y[:whole])
+        steps = [self._observer.step(u[k : k + length], y[k : k + length]) for k in range(0, whole, length)]
+        e, push = (np.concatenate(part) for part in zip(*steps, strict=True))  # one by one, whatever came at a time
         worst = np.abs(late[:whole]).reshape(count, length).max(axis=1)
         batch = self._cut(t[:whole], e, push, y[:whole], ref[:whole], worst)
         keep = np.isfinite(batch.e).all(axis=(1, 2))

@@ -39,6 +39,7 @@ function lamps(hello, status, message, connected, alive) {
     [!alive ? "off" : rises("missed", status.missed) ? "warn" : "good", "ticks", alive ? `${status.missed} missed` : "-"],
     [!alive ? "off" : rows.error || missing ? "bad" : "recorded" in rows ? "good" : "off", "recording",
       !alive ? "-" : rows.error ? "failed" : missing ? `${missing} rows lost` : "recorded" in rows ? "on" : "off"],
+    ...(status.model ? [modelLamp(status.model, alive)] : []),
     [!connected ? "bad" : rises("dropped", message?.dropped ?? 0) ? "warn" : "good", "page", connected ? `${message?.dropped ?? 0} frames dropped` : "no server"],
   ];
   const text = JSON.stringify(list);
@@ -52,14 +53,26 @@ function lamps(hello, status, message, connected, alive) {
   }));
 }
 
+// The model beside the machine, where `rtctl watch` runs one.
+function modelLamp(model, alive) {
+  if (!alive) return ["off", "model", "-"];
+  if (model.alarm) return ["bad", "model", "departs"];
+  if (model.silent) return ["warn", "model", "silent"];
+  const words = { waiting: "waits for motion", learning: `learns, ${Math.round(100 * model.learned)} %`, watching: "holds", astray: "runs away" };
+  return [{ watching: "good", learning: "off", waiting: "off", astray: "warn" }[model.state] ?? "off", "model", words[model.state] ?? model.state];
+}
+
 function banner(status, connected, alive, there) {
   const place = $("banner");
   const faults = (status.faults ?? []).map((fault) => fault.fault ?? String(fault));
   let text = "", warn = true;
+  const trip = status.trip ? `Tripped at tick ${status.trip.tick}, ${status.trip.code}: ${status.trip.why}.` : "";
+  const alarm = status.model?.alarm;
   if (!connected) text = "The scope's server does not answer; trying again.";
   else if (!alive && there) text = "The daemon does not answer: it starts, which may take a minute, or it hangs. Waiting for it.";
-  else if (!alive) text = "The daemon does not answer: it does not run. Waiting for it; what is shown is its last.";
-  else if (status.trip && status.state === "tripped") { text = `Tripped at tick ${status.trip.tick}, ${status.trip.code}: ${status.trip.why}.`; warn = false; }
+  else if (!alive) text = "The daemon does not answer: it does not run. Waiting for it; what is shown is its last." + (trip ? ` ${trip}` : "");
+  else if (trip && status.state === "tripped") { text = trip; warn = false; }
+  else if (alarm) text = `The machine departs from its model since ${alarm.t.toFixed(0)} s: ${alarm.words}.${alarm.diagnosis ? ` Diagnosis: ${alarm.diagnosis}` : ""}${alarm.page ? ` Page: ${alarm.page}` : ""}`;
   else if (faults.length) text = `Faults are injected on purpose: ${faults.join(", ")}.`;
   place.hidden = !text;
   place.className = warn ? "warn" : "";

@@ -58,7 +58,7 @@ export class TriggerPanel {
   tell(about, held) {
     const { mode } = this.want;
     if (mode === "off") return;
-    $("trigger-state").textContent = held ? "held" : about.done ? "one sweep caught; arm for the next"
+    $("trigger-state").textContent = held ? "held" : about.done ? "one sweep caught; Catch takes the next"
       : about.sweep ? `${about.sweeps} sweep${about.sweeps === 1 ? "" : "s"}` : mode === "auto" ? "no crossing: rolls" : "waits for a crossing";
   }
 }
