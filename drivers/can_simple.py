@@ -69,7 +69,7 @@ def number(word):
 
 @tick
 def drive(bus, node, command, value):
-    """Input of a node: torque in Nm, or speed in turns/s with no torque beside it. Eight bytes, as ODrive sends them."""
+    """Input of a node: torque in Nm, or speed in turns/s with no torque beside it; 8 bytes, as ODrive sends it."""
     return send(bus, node << 5 | command, 8, bits(value), 0)
 
 

@@ -1,5 +1,6 @@
 """CANSimple nodes as a board: what they are told, what they say, and what a bad one is told of."""
 
+import contextlib
 import struct
 import time
 
@@ -40,6 +41,9 @@ def bench():
         nodes = Nodes(theirs, 5)
         prepare(nodes.nodes[5])
         made.append((nodes, ours))
+        with nodes.lock, contextlib.suppress(BlockingIOError):
+            while ours.recv(16):  # heartbeats of before
+                pass
         card = CanBoard(CanSettings.model_validate({"timeout": 0.5, **given, **settings}), DESCRIBED, rate, ours)
         return (card.open() if opened else card), nodes
 
