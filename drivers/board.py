@@ -75,7 +75,7 @@ class Board(ABC):
     def __init__(self, wiring: Wiring) -> None:
         self.wiring = wiring
         self.outputs = [o.params if isinstance(o, Quantity) else mio.build_output(o, DT, 0) for o in wiring.outputs]
-        self.inputs = [i.params if isinstance(i, Quantity) else mio.build_input(i, DT) for i in wiring.inputs]
+        self.inputs = [input_params(i) for i in wiring.inputs]
         self.is_open = False
         self.failed: BoardError | None = None  # the first error since it was opened
 
@@ -184,6 +184,12 @@ class Board(ABC):
 
     @abstractmethod
     def _close(self) -> None: ...
+
+
+def input_params(wire: Any) -> mio.AnalogInputParams:
+    """Range and step of an input, a channel or a Quantity."""
+    found: mio.AnalogInputParams = wire.params if isinstance(wire, Quantity) else mio.build_input(wire, DT)
+    return found
 
 
 def nearest_code(p: mio.AnalogInputParams, volts: float) -> int:

@@ -114,20 +114,10 @@ class CanBoard(Board):
         self._bus["fd"], self._bus["garbled"], self._bus["errors"] = self._socket.fileno(), -1, 0
         self._nodes[:] = 0
         self._nodes["id"] = self._ids
-        for node in self._ids:
-            self._sent(can.send(self._bus, node << 5 | can.CLEAR_ERRORS, 0, 0, 0), f"node {node}: clear errors")
-        for drive in self._drives:
-            mode = INPUTS[drive.input][1]
-            self._sent(
-                can.send(self._bus, drive.id << 5 | can.CONTROLLER_MODE, 8, mode, can.PASSTHROUGH),
-                f"node {drive.id}: controller mode",
-            )
-        self._nodes["heartbeat_at"] = 0
-        begun = time.monotonic_ns()
-        first = np.array([(n, can.HEARTBEAT) for n in range(len(self._ids))], np.int64)
-        while not all(self._nodes["heartbeat_at"] > 0) and time.monotonic_ns() - begun < HELLO * SECOND:
-            self._received(can.sample(self._bus, self._nodes, first, 0, 0))
-            time.sleep(1e-3)
+        try:
+            self._prepare()
+        except BoardError as error:
+            raise UserError(f"driver: {error}") from error
         for n, node in enumerate(self._nodes):
             if not node["heartbeat_at"]:
                 raise UserError(
@@ -139,6 +129,24 @@ class CanBoard(Board):
                     f"driver: {self._who(n)} has an error: {error_words(int(node['error']))}; see odrivetool"
                 )
         self._first_sample()
+
+    def _prepare(self) -> None:
+        """Inputs to zero and idle first, whatever is said after; then errors cleared, modes set, heartbeats heard."""
+        self.zero()
+        for node in self._ids:
+            self._sent(can.send(self._bus, node << 5 | can.CLEAR_ERRORS, 1, 0, 0), f"node {node}: clear errors")
+        for drive in self._drives:
+            mode = INPUTS[drive.input][1]
+            self._sent(
+                can.send(self._bus, drive.id << 5 | can.CONTROLLER_MODE, 8, mode, can.PASSTHROUGH),
+                f"node {drive.id}: controller mode",
+            )
+        nodes, begun = self._nodes, time.monotonic_ns()
+        while time.monotonic_ns() - begun < HELLO * SECOND:  # an error stands in heartbeats until it is cleared
+            self._received(can.sample(self._bus, nodes, self._wanted, 0, 0))
+            if (nodes["heartbeat_at"] > 0).all() and not nodes["error"].any():
+                return
+            time.sleep(1e-3)
 
     def _first_sample(self) -> None:
         """Have every message once; counters begin where the machine stands."""
@@ -226,7 +234,7 @@ class CanBoard(Board):
 
     def _request_state(self, n: int, state: int) -> None:
         node = self._drives[n].id
-        self._sent(can.send(self._bus, node << 5 | can.SET_AXIS_STATE, 4, state, 0), f"{self._drive(n)}: its state")
+        self._sent(can.send(self._bus, node << 5 | can.SET_AXIS_STATE, 8, state, 0), f"{self._drive(n)}: its state")
 
     def _look(self) -> None:
         """Raise BoardError where a node is late, has an error, is in another state than wanted, or talks nonsense."""

@@ -69,10 +69,8 @@ def number(word):
 
 @tick
 def drive(bus, node, command, value):
-    """Input of a node: torque in Nm, or speed in turns/s with no torque beside it."""
-    if command == INPUT_VELOCITY:
-        return send(bus, node << 5 | command, 8, bits(value), 0)
-    return send(bus, node << 5 | command, 4, bits(value), 0)
+    """Input of a node: torque in Nm, or speed in turns/s with no torque beside it; 8 bytes, as ODrive sends it."""
+    return send(bus, node << 5 | command, 8, bits(value), 0)
 
 
 @tick

@@ -9,7 +9,7 @@ import numpy as np
 
 from rtctl.config.errors import UserError, nearest
 from rtctl.trace.bundle import Bundle, load_bundle
-from rtctl.trace.notebook import extra
+from rtctl.trace.notebook import extra, in_cell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,7 +110,7 @@ class Simulation:
         """Recorded, simulated and error of every channel."""
         from rtctl.cli.simulate import figure
 
-        return figure(self.result)
+        return in_cell(figure(self.result))
 
     def to_pandas(self) -> Any:
         """A DataFrame by time: `name` recorded and `name_simulated`. Raises UserError without pandas."""

@@ -13,9 +13,11 @@ from rtctl.config.errors import UserError
 from rtctl.doctor.finding import Finding
 from rtctl.drivers import at_mio_16de as mio
 from rtctl.drivers import daq_stc, optical_sensor
-from rtctl.drivers.board import Board
+from rtctl.drivers.board import Board, input_params
+from rtctl.machines.base import DESCRIBED
 from rtctl.machines.profile import REELS, SCALE
 from rtctl.machines.profiles import profile_of
+from rtctl.machines.wiring import wiring
 from rtctl.tick import frames
 
 REST_READS = 200
@@ -129,15 +131,23 @@ def _one(step: Step, wires: Wires, person: Person | None) -> Finding:
     return Finding(step.name, words, "good" if good else "bad", "", "" if good else f"right is: {step.right}")
 
 
+OUTPUTS = Step(
+    "outputs", "Measure every analog output at the connector block with a voltmeter.", "0 V, within 5 mV, and no drift",
+    None,
+)  # fmt: skip
+
+
 def steps(config: Any) -> list[Step]:
     """The checks of a machine, in the order in which they are safe."""
+    described = config.kind == DESCRIBED
     common = [
         Step("emergency stop", "Push the emergency stop. The motors must turn freely by hand.",
              "no drive has power while you touch the machine", None),
-        Step("outputs", "Measure every analog output at the connector block with a voltmeter.",
-             "0 V, within 5 mV, and no drift", None),
         Step("rest", "", f"counters stand still, inputs within {REST_CODES} codes", _rest(config)),
     ]  # fmt: skip
+    if described:  # on a bus: there is no terminal for a voltmeter
+        return [*common, *_named(config)]
+    common.insert(1, OUTPUTS)
     profile = profile_of(config.kind)
     of = _reels if profile.has(REELS) else _carriage if profile.has(SCALE) else _axis
     return [*common, *of(config)]
@@ -172,6 +182,38 @@ def _carriage(config: Any) -> list[Step]:
 def _axis(config: Any) -> list[Step]:
     travel = round(STROKE / config.encoder.pitch)
     return _way("encoder", 0, f"Push the axis {STROKE * 1e3:g} mm forwards.", travel, f"{STROKE * 1e3:g} mm", 0.1)
+
+
+def _named(config: Any) -> list[Step]:
+    """Each sensor of a described machine, moved by hand: that it shows a way, and goes the right way."""
+    wires = wiring(config)
+    found = []
+    for n, name in enumerate(wires.sensors):
+        what = config.machine.sensors[name]
+        if what.measures != "position" or what.body is None:
+            continue
+        do = f"Move {what.body} forwards by hand, half a turn or 50 mm, and leave it there."
+        counter, number = (n, None) if n < wires.counters else (None, n - wires.counters)
+        found.append(Step(name, do, "it goes up", _upwards(counter, number)))
+    return found
+
+
+def _upwards(counter: int | None, number: int | None) -> Callable[[list[Sample]], tuple[str, bool]]:
+    def judge(samples: list[Sample]) -> tuple[str, bool]:
+        if counter is not None:
+            moved: float = samples[-1].counts[counter]
+            words = f"{moved:+.0f} counts"
+        else:
+            assert number is not None
+            moved = samples[-1].volts[number] - samples[0].volts[number]
+            words = f"{moved:+.4g} rad or m"
+        if moved == 0:
+            words += "; it does not change: is it the right node, sensor and wire?"
+        elif moved < 0:
+            words += "; the wrong way: give per_turn the other sign, or swap A and B"
+        return words, moved > 0
+
+    return judge
 
 
 def _way(name: str, counter: int, do: str, counts: int, way: str, within: float) -> list[Step]:
@@ -236,23 +278,16 @@ def _rest(config: Any) -> Callable[[list[Sample]], tuple[str, bool]]:
         level = ", ".join(f"{v:.3f} V" for v in samples[-1].volts)
         words = f"counters moved {moved}" + (f"; inputs at {level}, {', '.join(f'{w * 1e3:.1f}' for w in wide)} mV wide"
                                              if wide else "")  # fmt: skip
-        steps_ = [REST_CODES * mio.build_input(i, 1.0).volts_per_code for i in _inputs(config)]
+        steps_ = [REST_CODES * input_params(i).volts_per_code for i in wiring(config).inputs]
         quiet = all(w <= most * (1 + 1e-9) for w, most in zip(wide, steps_, strict=True))
         return words, quiet and all(m <= 1 for m in moved)  # an encoder may stand on an edge
 
     return judge
 
 
-def _inputs(config: Any) -> tuple[Any, ...]:
-    from rtctl.machines.wiring import wiring
-
-    return wiring(config).inputs
-
-
 def card_of(config: Any) -> Board:
     """The card of a config, not open yet. Raises UserError where it has none."""
     from rtctl.drivers.boards import make
-    from rtctl.machines.wiring import wiring
 
     if config.driver.kind == "emulated":
         raise UserError(f"--board: {config.name} has an emulated board, which has no wires; say which card, e.g. "

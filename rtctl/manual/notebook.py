@@ -40,7 +40,10 @@ def cells(script: str) -> list[Cell]:
 def run(text: str, names: dict[str, Any]) -> tuple[str, Any]:
     """What a cell prints, and the value of its last expression; None where it ends in something else."""
     tree = ast.parse(text)
-    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    end = tree.body[-1] if tree.body else None
+    last = end if isinstance(end, ast.Expr) else None
+    if last is not None:
+        tree.body.pop()
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(compile(tree, "cell", "exec"), names)

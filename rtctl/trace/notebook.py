@@ -1,6 +1,8 @@
 """A bundle in a notebook: its words and table, the ways into pandas, xarray and Arrow, and a picture of its columns."""
 
+import io
 from collections.abc import Sequence
+from functools import partial
 from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -103,7 +105,20 @@ def plot(bundle: "Bundle", columns: Sequence[str]) -> "Figure":
     from rtctl.trace.plot import figure_of, figure_of_columns
 
     if not columns:
-        return figure_of(bundle, ())
+        return in_cell(figure_of(bundle, ()))
     for name in columns:
         column(bundle, name)
-    return figure_of_columns(bundle, columns)
+    return in_cell(figure_of_columns(bundle, columns))
+
+
+def in_cell(figure: "Figure") -> "Figure":
+    """The figure, which a cell shows as a picture where nobody has imported pyplot, too."""
+    figure._repr_png_ = partial(png, figure)  # type: ignore[attr-defined]  # what IPython asks an object for
+    return figure
+
+
+def png(figure: "Figure") -> bytes:
+    """A figure as the bytes of a PNG."""
+    file = io.BytesIO()
+    figure.savefig(file, format="png", bbox_inches="tight")
+    return file.getvalue()

@@ -94,11 +94,40 @@ def test_a_mistake_is_one_message_before_anything_runs(rtctl, words, message):
 
 
 @pytest.mark.parametrize(
-    ("config", "plant"), [("ivu_comedi", "/dev/comedi0 by comedi"), ("ldu_nidaqmx", "Dev1 by nidaqmx")]
+    ("config", "plant"),
+    [
+        ("ivu_comedi", "/dev/comedi0 by comedi"),
+        ("ldu_nidaqmx", "Dev1 by nidaqmx"),
+        ("axis_odrive", "can0 by can"),
+        ("axis_serial", "/dev/ttyACM0 by serial"),
+    ],
 )
 def test_the_configs_for_cards_are_right(rtctl, config, plant):
     code, out, err = rtctl("check", f"boards/{config}")
     assert (code, plant in out) == (0, True), err
+
+
+@pytest.mark.parametrize(
+    ("config", "change", "message"),
+    [
+        ("axis_odrive", "driver.nodes={moter: {id: 1}}", "driver.nodes.moter: the machine has no such drive"),
+        ("axis_odrive", "driver.sensors={}", "driver.sensors.encoder is missing: say which node"),
+        ("axis_odrive", "driver.nodes.torque.id=64", "driver.nodes.torque.id"),
+        ("axis_odrive", "loop.mode=fused", "a real board keeps real time"),
+        ("axis_odrive", "driver={kind: comedi}", "driver.kind"),
+        ("axis_serial", "driver.timeout=0 s", "driver.timeout"),
+    ],
+)
+def test_a_mistake_about_a_bus_is_one_message_before_anything_runs(rtctl, config, change, message):
+    code, _, err = rtctl("check", f"boards/{config}", "--set", change)
+    assert (code, message in err) == (2, True), err
+
+
+def test_a_bus_that_is_not_there_is_told(rtctl, runtime):
+    for config, words in (("axis_odrive", "driver.interface:"), ("axis_serial", "driver.port: there is no /dev/none")):
+        where = "driver.interface=nocan7" if config == "axis_odrive" else "driver.port=/dev/none"
+        code, _, err = rtctl("plant", f"boards/{config}", "--set", f"name=b{os.getpid()}", "--set", where)
+        assert (code, words in err) == (2, True), err
 
 
 def test_an_own_plant_is_neither_a_card_nor_an_fmu(rtctl, tmp_path, monkeypatch):

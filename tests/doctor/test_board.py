@@ -219,3 +219,30 @@ def test_a_question_is_asked_until_it_is_answered(console, text, said):
 def test_findings_are_told_with_what_would_be_right(console):
     board_console.tell(console, Finding("capstan", "-9 counts", "bad", "", "right is: +10000 counts"))
     assert console.file.getvalue().split() == ["bad", "capstan:", "-9", "counts", "right", "is:", "+10000", "counts"]
+
+
+@pytest.mark.parametrize(("turns", "good"), [(0.5, True), (-0.5, False), (0.0, False)])
+def test_a_described_machine_on_a_bus_is_moved_by_hand_and_has_no_terminals(turns, good):
+    from odrive_nodes import Nodes, pair
+
+    from rtctl.cli.common import load_config
+    from rtctl.drivers.can import CanBoard
+
+    config = load_config("boards/axis_odrive", ["driver.timeout=0.5 s"])
+    ours, theirs = pair()
+    nodes = Nodes(theirs, 1)
+    card = CanBoard(config.driver, wiring(config), 200.0, ours).open()
+
+    def hand(read):
+        nodes.nodes[1].position += turns
+        read()
+
+    try:
+        found = board.run(config, card, Hands({"encoder": hand}), lambda _: None)
+    finally:
+        card.close()
+        nodes.close()
+        ours.close()
+    assert [f.name for f in found] == ["card", "emergency stop", "rest", "encoder"]
+    assert (found[-1].verdict == "good") == good
+    assert f"{8192 * turns:+.0f} counts" in str(found[-1]) and nodes.nodes[1].torque == 0.0

@@ -86,7 +86,7 @@ class Nodes:
         if remote:
             self._answer(n, node, command)
         elif command == 0x07:
-            (wanted,) = struct.unpack("<I", data)
+            (wanted,) = struct.unpack("<I4x", data)
             node.state = node.state if node.stubborn and wanted == 8 else wanted
             node.torque = node.speed_input = 0.0
         elif command == 0x0B:
@@ -94,7 +94,7 @@ class Nodes:
         elif command == 0x0D:
             node.speed_input = struct.unpack("<ff", data)[0]
         elif command == 0x0E:
-            node.torque = struct.unpack("<f", data)[0]
+            node.torque = struct.unpack("<f4x", data)[0]
         elif command == 0x18:
             self.cleared += 1
 

@@ -191,3 +191,13 @@ def test_refuses_a_period_that_ends_before_the_board_is_done():
         mio.build_output(mio.AnalogOutputSettings(channel=1), 4e-6)
     with pytest.raises(ValueError, match="too short for 3 inputs"):
         mio.build_input(mio.AnalogInputSettings(channel=3), 5e-6, scan_index=2)
+
+
+@pytest.mark.parametrize(("polarity", "ends"), [("bipolar", (-32768, 32767)), ("unipolar", (0, 65535))])
+def test_converters_of_other_cards_have_other_bits(polarity, ends):
+    for made, span in ((output(polarity=polarity, bits=16), 20 if polarity == "bipolar" else 10),
+                       (analog_input(polarity=polarity, bits=16), 10)):  # fmt: skip
+        assert (made.code_min, made.code_max) == ends
+        assert made.volts_per_code == pytest.approx(span / 65536)
+    with pytest.raises(ValidationError):
+        output(bits=40)

@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rtctl.drivers import daq_stc
-from rtctl.drivers.at_mio_16de import AnalogOutputSettings
+from rtctl.drivers.at_mio_16de import AnalogInputSettings, AnalogOutputSettings
 from rtctl.drivers.board import BoardError, Wiring
 from rtctl.tick import frames
 
@@ -131,3 +131,18 @@ def test_a_machine_without_inputs_or_lines_reads_its_counter_alone(rig, kind, fr
     made.pulse(0, 3)
     made.card.read(frame)
     assert list(frame["counter_codes"][:2]) == [daq_stc.INITIAL_COUNT + 3, 0]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "comedi"])  # that card has 12 bits
+@pytest.mark.parametrize("code", [12345, -32768, 32767, 1])
+def test_a_converter_of_sixteen_bits(rig, kind, frame, code):
+    output = AnalogOutputSettings(channel=0, bits=16)
+    made = rig(kind, Wiring((output,), (AnalogInputSettings(channel=0, bits=16),), counters=1))
+    made.card.open()
+    made.card.write((code,), 0)
+    assert made.output(0) == pytest.approx(code * 20 / 65536, abs=2e-4)
+    made.set_input(0, 1.2345)
+    made.card.read(frame)
+    assert frame["ai_codes"][0] == pytest.approx(1.2345 / (10 / 65536), abs=0.5 + made.step / (10 / 65536))
+    with pytest.raises(BoardError, match="-32768 to 32767"):
+        made.card.write((32768,), 0)

@@ -1,5 +1,6 @@
 """CANSimple nodes as a board: what they are told, what they say, and what a bad one is told of."""
 
+import contextlib
 import struct
 import time
 
@@ -40,6 +41,9 @@ def bench():
         nodes = Nodes(theirs, 5)
         prepare(nodes.nodes[5])
         made.append((nodes, ours))
+        with nodes.lock, contextlib.suppress(BlockingIOError):
+            while ours.recv(16):  # heartbeats of before
+                pass
         card = CanBoard(CanSettings.model_validate({"timeout": 0.5, **given, **settings}), DESCRIBED, rate, ours)
         return (card.open() if opened else card), nodes
 
@@ -205,6 +209,34 @@ def test_nodes_that_answer_late_from_the_start_are_refused(bench):
 def test_drives_and_sensors_are_those_of_the_machine(given, words):
     with pytest.raises(UserError, match=words):
         CanBoard(CanSettings.model_validate({**GIVEN, **given}), DESCRIBED, 200.0)
+
+
+def test_an_input_is_zeroed_even_where_its_node_is_refused(bench):
+    """As after the death of a board's process: a node that is silent may still hear."""
+    seen = []
+
+    def runs_away(node):
+        node.torque, node.state = 1.0, 8
+        node.silent.add(0x01)
+        seen.append(node)
+
+    with pytest.raises(UserError, match="sends no heartbeat"):
+        bench(prepare=runs_away)
+    assert (seen[0].torque, seen[0].state) == (0.0, 1)
+
+
+def test_an_error_that_is_cleared_is_no_refusal(bench):
+    card, nodes = bench(opened=False, prepare=faulty)
+    take = nodes._take
+
+    def clears(identifier, remote, data):
+        if identifier & 0x1F == 0x18:
+            nodes.nodes[5].error = 0
+        take(identifier, remote, data)
+
+    nodes._take = clears
+    card.open()
+    assert nodes.cleared == 1
 
 
 def test_what_the_bus_cannot_do_for_a_machine():

@@ -20,7 +20,8 @@ for command in $("$python" -c "from rtctl.cli.main import COMMANDS; print(*COMMA
 done
 "$rtctl" run ldu --mode fused --for 3s --reference print_steps --set name=bounds -o run --json > run.json
 "$rtctl" replay run
-for form in csv mat parquet mcap mf4 tdms; do "$rtctl" trace export run --to "$form" -o "run.$form"; done
+for form in csv mat parquet mcap mcap-json mf4 tdms; do "$rtctl" trace export run --to "$form" -o "run.$form"; done
+"$rtctl" import run.mcap --plant axis --map u=u,x=position --parameter M=1.25 --case drive.newton_per_volt=10 -o imported_mcap
 "$rtctl" import run.csv --plant axis --map u=u,x=position --parameter M=1.25 --case drive.newton_per_volt=10 -o imported
 "$rtctl" diagnose imported --json > diagnosis.json
 grep -q '"verdict"' diagnosis.json

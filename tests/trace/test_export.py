@@ -258,7 +258,12 @@ def test_refuses_what_is_no_bundle_and_what_cannot_be_written(bundle, tmp_path):
 
 @pytest.mark.parametrize(
     ("to", "package", "how"),
-    [("mf4", "asammdf", r"'rtctl\[mf4\]'"), ("tdms", "nptdms", r"'rtctl\[tdms\]'"), ("mcap-json", "mcap", "'mcap'")],
+    [
+        ("mf4", "asammdf", r"'rtctl\[mf4\]'"),
+        ("tdms", "nptdms", r"'rtctl\[tdms\]'"),
+        ("mcap-json", "mcap", "'mcap'"),
+        ("rrd", "rerun", r"'rtctl\[rerun\]'"),
+    ],
 )
 def test_a_missing_package_is_told_with_what_installs_it(bundle, tmp_path, monkeypatch, to, package, how):
     for name in [*sys.modules, package]:

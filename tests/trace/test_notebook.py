@@ -98,3 +98,16 @@ def test_a_picture_of_some_columns_has_a_panel_a_unit(bundle):
     assert len(bundle.plot().axes) >= 1
     with pytest.raises(UserError, match="has no column"):
         bundle.plot("nothing")
+
+
+def test_a_cell_shows_a_figure_without_pyplot(tmp_path):
+    import pickle
+
+    from matplotlib.figure import Figure
+
+    from rtctl.trace.notebook import in_cell
+
+    figure = in_cell(Figure())
+    figure.subplots().plot([1.0, 2.0])
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert pickle.loads(pickle.dumps(figure))._repr_png_().startswith(b"\x89PNG")

@@ -74,6 +74,8 @@ class ProtobufRows:
 
     def _one_by_one(self) -> Messages:
         rows = Messages(self._path, f"messages of {self._topic}")
+        fields = self._type.DESCRIPTOR.fields
+        names = {field.name: name for field, (name, _) in zip(fields, self._told, strict=True)}
         for number, data in enumerate(self._data, 1):
             try:
                 message = self._type.FromString(data)
@@ -82,7 +84,7 @@ class ProtobufRows:
                     f"{self._path}: message {number} of {self._topic} is no {self._type.DESCRIPTOR.full_name}: "
                     f"{data[:20]!r}"
                 ) from None
-            rows.add(_plain(message, 0))
+            rows.add({names.get(key, key): value for key, value in _plain(message, 0).items()})
         return rows
 
 
