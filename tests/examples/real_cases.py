@@ -15,6 +15,11 @@ def cases() -> dict[str, dict[str, Any]]:
     return yaml.safe_load((FOLDER / "cases.yaml").read_text())
 
 
+def missing(case: dict[str, Any]) -> str:
+    """The first recording of a case that is not beside the project; "" where all are."""
+    return next((recording for recording in case["recordings"] if not (DATA / recording).exists()), "")
+
+
 def imports(case: dict[str, Any], out: Path) -> list[list[str]]:
     """Words of `rtctl import` for each recording with a description; the bundles go into `out`."""
     lines = []
