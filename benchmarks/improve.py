@@ -114,7 +114,7 @@ def concealed(kind: str, seed: int) -> tuple[Any, Any, dict[str, Any]]:
     from rtctl.plants.graph.elements import elements
     from rtctl.plants.graph.layout import layout
 
-    path = kind if kind in machines.CONFIGS else f"configs/machines/{kind}.yaml"
+    path = kind if kind in machines.CONFIGS else f"machines/{kind}"
     base = played.with_reference(load_config(path, []))
     if base.kind != DESCRIBED:
         truth, entry = conceal.conceal(base, seed)
@@ -146,12 +146,13 @@ def improved(base: Any, truth: Any, place: Path, known: bool) -> dict[str, Any]:
         start = model.of_config(truth, "told")
         verdict = "told"
     else:
-        from rtctl.diagnose.answer import answer, files
+        if not (place / model.FOLDER / model.RESULT).is_file():
+            from rtctl.diagnose.answer import answer, files
 
-        record(base, truth, place)
-        d = answer.diagnose(place)
-        files.write(d, place / model.FOLDER, report=False)
-        start, verdict = model.load(place, None, None), d.verdict
+            record(base, truth, place)
+            files.write(answer.diagnose(place), place / model.FOLDER, report=False)
+        start = model.load(place, None, None)
+        verdict = json.loads((place / model.FOLDER / model.RESULT).read_text())["verdict"]
     told_of = {"verdict": verdict, "named": [effect.words for effect in start.effects]}
     try:
         r = improve(start, written_too=False)

@@ -75,7 +75,7 @@ def prove(
     error = one("improved", after)
     configs.append(after)
     crossover = r.margins_after.f_PM if r.margins_after is not None else 0.01 * after.loop.rate
-    by = learning.learner(after, crossover, played.seconds_of(after))
+    by = learning.learner(after, crossover, played.move_of(after))
     values = np.zeros(learning.count(by))
     kept, least = values, figures[-1].rms
     for number in range(runs):
@@ -83,7 +83,7 @@ def prove(
             break
         if figures[-1].rms <= least:
             kept, least = values, figures[-1].rms
-            values = learning.learned(by, values, error)
+            values = learning.learned(by, values, error[: round(by.duration / by.dt)])
         else:
             values = 0.5 * (kept + values)
         learns = {"duration": by.duration, "values": [float(f"{v:.5g}") for v in values]}

@@ -114,11 +114,10 @@ def _effect(number: int, entry: Any, sizes: dict[tuple[str, str], Any]) -> Effec
     said = "taken to be"
     if name in told:
         interval = told[name]
-        low, high = _number(interval.get("low"), low), _number(interval.get("high"), high)
+        ends_told = interval.get("ci90") or (None, None)
+        low, high = _number(ends_told[0], low), _number(ends_told[1], high)
         unit, said = str(interval.get("unit", "")), "90 %"
-        factor = (
-            value / interval["value"] if interval.get("value") else 1.0
-        )  # units of the report to those of the entry
+        factor = value / interval["value"] if interval.get("value") else 1.0  # unit of the report to the entry's
         low, high = low * factor, high * factor
     ends = tuple({name: end} for end in (low, high) if _allowed(entry, name, end))
     words = f"{name} {value:.4g}, {said} {low:.4g} to {high:.4g} {unit}".rstrip()

@@ -16,8 +16,9 @@ from rtctl.config.load import set_paths
 from rtctl.design.margins import Margins
 from rtctl.improve import margins, played
 from rtctl.improve.found import Found, with_size
+from rtctl.improve.ground import Ground
 from rtctl.improve.played import Figures, Judge, Played
-from rtctl.improve.proposals import LEAST, Ground, data_of, proposals
+from rtctl.improve.proposals import LEAST, data_of, proposals
 from rtctl.improve.remedy import BASE, Remedy, Tried, neutral, written
 from rtctl.machines.reference_motion import motion
 

@@ -3,7 +3,7 @@
     u_j+1 = Q (u_j + gain e_j + D e_j')               e_j: error of run j, taken `lead` s later
 
 The learning filter is that of the feedback itself, so that a run takes away what the loop follows; Q is a low-pass
-without phase at the crossover, beyond which the loop does not follow and learning would grow. A run that is worse than
+without phase below the crossover, near which the loop amplifies and learning would grow. A run that is worse than
 the one before is not learned from: the values go back half of the way.
 
 Source: Bristow, Tharayil & Alleyne, A survey of iterative learning control, IEEE Control Systems Magazine 26 (2006).
@@ -15,7 +15,7 @@ import numpy as np
 
 from rtctl.laws.iterative_learning import MOST
 
-BEYOND = 1.5  # crossovers up to which is learned
+UP_TO = 0.6  # crossovers up to which is learned
 
 
 class Learner(NamedTuple):
@@ -35,7 +35,7 @@ def learner(config: Any, crossover: float, duration: float) -> Learner:
     gain = float(getattr(law, "gain", 0.0))
     D = gain * float(getattr(law, "tau_d", 0.0) or 0.0) + float(getattr(law, "velocity_gain", 0.0) or 0.0)
     lead = dt * (0.5 + (config.loop.write == "next_tick"))
-    return Learner(gain, D, lead, BEYOND * crossover, dt, duration)
+    return Learner(gain, D, lead, UP_TO * crossover, dt, duration)
 
 
 def learned(by: Learner, values: np.ndarray, error: np.ndarray) -> np.ndarray:

@@ -100,6 +100,12 @@ def seconds_of(config: Any) -> float:
     return played + REST
 
 
+def move_of(config: Any) -> float:
+    """Length of the move, s, after which it may come back."""
+    table = machines.build(config).reference
+    return table.period * table.dt if table.period else seconds_of(config)
+
+
 def play(law: Any, plant: Any, seconds: float, judge: Judge, asked: np.ndarray | None = None) -> Played:
     """Play the law of one config on the emulated machine of another for `seconds` of its reference.
 

@@ -1,46 +1,31 @@
 """Remedies proposed for a machine: of its description, of each effect as its term declares, of the rest."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from rtctl import machines
 from rtctl.config.load import written as plain
 from rtctl.design.feedforward import INERTIA
-from rtctl.design.margins import Margins
 from rtctl.improve import curve, sensor_table
-from rtctl.improve.found import Effect, Found
+from rtctl.improve.found import Effect
+from rtctl.improve.ground import Ground
 from rtctl.improve.margins import delay
-from rtctl.improve.played import Judge
 from rtctl.improve.remedy import BASE, Remedy
+from rtctl.improve.unnamed import unnamed
 from rtctl.laws import predictor
 from rtctl.machines.profiles import profile_of
 
 BELOW = 0.9  # share of dry friction that is compensated: above it the machine creeps on by itself
 SHARES = (0.9, 1.0, 0.75, 0.5)  # of any other effect
-BANDS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # bandwidth of the observer in crossovers
 SLOWER = (0.8, 0.6)  # bandwidth of the reference
-INTEGRALS = (0.5, 0.25, 0.1)  # crossovers at which the integral meets the gain
-GRAINS = 2.0  # steps of the sensor within which the integral rests
 FILTERED = 3.0  # crossovers at which the speed of a predictor is filtered
-REPEATS = (1.0, 0.3)  # crossovers at which the integral of a part of the turn meets the gain
-TURNS = 1.5  # turns that the reference must make for what comes back with them
-SLOW = 0.02  # of the travel, per second, below which nothing is learned
 LESS = (1.0, 0.8, 0.6, 0.45, 0.3)  # of the gains, where the margins ask for it
 GAINS = ("gain", "velocity_gain")  # of a position law, in proportion to which the loop gain is
 LEAST = (6.0, 45.0)  # dB and degrees
+WHOLE = ("curve", "table", "joint")  # remedies that hold all effects of their kind at once
 FEED = f"{BASE}.feedforward"
-
-
-class Ground(NamedTuple):
-    """What proposals are made from."""
-
-    found: Found
-    judge: Judge
-    margins: Margins | None
-    gain: tuple[float, float] | None  # acceleration for one unit of positive and negative command; None: no feedforward
-    travel: tuple[float, float]  # of the feedback
 
 
 def proposals(g: Ground) -> list[Remedy]:
@@ -52,8 +37,8 @@ def proposals(g: Ground) -> list[Remedy]:
             if kind in effect.term.remedies and (made := MAKERS[kind](g, effect)) is not None:
                 out.append(made)
     merged: dict[tuple[str, str], Remedy] = {}
-    for remedy in (*out, *rest(g)):  # one table, one curve, one joint: they hold all effects at once
-        merged.setdefault((remedy.kind, remedy.against), remedy)
+    for remedy in (*out, *unnamed(g)):
+        merged.setdefault((remedy.kind, "" if remedy.kind in WHOLE else remedy.against), remedy)
     return list(merged.values())
 
 
@@ -198,78 +183,6 @@ def notch(g: Ground, effect: Effect) -> Remedy | None:
         {f"{BASE}.filter.sections": [notch_at(hertz, depth, width)]} for depth, width in ((0.1, 0.5), (0.1, 0.3))
     )
     return Remedy("notch", f"notch at {hertz:.3g} Hz", effect.words, effect.interval, ways)
-
-
-def rest(g: Ground) -> list[Remedy]:
-    """What needs no name: integral and disturbance observer."""
-    config, out = g.found.config, []
-    crossover = g.margins.f_PM if g.margins is not None else 0.01 * config.loop.rate
-    gain = float(getattr(config.law.position, "gain", 0.0) or 0.0)
-    against = "what has no name" if g.found.unnamed else "what is left"
-    if g.gain and gain > 0.0:
-        two = abs(g.gain[0] - g.gain[1]) > 1e-6 * abs(g.gain[0])
-        back = {f"{BASE}.observer.acceleration_back": float(f"{abs(g.gain[1]):.5g}")} if two else {}
-        ways = tuple(
-            {
-                f"{BASE}.observer.bandwidth": float(f"{band * crossover:.3g}"),
-                f"{BASE}.observer.acceleration": float(f"{abs(g.gain[0]):.5g}"),
-                **back,
-                f"{BASE}.observer.share": 1.0,
-                f"{BASE}.observer.delay": int(config.loop.write == "next_tick"),
-            }
-            for band in BANDS
-        )
-        out.append(Remedy("observer", "disturbance observer", against, "bandwidth by the margins", ways))
-    turn = turn_of(config)
-    if gain > 0.0 and turn is not None and g.travel[1] - g.travel[0] > TURNS * turn and _comes_back(g):
-        fast = (g.travel[1] - g.travel[0]) * SLOW
-        ways = tuple(
-            {
-                f"{BASE}.repetitive": {
-                    "period": turn, "gain": float(f"{gain * share * crossover:.4g}"), "slow": float(f"{fast:.3g}"),
-                    "lead": machines.build(config).dt * (0.5 + (config.loop.write == "next_tick")),
-                }
-            }
-            for share in REPEATS
-        )  # fmt: skip
-        out.append(Remedy("repetitive", "repetitive control over a turn", against, "learns while it moves", ways))
-    if gain > 0.0 and getattr(config.law.position, "tau_i", None) is None:
-        zone = GRAINS * step_of(config)
-        ways = tuple(
-            {
-                f"{BASE}.integral.gain": float(f"{gain * share * crossover:.4g}"),
-                f"{BASE}.integral.dead_zone": float(f"{zone:.4g}"),
-            }
-            for share in INTEGRALS
-        )
-        size = f"rests within {zone:.3g} {machines.build(config).unit} of the reference"
-        out.append(Remedy("integral", "integral with a dead zone", against, size, ways))
-    return out
-
-
-def _comes_back(g: Ground) -> bool:
-    """Whether what is left may come back with the turn: it has no name, or goes with the angle."""
-    return g.found.unnamed or any(effect.term.axis == "angle" for effect in g.found.effects)
-
-
-def turn_of(config: Any) -> float | None:
-    """Travel of the reference for a turn of what it is measured at; None where nothing turns, or on a speed."""
-    machine = machines.build(config)
-    if machine.unit == "rad":
-        return 2.0 * np.pi
-    return 2.0 * np.pi * machine.radius if machine.unit == "m" and machine.radius else None
-
-
-def step_of(config: Any) -> float:
-    """One step of the feedback's sensor in the unit of the reference; 0 where nobody knows it."""
-    profile = profile_of(config.kind)
-    if profile.counts is not None:
-        return 1.0 / profile.counts(config)
-    from rtctl.machines.described_parts import parts_of
-
-    parts = parts_of(config)
-    sensor = parts.machine.sensors[parts.feedback]
-    return abs(sensor.grain / sensor.scale)
 
 
 def data_of(config: Any) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ import pytest
 
 from rtctl.config.errors import UserError
 from rtctl.config.load import to_yaml
+from rtctl.diagnose.evidence.diagnosis import Interval
 from rtctl.improve import found
 
 
@@ -22,7 +23,7 @@ def test_a_diagnosis_gives_the_intervals(with_sizes, tmp_path):
     folder = tmp_path / "bundle" / "diagnosis"
     folder.mkdir(parents=True)
     (folder / "model.yaml").write_text(to_yaml(with_sizes(dry=3.0)))
-    size = {"value": 3.0, "low": 2.5, "high": 3.2, "unit": "N"}
+    size = Interval(3.0, 2.5, 3.2, "N").as_json()
     told = {
         "verdict": "named",
         "effects": [{"name": "friction.coulomb", "node": "carriage", "parameters": {"F_C": size}}],

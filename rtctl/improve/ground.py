@@ -1,0 +1,17 @@
+"""What remedies are proposed from: the machine as it was found, and the loop that it has."""
+
+from typing import NamedTuple
+
+from rtctl.design.margins import Margins
+from rtctl.improve.found import Found
+from rtctl.improve.played import Judge
+
+
+class Ground(NamedTuple):
+    """What proposals are made from."""
+
+    found: Found
+    judge: Judge
+    margins: Margins | None
+    gain: tuple[float, float] | None  # acceleration for one unit of positive and negative command; None: no feedforward
+    travel: tuple[float, float]  # of the feedback
