@@ -28,7 +28,7 @@ SET = f"{ch.PRINTER}, print heads, {INKS}"
 
 COLOR = under(
     Row("11.color_before", "colour difference dE of the grey image, root of the mean square", "10", None, "",
-        bound="at least", expected=0.3, quote=DEVIATION, 
+        bound="at least", expected=0.3, quote=DEVIATION,
         remark="no number in the text; an eye just sees a dE of 1. Error of the measurement alone, as in 11.2"),
     Row("11.color_table", "the same with an error table from the scale, over that before", "11.3, (11.12)", None, "",
         bound="at most", expected=0.5, quote=REDUCED,
