@@ -78,8 +78,8 @@ def smooth(e: np.ndarray, dt: float) -> np.ndarray:
 @cache
 def table() -> tuple[float, ...]:
     """Error table from the scale."""
-    one = ch.printer(ch.SPEEDS[0])
-    return tuple(error_table.from_scale(one.x, one.e, ch.TURN).settings.values)
+    x, e = ch.left((0.0, 0.0), ch.SPEEDS[0])
+    return tuple(error_table.from_scale(x, e, ch.TURN).settings.values)
 
 
 @cache
