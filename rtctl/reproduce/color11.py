@@ -28,13 +28,14 @@ SET = f"{ch.PRINTER}, print heads, {INKS}"
 
 COLOR = under(
     Row("11.color_before", "colour difference dE of the grey image, root of the mean square", "10", None, "",
-        bound="at least", expected=0.3, quote=DEVIATION, remark="no number in the text; an eye just sees a dE of 1"),
+        bound="at least", expected=0.3, quote=DEVIATION,
+        remark="no number in the text; an eye just sees a dE of 1. Error of the measurement alone, as in 11.2"),
     Row("11.color_table", "the same with an error table from the scale, over that before", "11.3, (11.12)", None, "",
         bound="at most", expected=0.5, quote=REDUCED,
         remark="no number in the text; the guide's waves and dirt are left"),
     Row("11.color_direct", "the same with direct measurement, over that before", "11.3", None, "", bound="at most",
         expected=0.2, quote=NO_EFFECT, law=ch.PRESENT_LAW + ", feedback by the scale",
-        remark="no number in the text; what is left is the tracking error of the loop"),
+        remark="no number in the text; what is left are the counts of the scale, 0.5 um"),
     *(
         Row(f"11.coherence_{name}", f"coherence of error and luminance at {words} mm", "11.2, figure 11.9", None, "",
             bound="at least", expected=0.5, quote=CLEARLY,
@@ -50,17 +51,20 @@ WAYS: dict[str, dict[str, Any]] = {"before": {}, "direct": {"sensors.feedback": 
 
 @cache
 def way(which: str) -> tuple[np.ndarray, np.ndarray]:
-    """Positions that are asked for (n,) and the error of the carriage there (n,), both m, filtered as (11.2) is."""
+    """Positions that are asked for (n,) and the error of what the loop takes for its position there (n,), both m.
+
+    Filtered as in 11.2. The tracking error is left out: that of a pass is not that of printing steps.
+    """
     changes = WAYS.get(which)
     if changes is None:
         changes = {"sensors.correction": {"period": ch.TURN, "values": list(table())}}
     made = scale_error.scale_config(set_paths(config("ldu_printer"), changes), ch.TRAVEL, ch.SPEEDS[0])
     record = bench.play(made)
     (one,) = scale_error.passes(record)
-    t, ref, x = record.t, record["ref"], record["truth_x"]
+    t, ref, off = record.t, record["ref"], record["truth_x"] - record["position"]
     inside = (ref > one.start) & (ref < one.start + ch.LENGTH) & (np.gradient(ref, t) > 0.5 * ch.SPEEDS[0])
     every = max(1, round(1.0 / (scale_error.RATE * float(t[1] - t[0]))))
-    e = smooth((x - ref)[inside], float(t[1] - t[0]))[::every]
+    e = smooth(off[inside], float(t[1] - t[0]))[::every]
     return ref[inside][::every], e - e[0]
 
 
@@ -74,8 +78,8 @@ def smooth(e: np.ndarray, dt: float) -> np.ndarray:
 @cache
 def table() -> tuple[float, ...]:
     """Error table from the scale."""
-    one = ch.printer(ch.SPEEDS[0])
-    return tuple(error_table.from_scale(one.x, one.e, ch.TURN).settings.values)
+    x, e = ch.left((0.0, 0.0), ch.SPEEDS[0])
+    return tuple(error_table.from_scale(x, e, ch.TURN).settings.values)
 
 
 @cache
