@@ -1,7 +1,7 @@
 """Cumulative sums of bounded scores, with thresholds for a stated rate of false alarms.
 
 A score is a number of standard deviations of a window from what the healthy machine showed. It is bounded, so that no
-single window makes an alarm. Each sum falls by DRIFT a window and rises by the score; it never falls below zero.
+window alone makes an alarm. Each sum falls by DRIFT a window and rises by the score; it never falls below zero.
 
 Source: Page, Continuous inspection schemes, Biometrika 41 (1954); Siegmund, Sequential Analysis (1985), ch. 2: the
 mean time between false alarms grows as exp(theta h), where theta is the positive root of E exp(theta (score - drift))
@@ -14,7 +14,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 DRIFT = 0.6  # standard deviations: half the least shift that is to be noticed at once
-BOUND = 4.0  # standard deviations, of a score
+BOUND = 4.0  # standard deviations, beyond which a score counts by its logarithm
+TAIL = 2.0  # standard deviations for each factor e beyond BOUND
+HIGHEST = 9.0  # standard deviations, of a score: no window alone makes an alarm
 MARGIN = 1.5  # of the thresholds: for tails that a learned sample is too short to show
 LONG = 16  # windows of the sums by which the correlation of scores is measured
 MOST = 2.0  # of theta: no learned sample is long enough to promise a steeper tail
@@ -28,6 +30,13 @@ class Thresholds(NamedTuple):
     per_day: float  # false alarms in eight hours of motion, at most, by theory
 
 
+def bounded(scores: np.ndarray) -> np.ndarray:
+    """Scores as they count: an effect that shows in a few windows only, but there by far, has to be noticed too."""
+    size = np.abs(scores)
+    tail = BOUND + TAIL * np.log(np.maximum(size, BOUND) / BOUND)
+    return np.copysign(np.where(size < BOUND, size, np.minimum(tail, HIGHEST)), scores)
+
+
 def exponent(scores: np.ndarray, weights: np.ndarray) -> float:
     """Rate theta at which the chance of a false alarm falls with the threshold, by scores (n,) of a healthy machine and
     their weights (n,).
@@ -35,7 +44,7 @@ def exponent(scores: np.ndarray, weights: np.ndarray) -> float:
     The smaller of that of the distribution of single scores and that of the variance of long sums. Zero where the
     scores do not fall on the average.
     """
-    x = weights * (np.clip(scores, -BOUND, BOUND) - DRIFT)
+    x = weights * (bounded(scores) - DRIFT)
     if x.mean() >= 0.0:
         return 0.0
     if x.max() <= 0.0:
@@ -86,7 +95,7 @@ class Sums:
 
         Returns the number of the sum that is furthest beyond its threshold, None where none is.
         """
-        self.value = np.maximum(self.value + weight * (np.clip(score, -BOUND, BOUND) - DRIFT), 0.0)
+        self.value = np.maximum(self.value + weight * (bounded(score) - DRIFT), 0.0)
         self.rising = np.where(self.value > 0.0, self.rising + 1, 0)
         share = self.share
         top = int(np.argmax(share))

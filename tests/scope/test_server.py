@@ -295,7 +295,8 @@ def test_the_scope_may_be_first(runtime, config, rows, tmp_path):
     async def work(scope, session):
         async with page(scope, session) as viewer:
             assert (await viewer.until("hello"))["signals"] == []
-            await viewer.until("status", alive=False, there=False)
+            while not said:
+                await viewer.until("status", alive=False, there=False)
             late.__enter__()
             await viewer.until("status", alive=False, there=True)
             while len(said) < 2:

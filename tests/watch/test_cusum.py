@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rtctl.watch.cusum import BOUND, DAY, DRIFT, Sums, Thresholds, exponent, thresholds
+from rtctl.watch.cusum import BOUND, DAY, DRIFT, HIGHEST, Sums, Thresholds, bounded, exponent, thresholds
 
 
 def test_exponent_of_normal_scores():
@@ -39,7 +39,7 @@ def test_false_alarms_of_normal_scores_are_no_more_than_stated():
 def test_one_window_makes_no_alarm_and_a_shift_does():
     sums = Sums(Thresholds(np.array([12.0]), 1.0))
     assert sums.step(np.array([1e9]), 1.0) is None
-    assert sums.value[0] == pytest.approx(BOUND - DRIFT)
+    assert sums.value[0] == pytest.approx(HIGHEST - DRIFT)
     sums.restart()
     steps = next(n for n in range(100) if sums.step(np.array([2.0]), 1.0) is not None)
     assert steps == int(np.ceil(12.0 / (2.0 - DRIFT))) - 1
@@ -51,3 +51,12 @@ def test_a_repeated_window_counts_less():
     whole.step(np.array([2.0]), 1.0)
     part.step(np.array([2.0]), 0.1)
     assert part.value[0] == pytest.approx(0.1 * whole.value[0])
+
+
+def test_scores_are_bounded_evenly_on_both_sides():
+    z = np.array([-1e9, -BOUND, -1.0, 0.0, 1.0, BOUND, 2 * BOUND, 1e9])
+    found = bounded(z)
+    np.testing.assert_allclose(found[1:6], z[1:6])
+    assert BOUND < found[6] < 2 * BOUND
+    assert found[0] == -HIGHEST and found[7] == HIGHEST
+    assert (np.diff(bounded(np.linspace(-20, 20, 500))) >= 0).all()

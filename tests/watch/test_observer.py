@@ -43,4 +43,4 @@ def test_chunks_of_any_size_give_the_same(record):
     whole, pieces = fed(record, [15_000]), fed(record, [1, 2, 997, 4000, 10_000])
     np.testing.assert_allclose(pieces[0], whole[0], atol=1e-4 * record.grain[record.main])
     off = np.sqrt(np.mean((pieces[1] - whole[1]) ** 2))  # at the first row of a chunk the error has no rate
-    assert off < 0.05 * np.sqrt(np.mean(whole[1] ** 2))
+    assert off < 0.1 * np.sqrt(np.mean(whole[1] ** 2))

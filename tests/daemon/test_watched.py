@@ -1,0 +1,75 @@
+"""What a watch tells is kept, said in a sentence, and counts as silent after a while."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rtctl.daemon import watched
+from rtctl.daemon.metrics import MachineCollector
+from rtctl.daemon.protocol import ProtocolError, decode_request, encode_request
+from rtctl.daemon.watched import SILENT, Watched, sentence
+from rtctl.loop.records import STATUS
+
+GOOD = {"state": "watching", "residual": {"encoder": 1.04}}
+ALARM = {**GOOD, "alarm": {"t": 12.0, "words": "drag that the model lacks, at motor 2: 3.1 mNm of torque"}}
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    now = SimpleNamespace(at=100.0)
+    monkeypatch.setattr(watched, "time", SimpleNamespace(monotonic=lambda: now.at))
+    return now
+
+
+def test_nobody_has_told_anything():
+    assert Watched().told is None
+    assert Watched().sentence() is None
+
+
+def test_a_watch_that_is_silent_is_told(clock):
+    kept = Watched()
+    kept.take(GOOD)
+    assert kept.sentence() == "holds: encoder 1 sigma"
+    clock.at += SILENT + 1.0
+    assert kept.told["silent"] is True
+    assert kept.sentence() == "nobody watches: `rtctl watch` is silent for 11 s"
+
+
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        ({"state": "waiting"}, "waits for motion"),
+        ({"state": "learning", "learned": 0.4}, "learns the band of the machine, 40 %"),
+        (
+            {"state": "astray", "notes": ["the model ran away"]},
+            "runs away from the rows and is no judge; the model ran",
+        ),
+        (ALARM, "departs from the machine since 12 s: drag that the model lacks"),
+    ],
+)
+def test_sentences(told, words):
+    assert sentence({"silent": False, "residual": {}, **told}).startswith(words)
+
+
+def test_an_alarm_and_a_silent_watch_in_the_metrics(clock):
+    kept = Watched()
+    collector = MachineCollector("ivu", np.zeros(1, STATUS)[0], dict, lambda: kept.told, "real")
+
+    def found():
+        return {(s.name, s.labels.get("sensor")): s.value for family in collector.collect() for s in family.samples}
+
+    assert found()["rtctl_build_info", None] == 1.0
+    assert ("rtctl_model_alarm", None) not in found()
+    kept.take(ALARM)
+    assert found()["rtctl_model_alarm", None] == 1.0
+    assert found()["rtctl_residual_sigma", "encoder"] == 1.04
+    clock.at += SILENT + 1.0
+    assert ("rtctl_model_alarm", None) not in found()
+
+
+def test_a_report_is_checked():
+    asked = decode_request(encode_request(1, "watch", ALARM))
+    assert asked.args.alarm.words.startswith("drag")
+    with pytest.raises(ProtocolError, match="state"):
+        decode_request(encode_request(1, "watch", {"state": "fine"}))
