@@ -26,8 +26,8 @@ rtctl schema ivu > ivu.schema.json
 rtctl run ivu --set law.position.gain='25 V/rad' --set loop.mode=fused --for 5s
 ```
 
-In a path `[]` stands for any item of a list (`reference.steps.0.at` is of the first), and a word in brackets for the
-kind that was chosen. A key without a default must be given.
+In a path `[]` stands for any item of a list (`reference.steps.0.at` is of the first), `NAME` for a name of your own,
+and a word in brackets for the kind that was chosen. A key without a default must be given.
 
 The keys on this page are those of every machine. Each machine has a page for its own: {pages}. What can stand in
 `plant.physics` is on [a page of its own](config_physics.md).
@@ -152,5 +152,7 @@ def _models(place: Shape, path: str) -> Iterator[tuple[str, Any]]:
         item = child(place, 0)
         assert item is not None
         yield from _models(item, f"{path}[]")
+    if place.each is not None:
+        yield from _models(shape(place.each), f"{path}.NAME")
     for word, model in place.choices.items():
         yield from _models(Shape(model, model=model), f"{path}[{word}]")
