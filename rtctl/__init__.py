@@ -18,7 +18,7 @@ TYPE_CHECKING = False  # `python -m rtctl` would look for the module `typing` in
 if TYPE_CHECKING:
     from typing import Any
 
-    from rtctl import diagnose, identify
+    from rtctl import diagnose, identify, improve, watch
     from rtctl.api import change, connect, load_config, record, run, run_campaign, steps
     from rtctl.api_bundles import Simulation, export, import_recording, physics, simulate
     from rtctl.api_diagnosis import Diagnosis, Report, diagnosis
@@ -33,8 +33,8 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Bundle", "Client", "Diagnosis", "NoAnswer", "Report", "Run", "RunFailed", "Simulation", "UserError", "change",
-    "compare", "connect", "diagnose", "diagnosis", "export", "identify", "import_recording", "load_bundle",
-    "load_config", "physics", "record", "replay", "run", "run_campaign", "simulate", "steps",
+    "compare", "connect", "diagnose", "diagnosis", "export", "identify", "import_recording", "improve", "load_bundle",
+    "load_config", "physics", "record", "replay", "run", "run_campaign", "simulate", "steps", "watch",
 ]  # fmt: skip
 
 _WHERE = {  # name -> module and name there; a package that is called as a function has no name there
@@ -55,6 +55,7 @@ _WHERE = {  # name -> module and name there; a package that is called as a funct
     "export": "rtctl.api_bundles:export",
     "identify": "rtctl.identify:",
     "import_recording": "rtctl.api_bundles:import_recording",
+    "improve": "rtctl.improve:",
     "load_bundle": "rtctl.trace.bundle:load_bundle",
     "load_config": "rtctl.api:load_config",
     "physics": "rtctl.api_bundles:physics",
@@ -64,6 +65,7 @@ _WHERE = {  # name -> module and name there; a package that is called as a funct
     "run_campaign": "rtctl.api:run_campaign",
     "simulate": "rtctl.api_bundles:simulate",
     "steps": "rtctl.api:steps",
+    "watch": "rtctl.watch:",
 }
 
 
