@@ -73,8 +73,9 @@ def shaped(short: bool = False) -> shaping.Shaped:
 @cache
 def running(which: str, short: bool = False) -> check.Measured:
     """Loop gain while it runs: `present`, `kept` (filters made without the heads) or `made` (with them)."""
-    laws = {"kept": ch.shaped, "made": lambda: shaped(short)}
-    made = shaping.applied(machine(), laws[which]().law) if which in laws else machine()
+    made = machine()
+    if which != "present":
+        made = shaping.applied(made, (ch.shaped() if which == "kept" else shaped(short)).law)
     return check.measure(made, rms=ch.RMS["present" if which == "present" else "shaped"], f_max=ch.TOP)
 
 
