@@ -31,7 +31,7 @@ class CoarsePdParams(NamedTuple):
 
     gain: float  # V/rad
     D: float  # V s/rad
-    count: float  # rad
+    q: float  # rad, one count
     K_p: float  # rad/s^2/V
     share: float
     dt: float  # s
@@ -55,7 +55,7 @@ def step(p, s, x, ref, v_ref, a_ref):
     if s.direction * s.v < 0.0:
         s.v = 0.0
     s.x += p.dt * s.v
-    held = min(max(s.x, x), x + p.count)
+    held = min(max(s.x, x), x + p.q)
     s.since += p.dt
     if held != s.x:
         s.v += p.share * (held - s.x) / max(s.since, p.dt)

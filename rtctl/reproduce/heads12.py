@@ -1,6 +1,5 @@
 """Chapter 12 with print heads: figures 12.5, 12.8 and 12.9 on a linear drive that has the resonances of the text."""
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -74,8 +73,9 @@ def shaped(short: bool = False) -> shaping.Shaped:
 @cache
 def running(which: str, short: bool = False) -> check.Measured:
     """Loop gain while it runs: `present`, `kept` (filters made without the heads) or `made` (with them)."""
-    laws: dict[str, Callable[[], shaping.Shaped]] = {"kept": ch.shaped, "made": lambda: shaped(short)}
-    made = shaping.applied(machine(), laws[which]().law) if which in laws else machine()
+    made = machine()
+    if which != "present":
+        made = shaping.applied(made, (ch.shaped() if which == "kept" else shaped(short)).law)
     return check.measure(made, rms=ch.RMS["present" if which == "present" else "shaped"], f_max=ch.TOP)
 
 
