@@ -73,7 +73,7 @@ class Source:
             status = self._client.call("status")
         except UserError as error:
             self._tap = None
-            return Taken(None, notes=(f"the machine has gone: {error}",))
+            return Taken(None, notes=(f"the machine has gone, or its daemon is busy: {error}",))
         if status["pid"] != self._pid:
             return self._again(now)
         if self._still:
@@ -85,11 +85,13 @@ class Source:
         """Rows of the daemon that answers now, if one does."""
         if now - self._looked < LOOK:
             return Taken(None)
-        self._looked = now
+        self._looked, before = now, self._pid
         try:
             self.begin()
         except UserError:
             return Taken(None)
         assert self._tap is not None
+        if self._pid == before:
+            return Taken(self._tap.take(), notes=("the daemon answers again; it had been busy",))
         note = f"the machine was started anew, pid {self._pid}; the model begins with it"
         return Taken(self._tap.take(), begun=True, notes=(note,))

@@ -89,3 +89,15 @@ def test_a_ring_out_of_reach_is_told(made, monkeypatch):
     monkeypatch.setattr(source, "Tap", refuses)
     with pytest.raises(UserError, match="out of reach"):
         found.begin()
+
+
+def test_a_daemon_that_was_busy_is_no_other_machine(made):
+    found, daemon, now = made
+    daemon.there = False
+    now.at += STILL + 0.1
+    assert found.take().rows is None
+    daemon.there = True
+    now.at += LOOK + 0.1
+    back = found.take()
+    assert not back.begun
+    assert "answers again" in back.notes[0]
