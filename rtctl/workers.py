@@ -50,8 +50,11 @@ def _quiet() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def dask(function: Callable[..., Any], items: Sequence[Any], scheduler: str, *shared: Any) -> Results:
-    """The same of the workers of a Dask scheduler; `shared` is sent to each of them once.
+def dask(
+    function: Callable[..., Any], items: Sequence[Any], scheduler: str, *shared: Any, together: int = 1
+) -> Results:
+    """The same of the workers of a Dask scheduler; `shared` is sent to each of them once, and a task is of so many
+    items `together`: scheduler and client take a millisecond for each task, which two workers feel.
 
     Raises UserError where no scheduler answers, or it has no workers that can run this program, PoolError where a
     worker dies.
@@ -71,11 +74,12 @@ def dask(function: Callable[..., Any], items: Sequence[Any], scheduler: str, *sh
         except TimeoutError:
             raise UserError(f"--scheduler {scheduler}: it has no workers; start one with `dask worker`") from None
         sent = client.scatter(list(shared), broadcast=True) if shared else []
-        futures = {client.submit(function, *sent, item, pure=False): item for item in items}
+        tasks = [list(items[k : k + together]) for k in range(0, len(items), together)]
+        futures = {client.submit(_several, function, task, *sent, pure=False): task for task in tasks}
         try:
             for future in completed(futures):
                 try:
-                    yield futures[future], future.result()
+                    yield from zip(futures[future], future.result(), strict=True)
                 except (ImportError, AttributeError) as error:
                     raise UserError(
                         f"--scheduler {scheduler}: its workers cannot run this rtctl ({error}); install the same there"
@@ -87,6 +91,11 @@ def dask(function: Callable[..., Any], items: Sequence[Any], scheduler: str, *sh
         finally:
             with contextlib.suppress(Exception):
                 client.cancel(list(futures))
+
+
+def _several(function: Callable[..., Any], items: Sequence[Any], *shared: Any) -> list[Any]:
+    """What a function returns of each of some items, in a worker."""
+    return [function(*shared, item) for item in items]
 
 
 def first_line(error: Exception) -> str:

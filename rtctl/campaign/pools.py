@@ -10,13 +10,17 @@ from rtctl import workers
 from rtctl.campaign import cell
 from rtctl.campaign.plan import Plan
 
+MOST, TASKS = 5, 40  # chunks of a task of Dask, where so many tasks are left at least
+
 Done = Iterator[tuple[int, list[dict[str, Any]]]]  # chunk, its rows
 
 
 def compute(plan: Plan, chunks: Iterable[int], jobs: int, scheduler: str | None) -> Done:
     """Rows of each chunk, as they are done. Raises UserError where there is no such scheduler, PoolError."""
     if scheduler is not None:
-        return workers.dask(cell.run_chunk, list(chunks), scheduler, plan.payload, plan.identity)
+        left = list(chunks)
+        together = min(MOST, max(1, len(left) // TASKS))
+        return workers.dask(cell.run_chunk, left, scheduler, plan.payload, plan.identity, together=together)
     return _here(plan, chunks) if jobs == 1 else _local(plan, list(chunks), jobs)
 
 

@@ -95,14 +95,18 @@ def _words(found: dict[str, Any]) -> list[str]:
         f"{found['records']} recordings of {machines} machine{'s' if machines != 1 else ''}, {found['fitted']} fitted "
         f"now, in {found['wall_s']:.1f} s; {found['looked_at']} of {found['series']} numbers looked at"
     ]
-    for change in sorted(found["changes"], key=lambda one: not one["alarm"])[:LISTED]:
+    alarms = [change for change in found["changes"] if change["alarm"]]
+    for change in alarms[:LISTED]:
         what = change["number"] if change["of"] == "parameter" else f"residual of {change['number']}"
         when = "drifts by" if change["kind"] == "drift" else f"from {change['from']} on by"
         low, high = change["interval"]
         lines.append(
-            f"{'ALARM ' if change['alarm'] else ''}{change['machine']}: {what} {when} {100 * change['change']:+.3g} % "
+            f"ALARM {change['machine']}: {what} {when} {100 * change['change']:+.3g} % "
             f"({100 * low:+.3g} to {100 * high:+.3g}), probability {100 * min(change['probability'], 0.9999):.4g} %"
         )
+    slight = len(found["changes"]) - len(alarms)
+    if len(alarms) > LISTED or slight:
+        lines.append(f"{max(len(alarms) - LISTED, 0)} more alarms and {slight} slighter changes are on the page")
     if not found["changes"]:
         lines.append("no change")
     return [*lines, found["page"]]
