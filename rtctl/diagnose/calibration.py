@@ -35,5 +35,6 @@ FURTHER_POWER = 0.3  # share of the power that the others leave, which a further
 QUIET = (2.0, 1.2)  # times what counting leaves, and what differs from block to block: nothing is left to explain
 SURE = 0.9  # probability from which a name is given, or that something is missing
 VISIBLE = 0.1  # share of what is missing beyond sensor noise that an explanation has to take off: less is no finding
+POOR = 0.1  # share of the spread of a sensor: a description that leaves more, and no noise, lacks something
 MOSTLY = 0.5  # share of the residual's power above the noise that names have to take off
 WORSE = 1.0  # nats by which unseen rows must be predicted worse, until a name is withdrawn: less is chance

@@ -2,13 +2,13 @@
 
 from typing import NamedTuple
 
-from rtctl.diagnose.calibration import MOSTLY, SURE, VISIBLE
+from rtctl.diagnose.calibration import MOSTLY, POOR, SURE, VISIBLE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
 from rtctl.diagnose.evidence.evidence import Rival, rivals
 from rtctl.diagnose.evidence.free import Free
 from rtctl.diagnose.likelihood.clock import Clock, clock
 from rtctl.diagnose.likelihood.fits import Fitted
-from rtctl.diagnose.likelihood.shares import explained, shown
+from rtctl.diagnose.likelihood.shares import explained, poor, shown
 from rtctl.diagnose.search.search import Found
 
 ALIKE = 3  # names of an ambiguous answer
@@ -55,7 +55,11 @@ def of_motion(found: Found) -> Verdict:
     free, beside = (None, found.base) if top is None else (top.free, top.fit)
     best = fits[certain(ranked)]
 
+    left = poor(found.base)
+
     def answer(kind: str, model: Fitted, why: str) -> Verdict:
+        if kind == NOTHING and left > POOR:  # of all explanations it may be the best, and none is good
+            kind, why = UNNAMED, f"the description leaves {100 * left:.0f} % of what a sensor shows; {why}"
         return Verdict(kind, model, (), (), ranked, free, beside, why, table)
 
     if nothing > 1.0 - SURE and nothing > unlisted:

@@ -18,6 +18,13 @@ def silent(f: Fitted) -> bool:
     return bool((np.sqrt(np.mean(f.e**2, axis=0)) <= floor(f)).all())
 
 
+def poor(f: Fitted) -> float:
+    """Share of the spread of a sensor that a model leaves in it, of the sensor in which it leaves most; 0 where that is
+    no more than noise."""
+    left = np.sqrt(np.mean(f.e**2, axis=0))
+    return float(np.max(np.where(left > floor(f), left / f.like.spread, 0.0)))
+
+
 def explained(base: Fitted, best: Fitted) -> float:
     """Share of the power of the residual, above the noise of the sensor, that the best model takes off.
 
