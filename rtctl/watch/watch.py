@@ -4,7 +4,9 @@ Nothing here is waited for by loop or daemon: rows come through a tap, reports g
 are the daemon's, and a diagnosis is a process of the lowest priority.
 """
 
+import contextlib
 import os
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -63,7 +65,9 @@ class Watch:
         return Monitor(case, self._model, self._seconds, band)
 
     def run(self) -> None:
-        """Watch until an exception, such as that of Ctrl-C."""
+        """Watch until an exception, such as that of Ctrl-C or SIGTERM; no diagnosis outlives the watch."""
+        with contextlib.suppress(ValueError):  # not in the main thread
+            signal.signal(signal.SIGTERM, _interrupt)
         try:
             while True:
                 self.turn()
@@ -151,6 +155,10 @@ class Watch:
         if not self.notes or self.notes[-1] != note:
             self.say(note)
             self.notes = [*self.notes, note][-NOTES:]
+
+
+def _interrupt(*_: Any) -> None:
+    raise KeyboardInterrupt
 
 
 STATES = {
