@@ -57,25 +57,25 @@ def machine() -> Any:
 
 
 @cache
-def response_of(short: bool = False) -> best_linear.BestLinear:
+def response_of() -> best_linear.BestLinear:
     """Best linear approximation of its response."""
-    played = experiment.multisine(machine(), realisations=2, periods=1 if short else 2)
+    played = experiment.multisine(machine(), realisations=2, periods=2)
     return best_linear.identify([take(fused.run(one.config, one.seconds)) for one in played])
 
 
 @cache
-def shaped(short: bool = False) -> shaping.Shaped:
+def shaped() -> shaping.Shaped:
     """Filters by optimisation on that response."""
-    frf = response_of(short).frf
+    frf = response_of().frf
     return shaping.of_points(frf.f, frf.H, frf.dt, None)
 
 
 @cache
-def running(which: str, short: bool = False) -> check.Measured:
+def running(which: str) -> check.Measured:
     """Loop gain while it runs: `present`, `kept` (filters made without the heads) or `made` (with them)."""
     made = machine()
     if which != "present":
-        made = shaping.applied(made, (ch.shaped() if which == "kept" else shaped(short)).law)
+        made = shaping.applied(made, (ch.shaped() if which == "kept" else shaped()).law)
     return check.measure(made, rms=ch.RMS["present" if which == "present" else "shaped"], f_max=ch.TOP)
 
 
@@ -93,9 +93,9 @@ def peaks(f: np.ndarray, H: np.ndarray) -> list[float]:
 def with_heads(short: bool) -> dict[str, float]:
     """What holds on the machine with the heads."""
     best, present, kept = (
-        response_of(short), running("present", short).margins, running("kept", short).margins
+        response_of(), running("present").margins, running("kept").margins
     )  # fmt: skip
-    made = shaped(short)
+    made = shaped()
     return {
         "12.heads_seen": len(peaks(best.f, best.G)),
         "12.heads_present_bandwidth": present.bandwidth,
@@ -111,12 +111,12 @@ def with_heads(short: bool) -> dict[str, float]:
 def figure_12_11(short: bool) -> Picture:
     """Response, and the loops, with the heads and without."""
     figure, (H, opened, closed, S) = fig.panels(2, 2)
-    for best, color, words in ((ch.response_of(), fig.GREY, "without"), (response_of(short), fig.BLUE, "with heads")):
+    for best, color, words in ((ch.response_of(), fig.GREY, "without"), (response_of(), fig.BLUE, "with heads")):
         H.semilogx(best.f, fig.db(best.G * best.f**2), color=color, linewidth=0.9, label=words)
     H.set(xlim=(10, 300), ylabel="gain times f^2 [dB]")
     fig.legend(H)
     for which, color in (("present", fig.BLUE), ("kept", fig.GREEN), ("made", fig.ORANGE)):
-        got = running(which, short)
+        got = running(which)
         opened.semilogx(got.f, fig.db(got.L), color=color, linewidth=0.9, label=which)
         closed.semilogx(got.f, fig.db(got.L / (1 + got.L)), color=color, linewidth=0.9)
         S.semilogx(got.f, fig.db(1 / (1 + got.L)), color=color, linewidth=0.9)

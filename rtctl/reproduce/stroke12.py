@@ -67,7 +67,7 @@ def arrival(law: str, bandwidth: float) -> tuple[float, np.ndarray, np.ndarray]:
 
 def quickest(law: str, short: bool) -> float:
     """Shaper in rad/s with which the steps of a law arrive first."""
-    return min(SHAPERS[:2] if short else SHAPERS, key=lambda bandwidth: arrival(law, bandwidth)[0])
+    return min(SHAPERS[2:] if short else SHAPERS, key=lambda bandwidth: arrival(law, bandwidth)[0])
 
 
 def productivity(short: bool) -> dict[str, float]:

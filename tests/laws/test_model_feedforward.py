@@ -29,7 +29,7 @@ def test_a_machine_without_dry_friction_is_followed_by_its_model_alone(belt):
     free = set_paths(belt, {"machine.bodies.motor.dry": 0.0, "machine.bodies.carriage.dry": 0.0})
     without = error(free, free, **NOTHING)
     assert without == pytest.approx(error(free, free), rel=1e-12)
-    assert error(free, free, lead=1.5e-3) < 0.03 * without
+    assert error(free, free, lead=1.5e-3) < 0.1 * without
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.9])
@@ -39,7 +39,7 @@ def test_dry_friction_is_taken_by_its_share(belt, share):
 
 
 def test_an_effect_pushes_by_its_own_law(belt):
-    spring = {"term": "load.spring", "node": "carriage", "k": 60.0}
+    spring = {"term": "load.spring", "node": "carriage", "k": 20.0}
     plant = set_paths(belt, {"plant.physics": [spring], "machine.bodies.motor.dry": 0.0})
     law = set_paths(plant, {"law.position.gain": 4.55})
     base = {"lead": 1.5e-3, "friction": 0.9}
@@ -63,7 +63,7 @@ def test_a_body_that_there_is_not_is_told(belt):
 
 
 def test_an_effect_that_neither_pushes_nor_changes_a_command_is_refused(belt):
-    scale = {"term": "sensor.scale", "node": "encoder", "a": 0.01}
+    scale = {"term": "sensor.scale", "node": "encoder", "relative": 0.01}
     with pytest.raises(Exception, match="neither pushes nor changes a command"):
         set_paths(belt, {"law.compensation.feedforward": {"effects": [{"effect": scale}]}})
 

@@ -148,7 +148,7 @@ def test_only():
     assert "11.10" in run.parts("11.10")[0].figures
     with pytest.raises(UserError, match=r"--only 8\.dely: no such chapter, row or figure; did you mean '8\.delay'"):
         run.parts("8.dely")
-    with pytest.raises(UserError, match="chapters 4, 5, 6"):
+    with pytest.raises(UserError, match="chapters 3, 4, 5"):
         run.parts("13")
 
 
