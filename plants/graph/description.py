@@ -114,7 +114,7 @@ class _Joint(Settings):
             raise ValueError("ratio: 0 connects nothing; give what `to` moves for one unit of `from`")
         if self.span is not None and self.stiffness is None:
             raise ValueError("stiffness is missing; a span of tape needs it (N/m)")
-        if self.span is not None and "ratio" in self.model_fields_set:
+        if self.span is not None and self.ratio != 1.0:
             raise ValueError("ratio: that of a span follows from the radii of its two bodies; leave it out")
         return self
 

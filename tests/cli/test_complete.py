@@ -41,7 +41,9 @@ def test_configs_references_campaigns(tmp_path, monkeypatch):
     (tmp_path / "mine" / "bench.yaml").write_text("")
     (tmp_path / "more.yaml").write_text("")
     (tmp_path / "notes.txt").write_text("")
-    assert complete.configs("") == ["axis", "ivu", "ldu", "ldu_printer", "mine/", "more.yaml"]
+    assert complete.configs("") == [
+        "axis", "ivu", "ivu_coarse", "ivu_precise", "ldu", "ldu_printer", "mine/", "more.yaml",
+    ]  # fmt: skip
     assert complete.configs("mine/") == ["mine/bench.yaml"]
     assert complete.configs(f"{tmp_path}/m") == [f"{tmp_path}/mine/", f"{tmp_path}/more.yaml"]
     assert complete.configs("nowhere/") == []

@@ -98,7 +98,10 @@ def test_allocation_says_through_which_motor():
 
 def test_schedule_is_in_the_law():
     radii = {"radius__R1": 0.04, "radius__R2": 0.04}
-    fixed, led = (response.law(fused.config("ivu", law__gain_schedule__mode=m, **radii), F) for m in ("off", "model"))
+    floor = {"law__gain_schedule__floor": 0.0}
+    fixed, led = (
+        response.law(fused.config("ivu", law__gain_schedule__mode=m, **floor, **radii), F) for m in ("off", "model")
+    )
     assert 0.3 < abs(led[0] / fixed[0]) < 0.7
 
 

@@ -21,6 +21,7 @@ from rtctl.daemon.faults import Faults
 from rtctl.daemon.protocol import ProtocolError, decode_reply, decode_request, encode_request, encode_result
 from rtctl.daemon.server import CommandServer
 from rtctl.daemon.supervisor import Supervisor
+from rtctl.daemon.watched import Watched
 from rtctl.daemon.telemetry import Telemetry
 from rtctl.loop import generate
 from rtctl.loop.loop import Loop
@@ -103,7 +104,7 @@ def _standing(folder: Path) -> Any:
     made.segment = Segment.create(folder / "segment", shape)
     made.status, made.mailbox = made.segment["status"][0], Mailbox(made.segment)
     made.reader, made.server = SimpleNamespace(lost=0), SimpleNamespace(refused={})
-    made.journal = SimpleNamespace(note=lambda *_: None)
+    made.journal, made.watched = SimpleNamespace(note=lambda *_: None), Watched()
     made.faults, made.recorder, made.last_row = Faults(made), None, made.segment["rows"][0]
     captures = made.captures = Captures(made.machine.rate, made.made.columns, made.made.row, {"plant": "ivu"})
     start, names = captures.start, itertools.count()

@@ -104,7 +104,7 @@ def test_half_the_step_changes_less_than_a_tenth_of_a_count(name):
     n = round(3.0 * machine.rate)
     t = np.arange(n) * machine.dt
     wave = np.sin(2 * np.pi * 1.3 * t) * np.sin(np.pi * t / 3.0) ** 2
-    u = np.stack([0.25 * d.limit * wave for d in settings.machine.drives.values()], axis=1)
+    u = np.stack([0.25 * (d.limit or 1.0) * wave for d in settings.machine.drives.values()], axis=1)
     shown = [
         played(graph_of(settings.machine, machine.dt / k)[2], u, k) for k in (machine.substeps, 2 * machine.substeps)
     ]
@@ -117,7 +117,10 @@ def test_half_the_step_changes_less_than_a_tenth_of_a_count(name):
 def test_every_example_is_stable_with_margins(name):
     from rtctl.design import margins
 
-    found = margins.of_config(config(name), quick=True)
+    settings = config(name)
+    if ":" in settings.law.position.kind:
+        pytest.skip("a law of its own has no model of its response")
+    found = margins.of_config(settings, quick=True)
     assert found.stable and abs(found.GM) >= 6 and abs(found.PM) >= 45
 
 

@@ -17,6 +17,7 @@ from rtctl.trace.imports.plan import Plan
 
 T = np.arange(100) / 100
 X = np.sin(T)
+READ = [name for name, form in FORMATS.items() if form.suffix in READERS]
 
 
 def bundle(folder, rows=2500):
@@ -32,7 +33,7 @@ def bundle(folder, rows=2500):
     return folder
 
 
-@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("to", READ)
 def test_what_is_exported_is_imported_to_the_same_numbers_and_units(tmp_path, to):
     if FORMATS[to].package:
         pytest.importorskip(FORMATS[to].package)
@@ -46,7 +47,7 @@ def test_what_is_exported_is_imported_to_the_same_numbers_and_units(tmp_path, to
 
 
 def test_every_export_has_a_reader():
-    assert {form.suffix for form in FORMATS.values()} <= set(READERS)
+    assert set(FORMATS) - set(READ) == {"rrd"}  # Rerun shows it; what is to be read again goes to mcap
 
 
 @pytest.fixture

@@ -73,7 +73,7 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     entries: list[tuple[Fitted, Free | None, float]] = []
     for rank, fit in enumerate((*fits, *found.doubts)):
         doubt = bool(fit.space.doubted)
-        own = found.merit(fit) - doubt * (ODDS + float(np.log(len(fit.space.names))))
+        own = found.merit(fit) - (ODDS + float(np.log(len(fit.space.names))) if doubt else 0.0)
         off = wrong(fit) if fit.names or doubt else 0.0
         wander = wandering(fit)
         usual = float(np.linalg.norm([UNEXPLAINED, off, wander.noise]))
