@@ -21,8 +21,8 @@ from rtctl.daemon.faults import Faults
 from rtctl.daemon.protocol import ProtocolError, decode_reply, decode_request, encode_request, encode_result
 from rtctl.daemon.server import CommandServer
 from rtctl.daemon.supervisor import Supervisor
-from rtctl.daemon.watched import Watched
 from rtctl.daemon.telemetry import Telemetry
+from rtctl.daemon.watched import Watched
 from rtctl.loop import generate
 from rtctl.loop.loop import Loop
 from rtctl.loop.mailbox import Mailbox
