@@ -69,7 +69,7 @@ class GraphDiagnosis(NamedTuple):
         if self.verdict == NOTHING:
             return "Nothing is missing that this recording shows: the description follows it down to the noise."
         wrong = self._wrong_number()
-        if self.verdict == UNNAMED and wrong and self.decided.unlisted is None:
+        if self.verdict == UNNAMED and wrong:
             return wrong
         if self.verdict == UNNAMED:
             at = self.located
@@ -78,14 +78,14 @@ class GraphDiagnosis(NamedTuple):
         sure = [words.clause(machine, e, model) for e in self.effects if e.confidence >= SURE]
         if self.verdict == NAMED:
             text = "; ".join(sure)
-            return f"{text[:1].upper()}{text[1:]}. {wrong}".strip()
+            return f"{text[:1].upper()}{text[1:]}."
         open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
         first = "; ".join(sure)
         text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
         if len(open_) == 1:
             p = min(e.confidence for e in self.effects)
-            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name. {wrong}".strip()
-        return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}. {wrong}".strip()
+            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name."
+        return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
 
     def _wrong_number(self) -> str:
         """The number of the description that is wrong by far in the model that stands, in a sentence; "" for none."""

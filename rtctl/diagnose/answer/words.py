@@ -122,11 +122,11 @@ def clause(machine: Description, effect: Effect, model: GraphModel) -> str:
 
 
 def wrong_number(record: GraphRecord, path: str, believed: float, value: float) -> str:
-    """A number of the description that is wrong by far: "drives.motor.gain is 0.32, and 1 in the description: ..."."""
+    """A number of the description that is wrong by far: "the machine acts as if drives.motor.gain were 0.32 ..."."""
     unit = unit_in(record, path)
     return (
-        f"A number of the description is wrong: {path} is {nice(value, unit)}, and {nice(believed, unit)} in the "
-        f"description, which is more than its tolerance. Correct it, or look for what makes the machine act so."
+        f"The machine acts as if {path} were {nice(value, unit)} instead of {nice(believed, unit)}, which is beyond "
+        "its tolerance. Check that number; if it is right, look for what has the same effect."
     )
 
 

@@ -48,9 +48,9 @@ class Rival(NamedTuple):
 
     @property
     def unlisted(self) -> bool:
-        """Whether it has no name: a number of the description that is wrong by far, beside no effect, or a free
-        function that is more than what the law of a name may be wrong by."""
-        return (bool(self.doubted) and not self.fit.names) or (self.free is not None and self.free.large)
+        """Whether it has no name: a number of the description that is wrong by far, or a free function that is more
+        than what the law of a name may be wrong by."""
+        return bool(self.doubted) or (self.free is not None and self.free.large)
 
 
 def rivals(found: Found) -> tuple[Rival, ...]:

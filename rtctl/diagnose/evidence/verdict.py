@@ -48,11 +48,11 @@ def of_motion(found: Found) -> Verdict:
             named[rival.fit.names] = named.get(rival.fit.names, 0.0) + rival.probability
     ranked = tuple(sorted(named.items(), key=lambda item: -item[1]))
     nothing, unlisted = named.get((), 0.0), 1.0 - sum(named.values())
-    fits: dict[tuple[str, ...], Fitted] = {}  # the likeliest with each combination: a number may be wrong as well
+    fits: dict[tuple[str, ...], Fitted] = {}
     for rival in (r for r in table if not r.unlisted):
         fits.setdefault(rival.fit.names, rival.fit)
     top = max((r for r in table if r.unlisted), key=lambda r: r.merit, default=None)
-    free, beside = (None, found.base) if top is None else (top.free, top.fit)
+    free, beside = (None, found.base) if top is None else (None if top.doubted else top.free, top.fit)
     best = fits[certain(ranked)]
 
     left = poor(found.base)
@@ -90,7 +90,8 @@ def of_motion(found: Found) -> Verdict:
 def of_names(decided: Verdict) -> Verdict:
     """The verdict with the confidence in each effect of its best model, and its rivals."""
     ranked, best = decided.probabilities, decided.best
-    confidence = tuple(sum(p for names, p in ranked if holds(names, term)) for term in terms(best))
+    sure = [(r.fit.names, r.probability) for r in decided.table if r.doubted or not r.unlisted]
+    confidence = tuple(sum(p for names, p in sure if holds(names, term)) for term in terms(best))
     others = tuple(_rivals(ranked, best.names, index) for index in range(len(best.names)))
     kind = NAMED if min(confidence) >= SURE else AMBIGUOUS
     return decided._replace(verdict=kind, confidence=confidence, rivals=others)
