@@ -22,7 +22,8 @@ from pydantic import Field
 from rtctl.config.errors import UserError, nearest
 from rtctl.drivers import can_simple as can
 from rtctl.drivers import daq_stc
-from rtctl.drivers.board import Board, BoardError, Wiring
+from rtctl.drivers.board import BoardError, Wiring
+from rtctl.drivers.bus import BusBoard
 from rtctl.drivers.can_words import bus_words, error_words, state_words
 from rtctl.idiom import Settings, quantity
 
@@ -79,8 +80,15 @@ class CanSettings(Settings):
         return self.interface
 
 
-class CanBoard(Board):
+class CanBoard(BusBoard):
     """The nodes of a machine. `bus` is a socket that is open already, for tests."""
+
+    REASONS = {  # noqa: RUF012
+        errno.ENOBUFS: "the interface's queue is full, nobody acknowledges; are power, wires, termination and bit rate "
+        "right?",
+        errno.ENETDOWN: "the interface is down",
+        errno.EAGAIN: "the interface takes no more for now",
+    }
 
     def __init__(self, settings: CanSettings, wiring: Wiring, rate: float, bus: socket.socket | None = None) -> None:
         super().__init__(wiring)
@@ -282,14 +290,6 @@ class CanBoard(Board):
     def _drive(self, n: int) -> str:
         return f"node {self._drives[n].id} ({self.wiring.drives[n]})"
 
-    def _sent(self, result: int, what: str) -> None:
-        if result < 0:
-            raise BoardError(f"{self.name}: {what} could not be sent: {_why(-result)}")
-
-    def _received(self, result: int) -> None:
-        if result < 0:
-            raise BoardError(f"{self.name}: nothing can be received: {_why(-result)}")
-
 
 def _compile(nodes: np.ndarray, wanted: np.ndarray) -> None:
     """Have everything compiled before time matters, by a bus that is not there."""
@@ -366,14 +366,3 @@ def _refusal(interface: str, code: int) -> str:
     if code in (errno.EACCES, errno.EPERM):
         return f"this account may not open {interface}"
     return f"{interface} does not open: {os.strerror(code)}"
-
-
-def _why(code: int) -> str:
-    """What an error of the bus means."""
-    if code == errno.ENOBUFS:
-        return "the interface's queue is full, nobody acknowledges; are power, wires, termination and bit rate right?"
-    if code == errno.ENETDOWN:
-        return "the interface is down"
-    if code == errno.EAGAIN:
-        return "the interface takes no more for now"
-    return os.strerror(code)

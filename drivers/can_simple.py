@@ -20,7 +20,6 @@ IDLE, CLOSED_LOOP = 1, 8  # axis states
 VELOCITY_CONTROL, TORQUE_CONTROL, PASSTHROUGH = 2, 1, 1
 NODES = 64
 EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000  # flags of an identifier
-STANDARD = 0x7FF
 SIZE = 16  # bytes of a frame
 MOST = 256  # frames taken in one turn: a bus that floods us cannot hold it
 

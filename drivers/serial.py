@@ -23,7 +23,8 @@ from pydantic import Field
 from rtctl.config.errors import UserError
 from rtctl.drivers import daq_stc
 from rtctl.drivers import serial_frame as frame
-from rtctl.drivers.board import LINES, Board, BoardError, Wiring
+from rtctl.drivers.board import LINES, BoardError, Wiring
+from rtctl.drivers.bus import BusBoard
 from rtctl.idiom import Settings, quantity
 
 HELLO = 3.0  # s: a board with a bootloader starts anew when its port is opened
@@ -51,8 +52,13 @@ class SerialSettings(Settings):
         return self.port
 
 
-class SerialBoard(Board):
+class SerialBoard(BusBoard):
     """A device at a port. `fd` is a line that is open already, for tests."""
+
+    REASONS = {  # noqa: RUF012
+        **dict.fromkeys((errno.EIO, errno.EPIPE, errno.ENXIO), "the port is gone; was the device pulled out?"),
+        errno.EAGAIN: "the line takes no more; does the device read?",
+    }
 
     def __init__(self, settings: SerialSettings, wiring: Wiring, rate: float, fd: int | None = None) -> None:
         super().__init__(wiring)
@@ -183,14 +189,6 @@ class SerialBoard(Board):
                 os.close(self._fd)
         self._fd = -1
 
-    def _sent(self, result: int, what: str) -> None:
-        if result < 0:
-            raise BoardError(f"{self.name}: {what} could not be sent: {_why(-result)}")
-
-    def _received(self, result: int) -> None:
-        if result < 0:
-            raise BoardError(f"{self.name}: nothing can be received: {_why(-result)}")
-
 
 def check(wiring: Wiring) -> None:
     """Raise UserError where a machine has more than the frame carries."""
@@ -240,12 +238,3 @@ def _refusal(port: str, code: int) -> str:
     if code == errno.EBUSY:
         return f"{port} belongs to another program; end it"
     return f"{port} does not open: {os.strerror(code)}"
-
-
-def _why(code: int) -> str:
-    """What an error of the line means."""
-    if code in (errno.EIO, errno.EPIPE, errno.ENXIO):
-        return "the port is gone; was the device pulled out?"
-    if code == errno.EAGAIN:
-        return "the line takes no more; does the device read?"
-    return os.strerror(code)

@@ -14,9 +14,10 @@ from rtctl import __version__
 
 # folders and files whose sources no tick can come from
 NEVER_COMPILED = {
-    "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "foxglove", "identify", "manual", "own",
-    "proof", "reproduce", "scope", "soak", "terminal", "trace", "trend",
-    "api.py", "board.py", "boards.py", "comedi.py", "emulated.py", "fmu.py", "fmu_file.py", "nidaqmx.py",
+    "campaign", "cli", "daemon", "design", "diagnose", "doctor", "faults", "foxglove", "identify", "improve", "manual",
+    "own", "proof", "reproduce", "scope", "soak", "terminal", "trace", "trend", "watch",
+    "api.py", "api_bundles.py", "api_diagnosis.py", "api_improve.py", "board.py", "boards.py", "bus.py",
+    "callable_module.py", "comedi.py", "emulated.py", "fmu.py", "fmu_file.py", "nidaqmx.py",
     "wiring.py", "profile.py", "profiles.py", "told.py", "own_check.py", "shown.py", "workers.py",
 }  # fmt: skip
 

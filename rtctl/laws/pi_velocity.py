@@ -14,6 +14,9 @@ Source: thesis 12.7, figure 12.7; Astrom & Hagglund, PID Controllers (1995), sec
 from typing import NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.laws.integral import reset, track
+
+__all__ = ["PI_VELOCITY_STATE", "PiVelocityParams", "PiVelocitySettings", "build", "reset", "step", "track"]
 
 
 class PiVelocitySettings(Settings):
@@ -49,15 +52,3 @@ def step(p, s, e, v):
     """Command in V for the position error `e` (m or rad) and the measured velocity `v` (per s)."""
     s.i += p.integral * e
     return p.gain * e + s.i - p.velocity_gain * v
-
-
-@tick
-def track(p, s, u_wanted, u_written):
-    """Back-calculate the integral from what was wanted of the limiter and what it let through, both V."""
-    s.i += p.tracking * (u_written - u_wanted)
-
-
-@tick
-def reset(p, s):
-    """Empty the integral."""
-    s.i = 0.0

@@ -68,9 +68,9 @@ class GraphDiagnosis(NamedTuple):
         machine, model = self.record.case.machine, self.decided.best.model
         if self.verdict == NOTHING:
             return "Nothing is missing that this recording shows: the description follows it down to the noise."
-        wrong = self._wrong_number()
-        if self.verdict == UNNAMED and wrong:
-            return wrong
+        number = self.decided.best.space.doubted
+        if self.verdict == UNNAMED and number:
+            return words.wrong_number(self.record, number, self.nominal[number], model.base[number])
         if self.verdict == UNNAMED:
             at = self.located
             where = f" at {words.here(machine, at.node)}, by {at.axis}" if at is not None else ""
@@ -86,14 +86,6 @@ class GraphDiagnosis(NamedTuple):
             p = min(e.confidence for e in self.effects)
             return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name."
         return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
-
-    def _wrong_number(self) -> str:
-        """The number of the description that is wrong by far in the model that stands, in a sentence; "" for none."""
-        model = self.decided.best
-        path = model.space.doubted
-        if not path:
-            return ""
-        return words.wrong_number(self.record, path, self.nominal[path], model.model.base[path])
 
     def as_json(self) -> dict[str, Any]:
         """diagnosis.json in the form of the exchange format."""
@@ -227,9 +219,8 @@ def _located(found: Found, decided: Verdict, effects: tuple[Effect, ...]) -> Loc
         free = decided.unlisted
         if free is not None:
             return Located(channel, free.node, free.axis, f"along the {free.axis}", begin, share)
-        if decided.beside.space.doubted:
-            node = decided.beside.space.doubted.split(".")[1]
-            return Located(channel, node, "time", f"in the number {decided.beside.space.doubted}", begin, share)
+        if number := decided.beside.space.doubted:
+            return Located(channel, number.split(".")[1], "time", f"in the number {number}", begin, share)
         return Located(channel, str(found.like.sim.body), "time", "over the whole recording", begin, share)
     axis = TERMS[effects[0].name].axis
     return Located(channel, effects[0].node, axis, f"along the {axis}", begin, share)

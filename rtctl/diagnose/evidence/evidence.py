@@ -63,32 +63,35 @@ def rivals(found: Found) -> tuple[Rival, ...]:
     def wrong(fit: Fitted) -> float:
         """What the laws of a fit may be wrong by, in forces that move the machine: the correction at the followed body
         has less of what the effects are, also of those in a sensor or a drive."""
-        if fit is base or not len(fit.pushes[0]):
+        if not (fit.names or fit.space.doubted) or not len(fit.pushes[0]):
             return 0.0
         change = float(np.sqrt(np.mean((base.pushes[0] - fit.pushes[0])[:, 0] ** 2)))
         return LAW_ERROR_OF_FORCE * change / unit if np.isfinite(change) else 0.0
 
+    def beside(fit: Fitted, off: float, axes: dict[str, float]) -> list[Free]:
+        """Free functions beside a fit; errors of its laws are along axes, each with its share of `off`."""
+        return free_functions(fit, {axis: off * share for axis, share in axes.items() if off * share > LEAST})
+
     best = set(found.best.names)  # and whether a small error of fewer laws does as well
-    least = found.merit(found.best) - NEAR
     entries: list[tuple[Fitted, Free | None, float]] = []
-    for rank, fit in enumerate((*fits, *found.doubts)):
-        doubt = bool(fit.space.doubted)
-        own = found.merit(fit) - (ODDS + float(np.log(len(fit.space.names))) if doubt else 0.0)
-        off = wrong(fit) if fit.names or doubt else 0.0
-        wander = wandering(fit)
-        usual = float(np.linalg.norm([UNEXPLAINED, off, wander.noise]))
-        listed = own + log_density(wander.share, usual)
+    for rank, fit in enumerate(fits):
+        off, wander, merit = wrong(fit), wandering(fit), found.merit(fit)
+        listed = merit + wander.density(UNEXPLAINED, off)
         entries.append((fit, None, listed))
-        if wander.free is not None and not doubt:
-            entries.append((fit, wander.free, own + log_density(wander.share, FREE_FORCE) - ODDS))
-        if (own > least) if doubt else (rank < BESIDE or set(fit.names) < best):
-            may = dict.fromkeys(axes_of(fit.space.doubted), 1.0) if doubt else arguments(shares(fit))
-            along = {axis: off * share for axis, share in may.items() if off * share > LEAST}
-            free = free_functions(fit, along)
-            large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f)) and not doubt]
-            entries += [(fit, f, own + f.evidence + prior - ODDS) for f, prior in _shared(large)]
-            small = [f for f in free if not f.large]
-            entries += [(fit, f, listed + f.evidence + prior) for f, prior in _shared(small)]
+        if wander.free is not None:
+            entries.append((fit, wander.free, merit + log_density(wander.share, FREE_FORCE) - ODDS))
+        if rank < BESIDE or set(fit.names) < best:
+            free = beside(fit, off, arguments(shares(fit)))
+            large = [f for f in free if f.large and (not fit.names or exceeds(base, fit, f))]
+            entries += [(fit, f, merit + f.evidence + own - ODDS) for f, own in _shared(large)]
+            entries += [(fit, f, listed + f.evidence + own) for f, own in _small(free)]
+    for fit in found.doubts:
+        off, merit = wrong(fit), found.merit(fit) - ODDS - float(np.log(len(fit.space.names)))
+        listed = merit + wandering(fit).density(UNEXPLAINED, off)
+        entries.append((fit, None, listed))
+        if merit > found.merit(found.best) - NEAR:
+            free = beside(fit, off, dict.fromkeys(axes_of(fit.space.doubted), 1.0))
+            entries += [(fit, f, listed + f.evidence + own) for f, own in _small(free)]
     losses = [losses_of(base.power, fit, free) for fit, free, _ in entries]
     chances = bagged(np.array([merit for *_, merit in entries]), np.array(losses))
     out = [Rival(fit, free, merit, float(p)) for (fit, free, merit), p in zip(entries, chances, strict=True)]
@@ -152,6 +155,11 @@ def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
     drawn = (merits + losses.sum(axis=1)) - weights @ losses.T
     odds = np.exp(drawn - drawn.max(axis=1, keepdims=True))
     return np.asarray((odds / odds.sum(axis=1, keepdims=True)).mean(axis=0))
+
+
+def _small(free: list[Free]) -> list[tuple[Free, float]]:
+    """Errors of the laws of a model among free forces, each with the logarithm of its prior."""
+    return _shared([f for f in free if not f.large])
 
 
 def _shared(free: list[Free]) -> list[tuple[Free, float]]:

@@ -23,6 +23,11 @@ class Wander(NamedTuple):
     noise: float = 0.0  # what noise of the sensor makes of it, the same way
     free: Free | None = None  # the force itself; None where the model follows nothing
 
+    def density(self, *usual: float) -> float:
+        """Logarithm of the probability density of the force where it is sensor noise and what is `usual`, standard
+        deviations by the same force."""
+        return log_density(self.share, float(np.linalg.norm([*usual, self.noise])))
+
 
 def wandering(fit: Fitted) -> Wander:
     """The force that a fit leaves."""

@@ -22,25 +22,23 @@ def doubted(found: Found) -> tuple[Fitted, ...]:
     beyond its tolerance."""
     best = found.best
     fewer = [refit(best.like, *without(best, index)) for index in range(len(best.names))] if best.names[1:] else []
-    return tuple(_free(f, name) for f in (found.base, *fewer) for name in strained(f))
+    return tuple(
+        refit(f.like, f.space._replace(doubted=name), f.x, f.J) for f in (found.base, *fewer) for name in outside(f)
+    )
 
 
-def strained(f: Fitted) -> list[str]:
-    """Numbers that a fit took beyond their tolerance."""
-    return [name for name, x in zip(f.space.names, f.x, strict=False) if may(name) and beyond(f.space, name, x)]
+def outside(f: Fitted) -> list[str]:
+    """Numbers that a fit took out of their tolerance, but for those whose error is an effect of the library."""
+    values = zip(f.space.names, f.x, strict=False)
+    return [name for name, x in values if no_effect(name) and out_of_tolerance(f.space, name, x)]
 
 
-def may(name: str) -> bool:
+def no_effect(name: str) -> bool:
     """Whether no effect of the library is an error of this number."""
     return not name.startswith(PHYSICS) and not name.endswith(FRICTION)
 
 
-def beyond(space: Space, name: str, x: float) -> bool:
+def out_of_tolerance(space: Space, name: str, x: float) -> bool:
     """Whether a number, ln of its ratio to the owner's value, is outside its tolerance."""
     tol = space.tolerance(name)
     return bool(np.isfinite(tol)) and not np.log1p(-min(tol, 0.95)) <= x <= np.log1p(tol)
-
-
-def _free(f: Fitted, name: str) -> Fitted:
-    """A model with one number free of its tolerance."""
-    return refit(f.like, f.space._replace(doubted=name), f.x, f.J)

@@ -9,7 +9,7 @@ from rtctl.diagnose.evidence.evidence import rivals
 from rtctl.diagnose.likelihood.fits import refit
 from rtctl.diagnose.likelihood.joint import together
 from rtctl.diagnose.model.recording import record_of
-from rtctl.diagnose.search.doubts import doubted, may
+from rtctl.diagnose.search.doubts import doubted, no_effect
 from rtctl.diagnose.search.search import Found
 
 WEAK = 0.3  # of the gain of the description
@@ -46,5 +46,5 @@ def test_a_right_description_is_not_doubted():
 
 def test_what_has_a_name_of_its_own_is_no_wrong_number():
     assert not any(f.space.doubted.endswith(".dry") for f in doubted(found_of(BELT, [RUB])))
-    assert not may("physics.0.k")
-    assert may("joints.belt.stiffness")
+    assert not no_effect("physics.0.k")
+    assert no_effect("joints.belt.stiffness")
