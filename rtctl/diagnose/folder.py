@@ -193,9 +193,9 @@ def _serve(pipe: Connection, jobs: int, report: bool, work: Work) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     warnings.simplefilter("ignore", RuntimeWarning)  # a model that runs away overflows; the outcome says so
     if jobs > 1:
-        from rtctl.diagnose.likelihood import solver as fit
+        from rtctl.diagnose.likelihood.solver import THREADS
 
-        fit.THREADS = 1
+        THREADS.set(1)
     while True:
         try:
             task = pipe.recv()

@@ -6,6 +6,7 @@ in whatever order, it is the same to the bit.
 
 import math
 import warnings
+from contextvars import copy_context
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,11 @@ Row = dict[str, Any]
 
 def estimates(pieces: list[Piece]) -> list[list[Row]]:
     """Rows of the trend of each of some pieces, by one thread: what one task of a worker is."""
-    solver.THREADS = 1
+    return copy_context().run(_by_one_thread, pieces)
+
+
+def _by_one_thread(pieces: list[Piece]) -> list[list[Row]]:
+    solver.THREADS.set(1)
     with threadpool_limits(1), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a model that runs away overflows; its residual says so
         return [estimate(piece) for piece in pieces]

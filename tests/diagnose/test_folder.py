@@ -29,9 +29,10 @@ def work(task, report):
         time.sleep(600)
     if task.name == "dies":
         os._exit(7)
-    from rtctl.diagnose.likelihood import solver as fit
+    from rtctl.diagnose.likelihood.solver import THREADS
     alone = os.environ.get("OPENBLAS_NUM_THREADS")
-    return Outcome(task.name, 0, 0.1, {"threads": fit.THREADS, "blas": alone, "report": report, "pid": os.getpid()})
+    found = {"threads": THREADS.get(), "blas": alone, "report": report, "pid": os.getpid()}
+    return Outcome(task.name, 0, 0.1, found)
 '''
 
 
@@ -83,11 +84,11 @@ def test_what_gets_stuck_is_ended_and_the_next_begins(work):
 
 
 def test_one_process_has_the_cores_to_itself(work, monkeypatch):
-    from rtctl.diagnose.likelihood import solver as fit
+    from rtctl.diagnose.likelihood.solver import THREADS
 
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     outcomes = list(diagnose_all(named("a", "b"), jobs=1, report=False, work=work))
-    assert {o.diagnosis["threads"] for o in outcomes} == {fit.THREADS}
+    assert {o.diagnosis["threads"] for o in outcomes} == {THREADS.get()}
     assert not outcomes[0].diagnosis["report"]
     assert len({o.diagnosis["pid"] for o in outcomes}) == 1
     assert "OPENBLAS_NUM_THREADS" not in os.environ

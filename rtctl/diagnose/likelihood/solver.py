@@ -5,6 +5,7 @@ Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10.
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 from functools import partial
 from typing import Any, TypeVar
 
@@ -12,16 +13,19 @@ import numpy as np
 
 from rtctl.diagnose.model.space import Space
 
-THREADS = 2
+# Side by side in one process. Where whoever calls runs several processes already, it sets 1 for itself: a context
+# variable, so that nobody else in this process is slowed down by it.
+THREADS: ContextVar[int] = ContextVar("threads", default=2)
 
 Result = TypeVar("Result")
 
 
 def parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
     """Run simulations, or fits that consist of them, side by side: compiled code lets go of the interpreter."""
-    if len(jobs) < 2:
+    threads = THREADS.get()
+    if len(jobs) < 2 or threads < 2:
         return [job() for job in jobs]
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(lambda job: job(), jobs))
 
 
