@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import csv
 import os
 import shutil
 import signal
@@ -10,6 +11,8 @@ import sys
 import threading
 import time
 
+import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 from rtctl.config.errors import UserError
@@ -256,6 +259,94 @@ def test_it_comes_back_after_the_daemon_and_after_the_server(open_page, machine,
     page.wait_for_selector("#banner", state="hidden")
     until(page, "window.scope.traces.rolling && window.scope.traces.x.length > 10")
     open_page.said[:] = [text for text in open_page.said if "ERR_CONNECTION_REFUSED" not in text]
+
+
+def test_what_is_shown_is_saved_as_numbers_and_as_a_picture(open_page, tmp_path):
+    page = open_page()
+    page.keyboard.press(" ")
+    until(page, "window.scope.traces.about.held")
+    with page.expect_download() as numbers:
+        page.click("#csv")
+    with page.expect_download() as picture:
+        page.click("#png")
+    numbers.value.save_as(tmp_path / "shown.csv")
+    picture.value.save_as(tmp_path / "shown.png")
+    assert numbers.value.suggested_filename.endswith(".csv")
+    with (tmp_path / "shown.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    x, high = page.evaluate("[window.scope.traces.x, window.scope.traces.high]")
+    names = page.evaluate("window.scope.traces.names")
+    assert head[0] == "t [s]"
+    assert [float(row[0]) for row in rows] == pytest.approx(list(x), rel=1e-11)
+    column = next(i for i, text in enumerate(head) if text in ("capstan [rad]", "capstan highest [rad]"))
+    assert [float(row[column]) for row in rows] == pytest.approx(list(high[names.index("capstan")]), rel=1e-11)
+    image = plt.imread(tmp_path / "shown.png")
+    assert image.shape[1] > page.locator("#plots canvas").first.bounding_box()["width"]
+    assert len(np.unique(image.reshape(-1, image.shape[2]), axis=0)) > 5
+
+
+def test_the_scale_of_a_lane_is_held_and_set(open_page):
+    page = open_page()
+    lane = page.locator(".lane").first
+    lane.locator(".scale button").click()
+    held = page.evaluate("window.scope.plots.lanes[0].yRange")
+    assert page.evaluate("window.scope.plots.scales.fixed.get(window.scope.plots.lanes[0].key)") == held
+    upper = lane.locator(".scale input").nth(1)
+    upper.fill("-1e9")
+    upper.press("Enter")
+    assert upper.get_attribute("aria-invalid") == "true"
+    upper.fill("2000")
+    upper.press("Enter")
+    factor = page.evaluate("window.scope.plots.lanes[0].scale.factor")
+    until(page, "window.scope.plots.lanes[0].plot.scales.y.max > 1")
+    assert page.evaluate("window.scope.plots.lanes[0].yRange")[0] == pytest.approx(held[0])
+    page.reload()
+    until(page, "window.scope?.traces.x.length > 10")
+    assert page.evaluate("window.scope.plots.lanes[0].yRange[1]") >= 2000 * min(factor, 1e-6)
+    assert lane.locator(".scale button").inner_text() == "fixed"
+    lane.locator(".scale button").click()
+    until(page, "window.scope.plots.scales.fixed.size === 0")
+
+
+LABELS = """async ([ticks, factor]) => {
+    const { Labels } = await import('./static/labels.js');
+    const made = new Labels();
+    return [made.of(ticks, factor), made.offset];
+}"""
+
+
+@pytest.mark.parametrize(
+    ("ticks", "factor"),
+    [
+        ([0.1, 0.2, 0.30000000000000004], 1.0),
+        ([12345.678901, 12345.678902, 12345.678903], 1.0),
+        ([-3.1415926501, -3.1415926500, -3.1415926499], 1e-3),
+        ([1e9, 2e9, 3e9], 1.0),
+        ([None, 1e-9, 2e-9], 1.0),
+    ],
+)
+def test_labels_of_ticks_differ_and_have_room(open_page, ticks, factor):
+    words, offset = open_page().evaluate(LABELS, [ticks, factor])
+    known = [word for word, tick in zip(words, ticks, strict=True) if tick is not None]
+    assert len(set(known)) == len(known)
+    assert max(map(len, known)) <= 9
+    for word, tick in zip(words, ticks, strict=True):
+        if tick is not None:
+            assert float(word) + offset == pytest.approx(tick / factor, rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [(1100, 760), (800, 600), (390, 844)])
+def test_names_of_traces_stand_beside_them(open_page, size):
+    page = open_page()
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    until(page, "window.scope.plots.lanes.every(l => Math.abs(l.plot.width - l.graph.clientWidth) < 2)")
+    for lane in page.locator(".lane").all():
+        graph, legend = (lane.locator(part).bounding_box() for part in ("canvas", ".legend"))
+        beside = graph["x"] + graph["width"] <= legend["x"] + 1
+        above = legend["y"] + legend["height"] <= graph["y"] + 1
+        assert beside or above
+        assert graph["height"] > 60
+    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
 
 
 def test_a_narrow_screen_needs_no_sideways_scrolling(open_page):

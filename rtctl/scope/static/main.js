@@ -6,6 +6,7 @@ import { bindKeys } from "./keys.js";
 import { Link } from "./link.js";
 import { showMachine, showValues } from "./machine.js";
 import { colour, css, Plots } from "./plots.js";
+import { download, picture, table } from "./save.js";
 import { bindTheme } from "./theme.js";
 import { Traces } from "./traces.js";
 import { TriggerPanel } from "./trigger.js";
@@ -253,6 +254,16 @@ function cursor(which) {
   show();
 }
 
+// A file of what is shown at this moment, named by machine, kind and time.
+function save(ending) {
+  if (!traces.x.length) return say("nothing is shown yet", true);
+  const stamp = new Date().toISOString().slice(0, 19).replaceAll(":", "");
+  const name = `${hello.name}-${traces.kind}-${stamp}.${ending}`;
+  if (ending === "csv") download(new Blob([table(traces, signals)], { type: "text/csv" }), name);
+  else picture(plots.lanes, `${hello.name}, ${new Date().toLocaleString()}, ${note()}`).toBlob((blob) => download(blob, name));
+  say(`saved as ${name}`);
+}
+
 function kind(name) {
   if (want.kind === name) return;
   want.kind = name;
@@ -271,7 +282,7 @@ function longer(step) {
   ask();
 }
 
-window.scope = { want, traces }; // for the console
+window.scope = { want, traces, plots }; // for the console
 for (const button of document.querySelectorAll("[data-kind]")) button.onclick = () => kind(button.dataset.kind);
 $("hold").onclick = () => hold(!want.hold);
 $("unzoom").onclick = unzoom;
@@ -280,6 +291,8 @@ $("x").onchange = () => { want.x = $("x").value; ask(); };
 $("cursorA").onclick = () => cursor("A");
 $("cursorB").onclick = () => cursor("B");
 $("cursor0").onclick = () => { cursors.clear(); show(); };
+$("csv").onclick = () => save("csv");
+$("png").onclick = () => save("png");
 $("keys").onclick = () => $("help").showModal();
 bindTheme($("theme"), () => { plots.rebuild(); swatches(); show(); });
 bindKeys({

@@ -1,6 +1,8 @@
 // The plots: one lane for each unit, under each other, with a common axis. Errors have a lane of their own.
 
-import { prefixed, short } from "./units.js";
+import { Labels, spaceFor } from "./labels.js";
+import { Scales } from "./scales.js";
+import { prefixed } from "./units.js";
 
 const uPlot = window.uPlot;
 const AXIS = 78; // px of the y axes, so that the lanes line up
@@ -14,6 +16,7 @@ export class Plots {
   constructor(place, on) {
     this.place = place;
     this.on = on;
+    this.scales = new Scales(() => this.again());
     this.lanes = [];
     this.key = "";
     new ResizeObserver(() => this.resize()).observe(place);
@@ -29,6 +32,9 @@ export class Plots {
 
   // Draw again from nothing: the theme has changed.
   rebuild() { this.key = ""; }
+
+  // Draw what is shown once more: a scale was set.
+  again() { for (const lane of this.lanes) this.update(lane); }
 
   redraw() { for (const lane of this.lanes) lane.plot.redraw(false); }
 
@@ -49,20 +55,23 @@ export class Plots {
       lane.at = lane.names.map((name) => traces.names.indexOf(name));
       lane.xUnit = traces.kind === "time" ? "s" : traces.kind === "spectrum" ? "Hz" : signals.get(traces.xName)?.unit ?? "";
       lane.root = Object.assign(document.createElement("div"), { className: "lane" });
+      lane.graph = Object.assign(document.createElement("div"), { className: "graph" });
       const legend = Object.assign(document.createElement("div"), { className: "legend" });
       for (const name of lane.names) {
-        const item = document.createElement("span");
+        const item = Object.assign(document.createElement("span"), { title: signals.get(name).help ?? name });
         const line = document.createElement("i");
         line.style.background = colour(signals.get(name).slot);
         item.append(line, name);
         legend.append(item);
       }
-      lane.root.append(legend);
+      legend.append(this.scales.controls(lane));
+      lane.root.append(lane.graph, legend);
       this.place.append(lane.root);
       lane.scale = { factor: 1, unit: lane.unit };
       lane.xScale = { factor: 1, unit: lane.xUnit };
+      lane.labels = new Labels();
       const none = series(traces.kind, lane, traces).map(() => (traces.kind === "xy" ? [[], []] : []));
-      lane.plot = new uPlot(this.options(lane, traces, signals), [traces.kind === "xy" ? null : [], ...none], lane.root);
+      lane.plot = new uPlot(this.options(lane, traces, signals), [traces.kind === "xy" ? null : [], ...none], lane.graph);
     });
     this.resize();
   }
@@ -79,9 +88,10 @@ export class Plots {
       },
       axes: [
         { ...axis, size: lane.last ? 22 : 4, gap: 3, labelSize: lane.last ? 16 : 0, labelGap: 0, label: lane.last ? () => this.xLabel(lane) : null,
-          values: (_, ticks) => (lane.last ? labels(ticks, lane.xScale.factor) : ticks.map(() => "")) },
-        { ...axis, size: AXIS - 16, labelSize: 16, labelGap: 0, label: () => `${lane.error ? "error " : ""}[${lane.scale.unit || "-"}]`,
-          values: (_, ticks) => labels(ticks, lane.scale.factor) },
+          space: (plot, _axis, low, high, width) => spaceFor(low, high, width, lane.xScale.factor),
+          values: (_, ticks) => (lane.last ? new Labels(Infinity).of(ticks, lane.xScale.factor) : ticks.map(() => "")) },
+        { ...axis, size: AXIS - 16, labelSize: 16, labelGap: 0, label: () => this.yLabel(lane),
+          values: (_, ticks) => lane.labels.of(ticks, lane.scale.factor) },
       ],
       series: [kind === "xy" ? null : {}, ...shown.map(({ name }) => {
         const stroke = colour(signals.get(name).slot);
@@ -105,6 +115,12 @@ export class Plots {
     };
   }
 
+  // Where the labels are differences, the number that they are differences to.
+  yLabel(lane) {
+    const { offset } = lane.labels;
+    return `${lane.error ? "error " : ""}[${lane.scale.unit || "-"}]${offset ? ` ${offset < 0 ? "-" : "+"} ${Math.abs(offset)}` : ""}`;
+  }
+
   xLabel(lane) {
     const { kind, xName, about } = this.traces;
     if (kind === "xy") return `${xName} [${lane.xScale.unit || "-"}]`;
@@ -117,11 +133,11 @@ export class Plots {
     const { traces } = this;
     const shown = series(traces.kind, lane, traces);
     const [low, high] = extent(lane.at.flatMap((i) => [traces.low[i], traces.high[i]]));
-    const size = Math.max(Math.abs(low), Math.abs(high));
-    lane.scale = prefixed(lane.unit, size);
+    const fixed = this.scales.of(lane, [low, high]);
+    lane.scale = prefixed(lane.unit, Math.max(...(fixed ?? [low, high]).map(Math.abs)));
     if (traces.kind === "time") {
       lane.xRange = traces.range[1] > traces.range[0] ? traces.range : [0, 1];
-      lane.yRange = padded(low, high);
+      lane.yRange = fixed ?? padded(low, high);
       lane.xScale = traces.about.sweep ? prefixed("s", Math.max(...lane.xRange.map(Math.abs))) : { factor: 1, unit: "s" };
       lane.plot.setData([traces.x, ...shown.map((s) => s.values)], true);
     } else if (traces.kind === "spectrum") {
@@ -129,19 +145,21 @@ export class Plots {
       const top = high > 0 ? 10 ** Math.ceil(Math.log10(high)) : 1;
       lane.yRange = [Math.max(10 ** Math.floor(Math.log10(Math.max(low, 1e-300))), top / 10 ** DECADES), top];
       if (lane.yRange[0] >= top) lane.yRange[0] = top / 10;
+      if (fixed && fixed[0] > 0) lane.yRange = fixed;
       lane.plot.setData([traces.x, ...shown.map((s) => s.values.map((v) => (v > 0 ? v : null)))], true);
     } else {
       const [left, right] = extent([traces.x]);
       lane.xRange = padded(left, right);
-      lane.yRange = padded(low, high);
+      lane.yRange = fixed ?? padded(low, high);
       lane.xScale = prefixed(lane.xUnit, Math.max(Math.abs(left), Math.abs(right)));
       lane.plot.setData([null, ...shown.map((s) => [traces.x, s.values])], true);
     }
+    this.scales.tell(lane);
   }
 
   resize() {
-    for (const { plot, root } of this.lanes) {
-      const { clientWidth: width, clientHeight: height } = root;
+    for (const { plot, graph } of this.lanes) {
+      const { clientWidth: width, clientHeight: height } = graph;
       if (width > 0 && height > 0 && (plot.width !== width || plot.height !== height)) plot.setSize({ width, height });
     }
   }
@@ -154,7 +172,7 @@ function grouped(names, signals) {
     if (unit === undefined) continue;
     const error = name.endsWith("_error");
     const key = `${unit}|${error}`;
-    if (!lanes.has(key)) lanes.set(key, { unit, error, names: [] });
+    if (!lanes.has(key)) lanes.set(key, { key, unit, error, names: [] });
     lanes.get(key).names.push(name);
   }
   return [...lanes.values()];
@@ -182,19 +200,6 @@ function padded(low, high) {
   const room = 0.06 * (high - low) || 0.05 * Math.abs(high) || 1;
   return [low - room, high + room];
 }
-
-function tick(value, factor, largest) {
-  if (value === null) return "";
-  const scaled = Number((value / factor).toPrecision(9)); // 0.3, not 0.30000000000000004
-  if (scaled === 0 || Math.abs(value) < largest * 1e-9) return "0";
-  if (Math.abs(scaled) >= 1e6 || Math.abs(scaled) < 1e-3) return scaled.toExponential().replace("e+", "e");
-  return String(scaled);
-}
-
-const labels = (ticks, factor) => {
-  const largest = Math.max(...ticks.map((t) => Math.abs(t ?? 0)));
-  return ticks.map((t) => tick(t, factor, largest));
-};
 
 // One signal over another: a line from point to point in the order of time.
 function line(plot, index) {
