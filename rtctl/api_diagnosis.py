@@ -109,12 +109,14 @@ def diagnose(
     heldout: Bundle | str | Path | None = None,
     together: bool = False,
     out: str | Path | None = None,
+    machine: str | Path | None = None,
     progress: bool | Stage = True,
 ) -> Diagnosis:
     """Find the physics that the owner's model lacks, in a recording or in several of one machine.
 
     what: bundles or their folders; several are of one machine by the `group` of their cases, or with `together`.
     heldout: a second recording that is predicted. out: folder for the files of `rtctl diagnose`; none if absent.
+    machine: your config that names the file of the machine's mechanics, which no bundle may bring.
     progress: a bar in a notebook or on a terminal, or a function that hears each stage.
     Raises UserError for a bundle that cannot be read, NoAnswer for one that supports no verdict.
     """
@@ -128,6 +130,10 @@ def diagnose(
         raise UserError("rtctl.diagnose() needs a bundle: rtctl.diagnose('runs/a')")
     if len(folders) > 1:
         of_one_machine(folders, together)
+    if machine is not None:
+        from rtctl.own.mechanics import give_machine
+
+        give_machine(Path(machine))
     with stages(progress) as stage:
         found = answer.diagnose(*folders, progress=stage)
         if heldout is not None:

@@ -1,4 +1,4 @@
-"""`rtctl new law|plant|term|machine NAME`: the beginning of a file of your own, with what makes it run."""
+"""`rtctl new law|plant|term|machine|config NAME`: the beginning of a file of your own, with what makes it run."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,26 +10,28 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def new(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="law, plant, term or machine.")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="law, plant, term, machine or config.")],
     name: Annotated[str, typer.Argument(metavar="NAME", help="What it is called, e.g. feedforward.")],
     machine: Annotated[
         str, typer.Option("--for", metavar="MACHINE", help="ivu, ldu or axis: whose config comes with it.")
     ] = "ivu",
     like: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--like",
             metavar="MACHINE",
             help="Machine to start from: belt, arm, screw, torsion, pendulum, hoist, spindle, gantry, two-motor, axis, "
-            "furuta, cart-pole, ivu-old.",
+            "furuta, cart-pole, ivu-old; belt if not given. Of a config: ivu, ldu, axis, ivu_coarse, ivu_precise, "
+            "ldu_printer; ivu if not given.",
         ),
-    ] = "belt",
+    ] = None,
     into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder; made where it is missing.")] = Path(),
 ) -> None:
     """Write a law, a plant or a term of physics to start from: NAME.py, its test, and NAME.yaml, which uses it.
 
     Of a machine it writes NAME.yaml: bodies, joints, drives and sensors with their units, a law and a reference, which
-    runs as it is; docs/bring_your_own_machine.md goes on from there.
+    runs as it is; docs/bring_your_own_machine.md goes on from there. Of a config it writes NAME.yaml with every key of
+    the unit that it is like.
 
     Nothing is ever overwritten. docs/tutorial_own_law.md goes on from here.
 
@@ -42,13 +44,18 @@ def new(
       rtctl new term windage
 
       rtctl new machine winder.yaml --like spindle
-    """
-    if kind == "machine":
-        from rtctl.own.new_machine import write_machine
 
-        path = write_machine(name, like, into)
-        typer.echo(f"{path!s:32}  a machine like {like}: bodies, joints, drives, sensors, law, reference")
-        typer.echo(f"next: rtctl check {path}; rtctl tune {path} -o tuned.yaml; rtctl run {path} --mode fused --for 4s")
+      rtctl new config bench.yaml --like ivu
+    """
+    if kind in ("machine", "config"):
+        from rtctl.own.new_like import write_like
+
+        like = like or {"machine": "belt", "config": "ivu"}[kind]
+        path = write_like(kind, name, like, into)
+        about = "bodies, joints, drives, sensors, law, reference" if kind == "machine" else "loop, law, reference"
+        tune = f"rtctl tune {path} -o tuned.yaml; " if kind == "machine" else ""
+        typer.echo(f"{path!s:32}  a {kind} like {like}: {about}")
+        typer.echo(f"next: rtctl check {path}; {tune}rtctl run {path} --mode fused --for 4s")
         return
     from rtctl.own.new import write
 

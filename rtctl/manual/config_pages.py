@@ -40,7 +40,11 @@ The keys of `machine: {kind}` beside [those of every machine](config.md). The co
 {text}
 ```
 """
-TERM_HEAD = """# Config: physics
+TERM_HEAD = """---
+search: {boost: 4}
+---
+
+# Config: physics
 
 The terms that can stand in the list `plant.physics` of any config, each at a node: what an emulated machine can have
 beyond its equations, what `rtctl diagnose` can find, and what a fitted model carries. `rtctl physics TERM` draws one.

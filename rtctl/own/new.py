@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtctl.config.errors import UserError, nearest
+from rtctl.own.new_like import SHIPPED
 from rtctl.own.parts import camel, upper
 from rtctl.plants.physics.place import PLANTS
 
-KINDS = ("law", "plant", "term")  # of files; a machine is a config, see new_machine.py
+KINDS = ("law", "plant", "term")  # of files; machines and configs: see new_like.py
 MACHINES = tuple(PLANTS)
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 POSITION = re.compile(r"^  position:.*\n(?:    .*\n)+", re.MULTILINE)
@@ -32,7 +33,7 @@ class Written(NamedTuple):
 def write(kind: str, name: str, machine: str, folder: Path) -> Written:
     """Write the files of a new `kind` called `name` for a machine. Raises UserError, and writes nothing, where one is
     there already or a name does not do."""
-    for word, known, what in ((kind, KINDS, "kind"), (machine, MACHINES, "machine")):
+    for word, known, what in ((kind, (*KINDS, *SHIPPED), "kind"), (machine, MACHINES, "machine")):
         if word not in known:
             near = nearest(word, known)
             raise UserError(

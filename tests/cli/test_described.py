@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from rtctl.cli.common import load_config
-from rtctl.own.new_machine import examples
+from rtctl.own.new_like import examples
 
 
 @pytest.fixture(autouse=True)
@@ -13,7 +13,7 @@ def _runtime(runtime):
 
 
 def test_every_example_begins_a_machine_of_ones_own(rtctl, tmp_path):
-    for like in examples():
+    for like in examples("machine"):
         path = tmp_path / f"my-{like}.yaml"
         code, out, err = rtctl("new", "machine", path.name, "--like", like, "--into", tmp_path)
         assert (code, err) == (0, "") and str(path) in out and "next: rtctl check" in out

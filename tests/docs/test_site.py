@@ -1,6 +1,7 @@
 """The site builds without a warning, and what it is made of is all in its navigation."""
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -23,6 +24,24 @@ def test_site(tmp_path):
     for page in (tmp_path / "site").glob("*.html"):
         article = page.read_text().partition("<article")[2].partition("</article")[0]
         assert 'href="../' not in article, page.name
+    assert "transmission.backlash" in first_of_search((tmp_path / "site" / "index.html").as_uri(), "backlash")
+
+
+def first_of_search(url, words):
+    """The first that the site's search finds on a page that lies on the disk, where there is a browser."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("the rest needs a browser: apt-get install chromium")
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as started:
+        page = started.chromium.launch(executable_path=browser, args=["--no-sandbox"]).new_page()
+        page.goto(url)
+        page.locator("[data-md-component=search-query]").wait_for()
+        page.locator(".md-search__form").first.click()
+        page.keyboard.type(words, delay=50)
+        found = page.locator(".md-search-result__item").first
+        found.wait_for()
+        return found.inner_text()
 
 
 def test_every_page_is_in_the_navigation():

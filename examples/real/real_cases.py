@@ -5,8 +5,8 @@ from typing import Any
 
 import yaml
 
-ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / "examples" / "real"
+FOLDER = Path(__file__).parent
+ROOT = FOLDER.parents[1]
 DATA = ROOT.parent / "shared" / "data"
 
 

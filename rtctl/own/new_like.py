@@ -1,4 +1,5 @@
-"""Writes the beginning of a machine of the user's own: a config that describes one, commented, and runs as it is."""
+"""Writes the beginning of a config of the user's own, commented, which runs as it is: like one that comes with rtctl,
+of a described machine or of a unit with a plant of its own."""
 
 import re
 from importlib import resources
@@ -11,31 +12,35 @@ BESIDE = re.compile(r"^[^#\n]*\bkind: \./(\w+\.py):", re.MULTILINE)  # a file th
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
-def examples() -> list[str]:
-    """Names of the machines to start from."""
-    folder = Path(str(resources.files("rtctl.configs"))) / "machines"
+SHIPPED = {"machine": "machines", "config": ""}  # kind -> folder of what comes with rtctl
+
+
+def examples(kind: str) -> list[str]:
+    """Names of the machines, or of the configs, to start from."""
+    folder = Path(str(resources.files("rtctl.configs"))) / SHIPPED[kind]
     return sorted(path.stem for path in folder.glob("*.yaml"))
 
 
-def write_machine(name: str, like: str, folder: Path) -> Path:
-    """Write NAME.yaml, a described machine like one that comes with rtctl, into a folder; returns its path.
+def write_like(kind: str, name: str, like: str, folder: Path) -> Path:
+    """Write NAME.yaml, like a described machine or a config that comes with rtctl, into a folder; returns its path.
 
     The file of its mechanics or of its law, where it has one, is written beside it; one that is there with the same
     text stays.
 
     Raises UserError, and writes nothing, where it is there already or a name does not do.
     """
-    known = examples()
+    known = examples(kind)
     if like not in known:
         near = nearest(like, known)
         hint = f"did you mean '{near}'?" if near else f"there is {', '.join(known)}"
-        raise UserError(f"--like {like}: no such machine; {hint}")
+        other = next((k for k in SHIPPED if like in examples(k)), None)
+        raise UserError(f"--like {like}: no such {kind}; {f'rtctl new {other} starts from it' if other else hint}")
     path = folder / (name if Path(name).suffix in (".yaml", ".yml") else f"{name}.yaml")
     if not NAME.fullmatch(path.stem):
-        raise UserError(f"'{name:.60}': a machine's name is letters, digits, - and _; write e.g. belt.yaml")
+        raise UserError(f"'{name:.60}': a {kind}'s name is letters, digits, - and _; write e.g. belt.yaml")
     if path.exists():
         raise UserError(f"{path}: there already, and nothing is overwritten; take another name or --into DIR")
-    shipped = resources.files("rtctl.configs") / "machines"
+    shipped = resources.files("rtctl.configs") / SHIPPED[kind]
     text = (shipped / f"{like}.yaml").read_text(encoding="utf-8")
     beside = {path.parent / name: (shipped / name).read_text(encoding="utf-8") for name in BESIDE.findall(text)}
     for file, code in beside.items():
