@@ -3,9 +3,9 @@
 import pytest
 from typer.testing import CliRunner
 
+from rtctl.api import load_config
 from rtctl.cli.main import app
 from rtctl.config.errors import UserError
-from rtctl.api import load_config
 from rtctl.own.new_like import examples, write_like
 
 

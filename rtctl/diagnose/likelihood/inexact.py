@@ -11,7 +11,6 @@ from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import Measures, speed
 from rtctl.diagnose.model.space import Space
 
-
 Part = Callable[[np.ndarray], np.ndarray]  # of what an effect does (blocks, sensors)
 
 
