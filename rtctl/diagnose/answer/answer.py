@@ -27,6 +27,7 @@ from rtctl.diagnose.search.search import Found, Progress, search
 from rtctl.plants.physics import TERMS
 
 SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
+TOLD = 0.05  # probability from which on a rival is told in the headline
 
 
 class GraphDiagnosis(NamedTuple):
@@ -79,13 +80,27 @@ class GraphDiagnosis(NamedTuple):
         if self.verdict == NAMED:
             text = "; ".join(sure)
             return f"{text[:1].upper()}{text[1:]}."
-        open_ = [words.called(machine, f"{e.name}:{e.node}") for e in self.effects if e.confidence < SURE]
         first = "; ".join(sure)
         text = f"{first[:1].upper()}{first[1:]}. Something else" if sure else "Something"
-        if len(open_) == 1:
-            p = min(e.confidence for e in self.effects)
-            return f"{text} is missing: {open_[0]} with {100 * p:.0f} %, or an effect without a name."
-        return f"{text} is missing, and this recording cannot tell which: {' or '.join(open_)}."
+        return f"{text} is missing, most probably {self._open()}."
+
+    def _open(self) -> str:
+        """The effects of which an ambiguous answer is not sure, with their odds, and what may be there instead."""
+        machine = self.record.case.machine
+        open_ = [e for e in self.effects if e.confidence < SURE]
+        names = " and ".join(words.called(machine, f"{e.name}:{e.node}") for e in open_)
+        odds = min(e.confidence for e in open_)
+        said = f"{names}{' together' if len(open_) > 1 else ''} ({100 * odds:.0f} %)"
+        for e in open_:
+            for other in e.look_alikes[:1]:
+                if other.p_value >= TOLD:
+                    at = words.called(machine, f"{other.name}:{other.node}")
+                    instead = f"instead of {words.called(machine, f'{e.name}:{e.node}')} " if len(open_) > 1 else ""
+                    said += f"; {instead}it may be {at} ({100 * other.p_value:.0f} %)"
+        nameless = 1.0 - sum(p for _, p in self.decided.probabilities)
+        number = self.decided.beside.space.doubted
+        other = f"a wrong {number}" if number else "an effect without a name"
+        return said + (f", or {other} ({100 * nameless:.0f} %)" if nameless >= TOLD else "")
 
     def as_json(self) -> dict[str, Any]:
         """diagnosis.json in the form of the exchange format."""

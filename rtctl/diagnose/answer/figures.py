@@ -7,7 +7,7 @@ from scipy.signal import welch
 from rtctl.case.start import is_start
 from rtctl.diagnose.answer.answer import GraphDiagnosis
 from rtctl.diagnose.answer.figure_style import AFTER, BEFORE, BINS, INK, NOISE, SEEN, label, legend, new, prefixed, thin
-from rtctl.diagnose.answer.missing_force import Missing, subjects
+from rtctl.diagnose.answer.missing_force import TURN, Missing, subjects
 from rtctl.diagnose.answer.phrases import noun
 from rtctl.diagnose.answer.posterior import in_words, rivals
 from rtctl.diagnose.answer.runner_up import lost_by
@@ -79,8 +79,11 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
         half = max(half, _middle(band))
     free = d.decided.unlisted
     if not term and d.located is not None and free is not None and axis == free.axis:
-        inside = np.degrees(free.knots) if c.x_unit == "degrees" else across * free.knots
-        ax.plot(inside, scale * free.value, color=AFTER, lw=1.5, marker="s", ms=3, label="free function that fits best")
+        inside, value = across * free.knots, free.value
+        if c.x_unit == "degrees":
+            inside = np.min(c.x) + np.mod(np.degrees(free.knots) - np.min(c.x), TURN)
+            inside, value = np.sort(inside), value[np.argsort(inside)]
+        ax.plot(inside, scale * value, color=AFTER, lw=1.5, marker="s", ms=3, label="free function that fits best")
     ax.axhline(0, color=SEEN, lw=0.8)
     top = scale * (1.4 * max(size, law) + half)
     ax.set_ylim(-top or -1.0, top or 1.0)

@@ -23,6 +23,8 @@ from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.dimensions import DIMENSIONS
 
 CLEARER = 3.0  # times more than the followed sensor, from which on another sensor's reading shows an effect
+TURN = 360.0  # degrees
+UNVISITED = 20.0  # degrees of the turn where the machine has not been: the axis is cut there
 
 
 class Curve(NamedTuple):
@@ -114,7 +116,7 @@ class Missing:
         if axis == "velocity":
             return speed(x, record.dt), f"speed of {at}", DIMENSIONS["speed"][not turns]
         if axis == "angle" and turns:
-            return np.degrees(np.mod(x, 2 * np.pi)), f"angle of {at}", "degrees"
+            return of_turn(x), f"angle of {at}", "degrees"
         if axis in ("position", "angle"):
             return x, f"position of {at}", DIMENSIONS["position"][not turns]
         if axis == "command" and record.u.shape[1]:
@@ -174,3 +176,17 @@ def machine_words(machine: Description) -> str:
     """The machine in a few words: "motor and carriage"."""
     names = [name.replace("_", " ") for name in machine.bodies if not machine.is_frame(name)]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def of_turn(x: np.ndarray) -> np.ndarray:
+    """Angles (n,) within one turn, degrees, from angles in rad: cut where the machine has not been, so that what it
+    sweeps stays in one piece."""
+    angle = np.degrees(np.mod(x, 2 * np.pi))
+    visited = np.sort(angle)
+    gaps = np.diff(visited, append=visited[0] + TURN)
+    widest = int(np.argmax(gaps))
+    if gaps[widest] < UNVISITED:
+        return np.asarray(angle)
+    cut = visited[widest] + 0.5 * gaps[widest]
+    out = cut + np.mod(angle - cut, TURN)
+    return np.asarray(out - TURN * np.round(np.median(out) / TURN))

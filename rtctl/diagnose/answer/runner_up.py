@@ -6,10 +6,12 @@ import numpy as np
 
 from rtctl.diagnose.answer.answer import GraphDiagnosis
 from rtctl.diagnose.answer.posterior import Bar, groups, in_words
+from rtctl.diagnose.answer.si_format import percent
 from rtctl.diagnose.evidence.diagnosis import NOTHING, UNNAMED
 from rtctl.diagnose.evidence.evidence import losses_of
 
 HALF = 0.5  # of what speaks for the answer: the parts that are named
+LEAST_SHARE = 0.001  # probability that is told
 CLOSE = 1.0  # nats: less is told as about even
 
 
@@ -17,6 +19,7 @@ class Lost(NamedTuple):
     """The next likeliest answer beside the one that was given."""
 
     other: str  # in words
+    share: float  # its probability over resampled segments
     behind: float  # nats: ln of the odds of the answer against it, on the whole recording
     edges: np.ndarray  # (parts + 1,) of the parts, s; of several recordings shares of all their rows, 0 to 1
     nats: np.ndarray  # (parts,) for the answer
@@ -35,7 +38,7 @@ def lost_by(d: GraphDiagnosis) -> Lost | None:
     parts = np.linspace(0.0, 1.0, len(nats) + 1)
     begin, end = d.found.like.rows
     edges = parts if len(d.records) > 1 else (begin + parts * (end - begin)) * d.record.dt
-    return Lost(in_words(d, other), bar.behind - other.behind, edges, nats)
+    return Lost(in_words(d, other), other.probability, bar.behind - other.behind, edges, nats)
 
 
 def answers(d: GraphDiagnosis, bar: Bar) -> bool:
@@ -55,7 +58,8 @@ def sentence(d: GraphDiagnosis) -> str:
         return f"{said} It is about as probable: the recording does not tell the two apart."
     digits = lost.behind / np.log(10.0)
     odds = f"10^{digits:.0f}" if digits > 4.0 else f"{np.exp(lost.behind):.0f}"
-    said += f" The odds against it are {odds} to 1."
+    said += f" On the recording as a whole the odds against it are {odds} to 1"
+    said += f"; over resampled segments it has {percent(lost.share)}." if lost.share >= LEAST_SHARE else "."
     return f"{said} {when(lost, len(d.records))}".strip()
 
 

@@ -51,7 +51,7 @@ def of_motion(found: Found) -> Verdict:
     fits: dict[tuple[str, ...], Fitted] = {}
     for rival in (r for r in table if not r.unlisted):
         fits.setdefault(rival.fit.names, rival.fit)
-    top = max((r for r in table if r.unlisted), key=lambda r: r.merit, default=None)
+    top = nameless_best(table)
     free, beside = (None, found.base) if top is None else (None if top.doubted else top.free, top.fit)
     best = fits[certain(ranked)]
 
@@ -64,7 +64,7 @@ def of_motion(found: Found) -> Verdict:
 
     if nothing > 1.0 - SURE and nothing > unlisted:
         return answer(NOTHING, found.base, f"the description alone has a probability of {100 * nothing:.0f} %")
-    nameless = unlisted > 0.5 or not best.names
+    nameless = (unlisted > 0.5 and not robust(table, best.names)) or not best.names
     stands = beside if nameless else best
     if not (nameless and free) and (seen := shown(found.base, stands)) < VISIBLE:
         why = (
@@ -85,6 +85,37 @@ def of_motion(found: Found) -> Verdict:
             return answer(UNNAMED, best, why)
         return answer(NOTHING, found.base, f"{why}, and the rest is as noise of the sensors leaves it")
     return of_names(answer(NAMED, best, ""))
+
+
+def nameless_best(table: tuple[Rival, ...]) -> Rival | None:
+    """The likeliest of what has no name: of the place and axis, or the wrong number, that has most of the probability
+    together, the rival that the whole recording favours most. None where there is none."""
+    found: dict[tuple[str, ...], list[Rival]] = {}
+    for r in table:
+        if r.doubted:
+            found.setdefault((r.doubted,), []).append(r)
+        elif r.free is not None and r.unlisted:
+            found.setdefault((r.free.kind, r.free.node, r.free.axis), []).append(r)
+    if not found:
+        return None
+    most = max(found.values(), key=lambda group: (sum(r.probability for r in group), max(r.merit for r in group)))
+    return max(most, key=lambda r: r.merit)
+
+
+def robust(table: tuple[Rival, ...], names: tuple[str, ...]) -> bool:
+    """Whether one of the names is sure whether or not a number of the description is wrong: both kinds of explanation
+    have a say, and each holds it."""
+    listed = [r for r in table if not r.unlisted]
+    doubted = [r for r in table if r.doubted]
+    share = sum(r.probability for r in listed)
+
+    def held(some: list[Rival], term: str) -> float:
+        return sum(r.probability for r in some if holds(r.fit.names, term))
+
+    terms_ = [name.partition(":")[0] for name in names]
+    return share > 1.0 - SURE and any(
+        held(listed, term) >= SURE * share and held(listed + doubted, term) >= SURE for term in terms_
+    )
 
 
 def of_names(decided: Verdict) -> Verdict:

@@ -206,7 +206,7 @@ def evaluated(like: Likelihood, space: Space, at: Point) -> Fitted:
     models compare, whichever noise their fits began with. How exact the laws are is told by the recording as well.
     """
     own = like.slackened(None).told(at.e)
-    laws, fixed = errors(own, space, at.x, at.e, at.J)
+    laws, fixed = errors(own, space, at.x, at.e)
     if laws.shape[2] + fixed.shape[2]:
         tried = [
             own.slackened(np.concatenate([fixed, share * laws], axis=2), odds).told(at.e)

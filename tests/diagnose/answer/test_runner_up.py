@@ -43,7 +43,7 @@ def test_the_answer_is_what_the_verdict_says(verdict, d):
 
 def test_the_parts_that_decide_are_told():
     edges = np.arange(9.0)
-    here = Lost("x", 30.0, edges, np.array([0.0, 0.0, 10.0, 12.0, 0.5, 0.0, 8.0, 0.0]))
+    here = Lost("x", 0.0, 30.0, edges, np.array([0.0, 0.0, 10.0, 12.0, 0.5, 0.0, 8.0, 0.0]))
     assert when(here, 1) == "It loses half of that in the rows from 2 to 4 s."
     even = here._replace(nats=np.full(8, 0.01))
     assert "do not decide" in when(even, 1)
