@@ -1,5 +1,6 @@
 """Cases of examples/real/cases.yaml as command lines."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import yaml
 
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parents[1]
-DATA = ROOT.parent / "shared" / "data"
+DATA = Path(os.environ.get("REAL_DATA", ROOT.parent / "shared" / "data"))
 
 
 def cases() -> dict[str, dict[str, Any]]:

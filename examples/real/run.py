@@ -5,12 +5,14 @@
 
 Each case of cases.yaml (all where none is named) is imported and diagnosed in a process of its own. `found/CASE.json`
 then holds verdict, effects and held-out errors, docs/images/real/CASE_missing.png and CASE_heldout.png its figures,
-FOLDER (build/real) all the rest. --table prints the table of docs/real_machines.md of what `found` holds.
+FOLDER (build/real) all the rest. The environment's REAL_DATA is where the recordings lie, if not in ../shared/data.
+--table writes the table of docs/real_machines.md anew, of what `found` holds.
 """
 
 import argparse
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +23,9 @@ from real_cases import FOLDER, ROOT, bundle, cases, imports, missing
 FOUND = FOLDER / "found"
 IMAGES = ROOT / "docs" / "images" / "real"
 DIGITS = 3
+PAGE = ROOT / "docs" / "real_machines.md"
+NUMBER = re.compile(r"The machine acts as if (.*?) instead of")  # a number of the description that is wrong by far
+BEGIN, END = "<!-- found: begin -->", "<!-- found: end -->"
 
 
 def run(name: str, case: dict[str, Any], out: Path) -> None:
@@ -90,6 +95,12 @@ def table() -> str:
     return "\n".join(lines)
 
 
+def page(text: str) -> str:
+    """The page of real machines with the table of what was found."""
+    head, _, rest = text.partition(BEGIN)
+    return f"{head}{BEGIN}\n\n{table()}\n\n{END}{rest.partition(END)[2]}"
+
+
 def row(name: str, case: dict[str, Any], found: dict[str, Any]) -> str:
     """One line of the table; a name that is known to be wrong is bold."""
     wrong = case.get("wrong", [])
@@ -99,7 +110,10 @@ def row(name: str, case: dict[str, Any], found: dict[str, Any]) -> str:
         text = f"{e['name']} at {e['node']}{f', {sizes}' if sizes else ''}, {100 * e['confidence']:.0f} %"
         names.append(f"**{text}: wrong**" if e["name"] in wrong else text)
     at = found["located"]
-    if found["verdict"] == "unnamed" and at:
+    number = NUMBER.match(found["headline"])
+    if number is not None:
+        names.insert(0, f"as if {number[1]}")
+    elif found["verdict"] == "unnamed" and at:
         names.insert(0, f"a force or error at {at['node']} by {at['axis']}")
     verdict = f"`{found['verdict']}`{': ' if names else ''}{'; '.join(names)}"
     before, after = (f"{100 * x:.2g} %" for x in found["heldout"])
@@ -117,7 +131,8 @@ def main() -> None:
     args = parser.parse_args()
     listed = cases()
     if args.table:
-        return print(table())
+        PAGE.write_text(page(PAGE.read_text()))
+        return
     if unknown := set(args.cases) - set(listed):
         parser.error(f"no such case: {', '.join(sorted(unknown))}; there are {', '.join(listed)}")
     for name in args.cases or listed:
@@ -132,7 +147,6 @@ def main() -> None:
                 print(f"{name}: {'done' if done.returncode == 0 else f'exit code {done.returncode}'}", flush=True)
             except subprocess.TimeoutExpired:
                 print(f"{name}: no answer in {args.limit:g} s", flush=True)
-    return None
 
 
 if __name__ == "__main__":
