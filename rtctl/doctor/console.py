@@ -13,6 +13,7 @@ from rtctl.doctor.facts import changes
 from rtctl.doctor.finding import Finding
 from rtctl.doctor.measure import Measured, Rate, words
 from rtctl.doctor.report import figures, sentence
+from rtctl.doctor.spin import advice
 
 COLOUR = {"good": "green", "fair": "yellow", "bad": "bold red", "unknown": "dim"}
 
@@ -36,6 +37,8 @@ def show(console: Console, title: str, findings: list[Finding], measured: Measur
     console.print(checks(findings))
     if measured is not None:
         _measurement(console, measured)
+        if (spin := advice(findings, measured.rates)) is not None:
+            console.print(Text(spin.sentence))
     _changes(console, changes(findings))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from rtctl.doctor.facts import changes
 from rtctl.doctor.finding import Finding, Tree
 from rtctl.doctor.measure import MOST_LATE, Lateness, Measured, Rate, edges, words
+from rtctl.doctor.spin import advice
 
 
 def sentence(rate: Rate) -> str:
@@ -41,9 +42,12 @@ def as_json(tree: Tree, findings: Sequence[Finding], measured: Measured | None, 
         "facts": [f._asdict() for f in findings],
         "change": [f.name for f in changes(list(findings))],
         "measured": None,
+        "spin": None,
         "need": None,
     }
     if measured is not None:
+        spin = advice(list(findings), measured.rates)
+        out["spin"] = None if spin is None else spin._asdict()
         out["measured"] = {
             "cpu": measured.cpu,
             "priority": measured.priority,
