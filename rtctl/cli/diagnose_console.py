@@ -16,6 +16,7 @@ STAGES = {  # how a stage's sentence begins -> share of the whole that is then d
     "recording": 0.0, "preflight": 0.02, "fitting the nominal": 0.04, "screening": 0.15, "fitting": 0.25,
     "look-alikes": 0.6, "predicting": 0.9, "writing": 0.95,
 }  # fmt: skip
+FIRST = "first look"  # rtctl/diagnose/search/first_look.py, which takes seconds to import
 ONWARD = 0.12  # of what is left, when a stage comes once more
 COLOUR = {"named": "green", "ambiguous": "yellow", "unnamed": "magenta", "nothing": "cyan"}
 MOST_EFFECTS = 8  # in the table of a folder
@@ -51,6 +52,9 @@ class DiagnoseConsole:
 
             def show(text: str) -> None:
                 nonlocal done
+                if text.startswith(FIRST):  # it stays on the screen while names are looked for
+                    bar.console.print(f"{time.monotonic() - began:.1f} s  {text}", highlight=False, markup=False)
+                    return
                 done = onward(done, text)
                 bar.update(task, completed=done, description=text)
 

@@ -17,6 +17,7 @@ from rtctl.diagnose.model.space import Space
 from rtctl.diagnose.search.description_errors import inexact
 from rtctl.diagnose.search.enrich import restarted
 from rtctl.diagnose.search.extend import extended, screened
+from rtctl.diagnose.search.first_look import first_look
 from rtctl.diagnose.search.screen import Screened
 from rtctl.diagnose.search.standing import merit_of
 
@@ -44,7 +45,9 @@ class Begun(NamedTuple):
 def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
     """The base, models with one effect, the screening scores beside the base, and the prior odds of one effect."""
     progress("fitting the nominal parameters")
-    base = restarted(refit(like, space))
+    base = refit(like, space)
+    progress(first_look(base))
+    base = restarted(base)
     told = clock(base, 0.0)
     if told.gain > 0.0:
         progress("telling the times of the ticks")
