@@ -30,6 +30,12 @@ def tune(
     pm: Annotated[
         float | None, typer.Option("--pm", metavar="DEG", help="Least phase margin; 45, 60 on the ldu if absent.")
     ] = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            "--method", metavar="NAME", help="usual, or lq: state feedback from an observer, of a described machine."
+        ),
+    ] = "usual",
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE.yaml", help="Tuned config; NAME-tuned.yaml if absent.")
     ] = None,
@@ -41,7 +47,8 @@ def tune(
     json: JsonOption = False,
 ) -> None:
     """Tune the law of a config on the model in its `plant`: PD with a gain schedule over the reel radii (ivu), lead-lag
-    with notches and a low-pass (ldu), PD (axis), and a first law for a machine that the config describes: PD or PI.
+    with notches and a low-pass (ldu), PD (axis), and a first law for a machine that the config describes: PD or PI,
+    or with --method lq a state feedback from an observer of the whole machine, with an integral.
     Writes the tuned config with the reasons as comments, and a picture of Bode plot, Nyquist plot and step response
     before and after.
 
@@ -52,6 +59,8 @@ def tune(
       rtctl tune ivu --bandwidth 2 -o tuned.yaml
 
       rtctl tune belt.yaml -o tuned.yaml
+
+      rtctl tune belt.yaml --method lq -o tuned.yaml
 
       rtctl tune ldu --set sensors.feedback=scale --gm 11 --pm 60
     """
@@ -68,7 +77,7 @@ def tune(
         *([picture.with_stem(f"{picture.stem}-radii")] if profile_of(settings.kind).has(REELS) else []),
     ]
     check_files(file, pictures, force)
-    found = design.tune(settings, bandwidth, damping, gm, pm)
+    found = design.tune(settings, bandwidth, damping, gm, pm, method)
     header = f"{settings.name}, tuned by `rtctl tune`.\nbefore: {design.words(found.before)}\n"
     header += f"after:  {design.words(found.after)}"
     write(file, design.written(found, header))

@@ -60,14 +60,14 @@ def design(config: Any, least: tuple[float, float], bandwidth: float | None = No
     parts, (kind, why) = parts_of(config), kind_for(config)
     rate, room = config.loop.rate, ROOM if bandwidth is None else (0.0, 0.0)
     start = response.take(set_path(config, "law.position", {"kind": "pd", "gain": 1.0}))
-    f = np.unique(np.concatenate([np.geomspace(margins.LOW / 5, margins.HIGH * rate, 1000), _near(start, rate)]))
+    f = np.unique(np.concatenate([np.geomspace(margins.LOW / 5, margins.HIGH * rate, 1000), near(start, rate)]))
     P = response.plant_response(start.model, f) * response.hold(start, f)
     best: tuple[float, str] | None = None  # nearest miss, in dB or degrees beyond its least, and words
     for crossover in np.geomspace(FASTEST * rate, SLOWEST * rate, CROSSOVERS) if bandwidth is None else [bandwidth]:
         for lead, filter in LEADS if not parts.is_speed else ((0.0, 1.0),):
             law = _scaled(start, kind, crossover, lead, filter, f, P)
             loop = _loop(start, law)
-            if _grain(config, loop, parts) > GRAIN:
+            if grain(config, loop, parts) > GRAIN:
                 continue
             L, forward = (P * response.law_response(loop, f, path) for path in ("feedback", "reference"))
             try:
@@ -75,15 +75,15 @@ def design(config: Any, least: tuple[float, float], bandwidth: float | None = No
             except NoAnswer:
                 continue
             short = min(abs(found.GM) - least[0] - room[0], abs(found.PM) - least[1] - room[1])
-            if short >= 0 and _inside(loop):
+            if short >= 0 and inside(loop):
                 made = applied(config, law, parts)
                 return First(made, law, float(crossover), found._replace(stable=True), why)
             if best is None or short > best[0]:
                 best = short, f"at {crossover:.3g} Hz it would have {found.GM:.1f} dB and {found.PM:.0f} degrees"
-    near = f"; {best[1]}" if best is not None else ""
+    missed = f"; {best[1]}" if best is not None else ""
     raise NoAnswer(
         f"no {_named(kind, parts)} law from {parts.feedback} to {parts.drive} is stable with {least[0]:g} dB and "
-        f"{least[1]:g} degrees{near}; {_advice(parts)}"
+        f"{least[1]:g} degrees{missed}; {_advice(parts)}"
     )
 
 
@@ -136,14 +136,14 @@ def _scaled(
     return law._replace(gain=_short(1.0 / (at * abs(K))))
 
 
-def _grain(config: Any, loop: response.Loop, parts: Parts) -> float:
+def grain(config: Any, loop: response.Loop, parts: Parts) -> float:
     """Share of the limit that one step of the sensor makes of the command."""
     sensor = parts.machine.sensors[parts.feedback]
     quick = abs(response.law_response(loop, np.array([0.45 / loop.dt]))[0])
     return float(quick * sensor.grain / abs(sensor.scale) / config.law.limit.high)
 
 
-def _near(parts: response.Loop, rate: float) -> np.ndarray:
+def near(parts: response.Loop, rate: float) -> np.ndarray:
     """Frequencies around every resonance of the plant, where the response changes fast."""
     values = np.linalg.eigvals(parts.model.A)
     swinging = values[values.imag > 0]
@@ -152,7 +152,7 @@ def _near(parts: response.Loop, rate: float) -> np.ndarray:
     return every[(every > margins.LOW) & (every < margins.HIGH * rate)]
 
 
-def _inside(loop: response.Loop) -> bool:
+def inside(loop: response.Loop) -> bool:
     """Whether every pole of the closed loop lies inside the unit circle, also where the machine alone would fall."""
     import control  # slow to import
 

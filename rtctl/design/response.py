@@ -16,7 +16,7 @@ import numpy as np
 
 from rtctl import machines
 from rtctl.config.errors import UserError
-from rtctl.laws import allocation, disturbance_observer, gain_schedule
+from rtctl.laws import allocation, disturbance_observer, gain_schedule, state_feedback
 from rtctl.machines import described
 from rtctl.machines.profile import Model
 from rtctl.machines.profiles import profile_of
@@ -29,7 +29,7 @@ class Loop(NamedTuple):
 
     model: Model
     blocks: dict[str, Any]  # params of the blocks of the tick, by name
-    kind: str  # pd | pi_velocity | sections
+    kind: str  # pd | pi_velocity | sections | state_feedback
     dt: float  # s
     delay: int  # ticks until a command is written
     factor: float  # of the gain schedule
@@ -125,6 +125,8 @@ def law_response(parts: Loop, f: np.ndarray, path: str = "feedback") -> np.ndarr
         K = np.prod([biquad_response(section, back) for section in p], axis=0)
     elif parts.kind == "pd":
         K = p.gain + p.D * difference(p.a, p.dt, back)
+    elif parts.kind == "state_feedback":
+        K = state_feedback.response(p, back, path)
     else:
         K = p.gain + p.integral / (1 - back)
         if path == "feedback":

@@ -13,6 +13,7 @@ import numpy as np
 
 from rtctl.design import response
 from rtctl.design.response import Loop, Model
+from rtctl.laws import state_feedback
 from rtctl.plants import linear
 
 
@@ -52,6 +53,9 @@ def law_system(parts: Loop, path: str = "feedback") -> Any:
             K = _system([section.b0, section.b1, section.b2], [1.0, section.a1, section.a2], dt) * K
     elif parts.kind == "pd":
         K = p.gain + p.D * _difference(p.a, dt)
+    elif parts.kind == "state_feedback":
+        A, b, c, d = state_feedback.system(p, path)
+        K = control.ss(A, b[:, None], c[None, :], d, dt)
     else:
         K = _system([p.gain], [1.0], dt)
         if p.integral:

@@ -3,7 +3,7 @@
     ivu     PD by bandwidth and damping (5.4), a gain schedule over the radii, feedforward of friction and inertia
     ldu     lead-lag, two notches and a low-pass by optimisation (12.7), feedforward of friction
     axis    PD by bandwidth and damping
-    others  PD or PI, the fastest that keeps its margins (first_law.py)
+    others  PD or PI, the fastest that keeps its margins (first_law.py); or state feedback by LQ (lq.py)
 
 What is tuned is the model that the config's `plant` holds, as it was identified or given.
 
@@ -17,7 +17,7 @@ import numpy as np
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.config.load import to_yaml
 from rtctl.config.yaml_file import parse
-from rtctl.design import feedforward, first_law, margins, pd, schedule, shaping
+from rtctl.design import feedforward, first_law, lq, margins, pd, schedule, shaping
 from rtctl.design.margins import Margins
 from rtctl.design.robustness import Map
 from rtctl.design.shaping import Limits
@@ -45,15 +45,21 @@ class Tuned(NamedTuple):
     maps: dict[str, Map]
 
 
-def _described(config: Any, hertz: float | None, GM: float | None, PM: float | None) -> Tuned:
-    """First law of a described machine, whatever law it had."""
+METHODS = ("usual", "lq")  # lq: state feedback from an observer, of a described machine
+
+
+def _described(config: Any, hertz: float | None, GM: float | None, PM: float | None, method: str) -> Tuned:
+    """A law of a described machine, whatever law it had."""
     least = (PLAIN[0] if GM is None else GM, PLAIN[1] if PM is None else PM)
     check(1e-3 * config.loop.rate if hertz is None else hertz, 1.0, least, config.loop.rate)
     before = None
     if getattr(config.law.position, "gain", 1.0):
         before = margins.of_config(config)
-    found = first_law.design(config, least, hertz)
+    found = (lq if method == "lq" else first_law).design(config, least, hertz)
     law = found.law
+    if method == "lq":
+        words = f"{found.words}; |L| = 1 near {found.crossover:.3g} Hz, the fastest with these margins"
+        return Tuned(found.config, [Reason("law.position.kind", words)], before, found.margins, {})
     reasons = [
         Reason("law.position.kind", found.words),
         Reason("law.position.gain", f"crosses |L| = 1 at {found.crossover:.3g} Hz, the fastest with these margins"),
@@ -70,15 +76,21 @@ def _described(config: Any, hertz: float | None, GM: float | None, PM: float | N
 
 
 def tune(
-    config: Any, bandwidth: float | None = None, damping: float = 1.0, GM: float | None = None, PM: float | None = None
-) -> Tuned:
+    config: Any, bandwidth: float | None = None, damping: float = 1.0, GM: float | None = None, PM: float | None = None,
+    method: str = "usual",
+) -> Tuned:  # fmt: skip
     """The config with a law for `bandwidth` Hz, `damping`, and at least `GM` dB and `PM` deg; by machine where None.
 
-    Raises NoAnswer where the loop to start from is unstable, or the limits cannot be met.
+    Raises UserError where the method is not for this machine, NoAnswer where the loop to start from is unstable, or the
+    limits cannot be met.
     """
     kind = config.kind
+    if method not in METHODS:
+        raise UserError(f"--method {method}: it is {' or '.join(METHODS)}")
     if kind == DESCRIBED:
-        return _described(config, bandwidth, GM, PM)
+        return _described(config, bandwidth, GM, PM, method)
+    if method == "lq":
+        raise UserError(f"--method lq is for machines that a config describes; {config.name} has a law of its own")
     profile = profile_of(kind)
     least = (profile.least[0] if GM is None else GM, profile.least[1] if PM is None else PM)
     hertz = profile.bandwidth if bandwidth is None else bandwidth

@@ -7,7 +7,7 @@ command.
 import keyword
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model, model_validator
 
@@ -22,10 +22,11 @@ from rtctl.laws.excitation import ExcitationSettings, NoneSettings
 from rtctl.laws.limit import LimitSettings
 from rtctl.laws.reference import ReferenceSettings
 from rtctl.laws.shaper import ShaperSettings
+from rtctl.laws.state_feedback import StateFeedbackSettings
 from rtctl.laws.velocity import VelocitySettings
 from rtctl.machines.base import COMMON_COLUMNS, MachineSettings
 from rtctl.machines.compensation import CompensationSettings, in_units
-from rtctl.machines.ldu import PdLawSettings, PositionSettings
+from rtctl.machines.ldu import PdLawSettings, PiLawSettings, SectionsLawSettings
 from rtctl.machines.physics import PhysicsTerm
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.elements import check_node
@@ -35,6 +36,17 @@ from rtctl.tick.safety import SafetySettings
 SIGNALS = ("target", "ref", "w", "feedback", "position_error", "speed", "u_c")  # of the loop, in the trace
 FEEDBACK = ("position", "speed")  # what a loop can close on, in the order in which it is looked for
 FULL = 10.0  # command units, where neither limit nor converter says more
+
+
+class StateFeedbackLawSettings(StateFeedbackSettings):
+    """State feedback from an observer of the whole machine, as `rtctl tune --method lq` designs it."""
+
+    kind: Literal["state_feedback"] = "state_feedback"
+
+
+PositionSettings = Annotated[
+    PiLawSettings | PdLawSettings | SectionsLawSettings | StateFeedbackLawSettings, Field(discriminator="kind")
+]
 
 
 class DescribedLawSettings(Settings):

@@ -99,8 +99,8 @@ class GraphDiagnosis(NamedTuple):
                     said += f"; {instead}it may be {at} ({100 * other.p_value:.0f} %)"
         nameless = 1.0 - sum(p for _, p in self.decided.probabilities)
         number = self.decided.beside.space.doubted
-        other = f"a wrong {number}" if number else "an effect without a name"
-        return said + (f", or {other} ({100 * nameless:.0f} %)" if nameless >= TOLD else "")
+        what = f"a wrong {number}" if number else "an effect without a name"
+        return said + (f", or {what} ({100 * nameless:.0f} %)" if nameless >= TOLD else "")
 
     def as_json(self) -> dict[str, Any]:
         """diagnosis.json in the form of the exchange format."""
