@@ -13,6 +13,7 @@ from rtctl.diagnose.answer.intervals import parameters, sizes
 from rtctl.diagnose.answer.load import load
 from rtctl.diagnose.calibration import SURE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
+from rtctl.diagnose.evidence.hollow import filled
 from rtctl.diagnose.evidence.prediction import Heldout, predict
 from rtctl.diagnose.evidence.verdict import Verdict, fewer, verdict
 from rtctl.diagnose.evidence.withdrawn import borne_out, told
@@ -163,7 +164,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             found = search(other, space, progress)
         progress("weighing names against wrong numbers and forces without a name")
         found = found._replace(doubts=doubted(found))
-        decided = verdict(found)
+        decided = filled(verdict(found), found.base)
         progress("predicting rows that were not fitted")
         heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
         decided = borne_out(fewer(decided, best, "the last rows are predicted better"), heldout)

@@ -5,7 +5,7 @@ import numpy as np
 from rtctl.diagnose.calibration import INNOVATIONS_OF_INTERVAL
 from rtctl.diagnose.likelihood.fits import Fitted, curvature
 from rtctl.diagnose.likelihood.likelihood import coarsened
-from rtctl.diagnose.model.space import COSINE, SINE
+from rtctl.diagnose.model.space import COSINE, REST, SINE, SIZE
 
 Z90 = 1.645  # standard deviations of a 90 % interval, each way
 
@@ -26,6 +26,20 @@ def faint(f: Fitted) -> list[int]:
         sizes = [along(x[i : i + 2], reach[i : i + 2]) if h.coordinates[i].kind == COSINE else (abs(x[i]), reach[i])
                  for i in h.sizes if h.coordinates[i].kind != SINE]  # fmt: skip
         if sizes and all(size < width for size, width in sizes):
+            out.append(index)
+    return out
+
+
+def hollow(f: Fitted) -> list[int]:
+    """Numbers of the effects of a model of which only the force at their place of rest is told: their own size may be
+    zero by its 90 % interval."""
+    half, weak = half_widths(f), faint(f)
+    out = []
+    for index, h in enumerate(f.space.hypotheses):
+        columns = f.space.columns(index)
+        own = [i for i in h.sizes if h.coordinates[i].kind == SIZE]
+        rests = any(c.kind == REST for c in h.coordinates)
+        if index not in weak and rests and all(abs(f.x[columns][i]) < half[columns][i] for i in own):
             out.append(index)
     return out
 
