@@ -151,9 +151,12 @@ def checks(d: GraphDiagnosis) -> list[str]:
 
 
 def reason(d: GraphDiagnosis) -> str:
-    """Why no name is given, where none is."""
-    if d.verdict not in (UNNAMED, NOTHING) or not d.decided.why:
+    """Why no name is given, where none is; else what is to be known beside the names."""
+    if not d.decided.why:
         return ""
+    if d.verdict not in (UNNAMED, NOTHING):
+        text = told_names(d, d.decided.why)
+        return f"{text[:1].upper()}{text[1:]}."
     return f"The verdict is {d.verdict}: {told_names(d, d.decided.why)}."
 
 

@@ -64,7 +64,12 @@ def of_motion(found: Found) -> Verdict:
 
     if nothing > 1.0 - SURE and nothing > unlisted:
         return answer(NOTHING, found.base, f"the description alone has a probability of {100 * nothing:.0f} %")
-    nameless = (unlisted > 0.5 and not robust(table, best.names)) or not best.names
+    nameless = unlisted > 0.5 or not best.names
+    alone = robust(table, best.names)
+    whole = next((f for names, f in fits.items() if alone and set(names) == set(alone)), None)
+    if nameless and whole is not None and explained(found.base, whole) >= MOSTLY:
+        why = f"beside it a wrong {beside.space.doubted} has a probability of {100 * unlisted:.0f} %"
+        return of_names(answer(NAMED, whole, why))
     stands = beside if nameless else best
     if not (nameless and free) and (seen := shown(found.base, stands)) < VISIBLE:
         why = (
@@ -102,20 +107,19 @@ def nameless_best(table: tuple[Rival, ...]) -> Rival | None:
     return max(most, key=lambda r: r.merit)
 
 
-def robust(table: tuple[Rival, ...], names: tuple[str, ...]) -> bool:
-    """Whether one of the names is sure whether or not a number of the description is wrong: both kinds of explanation
-    have a say, and each holds it."""
+def robust(table: tuple[Rival, ...], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Those of the names that are sure whether or not a number of the description is wrong: both kinds of explanation
+    have a say, and each holds them."""
     listed = [r for r in table if not r.unlisted]
-    doubted = [r for r in table if r.doubted]
+    both = [*listed, *(r for r in table if r.doubted)]
     share = sum(r.probability for r in listed)
+    if share <= 1.0 - SURE:
+        return ()
 
-    def held(some: list[Rival], term: str) -> float:
-        return sum(r.probability for r in some if holds(r.fit.names, term))
+    def held(some: list[Rival], name: str) -> float:
+        return sum(r.probability for r in some if holds(r.fit.names, name.partition(":")[0]))
 
-    terms_ = [name.partition(":")[0] for name in names]
-    return share > 1.0 - SURE and any(
-        held(listed, term) >= SURE * share and held(listed + doubted, term) >= SURE for term in terms_
-    )
+    return tuple(name for name in names if held(listed, name) >= SURE * share and held(both, name) >= SURE)
 
 
 def of_names(decided: Verdict) -> Verdict:
