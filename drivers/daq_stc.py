@@ -50,11 +50,3 @@ def counter_position(s, codes):
     s.previous = codes
     s.n += 1
     return s.position
-
-
-@tick
-def position_reset(s):
-    """Start again at position 0, as after a reset of the counter."""
-    s.n = 0
-    s.previous = 0
-    s.position = 0

@@ -107,16 +107,6 @@ def wavelength(R_c: float) -> float:
     return 2 * np.pi * R_c
 
 
-def trend_radius(error: float, travel: float, R_c: float) -> float:
-    """Deviation of the mean capstan radius in m from the trend of the error over a travel, m (11.3)."""
-    return error / travel * R_c
-
-
-def oval_error(dR: float, order: int = 1) -> float:
-    """Largest position error in m of a capstan whose radius swings by `dR` m, `order` times a turn (11.3)."""
-    return 2 * dR / order
-
-
 def disc_error(eccentricity: float, R_g: float) -> float:
     """Largest reading error in rad of a disc off centre on its graduation radius, both m (11.5)."""
     return float(np.arctan(eccentricity / R_g))

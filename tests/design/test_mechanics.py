@@ -58,8 +58,6 @@ def test_process_gain_is_that_of_the_model():
 
 def test_errors_of_chapter_eleven():
     assert mechanics.wavelength(3e-3) == pytest.approx(18.85e-3, rel=1e-3)  # (11.4)
-    assert mechanics.trend_radius(0.36e-3, 0.6, 3e-3) == pytest.approx(1.8e-6)  # figure 11.6
-    assert mechanics.oval_error(2e-6) == pytest.approx(4e-6)  # (11.3)
     assert mechanics.disc_error(5e-6, 19e-3) == pytest.approx(3e-4, rel=0.15)  # (11.5)
     assert mechanics.strip_error(1e-4, 0.1, 0.6) == pytest.approx(0.6 * (np.pi * 1e-3) ** 2, rel=1e-3)  # (11.6)
 

@@ -41,11 +41,3 @@ def test_wraps_at_both_ends():
 def test_the_first_reading_counts_from_the_initial_count():
     _, reader = new()
     assert daq_stc.counter_position(reader, 8388608 + 5) == 5
-
-
-def test_a_reset_on_both_sides_starts_again():
-    counter, reader = new()
-    daq_stc.counter_position(reader, count(counter, 1234))
-    daq_stc.counter_reset(counter)
-    daq_stc.position_reset(reader)
-    assert daq_stc.counter_position(reader, count(counter, -3)) == -3
