@@ -27,6 +27,7 @@ FIRST = 10.0  # s in one stretch, after which a record is tried
 LONGEST = 120.0  # s of a first record; where it supports nothing, its older half is dropped
 JUMP = 0.25  # s by which the clock of a row is off from its tick, from one row to the next: it has jumped
 RECENT = 120  # windows kept for what is told of an alarm
+BLIND = (60, 0.5)  # windows in motion, and the share of them that is judged, below which it says that it sees little
 AWAY = 3  # times in RECENT windows that a model runs away, after which it is no judge
 
 
@@ -65,6 +66,8 @@ class Monitor:
         self._learned: list[Batch] = []
         self._recent: deque[Batch] = deque(maxlen=RECENT)
         self._before: Any = None
+        self._seen = (0, 0, 0)  # windows judged, with late rows, and faster ones, when it last looked around
+        self._blind = False
         self._end: tuple[int, float] | None = None  # tick and time of the last row
         self._away: deque[int] = deque(maxlen=AWAY)
         self.windows = 0
@@ -253,6 +256,7 @@ class Monitor:
         self.faster += int(moving.sum()) - int(counts.sum()) - untimely
         batch = batch.some(counts)
         self.judged += batch.size
+        self._look_around()
         if not batch.size or self.astray:
             return None
         weights, self._before = band.weights(batch, self._before)
@@ -269,6 +273,23 @@ class Monitor:
                 sums.restart()
         self.alarm = self.alarm or found
         return found
+
+    def _look_around(self) -> None:
+        """Say where most of the motion is not judged, and when it is again: a watch that sees little must tell."""
+        now = self.judged, self.untimely, self.faster
+        judged, untimely, faster = (a - b for a, b in zip(now, self._seen, strict=True))
+        count = judged + untimely + faster
+        if count < BLIND[0]:
+            return
+        self._seen, blind = now, judged < BLIND[1] * count
+        if blind and not self._blind:
+            self.notes.append(
+                f"of the last {count} windows in motion {judged} were judged: {untimely} had rows that came later, "
+                f"{faster} were faster than when the band was learned; an alarm may come late, or not at all"
+            )
+        elif self._blind and not blind:
+            self.notes.append("most of the motion is judged again")
+        self._blind = blind
 
     def _learn(self) -> None:
         assert self._observer is not None

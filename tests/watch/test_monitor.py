@@ -79,6 +79,9 @@ def test_late_rows_are_not_judged(rehearsed, monitor):
     assert monitor.feed(rows) is None
     assert monitor.untimely > 50
     assert monitor.judged < monitor.untimely
+    told = [note for note in monitor.notes if "had rows that came later" in note]
+    assert len(told) == 1
+    assert "an alarm may come late, or not at all" in told[0]
 
 
 def test_a_model_that_runs_away_is_no_judge(rehearsed, monitor):
