@@ -303,7 +303,7 @@ def test_the_scale_of_a_lane_is_held_and_set(open_page):
     page.reload()
     until(page, "window.scope?.traces.x.length > 10")
     assert page.evaluate("window.scope.plots.lanes[0].yRange[1]") >= 2000 * min(factor, 1e-6)
-    assert lane.locator(".scale button").inner_text() == "fixed"
+    assert lane.locator(".scale button").inner_text() == "scale fixed"
     lane.locator(".scale button").click()
     until(page, "window.scope.plots.scales.fixed.size === 0")
 

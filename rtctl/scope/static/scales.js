@@ -59,7 +59,7 @@ export class Scales {
   tell(lane) {
     const fixed = this.fixed.has(lane.key);
     lane.lock.setAttribute("aria-pressed", fixed);
-    const words = fixed ? "fixed" : "auto";
+    const words = fixed ? "scale fixed" : "scale auto";
     if (lane.lock.textContent !== words) lane.lock.textContent = words;
     lane.ends.forEach((field, i) => {
       field.hidden = !fixed;
