@@ -1,7 +1,7 @@
 // Numbers as a person reads them: three to five digits, and a prefix that suits the unit.
 
 const PREFIXES = [["n", 1e-9], ["u", 1e-6], ["m", 1e-3], ["", 1], ["k", 1e3], ["M", 1e6]];
-const NOTHING = 1e-13; // of a unit: what is left of a decay
+const NOTHING = 1e-12; // of a unit: what is left of a decay
 const PREFIXED = /^(m|s|V|A|N|rad|Hz|Nm|W|J|m\/s|rad\/s|V\/s|N\/s)$/;
 
 // The factor and the prefixed unit in which numbers up to `size` are short.
