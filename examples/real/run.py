@@ -6,7 +6,7 @@
 Each case of cases.yaml (all where none is named) is imported and diagnosed in a process of its own. `found/CASE.json`
 then holds verdict, effects and held-out errors, docs/images/real/CASE_missing.png and CASE_heldout.png its figures,
 FOLDER (build/real) all the rest. The environment's REAL_DATA is where the recordings lie, if not in ../shared/data.
---table writes the table of docs/real_machines.md anew, of what `found` holds.
+--table writes the table of docs/proof.md anew, of what `found` holds.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from real_cases import FOLDER, ROOT, bundle, cases, imports, missing
 FOUND = FOLDER / "found"
 IMAGES = ROOT / "docs" / "images" / "real"
 DIGITS = 3
-PAGE = ROOT / "docs" / "real_machines.md"
+PAGE = ROOT / "docs" / "proof.md"
 NUMBER = re.compile(r"The machine acts as if (.*?) instead of")  # a number of the description that is wrong by far
 BEGIN, END = "<!-- found: begin -->", "<!-- found: end -->"
 
@@ -96,7 +96,7 @@ def table() -> str:
 
 
 def page(text: str) -> str:
-    """The page of real machines with the table of what was found."""
+    """The page of proofs with the table of what was found."""
     head, _, rest = text.partition(BEGIN)
     return f"{head}{BEGIN}\n\n{table()}\n\n{END}{rest.partition(END)[2]}"
 

@@ -1,4 +1,4 @@
-"""The page of real machines tells what was found, and shows it."""
+"""The pages of proofs and of real machines tell what was found, and show it."""
 
 import json
 import re
@@ -30,7 +30,7 @@ def test_no_answer_names_what_would_be_wrong_and_says_nothing_of_it():
 
 
 def test_every_figure_is_there():
-    shown = re.findall(r"\(images/(real/[^)]+)\)", PAGE.read_text())
+    shown = re.findall(r"\(images/(real/[^)]+)\)", (ROOT / "docs" / "real_machines.md").read_text())
     assert len(shown) > 5
     for name in shown:
         assert (ROOT / "docs" / "images" / name).is_file(), name
