@@ -13,7 +13,7 @@ import numpy as np
 
 from rtctl.design import response
 from rtctl.design.response import Loop, Model
-from rtctl.laws import state_feedback
+from rtctl.laws import disturbance_observer, state_feedback
 from rtctl.plants import linear
 
 
@@ -63,7 +63,28 @@ def law_system(parts: Loop, path: str = "feedback") -> Any:
         if path == "feedback":
             v = parts.blocks["velocity"]
             K = K + p.velocity_gain * _difference(v.a, v.dt)
-    return parts.factor * K
+    return compensated(parts, parts.factor * K, path)
+
+
+def compensated(parts: Loop, K: Any, path: str) -> Any:
+    """A law `K` with the filter, the integral, the predictor and the disturbance observer around it."""
+    blocks, dt = parts.blocks, parts.dt
+    for section in blocks.get("filter", ()):
+        K = _system([section.b0, section.b1, section.b2], [1.0, section.a1, section.a2], dt) * K
+    if "integral" in blocks and blocks["integral"].gain:
+        K = K + _system([blocks["integral"].gain, 0.0], [1.0, -1.0], dt)
+    if "predictor" in blocks and path == "feedback":
+        p, v = blocks["predictor"], blocks["velocity"]
+        moved = [p.K * p.dt**2 * (n - 0.5) for n in range(1, p.n + 1)]  # by the commands that have not acted yet
+        inner = control.ss(control.tf(moved, [1.0, *np.zeros(p.n)], dt))
+        K = (1.0 + p.n * p.dt * _difference(v.a, v.dt)) * control.feedback(K, inner)
+    if "observer" in blocks:
+        to_y, to_u = (
+            control.ss(A, b[:, None], c[None, :], d, dt)
+            for A, b, c, d in disturbance_observer.systems(blocks["observer"], parts.motor == 2)
+        )
+        K = control.feedback(1.0, to_u, sign=1) * (K + to_y if path == "feedback" else K)
+    return K
 
 
 def _difference(a: float, dt: float) -> Any:

@@ -99,19 +99,39 @@ def reset(p, s):
         s.u[i] = 0.0
 
 
-def response(p: DisturbanceObserverParams, f: np.ndarray, back: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Responses (n,) of the voltage against the disturbance to the negative position and to the command written, at
-    `f` (n,) Hz, for positive commands or with `back` for negative ones."""
+System = tuple[np.ndarray, np.ndarray, np.ndarray, float]  # A (n, n), b (n,), c (n,) and d
+
+
+def systems(p: DisturbanceObserverParams, back: bool = False) -> tuple[System, System]:
+    """From the negative position, and from the command written, to the voltage against the disturbance, for positive
+    commands or with `back` for negative ones."""
     K = p.K_back if back else p.K
-    z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(f, float)) * p.dt)
     move = np.array([[1, p.dt, p.dt**2 / 2], [0, 1 - p.B * p.dt, p.dt], [0, 0, 1.0]])
     move[0, 1] -= p.B * p.dt**2 / 2
     push = K * np.array([p.dt**2 / 2, p.dt, 0.0])
     gain = np.array([p.x, p.v, p.d])
     seen = np.eye(3) - np.outer(gain, [1.0, 0, 0])
-    A = move @ seen  # of the prediction x(k+1|k)
-    inverse = np.linalg.inv(z[:, None, None] * np.eye(3) - A)
     out = -p.share / K * np.array([0, 0, 1.0])
-    to_y = out @ gain + np.einsum("i,nij,j->n", out @ seen, inverse, move @ gain)
-    to_u = np.einsum("i,nij,j->n", out @ seen, inverse, push) * z ** (-p.delay)
-    return -to_y, to_u
+    A = move @ seen  # of the prediction x(k+1|k)
+    to_y: System = A, -move @ gain, out @ seen, float(-out @ gain)
+    n = 3 + p.delay  # the commands that have not acted yet come after the estimates, the oldest first
+    late, enter = np.zeros((n, n)), np.zeros(n)
+    late[:3, :3] = A
+    if p.delay:
+        late[:3, 3] = push
+        late[range(3, n - 1), range(4, n)] = 1.0
+        enter[-1] = 1.0
+    else:
+        enter[:3] = push
+    return to_y, (late, enter, np.append(out @ seen, np.zeros(p.delay)), 0.0)
+
+
+def response(p: DisturbanceObserverParams, f: np.ndarray, back: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Responses (n,) of the voltage against the disturbance to the negative position and to the command written, at
+    `f` (n,) Hz, for positive commands or with `back` for negative ones."""
+    z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(f, float)) * p.dt)
+    to_y, to_u = (
+        d + np.einsum("i,nij,j->n", c, np.linalg.inv(z[:, None, None] * np.eye(len(A)) - A), b)
+        for A, b, c, d in systems(p, back)
+    )
+    return to_y, to_u

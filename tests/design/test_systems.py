@@ -3,6 +3,8 @@ import fused
 import numpy as np
 import pytest
 
+from rtctl.api import load_config
+from rtctl.config.load import set_path
 from rtctl.design import response, systems
 
 
@@ -31,3 +33,22 @@ def test_step_response_is_what_the_machine_does():
 def test_write_at_the_same_tick_has_one_state_less():
     late, soon = (systems.sampled(fused.config("ivu", loop__write=w))[0] for w in ("next_tick", "same_tick"))
     assert late.nstates == soon.nstates + 1
+
+
+@pytest.mark.parametrize(
+    "around",
+    [
+        {"integral": {"gain": 20.0}},
+        {"observer": {"bandwidth": 8.0, "acceleration": 320.0, "delay": 1}},
+        {"observer": {"bandwidth": 8.0, "acceleration": 320.0, "delay": 0}},
+        {"predictor": {"delay": 2, "acceleration": 320.0}},
+        {"integral": {"gain": 20.0}, "observer": {"bandwidth": 5.0, "acceleration": 320.0}},
+    ],
+)
+def test_what_stands_around_a_law_is_in_its_poles(around):
+    config = set_path(load_config("machines/belt"), "law.compensation", around)
+    _, K, R = systems.sampled(config)
+    f = np.geomspace(0.5, 0.4 * config.loop.rate, 20)
+    z = np.exp(2j * np.pi * f / config.loop.rate)
+    np.testing.assert_allclose(K(z), response.law(config, f), rtol=1e-6)
+    np.testing.assert_allclose(R(z), response.law_response(response.take(config), f, "reference"), rtol=1e-6)
