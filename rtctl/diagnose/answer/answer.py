@@ -15,6 +15,7 @@ from rtctl.diagnose.calibration import SURE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
 from rtctl.diagnose.evidence.hollow import filled
 from rtctl.diagnose.evidence.prediction import Heldout, predict
+from rtctl.diagnose.evidence.predictive import freest
 from rtctl.diagnose.evidence.verdict import Verdict, fewer, verdict
 from rtctl.diagnose.evidence.withdrawn import borne_out, told
 from rtctl.diagnose.likelihood.clock import UNSTEADY
@@ -42,7 +43,7 @@ class GraphDiagnosis(NamedTuple):
     parameters: dict[str, Interval]
     heldout: Heldout
     cannot_test: tuple[str, ...]
-    predictor: Fitted  # the model that predicts best, which may have effects of which the verdict is not sure
+    predictor: Fitted  # the model that runs freely best, which may have effects of which the verdict is not sure
     seconds: float
     records: tuple[GraphRecord, ...]
     planned: Planned = Planned()
@@ -168,8 +169,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
         progress("predicting rows that were not fitted")
         heldout, best = predict(found.base, decided.best, decided.verdict in (NAMED, AMBIGUOUS))
         decided = borne_out(fewer(decided, best, "the last rows are predicted better"), heldout)
-        decided, heldout, predictor = told(decided, heldout, found)
-        effects = _effects(decided, predictor)
+        decided, heldout, numbers = told(decided, heldout, found)
+        effects = _effects(decided, numbers)
         if len(left(decided)) > 1:
             progress("planning an experiment")
         return GraphDiagnosis(
@@ -178,8 +179,8 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
             decided=decided,
             effects=effects,
             located=_located(found, decided, effects),
-            parameters=parameters(predictor, like.sim.record),
-            predictor=predictor,
+            parameters=parameters(numbers, like.sim.record),
+            predictor=freest(numbers) if decided.verdict in (NAMED, AMBIGUOUS) else numbers,
             heldout=heldout,
             planned=planned(like.sim.record, decided),
             cannot_test=tuple(sorted(_cannot(found))),

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from graph_cases import named, nothing, unnamed
 
-from rtctl.diagnose.evidence.predictive import free_error, least_squares, predictive, probable
+from rtctl.diagnose.evidence.predictive import at, free_error, freest, least_squares, predictive, probable
 
 
 def rubbing(f, x):
@@ -24,6 +24,17 @@ def test_a_free_run_of_the_right_model_is_nearer():
     d = named()
     base, best = (f.model for f in d.heldout.fits)
     assert free_error(d.heldout.late, best) < 0.3 * free_error(d.heldout.late, base)
+
+
+def test_of_the_same_model_the_numbers_that_run_freely_best_are_taken():
+    best = named().found.best
+    x = best.x.copy()
+    x[best.space.columns(0)[0]] *= 1.3
+    off = at(best, x)
+    found = freest(off)
+    assert found.names == best.names
+    assert free_error(off.like, found.model) < 0.5 * free_error(off.like, off.model)
+    assert free_error(off.like, freest(best).model) <= free_error(off.like, best.model)
 
 
 def test_a_model_that_runs_away_predicts_nothing():
