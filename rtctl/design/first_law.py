@@ -4,19 +4,20 @@
     PI   K (1 + 1/(tau_i s)) + K_v s         a position that weight pulls at
     PI   K (1 + 1/(tau_i s))                 a speed
 
-The crossover is lowered until gain and phase margin hold, every closed-loop pole lies inside the unit circle, and one
-step of the sensor makes less of the command than `GRAIN` of its limit.
+The crossover is lowered until the law holds, as fastest.py says it.
 
 Source: Astrom & Murray, Feedback Systems (2008), 11.3 (loop shaping by the crossover).
 """
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rtctl.config.errors import NoAnswer
 from rtctl.config.load import set_path
-from rtctl.design import margins, response, systems
+from rtctl.design import response
+from rtctl.design.fastest import ROOM, Machine, fastest, machine_of
 from rtctl.design.margins import Margins
 from rtctl.laws import pd, pi_velocity, velocity
 from rtctl.machines.described_parts import Parts, parts_of
@@ -28,8 +29,6 @@ SLOWEST, FASTEST = 1 / 4000, 1 / 12  # of the sample rate
 LEADS = ((60.0, 6.0), (70.0, 6.0), (60.0, 3.0), (70.0, 3.0), (45.0, 10.0), (20.0, 10.0))  # degrees, and corner of the
 # derivative's filter in units of the crossover, in the order in which they are tried
 INTEGRAL = 6.0  # integral time, in units of 1 / crossover
-ROOM = (2.0, 8.0)  # dB and degrees beyond the least margins, so that a machine a little off its model is held
-GRAIN = 0.2  # share of the limit that one step of the sensor may make
 
 
 class Numbers(NamedTuple):
@@ -58,33 +57,23 @@ def design(config: Any, least: tuple[float, float], bandwidth: float | None = No
     Raises NoAnswer where no law of the kind is stable with these margins.
     """
     parts, (kind, why) = parts_of(config), kind_for(config)
-    rate, room = config.loop.rate, ROOM if bandwidth is None else (0.0, 0.0)
     start = response.take(set_path(config, "law.position", {"kind": "pd", "gain": 1.0}))
-    f = np.unique(np.concatenate([np.geomspace(margins.LOW / 5, margins.HIGH * rate, 1000), near(start, rate)]))
-    P = response.plant_response(start.model, f) * response.hold(start, f)
-    best: tuple[float, str] | None = None  # nearest miss, in dB or degrees beyond its least, and words
-    for crossover in np.geomspace(FASTEST * rate, SLOWEST * rate, CROSSOVERS) if bandwidth is None else [bandwidth]:
-        for lead, filter in LEADS if not parts.is_speed else ((0.0, 1.0),):
-            law = _scaled(start, kind, crossover, lead, filter, f, P)
-            loop = _loop(start, law)
-            if grain(config, loop, parts) > GRAIN:
-                continue
-            L, forward = (P * response.law_response(loop, f, path) for path in ("feedback", "reference"))
-            try:
-                found = margins.points(f, L, forward)
-            except NoAnswer:
-                continue
-            short = min(abs(found.GM) - least[0] - room[0], abs(found.PM) - least[1] - room[1])
-            if short >= 0 and inside(loop):
-                made = applied(config, law, parts)
-                return First(made, law, float(crossover), found._replace(stable=True), why)
-            if best is None or short > best[0]:
-                best = short, f"at {crossover:.3g} Hz it would have {found.GM:.1f} dB and {found.PM:.0f} degrees"
-    missed = f"; {best[1]}" if best is not None else ""
-    raise NoAnswer(
-        f"no {_named(kind, parts)} law from {parts.feedback} to {parts.drive} is stable with {least[0]:g} dB and "
-        f"{least[1]:g} degrees{missed}; {_advice(parts)}"
-    )
+    machine, rate = machine_of(config, start), config.loop.rate
+
+    def laws() -> Iterator[tuple[float, Numbers, response.Loop]]:
+        wanted = np.geomspace(FASTEST * rate, SLOWEST * rate, CROSSOVERS) if bandwidth is None else [bandwidth]
+        for crossover in wanted:
+            for lead, filter in LEADS if not parts.is_speed else ((0.0, 1.0),):
+                law = _scaled(machine, kind, float(crossover), lead, filter)
+                yield float(crossover), law, _loop(start, law)
+
+    found = fastest(config, machine, laws(), least, ROOM if bandwidth is None else (0.0, 0.0))
+    if isinstance(found, str):
+        raise NoAnswer(
+            f"no {_named(kind, parts)} law from {parts.feedback} to {parts.drive} is stable with {least[0]:g} dB and "
+            f"{least[1]:g} degrees{found}; {_advice(parts)}"
+        )
+    return First(applied(config, found.law, parts), found.law, found.crossover, found.margins, why)
 
 
 def kind_for(config: Any) -> tuple[str, str]:
@@ -124,46 +113,15 @@ def _loop(start: response.Loop, law: Numbers) -> response.Loop:
     return start._replace(kind=law.kind, blocks={**start.blocks, "position": made, "velocity": filtered})
 
 
-def _scaled(
-    start: response.Loop, kind: str, crossover: float, lead: float, filter: float, f: np.ndarray, P: np.ndarray
-) -> Numbers:
+def _scaled(machine: Machine, kind: str, crossover: float, lead: float, filter: float) -> Numbers:
     """The law that crosses at `crossover` Hz with `lead` degrees of lead."""
+    start, f, P = machine
     w = 2 * np.pi * crossover
     corner = min(filter * crossover, 0.4 / start.dt)
     law = Numbers(kind, 1.0, _short(np.tan(np.radians(lead)) / w), _short(INTEGRAL / w), _short(corner))
     K = response.law_response(_loop(start, law), np.array([crossover]))[0]
     at = np.exp(np.interp(np.log(crossover), np.log(f), np.log(np.abs(P))))
     return law._replace(gain=_short(1.0 / (at * abs(K))))
-
-
-def grain(config: Any, loop: response.Loop, parts: Parts) -> float:
-    """Share of the limit that one step of the sensor makes of the command."""
-    sensor = parts.machine.sensors[parts.feedback]
-    quick = abs(response.law_response(loop, np.array([0.45 / loop.dt]))[0])
-    return float(quick * sensor.grain / abs(sensor.scale) / config.law.limit.high)
-
-
-def near(parts: response.Loop, rate: float) -> np.ndarray:
-    """Frequencies around every resonance of the plant, where the response changes fast."""
-    values = np.linalg.eigvals(parts.model.A)
-    swinging = values[values.imag > 0]
-    grid = [abs(s) / (2 * np.pi) * (1 + max(-s.real / abs(s), 1e-4) * np.linspace(-8, 8, 65)) for s in swinging]
-    every = np.concatenate([*grid, [1.0]])
-    return every[(every > margins.LOW) & (every < margins.HIGH * rate)]
-
-
-def inside(loop: response.Loop) -> bool:
-    """Whether every pole of the closed loop lies inside the unit circle, also where the machine alone would fall."""
-    import control  # slow to import
-
-    model = loop.model
-    closed = control.feedback(systems.plant_system(model, loop.dt, loop.delay) * systems.law_system(loop), 1)
-    poles = closed.poles()
-    rows = np.vstack([model.A, model.c[None, :]])
-    rows = rows / np.maximum(np.abs(rows).max(axis=1, keepdims=True), 1e-300)
-    unseen = len(model.A) - np.linalg.matrix_rank(rows)  # positions behind a sensor of speed: they may go anywhere
-    poles = poles[np.argsort(np.abs(poles - 1))][unseen:]
-    return bool(np.abs(poles).max() < 1 - 1e-9)
 
 
 def _short(value: float) -> float:

@@ -17,8 +17,9 @@ import numpy as np
 
 from rtctl.config.errors import NoAnswer
 from rtctl.config.load import set_path
-from rtctl.design import first_law, margins, response
-from rtctl.design.first_law import First, grain, inside, near
+from rtctl.design import response
+from rtctl.design.fastest import ROOM, fastest, machine_of
+from rtctl.design.margins import Margins
 from rtctl.laws import state_feedback
 from rtctl.machines.described_parts import parts_of
 from rtctl.plants import linear
@@ -40,48 +41,46 @@ class Sampled(NamedTuple):
     noise: np.ndarray  # (n,) where a force at the drive enters
 
 
-def design(config: Any, least: tuple[float, float], bandwidth: float | None = None) -> First:
+class Designed(NamedTuple):
+    """A config with a state feedback that holds, and what it reaches."""
+
+    config: Any
+    crossover: float  # Hz
+    margins: Margins
+    words: str
+
+
+def design(config: Any, least: tuple[float, float], bandwidth: float | None = None) -> Designed:
     """The law with the highest crossover that keeps `least` dB and degrees; about `bandwidth` Hz where it is given.
 
     Raises NoAnswer where none is stable with these margins, or where the machine has more states than the law.
     """
     parts, rate = parts_of(config), config.loop.rate
     start = response.take(set_path(config, "law.position", {"kind": "pd", "gain": 1.0}))
-    machine = sampled(start)
-    if len(machine.B) > state_feedback.MOST:
+    model, machine = sampled(start), machine_of(config, start)
+    if len(model.B) > state_feedback.MOST:
         raise NoAnswer(
-            f"the machine has {len(machine.B)} states and a state feedback takes {state_feedback.MOST}; leave "
+            f"the machine has {len(model.B)} states and a state feedback takes {state_feedback.MOST}; leave "
             "out joints that are stiff (no `stiffness`), or tune a PD"
         )
-    f = np.unique(np.concatenate([np.geomspace(margins.LOW / 5, margins.HIGH * rate, 1000), near(start, rate)]))
-    P = response.plant_response(start.model, f) * response.hold(start, f)
-    room = first_law.ROOM if bandwidth is None else (0.0, 0.0)
-    wanted = np.geomspace(FASTEST * rate, SLOWEST * rate, CROSSOVERS) if bandwidth is None else np.array([bandwidth])
-    best: tuple[float, str] | None = None
-    for crossover in wanted:
-        for law in laws(machine, f, np.abs(P), float(crossover), start.dt):
-            params = state_feedback.build(state_feedback.StateFeedbackSettings(**law), start.dt)
-            loop = start._replace(kind="state_feedback", blocks={**start.blocks, "position": params})
-            if grain(config, loop, parts) > first_law.GRAIN:
-                continue
-            L, forward = (P * response.law_response(loop, f, path) for path in ("feedback", "reference"))
-            try:
-                found = margins.points(f, L, forward)
-            except NoAnswer:
-                continue
-            short = min(abs(found.GM) - least[0] - room[0], abs(found.PM) - least[1] - room[1])
-            if short >= 0 and inside(loop):
-                made = set_path(config, "law.position", {"kind": "state_feedback", **law})
-                numbers = first_law.Numbers("state_feedback", float(np.linalg.norm(params.K)), 0.0, 0.0, 0.0)
-                words = f"LQ with an observer of {len(machine.B)} states from {parts.feedback} to {parts.drive}"
-                return First(made, numbers, float(crossover), found._replace(stable=True), words)
-            if best is None or short > best[0]:
-                best = short, f"at {crossover:.3g} Hz it would have {found.GM:.1f} dB and {found.PM:.0f} degrees"
-    why = f"; {best[1]}" if best is not None else ""
-    raise NoAnswer(
-        f"no state feedback from {parts.feedback} to {parts.drive} is stable with {least[0]:g} dB and {least[1]:g} "
-        f"degrees{why}; lower --gm or --pm, or take a faster loop.rate"
-    )
+
+    def tried() -> Iterator[tuple[float, dict[str, Any], response.Loop]]:
+        wanted = np.geomspace(FASTEST * rate, SLOWEST * rate, CROSSOVERS) if bandwidth is None else [bandwidth]
+        for crossover in wanted:
+            for law in laws(model, machine.f, np.abs(machine.P), float(crossover), start.dt):
+                params = state_feedback.build(state_feedback.StateFeedbackSettings(**law), start.dt)
+                blocks = {**start.blocks, "position": params}
+                yield float(crossover), law, start._replace(kind="state_feedback", blocks=blocks)
+
+    found = fastest(config, machine, tried(), least, ROOM if bandwidth is None else (0.0, 0.0))
+    if isinstance(found, str):
+        raise NoAnswer(
+            f"no state feedback from {parts.feedback} to {parts.drive} is stable with {least[0]:g} dB and {least[1]:g} "
+            f"degrees{found}; lower --gm or --pm, or take a faster loop.rate"
+        )
+    made = set_path(config, "law.position", {"kind": "state_feedback", **found.law})
+    words = f"LQ with an observer of {len(model.B)} states from {parts.feedback} to {parts.drive}"
+    return Designed(made, found.crossover, found.margins, words)
 
 
 def sampled(start: response.Loop) -> Sampled:

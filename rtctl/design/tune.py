@@ -55,11 +55,12 @@ def _described(config: Any, hertz: float | None, GM: float | None, PM: float | N
     before = None
     if getattr(config.law.position, "gain", 1.0):
         before = margins.of_config(config)
-    found = (lq if method == "lq" else first_law).design(config, least, hertz)
-    law = found.law
     if method == "lq":
-        words = f"{found.words}; |L| = 1 near {found.crossover:.3g} Hz, the fastest with these margins"
-        return Tuned(found.config, [Reason("law.position.kind", words)], before, found.margins, {})
+        made = lq.design(config, least, hertz)
+        words = f"{made.words}; |L| = 1 near {made.crossover:.3g} Hz, the fastest with these margins"
+        return Tuned(made.config, [Reason("law.position.kind", words)], before, made.margins, {})
+    found = first_law.design(config, least, hertz)
+    law = found.law
     reasons = [
         Reason("law.position.kind", found.words),
         Reason("law.position.gain", f"crosses |L| = 1 at {found.crossover:.3g} Hz, the fastest with these margins"),
