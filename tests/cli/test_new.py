@@ -61,7 +61,7 @@ def test_it_never_overwrites(rtctl, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["low", "x"], "kind 'low': it is law, plant, term; did you mean 'law'?"),
+        (["low", "x"], "kind 'low': it is law, plant, term, machine, config; did you mean 'law'?"),
         (["law", "x", "--for", "lud"], "machine 'lud': it is ivu, ldu, axis; did you mean 'ldu'?"),
         (["law", "3x"], "'3x' is no name for a Python file"),
         (["law", "../x"], "'../x' is no name for a Python file"),
