@@ -265,7 +265,7 @@ def test_a_machine_outlives_a_flood_with_few_file_descriptors(runtime: Path, tmp
     assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] > 700
     held: list[socket.socket] = []
     try:
-        with Client(f"ipc://{runtime}/rtctl/flooded.command", timeout=30.0) as client:
+        with Client(f"ipc://{runtime}/rtctl/flooded.command", timeout=20.0) as client:
             deadline = time.monotonic() + 200
             while True:
                 with contextlib.suppress(UserError):
@@ -276,7 +276,13 @@ def test_a_machine_outlives_a_flood_with_few_file_descriptors(runtime: Path, tmp
                 while len(held) < 200 * (1 + ("telemetry", "rows", "command").index(which)):
                     made = connect(f"ipc://{runtime}/rtctl/flooded.{which}")
                     held += [made] if made is not None else []
-            assert client.call("disarm")
+            # The flood takes the place of who has been silent longest. Whoever asks at that moment loses one question.
+            for _ in range(3):
+                with contextlib.suppress(UserError):
+                    assert client.call("disarm")
+                    break
+            else:
+                pytest.fail("a client that was there before the flood is not answered any more")
             with Client(f"ipc://{runtime}/rtctl/flooded.command", timeout=30.0) as other:
                 assert other.call("status")["state"] == "idle"
                 other.call("stop")
