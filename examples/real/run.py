@@ -49,7 +49,7 @@ def run(name: str, case: dict[str, Any], out: Path) -> None:
     (FOUND / f"{name}.json").write_text(json.dumps(short(made.as_json()), indent=1) + "\n")
     for kind in ("missing_force", "heldout"):
         figure = getattr(figures, kind)(made.found)
-        figure.savefig(IMAGES / f"{name}_{kind.partition('_')[0]}.png", dpi=100)
+        figure.savefig(IMAGES / f"{name}_{kind.partition('_')[0]}.png", dpi=100, facecolor="white")
 
 
 def keywords(case: dict[str, Any]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ the law is the law as it is ticked. Where `response` gives curves, this gives po
 Source: Franklin, Powell & Workman, Digital Control of Dynamic Systems (1998), 4.3 (exact discretisation).
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 import control
@@ -14,6 +15,7 @@ import numpy as np
 from rtctl.design import response
 from rtctl.design.response import Loop, Model
 from rtctl.laws import disturbance_observer, state_feedback
+from rtctl.laws.transfer import System
 from rtctl.plants import linear
 
 
@@ -48,18 +50,15 @@ def law_system(parts: Loop, path: str = "feedback") -> Any:
     """The law as a sampled system: `feedback` from the negative position, `reference` from the reference."""
     p, dt = parts.blocks["position"], parts.dt
     if parts.kind == "sections":
-        K = _system([1.0], [1.0], dt)
-        for section in p:
-            K = _system([section.b0, section.b1, section.b2], [1.0, section.a1, section.a2], dt) * K
+        K = _filtered(_system([1.0], [1.0], dt), p, dt)
     elif parts.kind == "pd":
         K = p.gain + p.D * _difference(p.a, dt)
     elif parts.kind == "state_feedback":
-        A, b, c, d = state_feedback.system(p, path)
-        K = control.ss(A, b[:, None], c[None, :], d, dt)
+        K = _of_law(state_feedback.system(p, path), dt)
     else:
         K = _system([p.gain], [1.0], dt)
         if p.integral:
-            K = K + _system([p.integral, 0.0], [1.0, -1.0], dt)
+            K = K + _integral(p.integral, dt)
         if path == "feedback":
             v = parts.blocks["velocity"]
             K = K + p.velocity_gain * _difference(v.a, v.dt)
@@ -69,22 +68,34 @@ def law_system(parts: Loop, path: str = "feedback") -> Any:
 def compensated(parts: Loop, K: Any, path: str) -> Any:
     """A law `K` with the filter, the integral, the predictor and the disturbance observer around it."""
     blocks, dt = parts.blocks, parts.dt
-    for section in blocks.get("filter", ()):
-        K = _system([section.b0, section.b1, section.b2], [1.0, section.a1, section.a2], dt) * K
+    K = _filtered(K, blocks.get("filter", ()), dt)
     if "integral" in blocks and blocks["integral"].gain:
-        K = K + _system([blocks["integral"].gain, 0.0], [1.0, -1.0], dt)
+        K = K + _integral(blocks["integral"].gain, dt)
     if "predictor" in blocks and path == "feedback":
         p, v = blocks["predictor"], blocks["velocity"]
         moved = [p.K * p.dt**2 * (n - 0.5) for n in range(1, p.n + 1)]  # by the commands that have not acted yet
         inner = control.ss(control.tf(moved, [1.0, *np.zeros(p.n)], dt))
         K = (1.0 + p.n * p.dt * _difference(v.a, v.dt)) * control.feedback(K, inner)
     if "observer" in blocks:
-        to_y, to_u = (
-            control.ss(A, b[:, None], c[None, :], d, dt)
-            for A, b, c, d in disturbance_observer.systems(blocks["observer"], parts.motor == 2)
-        )
+        to_y, to_u = (_of_law(s, dt) for s in disturbance_observer.systems(blocks["observer"], parts.motor == 2))
         K = control.feedback(1.0, to_u, sign=1) * (K + to_y if path == "feedback" else K)
     return K
+
+
+def _filtered(K: Any, sections: Iterable[Any], dt: float) -> Any:
+    """A law with second-order sections behind it, by their params."""
+    for section in sections:
+        K = _system([section.b0, section.b1, section.b2], [1.0, section.a1, section.a2], dt) * K
+    return K
+
+
+def _of_law(system: System, dt: float) -> Any:
+    A, b, c, d = system
+    return control.ss(A, b[:, None], c[None, :], d, dt)
+
+
+def _integral(gain: float, dt: float) -> Any:
+    return _system([gain, 0.0], [1.0, -1.0], dt)
 
 
 def _difference(a: float, dt: float) -> Any:

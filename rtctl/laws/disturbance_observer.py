@@ -19,6 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.laws import transfer
+from rtctl.laws.transfer import System
 
 MOST_DELAY = 8  # ticks
 
@@ -99,9 +101,6 @@ def reset(p, s):
         s.u[i] = 0.0
 
 
-System = tuple[np.ndarray, np.ndarray, np.ndarray, float]  # A (n, n), b (n,), c (n,) and d
-
-
 def systems(p: DisturbanceObserverParams, back: bool = False) -> tuple[System, System]:
     """From the negative position, and from the command written, to the voltage against the disturbance, for positive
     commands or with `back` for negative ones."""
@@ -130,8 +129,5 @@ def response(p: DisturbanceObserverParams, f: np.ndarray, back: bool = False) ->
     """Responses (n,) of the voltage against the disturbance to the negative position and to the command written, at
     `f` (n,) Hz, for positive commands or with `back` for negative ones."""
     z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(f, float)) * p.dt)
-    to_y, to_u = (
-        d + np.einsum("i,nij,j->n", c, np.linalg.inv(z[:, None, None] * np.eye(len(A)) - A), b)
-        for A, b, c, d in systems(p, back)
-    )
-    return to_y, to_u
+    to_y, to_u = systems(p, back)
+    return transfer.response(to_y, z), transfer.response(to_u, z)

@@ -18,6 +18,10 @@ import numpy as np
 from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
+from rtctl.laws import integral, transfer
+from rtctl.laws.integral import IntegralParams, IntegralSettings
+from rtctl.laws.integral import track as unwind
+from rtctl.laws.transfer import System
 
 MOST = 16  # states
 
@@ -63,13 +67,13 @@ def build(settings: StateFeedbackSettings, dt: float) -> StateFeedbackParams:
             raise ValueError(f"{name} has {len(getattr(settings, name))} numbers, B has {n}; each has one for a state")
     if [len(row) for row in settings.A] != [n] * n:
         raise ValueError(f"A is {n} rows of {n} numbers, as B has {n}")
-    if settings.integral > 0.0 and settings.tau_t < dt:
-        raise ValueError(f"tau_t {settings.tau_t:g} s is shorter than the tick {dt:g} s; the integral would oscillate")
     A = np.zeros((MOST, MOST))
     A[:n, :n] = settings.A
     B, C, L, K, N = (_padded(row) for row in (settings.B, settings.C, settings.L, settings.K, settings.N))
-    tracking = dt / settings.tau_t if settings.integral > 0.0 else 0.0
-    return StateFeedbackParams(n, A, B, C, L, K, N, settings.N_u, settings.integral * dt, tracking)
+    part = IntegralParams(0.0, 0.0, 0.0)
+    if settings.integral > 0.0:
+        part = integral.build(IntegralSettings(gain=settings.integral, tau_t=settings.tau_t), dt)
+    return StateFeedbackParams(n, A, B, C, L, K, N, settings.N_u, part.gain, part.tracking)
 
 
 def _padded(row: list[float]) -> np.ndarray:
@@ -99,7 +103,7 @@ def step(p, s, e, x, ref):
 @tick
 def track(p, s, u_wanted, u_written):
     """Predict the next sample from the command written, V, and take from the integral what was cut off."""
-    s.i += p.tracking * (u_written - u_wanted)
+    unwind(p, s, u_wanted, u_written)
     for j in range(p.n):
         s.was[j] = s.x[j]
     for j in range(p.n):
@@ -115,7 +119,7 @@ def reset(p, s):
     s.primed = 0
 
 
-def system(p: StateFeedbackParams, path: str = "feedback") -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def system(p: StateFeedbackParams, path: str = "feedback") -> System:
     """A (n+1, n+1), b (n+1,), c (n+1,) and d of the law from the negative position (`feedback`) or from the reference
     alone (`reference`) to the command."""
     n = p.n
@@ -135,6 +139,4 @@ def system(p: StateFeedbackParams, path: str = "feedback") -> tuple[np.ndarray, 
 
 def response(p: StateFeedbackParams, back: np.ndarray, path: str = "feedback") -> np.ndarray:
     """Response (n,) of the law, `back` = e^(-j w dt)."""
-    A, b, c, d = system(p, path)
-    z = 1.0 / np.asarray(back)
-    return np.asarray(d + np.einsum("j,njk,k->n", c, np.linalg.inv(z[:, None, None] * np.eye(len(A)) - A), b))
+    return transfer.response(system(p, path), 1.0 / np.asarray(back))

@@ -6,7 +6,7 @@ a little better than a push that has none, and says something that nobody has se
 
 from rtctl.diagnose.calibration import VISIBLE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED
-from rtctl.diagnose.evidence.verdict import Verdict, of_names
+from rtctl.diagnose.evidence.verdict import Verdict, combinations, of_names
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.shares import explained
 from rtctl.diagnose.likelihood.widths import hollow
@@ -22,12 +22,7 @@ def filled(decided: Verdict, base: Fitted) -> Verdict:
         table = tuple(
             r._replace(fit=other) if r.fit.names == best.names and not r.unlisted else r for r in decided.table
         )
-        named: dict[tuple[str, ...], float] = {}
-        for r in table:
-            if not r.unlisted:
-                named[r.fit.names] = named.get(r.fit.names, 0.0) + r.probability
-        ranked = tuple(sorted(named.items(), key=lambda item: -item[1]))
-        decided = of_names(decided._replace(best=other, table=table, probabilities=ranked))
+        decided = of_names(decided._replace(best=other, table=table, probabilities=combinations(table)))
     return decided
 
 

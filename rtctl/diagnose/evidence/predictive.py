@@ -34,18 +34,17 @@ def predictive(decided: Verdict, heldout: Heldout) -> Fitted:
     """
     best = decided.best
     like = best.like
-    if decided.verdict not in (NAMED, AMBIGUOUS) or any(part.sim.mode != TRACK for part in like.parts):
+    if decided.verdict not in (NAMED, AMBIGUOUS) or not followed(like):
         return best
     tried: list[tuple[float, Fitted, bool]] = []
-    usual = min(1.0, like.sim.followed[0].bandwidth / like.sim.follow)
     for f in (best, *probable(decided)):
         early = heldout.fits[1] if f is best else fitted_to(heldout.early, f)
-        plain = f.space.model(least_squares(early.like.following(usual), early))
+        plain = f.space.model(least_squares(early.like.following(usual(like)), early))
         tried += [(free_error(heldout.late, early.model), f, False), (free_error(heldout.late, plain), f, True)]
     _, f, by_squares = min(tried, key=lambda one: one[0])
     if not by_squares:
         return f
-    return at(f, least_squares(like.following(usual), f))
+    return at(f, least_squares(like.following(usual(like)), f))
 
 
 def freest(f: Fitted) -> Fitted:
@@ -55,13 +54,22 @@ def freest(f: Fitted) -> Fitted:
     All have as many numbers. The held-out rows alone are too few to choose by, where a machine adds up its errors.
     """
     like = f.like
-    if not f.names or any(part.sim.mode != TRACK for part in like.parts):
+    if not f.names or not followed(like):
         return f
-    usual = min(1.0, like.sim.followed[0].bandwidth / like.sim.follow)
-    found = [f.x, *(least_squares(like.following(usual * slower), f) for slower in SLOWER)]
+    found = [f.x, *(least_squares(like.following(usual(like) * slower), f) for slower in SLOWER)]
     errors = [free_error(like, f.space.model(x)) for x in found]
     best = int(np.argmin(errors))
     return f if best == 0 or not np.isfinite(errors[best]) else at(f, found[best])
+
+
+def followed(like: Likelihood) -> bool:
+    """Whether an observer follows the machine in every recording."""
+    return all(part.sim.mode == TRACK for part in like.parts)
+
+
+def usual(like: Likelihood) -> float:
+    """The usual observer's quickness over that of the likelihood's own."""
+    return min(1.0, like.sim.followed[0].bandwidth / like.sim.follow)
 
 
 def at(f: Fitted, x: np.ndarray) -> Fitted:

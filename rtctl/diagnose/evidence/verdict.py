@@ -42,12 +42,8 @@ def verdict(found: Found) -> Verdict:
 def of_motion(found: Found) -> Verdict:
     """Verdict on what moves the machine."""
     table = rivals(found)
-    named: dict[tuple[str, ...], float] = {}
-    for rival in table:
-        if not rival.unlisted:
-            named[rival.fit.names] = named.get(rival.fit.names, 0.0) + rival.probability
-    ranked = tuple(sorted(named.items(), key=lambda item: -item[1]))
-    nothing, unlisted = named.get((), 0.0), 1.0 - sum(named.values())
+    ranked = combinations(table)
+    nothing, unlisted = dict(ranked).get((), 0.0), 1.0 - sum(p for _, p in ranked)
     fits: dict[tuple[str, ...], Fitted] = {}
     for rival in (r for r in table if not r.unlisted):
         fits.setdefault(rival.fit.names, rival.fit)
@@ -65,11 +61,14 @@ def of_motion(found: Found) -> Verdict:
     if nothing > 1.0 - SURE and nothing > unlisted:
         return answer(NOTHING, found.base, f"the description alone has a probability of {100 * nothing:.0f} %")
     nameless = unlisted > 0.5 or not best.names
-    alone = robust(table, best.names)
-    whole = next((f for names, f in fits.items() if alone and set(names) == set(alone)), None)
-    if nameless and whole is not None and explained(found.base, whole) >= MOSTLY:
-        why = f"beside it a wrong {beside.space.doubted} has a probability of {100 * unlisted:.0f} %"
-        return of_names(answer(NAMED, whole, why))
+    what = ""
+    if top is not None:
+        what = f"a wrong {top.doubted}" if free is None else f"{free.kind} at {free.node} by {free.axis} without a name"
+        what += f" has a probability of {100 * unlisted:.0f} %"
+    alone = set(robust(table, best.names)) if nameless else set()
+    whole = next((f for names, f in fits.items() if alone and set(names) == alone), None)
+    if whole is not None and explained(found.base, whole) >= MOSTLY:
+        return of_names(answer(NAMED, whole, f"beside it {what}"))
     stands = beside if nameless else best
     if not (nameless and free) and (seen := shown(found.base, stands)) < VISIBLE:
         why = (
@@ -77,11 +76,8 @@ def of_motion(found: Found) -> Verdict:
         )
         return answer(NOTHING, found.base, why)
     if nameless:
-        assert top is not None
         also = f"beside {', '.join(beside.names)} " if beside.names else ""
-        what = f"a wrong {top.doubted}" if free is None else f"{free.kind} at {free.node} by {free.axis} without a name"
-        why = f"{also}{what} has a probability of {100 * unlisted:.0f} %"
-        return answer(UNNAMED, beside, why)
+        return answer(UNNAMED, beside, f"{also}{what}")
     share = explained(found.base, best)
     if share < MOSTLY:
         bare = max((r for r in table if not r.fit.names), key=lambda r: r.merit)
@@ -90,6 +86,15 @@ def of_motion(found: Found) -> Verdict:
             return answer(UNNAMED, best, why)
         return answer(NOTHING, found.base, f"{why}, and the rest is as noise of the sensors leaves it")
     return of_names(answer(NAMED, best, ""))
+
+
+def combinations(table: tuple[Rival, ...]) -> tuple[tuple[tuple[str, ...], float], ...]:
+    """Probability of each combination of effects that has a name, likeliest first."""
+    named: dict[tuple[str, ...], float] = {}
+    for rival in table:
+        if not rival.unlisted:
+            named[rival.fit.names] = named.get(rival.fit.names, 0.0) + rival.probability
+    return tuple(sorted(named.items(), key=lambda item: -item[1]))
 
 
 def nameless_best(table: tuple[Rival, ...]) -> Rival | None:

@@ -33,13 +33,12 @@ def faint(f: Fitted) -> list[int]:
 def hollow(f: Fitted) -> list[int]:
     """Numbers of the effects of a model of which only the force at their place of rest is told: their own size may be
     zero by its 90 % interval."""
-    half, weak = half_widths(f), faint(f)
-    out = []
+    half, out = half_widths(f), []
     for index, h in enumerate(f.space.hypotheses):
         columns = f.space.columns(index)
-        own = [i for i in h.sizes if h.coordinates[i].kind == SIZE]
-        rests = any(c.kind == REST for c in h.coordinates)
-        if index not in weak and rests and all(abs(f.x[columns][i]) < half[columns][i] for i in own):
+        told = np.abs(f.x[columns]) >= half[columns]
+        own, rests = (told[[c.kind == kind for c in h.coordinates]] for kind in (SIZE, REST))
+        if rests.any() and not own.any():
             out.append(index)
     return out
 

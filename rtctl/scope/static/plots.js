@@ -133,7 +133,7 @@ export class Plots {
     const { traces } = this;
     const shown = series(traces.kind, lane, traces);
     const [low, high] = extent(lane.at.flatMap((i) => [traces.low[i], traces.high[i]]));
-    const fixed = this.scales.of(lane, [low, high]);
+    const fixed = this.scales.of(lane);
     lane.scale = prefixed(lane.unit, Math.max(...(fixed ?? [low, high]).map(Math.abs)));
     if (traces.kind === "time") {
       lane.xRange = traces.range[1] > traces.range[0] ? traces.range : [0, 1];

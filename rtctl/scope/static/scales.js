@@ -15,9 +15,8 @@ export class Scales {
     }
   }
 
-  // The fixed range of a lane in its unit, or null. `shown` is what its traces span.
-  of(lane, shown) {
-    lane.shown = shown;
+  // The fixed range of a lane in its unit, or null.
+  of(lane) {
     return this.fixed.get(lane.key) ?? null;
   }
 
