@@ -9,7 +9,6 @@ Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3 for the hel
 Drives (2001), 2.8 for the thermal model of first order.
 """
 
-import cmath
 import math
 from typing import Literal, NamedTuple
 
@@ -17,6 +16,7 @@ from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
+from rtctl.plants.physics import second_order
 from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
@@ -26,17 +26,18 @@ LEAST = 0.05  # of the cold one, that is always left
 
 
 class LagSettings(Settings):
-    """tau is the size. Order 2 has the natural frequency 1/tau rad/s and the damping zeta."""
+    """tau is the size: how late a slow command acts. Order 2 has the damping zeta and its natural frequency at
+    2 zeta/tau rad/s."""
 
     term: Literal["drive.lag"] = "drive.lag"
     node: Node
-    tau: float = quantity(unit="s", ge=0, le=10, help="time constant; 0 is no lag")
+    tau: float = quantity(unit="s", ge=0, le=10, help="how late it is; 0 is no lag")
     order: Literal[1, 2] = Field(default=1, description="of the lag")
     zeta: float = quantity(0.7, unit="", ge=0.05, le=20, help="damping of order 2")
 
 
 class LagParams(NamedTuple):
-    end: float  # e+ = end e + end_d d with e = y - u and d = tau y'
+    end: float  # e+ = end e + end_d d with e = y - u and d = y' in units of its own time
     end_d: float
     back: float  # d+ = back e + back_d d
     back_d: float
@@ -57,11 +58,8 @@ def build_lag(settings: LagSettings, h: float) -> LagParams:
         end = math.exp(-x)
         return LagParams(end, 0.0, 0.0, 0.0, -math.expm1(-x) / x, 0.0)
     zeta = settings.zeta
-    d = cmath.sqrt(1.0 - zeta * zeta)  # imaginary above critical damping
-    plus, minus = cmath.exp((-zeta + 1j * d) * x), cmath.exp((-zeta - 1j * d) * x)
-    C = (0.5 * (plus + minus)).real
-    S = ((plus - minus) / (2j * d)).real if abs(d) > 1e-6 else x * math.exp(-zeta * x)
-    end, end_d, back, back_d = C + zeta * S, S, -S, C - zeta * S
+    x *= 2.0 * zeta
+    end, end_d, back, back_d = second_order.transition(x, zeta)
     # The mean is A^-1 (Phi - I) / x with A = [[0, 1], [-1, -2 zeta]], in e and d.
     mean = (-2.0 * zeta * (end - 1.0) - back) / x
     mean_d = (-2.0 * zeta * end_d - (back_d - 1.0)) / x
@@ -150,7 +148,7 @@ LAG = Term(
     name="drive.lag",
     remedies=("feedforward", "lead"),
     words="it comes late and soft: the drive needs a moment to build up what is asked for",
-    equation="tau y' = u - y, or tau^2 y'' + 2 zeta tau y' + y = u",
+    equation="tau y' = u - y, or (tau/(2 zeta))^2 y'' + tau y' + y = u",
     source="Astrom & Wittenmark 1997, 2.3",
     settings=LagSettings,
     build=build_lag,
@@ -175,7 +173,7 @@ LAG = Term(
     ),
     check="Look for a filter on the command input and at the gains of the current loop.",
     search=(Size("tau", "tick", 0.5, blur="driver"), Choice("order", (1, 2))),
-    richer=(Shape("zeta", "one", (0.7,), 5.0),),
+    richer=(Shape("zeta", "one", (1.0,), 5.0), Choice("order", (2,))),
     late="bends",
     chosen={"order": (1, 2)},
 )

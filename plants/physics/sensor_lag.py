@@ -1,10 +1,10 @@
 """Lag of a sensor: it shows a filtered reading, which stays behind while the body moves.
 
-    tau y' = x - y
+    tau y' = x - y,  or  T^2 y'' + tau y' + y = x  with  T = tau / (2 zeta)
 
-What it shows is off by d = y - x with  d' = -d / tau - x',  stepped by its exponential from one reading to the next:
-exact for a reading that changes evenly in between, whatever it is of, any tau. A reading that is asked for twice at one
-time is the same.
+What it shows is off by d = y - x. With the rate g = T y' of order 2, d and g leave what they are where x goes on for
+ever as it does, exactly from one reading to the next: for a reading that changes evenly in between, whatever it is of,
+any tau. A reading that is asked for twice at one time is the same.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3; Harris & Piersol, Shock and Vibration Handbook
 (2002), ch. 13 for the filters of sensors.
@@ -13,27 +13,36 @@ Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3; Harris & P
 import math
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
-from rtctl.plants.physics.search import Size
+from rtctl.plants.physics import second_order
+from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
 class SensorLagSettings(Settings):
-    """tau is the size."""
+    """tau is the size: how late a steady motion is shown. Order 2 has the damping zeta and its natural frequency at
+    2 zeta/tau rad/s."""
 
     term: Literal["sensor.lag"] = "sensor.lag"
     node: Node
-    tau: float = quantity(unit="s", ge=0, le=10, help="time constant of the filter")
+    tau: float = quantity(unit="s", ge=0, le=10, help="how late it shows a steady motion")
+    order: Literal[1, 2] = Field(default=1, description="of the filter")
+    zeta: float = quantity(1.0, unit="", ge=0.05, le=20, help="damping of order 2")
 
 
 class SensorLagParams(NamedTuple):
     tau: float
+    T: float  # of order 2, inverse natural frequency, s; 0: of order 1
+    zeta: float
 
 
 SENSOR_LAG_STATE = state(
     d=float,
+    g=float,
     x=float,  # the reading before, and when it was
     t=float,
     begun=int,
@@ -42,7 +51,8 @@ SENSOR_LAG_STATE = state(
 
 def build_sensor_lag(settings: SensorLagSettings, h: float) -> SensorLagParams:
     """Nothing to discretise: the time between two readings is theirs."""
-    return SensorLagParams(max(settings.tau, 0.0))
+    tau = max(settings.tau, 0.0)
+    return SensorLagParams(tau, tau / (2.0 * settings.zeta) if settings.order == 2 else 0.0, settings.zeta)
 
 
 @tick
@@ -50,8 +60,16 @@ def show(p, s, x, t):
     """What the filter shows of a reading `x` at time t; where the clock begins anew, it goes on from there."""
     dt = t - s.t
     if s.begun == 1 and dt > 0.0:
-        keep = math.exp(-dt / p.tau) if p.tau > 0.0 else 0.0
-        s.d = s.d * keep - p.tau * (1.0 - keep) * (x - s.x) / dt
+        rest = -p.tau * (x - s.x) / dt  # where x goes on like this
+        if p.tau <= 0.0:
+            s.d, s.g = 0.0, 0.0
+        elif p.T == 0.0:
+            s.d = rest + (s.d - rest) * math.exp(-dt / p.tau)
+        else:
+            rate = p.T * (x - s.x) / dt
+            e, d = s.d - rest, s.g - rate
+            end, end_d, back, back_d = second_order.transition(dt / p.T, p.zeta)
+            s.d, s.g = rest + end * e + end_d * d, rate + back * e + back_d * d
     if s.begun == 0 or dt != 0.0:
         s.begun, s.x, s.t = 1, x, t
     return x + s.d
@@ -61,7 +79,7 @@ SENSOR_LAG = Term(
     name="sensor.lag",
     remedies=("behind",),
     words="the reading comes late and soft: it stays behind while the body moves, and is right at rest",
-    equation="tau y' = x - y",
+    equation="tau y' = x - y, or (tau/(2 zeta))^2 y'' + tau y' + y = x",
     source="Astrom & Wittenmark 1997, 2.3",
     settings=SensorLagSettings,
     build=build_sensor_lag,
@@ -87,5 +105,6 @@ SENSOR_LAG = Term(
     ),
     check="Look for a filter in the sensor, its converter or the input card, and at the averaging that is set there.",
     search=(Size("tau", "tick", 1.0, blur="driver"),),
+    richer=(Shape("zeta", "one", (1.0,), 5.0), Choice("order", (2,))),
     draws={"tau": Draw(0.5, 3.0, "tick")},
 )
