@@ -22,6 +22,7 @@ from rtctl.plants.rows import LANES, sum_rows
 SWEEPS = 3  # of Gauss-Seidel, warm-started: node couplings within one substep are weak
 TAYLOR = 12  # terms; the argument is scaled below a half, so the remainder is under 1e-13 of it
 BALANCE_SWEEPS = 20
+ENDLESS = 1e100  # rate times a substep
 
 
 MOST_BODIES = 12  # coordinates, as many as a machine may have; a record of one size is compiled once for all machines
@@ -63,6 +64,7 @@ MACHINE = state(  # a machine: its matrices for one substep, its state, and what
     dry_base=(float, MOST_BODIES),
     dry=(float, MOST_BODIES),  # limit of the dry friction on each coordinate
     r=(float, MOST_BODIES),  # dry friction in force
+    meant=int,  # 1: more moves it than A and G say, so that accelerations are means of the last substep
     link_i=(int, MOST_LINKS),
     link_j=(int, MOST_LINKS),
     link_a=(float, MOST_LINKS),
@@ -117,6 +119,9 @@ def discretise_into(A, G, nx, ng, h, Phi_T, Gamma_T, work):
         for j in range(n):
             row += abs(M[i, j])
         norm = max(norm, row)
+    if not norm < ENDLESS:  # of a model that has run away: halving would never end
+        Phi_T[:nx, :nx], Gamma_T[: n - nx, :nx] = np.nan, np.nan
+        return
     squarings = 0
     while norm > 0.5:
         norm *= 0.5
@@ -206,6 +211,22 @@ def midpoint(m):
         m.link_T[j] = 0.0
         m.link_e[j] = 0.0
         m.link_v[j] = 0.0
+
+
+@tick
+def acceleration(m, i):
+    """Of coordinate `i` at the end of the last substep, by the forces there: a mean of the substep would be late."""
+    if m.t == 0.0:
+        return 0.0
+    at = m.nq + i
+    if m.meant == 1:
+        return (m.x[at] - m.v_before[i]) / m.h
+    total = m.G[at, m.nu + i] * (m.f[i] + m.r[i])
+    for k in range(m.nx):
+        total += m.A[at, k] * m.x[k]
+    for d in range(m.nu):
+        total += m.G[at, d] * m.u[d]
+    return total
 
 
 @tick

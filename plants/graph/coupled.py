@@ -347,6 +347,7 @@ def steps(mechanics: Any, name: str) -> ModuleType:
         """One substep with the inputs m.u and the smooth forces m.f held; dry friction m.dry closes it."""
         nq, W = p.nq, m.work
         m.t += p.h
+        m.meant = 1
         dry = 0
         for j in range(nq):
             if m.dry[j] > 0.0:

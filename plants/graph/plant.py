@@ -124,8 +124,8 @@ def read(p, m):
             at = kind * nq
             m.y[c] = a * m.x[at + i] + b * m.x[at + j]
             m.y_rate[c] = a * m.x[nq + i] + b * m.x[nq + j] if kind == POSITION else 0.0
-        elif kind == ACCELERATION:  # mean of the last substep
-            m.y[c] = (a * (m.x[nq + i] - m.v_before[i]) + b * (m.x[nq + j] - m.v_before[j])) / m.h
+        elif kind == ACCELERATION:
+            m.y[c] = a * linear.acceleration(m, i) + b * linear.acceleration(m, j)
         elif kind == TENSION:
             m.y[c] = tension(m, p.sensor_of[c])
         else:

@@ -3,7 +3,7 @@
 Both steps are exact for a command that is held over the substep; the lag gives the mean of its response over it.
 `drive.thermal` at a drive takes from the gain (resistance and magnets), and with `ease` from the dry friction that it
 works against (grease); at a node with dry friction from that alone.
-Either way the heat is that of the motor's current.
+At a body of a described machine it is the friction there. The heat is that of the motor's current, or of all of them.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3 for the held input; Krishnan, Electric Motor
 Drives (2001), 2.8 for the thermal model of first order.
@@ -100,8 +100,8 @@ class ThermalParams(NamedTuple):
     end: float  # exp(-h/tau)
     per_volt2: float
     channel: int
-    a: float  # of a described machine, whose node is always a drive: losses of its gain and of what it works against
-    ease: float
+    a: float  # of a described machine: loss of the gain of a drive, or of the friction of a body
+    ease: float  # and of the friction that a drive works against
 
 
 THERMAL_STATE = state(heat=float)
@@ -127,7 +127,10 @@ def left(p, lost):
 
 @tick
 def thermal_gain(p, s, volts, c, loss):
-    """Warm the motor by volts `c` of the `volts` (n,) over a substep and lower them by what it has lost."""
+    """Warm the motor by volts `c` of the `volts` (n,) over a substep and lower them by what it has lost; not where c is
+    below zero, at a body."""
+    if c < 0:
+        return
     u = volts[c]
     load = u * u * p.per_volt2
     volts[c] = u * left(p, loss * s.heat)
@@ -138,6 +141,20 @@ def thermal_gain(p, s, volts, c, loss):
 def thermal_friction(p, s, dry, loss):
     """Dry friction of a warm motor whose cold one is `dry`, Nm or N."""
     return dry * left(p, loss * s.heat)
+
+
+@tick
+def thermal_dry(p, s, m, i, c):
+    """Dry friction of coordinate `i` of a described machine, Nm or N: that which a warm drive `c` works against, or of
+    a body (c below zero) that the drives of the machine warm."""
+    if c >= 0:
+        return thermal_friction(p, s, m.dry[i], p.ease)
+    load = 0.0
+    for d in range(m.nu):
+        load += m.volts[d] * m.volts[d] * p.per_volt2
+    dry = thermal_friction(p, s, m.dry[i], p.a)
+    s.heat = load + (s.heat - load) * p.end
+    return dry
 
 
 BY_NAME = (  # of a plant whose nodes are motors as well as drives
@@ -187,7 +204,7 @@ THERMAL = Term(
     build=build_thermal,
     act={
         "command": "drive_dynamics.thermal_gain({p}, {s}, {m}.volts, {c}, {p}.a)",
-        "force": "{m}.dry[{i}] = drive_dynamics.thermal_friction({p}, {s}, {m}.dry[{i}], {p}.ease)",
+        "force": "{m}.dry[{i}] = drive_dynamics.thermal_dry({p}, {s}, {m}, {i}, {c})",
         **{f"command:{kind}": BY_NAME[0] for kind in ("ivu", "ldu", "axis")},
         **{f"force:{kind}": BY_NAME[1] for kind in ("ivu", "ldu", "axis")},
     },

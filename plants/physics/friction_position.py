@@ -1,7 +1,13 @@
 """Dry friction that changes along the way: a bent rail, a bearing out of true, a stretch that is worn.
 
-The limit of dry friction is larger by  slope x + A sin(2 pi x / length + phi). Where a sum of limits is below zero it
-counts as none, so that friction never pushes.
+The limit of dry friction is larger by  slope x + A f(x), in one of three forms:
+
+    wave  f = sin(2 pi x / length + phi)              a shaft or a bearing out of true, a wavy rail
+    step  f = (1 + tanh(2 (x - at) / length)) / 2     another piece of rail, a seal from some place on
+    spot  f = exp(-((x - at) / length)^2 / 2)         a stretch that is worn, or where a rail pinches
+
+Where a sum of limits is below zero it counts as none, so that friction never pushes. A spot that is narrow against the
+travel is a `load.bump`.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), section 2.3 for friction by position;
 Armstrong, Friction: experimental determination, modeling and compensation, ICRA (1988).
@@ -10,21 +16,28 @@ Armstrong, Friction: experimental determination, modeling and compensation, ICRA
 import math
 from typing import Literal, NamedTuple
 
+from pydantic import Field
+
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
-from rtctl.plants.physics.search import Shape, Size, Turn
+from rtctl.plants.physics.search import At, Choice, Shape, Size, Turn
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 
+FORMS = ("wave", "step", "spot")
+
+
 class PositionSettings(Settings):
-    """A and slope are the sizes."""
+    """A and slope are the sizes; below zero it rubs less."""
 
     term: Literal["friction.position"] = "friction.position"
     node: Node
     A: float = quantity(unit="", ge=-1e4, le=1e4, help="amplitude of dry friction along the way, Nm or N by node")
     phi: float = quantity(0.0, unit="rad", ge=-100, le=100, help="phase at position 0")
-    length: float = quantity(unit="", gt=0, le=1e3, help="way over which it comes back, rad or m by node")
+    length: float = quantity(unit="", gt=0, le=1e3, help="of a wave; width of a step or a spot; rad or m by node")
+    form: Literal["wave", "step", "spot"] = Field(default="wave", description="how it changes")
+    at: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="where the step or the spot is, rad or m by node")
     slope: float = quantity(0.0, unit="", ge=-1e6, le=1e6, help="growth of dry friction along the way, N/m or Nm/rad")
 
 
@@ -33,29 +46,41 @@ class PositionParams(NamedTuple):
     phi: float
     n: float  # rad/m, or 1
     slope: float
+    form: int
+    at: float
+    length: float
 
 
 def build_position(settings: PositionSettings, h: float) -> PositionParams:
     """Nothing to discretise."""
-    return PositionParams(settings.A, settings.phi, 2.0 * math.pi / settings.length, settings.slope)
+    s = settings
+    return PositionParams(s.A, s.phi, 2.0 * math.pi / s.length, s.slope, FORMS.index(s.form), s.at, s.length)
 
 
 @tick
 def along(p, x):
     """Addition to the limit of dry friction at `x`, Nm or N."""
-    return p.slope * x + p.A * math.sin(p.n * x + p.phi)
+    if p.form == 0:
+        return p.slope * x + p.A * math.sin(p.n * x + p.phi)
+    r = (x - p.at) / p.length
+    return p.slope * x + p.A * (0.5 + 0.5 * math.tanh(2.0 * r) if p.form == 1 else math.exp(-0.5 * r * r))
+
+
+WAVE = (Turn("A", "phi", "force", 0.2), Shape("length", "span", (0.5, 1.2), 2.0), Choice("form", ("wave",)))
+STEP = (Size("A", "force", 0.2, signed=True), At("at", "length", 3, 0.1, 0.1), Choice("form", ("step",)))
+SPOT = (Size("A", "force", 0.2, signed=True), At("at", "length", 4, 0.1, 0.1), Choice("form", ("spot",)))
 
 
 POSITION = Term(
     name="friction.position",
     remedies=("feedforward", "integral"),
     words="it rubs more at one end or in the middle of the way than elsewhere",
-    equation="|F| <= F_C + slope x + A sin(2 pi x / length + phi)",
+    equation="|F| <= F_C + slope x + A f(x), f a wave, a step or a spot of some length",
     source="Armstrong-Helouvry et al. 1994, 2.3",
     settings=PositionSettings,
     build=build_position,
     act={"force": "{m}.dry[{i}] += {r} * friction_position.along({p}, {r} * {m}.qm[{i}])"},
-    stands=(stand("body", "general"),),
+    stands=(stand("body", "general", ways=(WAVE, STEP, SPOT)),),
     look_alikes={
         "load.bump": "pass slowly over the whole way: a bump is narrow, friction along the way changes gently",
         "load.spring": "there and back slowly: a spring helps one way, friction hinders both",
@@ -70,13 +95,13 @@ POSITION = Term(
     phrase=Phrase(
         noun="friction that changes along the way",
         head="{here} rubs more at some places",
-        detail="by up to {A}, in waves of {length}",
+        detail="{A} {A:more|less}, over {length}",
         need="slow moves over the whole way, both directions",
     ),
     check="Pull slowly over the whole way with a spring balance; look at the rail and at worn stretches.",
-    units={"A": "force", "length": "position", "slope": "stiffness"},
+    units={"A": "force", "length": "position", "at": "position", "slope": "stiffness"},
     needs=Needs(dry=True),
-    search=(Turn("A", "phi", "force", 0.2), Shape("length", "span", (0.5, 1.2), 2.0)),
+    search=WAVE,
     richer=(Size("slope", "stiff", 0.1, signed=True),),
     static=True,
     draws={"A": Draw(0.1, 0.5, "force"), "length": Draw(0.5, 1.5, "travel")},

@@ -255,3 +255,9 @@ def test_advance_and_discretise_allocate_nothing(allocations):
 def discretisations(m, n):
     for _ in range(n):
         linear.discretise_machine(m)
+
+
+@pytest.mark.parametrize("rate", [np.inf, np.nan, 1e200])
+def test_a_machine_that_has_run_away_ends(rate):
+    Phi_T, Gamma_T = linear.discretise(np.array([[0.0, 1.0], [-rate, 0.0]]), np.array([[0.0], [1.0]]), 1e-3)
+    assert np.isnan(Phi_T).all() and np.isnan(Gamma_T).all()

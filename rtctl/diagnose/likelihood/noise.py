@@ -16,7 +16,8 @@ from numpy.lib.stride_tricks import as_strided, sliding_window_view
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import nnls
 
-SPAN = 3  # innovations before and after, of each earlier sensor, that foretell one of a later sensor
+SPAN = 10  # innovations before and after, of each earlier sensor, that foretell one of a later sensor
+OWN = 10  # innovations of its own before, that foretell it beside those
 ROWS = 20  # innovations for each coefficient, without which nothing is foretold
 VARIANCES = 5  # rounds of a variance function, at most, each weighed by the one before
 SETTLED = 1e-3  # of the least variance: a round that changes less is the last
@@ -104,24 +105,46 @@ def noises_of(
     grids: list[np.ndarray | None] = []
     for c, rows in enumerate(present):
         own = noise_of(e[rows, c], order, float(least[c]))
-        rest, at = own.filtered(e[rows, c]), rows[own.order :]
-        known = [(d, neighbours(grid, at)) for d, grid in enumerate(grids) if grid is not None]
-        beside, left = [np.zeros(2 * SPAN + 1)] * c, rest
-        if known and len(at) > ROWS * len(known) * (2 * SPAN + 1):
-            M = np.concatenate([found for _, found in known], axis=1)
-            A = M.T @ M
-            A[np.diag_indices_from(A)] += 1e-9 * np.trace(A) + 1e-300
-            told = np.linalg.solve(A, M.T @ rest)
-            for (d, _), own_part in zip(known, np.split(told, len(known)), strict=True):
-                beside[d] = own_part
-            left = rest - M @ told
-            own = own._replace(sigma=max(float(np.sqrt(np.mean(left**2))), float(least[c])), beside=tuple(beside))
+        left, at = own.filtered(e[rows, c]), rows[own.order :]
+        if any(grid is not None for grid in grids):
+            own, left = joined(own, left, at, grids)
+            at = rows[own.order :]
+            own = own._replace(sigma=max(float(np.sqrt(np.mean(left**2))), float(least[c])))
         if growth and len(left) > ROWS * growth[c].shape[1]:
             own = own._replace(sigma=levels(left, growth[c][own.order :], float(least[c])))
         out.append(own)
         white.append(left / own.sigma)
-        grids.append(gridded(rest, at, len(e)) if len(rows) == len(e) else None)
+        grids.append(gridded(left, at, len(e)) if len(rows) == len(e) else None)
     return out, white
+
+
+def joined(
+    own: Noise, rest: np.ndarray, at: np.ndarray, grids: Sequence[np.ndarray | None]
+) -> tuple[Noise, np.ndarray]:
+    """Noise of a sensor by its past and by the innovations of the sensors before it, and what neither foretells; as it
+    is alone (`rest` in the rows `at`) where there are too few rows.
+
+    Both are fitted at once: of what others foretell, the past of a sensor foretells another part than of all of it.
+    """
+    past = min(OWN, own.order)
+    columns = [neighbours(grid, at[past:]) for grid in grids if grid is not None]
+    if len(at) - past <= ROWS * (past + (2 * SPAN + 1) * len(columns)):
+        return own, rest
+    if past:
+        columns.append(sliding_window_view(rest, past)[:-1, ::-1])
+    M = np.concatenate(columns, axis=1)
+    A = M.T @ M
+    A[np.diag_indices_from(A)] *= 1.0 + 1e-9
+    A[np.diag_indices_from(A)] += 1e-300
+    told = np.linalg.solve(A, M.T @ rest[past:])
+    left = rest[past:] - M @ told
+    beside, at_column = [], 0
+    for grid in grids:
+        width = 0 if grid is None else 2 * SPAN + 1
+        beside.append(told[at_column : at_column + width] if width else np.zeros(2 * SPAN + 1))
+        at_column += width
+    a = np.convolve(own.a, np.concatenate([[1.0], -told[at_column:]]))
+    return own._replace(a=a, beside=tuple(beside)), left
 
 
 def whitened(noises: Sequence[Noise], e: np.ndarray, present: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -130,11 +153,11 @@ def whitened(noises: Sequence[Noise], e: np.ndarray, present: Sequence[np.ndarra
     grids: list[np.ndarray | None] = []
     for c, (noise, rows) in enumerate(zip(noises, present, strict=True)):
         rest, at = noise.filtered(e[rows, c]), rows[noise.order :]
-        needed = any(len(later.beside) > c and later.beside[c].any() for later in noises[c + 1 :])
-        grids.append(gridded(rest, at, len(e)) if needed else None)
         for grid, told in zip(grids, noise.beside, strict=False):
             if grid is not None and told.any():
                 rest = rest - filtered(told[::-1], grid)[at]
+        needed = any(len(later.beside) > c and later.beside[c].any() for later in noises[c + 1 :])
+        grids.append(gridded(rest, at, len(e)) if needed else None)
         out.append(noise.scaled(rest))
     return out
 

@@ -108,6 +108,7 @@ def hold(job, p, m, k, share, path, pace):
     one = min(max(k, 0), n - 1)
     two = min(one + 1, n - 1) if k >= 0 else one
     s, T = share, 1.0 / job.rate
+    m.meant = 1
     for i in range(p.nq):
         if job.held[i] == 0:
             continue

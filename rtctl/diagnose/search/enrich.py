@@ -1,5 +1,7 @@
 """Richer and other forms of the effects that were found: harmonics, a second branch, another shape of the same law."""
 
+from itertools import product
+
 import numpy as np
 
 from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, relaxed
@@ -10,6 +12,8 @@ from rtctl.diagnose.search.grid_starts import starts_of
 from rtctl.diagnose.search.term_variants import forms, is_rich
 from rtctl.plants.physics import TERMS, standing
 
+ORDER = "order"  # of a wave, per turn
+ROUNDS = 2  # of other forms: a further parameter may ask for another setting beside it
 WORTH = 2.0  # nats of evidence that another form must bring
 QUIET = 3.0  # times the least noise, below which one maximum is enough
 SHARES = (0.4, 2.5, 7.0)  # of a size, at other starts
@@ -19,13 +23,17 @@ DRAWS = 2  # starts with other nominal values
 def enriched(best: Fitted) -> Fitted:
     """The model with each effect in the form that the record asks for."""
     for index in range(len(best.space.hypotheses)):
-        for other in others(best, index):
-            space, x = exchanged(best, index, other)
-            trial = refit(best.like, space, x, best.J[..., : space.nb], draft=True)
-            if trial.log_evidence > best.log_evidence - NEAR:
-                trial = finished(trial)
-            if trial.log_evidence > best.log_evidence + WORTH:
-                best = trial
+        for _ in range(ROUNDS):
+            before = best
+            for other in others(best, index):
+                space, x = exchanged(best, index, other)
+                trial = refit(best.like, space, x, best.J[..., : space.nb], draft=True)
+                if trial.log_evidence > best.log_evidence - NEAR:
+                    trial = finished(trial)
+                if trial.log_evidence > best.log_evidence + WORTH:
+                    best = trial
+            if best is before:
+                break
     return best
 
 
@@ -67,18 +75,23 @@ def others(f: Fitted, index: int) -> list[Hypothesis]:
 
 
 def richer(f: Fitted, h: Hypothesis) -> list[Hypothesis]:
-    """The effect with the further parameters of its richer form; none where it has none."""
+    """The effect with the further parameters of its richer form; none where it has none.
+
+    What comes several times a turn may be a harmonic of what comes once.
+    """
     term, sim = TERMS[h.term], f.like.sim
     found = standing(term, sim.elements, h.node)
     if not term.richer or is_rich(h) or (term.richer_at and (found is None or found[1].kind != term.richer_at)):
         return []
     measures = Measures(sim, f.model.base, {})
     own = {c.name for c in h.coordinates}
-    out = []
-    for more in starts_of(h.term, h.node, term.richer, measures):
+    out: list[Hypothesis] = []
+    orders = [{}] if h.fixed.get(ORDER, 1.0) == 1.0 else [{}, {ORDER: 1.0}]
+    for more, order in product(starts_of(h.term, h.node, term.richer, measures), orders):
         added = tuple(c for c in more.coordinates if c.name not in own)
-        if added:
-            out.append(h._replace(coordinates=(*h.coordinates, *added), fixed={**h.fixed, **more.fixed}))
+        other = h._replace(coordinates=(*h.coordinates, *added), fixed={**h.fixed, **order, **more.fixed})
+        if added and other not in out:
+            out.append(other)
     return out
 
 

@@ -30,7 +30,7 @@ def run(p, s, n):
 
 
 def params(h: float, **groups: Any) -> Any:
-    machine = Description.model_validate({"sensors": SEEN, **groups})
+    machine = Description.model_validate({"sensors": SEEN} | groups)
     return build(layout(machine), dict(machine.paths()), h)
 
 
@@ -53,6 +53,33 @@ def test_modes_of_a_belt():
     lightness = n * n / J + 1.0 / m
     assert abs(values[3]) == pytest.approx(math.sqrt(k * lightness))
     assert -values[3].real / abs(values[3]) == pytest.approx(0.5 * d * math.sqrt(lightness / k))
+
+
+@pytest.mark.parametrize("h", [1e-4, 1e-3, 4e-3])
+def test_an_accelerometer_shows_the_instant_however_long_a_substep_is(h):
+    m, k = 2.0, 800.0
+    seen = {"eye": {"body": "a", "column": "eye", "measures": "acceleration"}}
+    p = params(
+        h, sensors=seen, bodies={"a": {"mass": m}, "wall": {"fixed": True}},
+        joints={"spring": {"from": "wall", "to": "a", "stiffness": k}},
+    )  # fmt: skip
+    s = started(p)
+    s.m.x[0] = 0.01
+    run(p, s, round(0.1 / h))
+    w = math.sqrt(k / m)
+    assert s.m.y[0] == pytest.approx(-w * w * 0.01 * math.cos(w * 0.1), rel=1e-6)
+
+
+def test_an_accelerometer_shows_nothing_of_what_stands_still():
+    seen = {"eye": {"body": "a", "column": "eye", "measures": "acceleration"}}
+    p = params(
+        1e-3, sensors=seen, bodies={"a": {"mass": 2.0, "dry": "1 N"}},
+        drives={"motor": {"body": "a", "column": "u", "kind": "force", "gain": 1.0}},
+    )  # fmt: skip
+    s = started(p)
+    s.m.volts[0] = 0.8
+    run(p, s, 20)
+    assert s.m.y[0] == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("extra", [{}, {"inductance": 1e-3}, {"bandwidth_hz": 300.0}])
