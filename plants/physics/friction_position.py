@@ -24,7 +24,6 @@ from rtctl.plants.physics.search import At, Choice, Shape, Size, Turn
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
-
 FORMS = ("wave", "step", "spot")
 
 

@@ -44,33 +44,34 @@ def build_inertia(settings: InertiaSettings, h: float) -> InertiaParams:
 
 
 @tick
-def acceleration(m, i):
-    """What the linear model makes of all that acts on node `i`, without dry friction, rad/s^2 or m/s^2."""
-    nq, nu, nx = m.nq, m.nu, m.nx
-    a = 0.0
+def gained(m, i):
+    """Speed that node `i` gains in this substep by the linear model and the forces so far, rad/s or m/s."""
+    nq, nu, at = m.nq, m.nu, m.nq + i
+    v = -m.x[at]
+    for k in range(m.nx):
+        v += m.Phi_T[k, at] * m.x[k]
+    for d in range(nu):
+        v += m.Gamma_T[d, at] * m.u[d]
     for j in range(nq):
-        a += m.A[nq + i, j] * m.qm[j] + m.A[nq + i, nq + j] * m.vm[j] + m.G[nq + i, nu + j] * m.f[j]
-    for j in range(2 * nq, nx):
-        a += m.A[nq + i, j] * m.x[j]
-    for j in range(nu):
-        a += m.G[nq + i, j] * m.u[j]
-    return a
+        v += m.Gamma_T[nu + j, at] * m.f[j]
+    return v
 
 
 @tick
 def turned(p, m, i, r):
-    """Let all that turns node `i` turn its inertia at its angle; `r` takes its rotation to the unit of A."""
-    nq, nu = m.nq, m.nu
-    J_0 = 1.0 / m.G[nq + i, nu + i]
+    """Let all that turns node `i` turn its inertia at its angle; `r` takes its rotation to the unit of A.
+
+    In a substep J dv is the impulse of all forces, and J_0 dv the same with that of the torque here. The torque changes
+    dv, and with it what stiff springs beside the node do: it is solved for at once.
+    """
+    J_0 = 1.0 / m.G[m.nq + i, m.nu + i]
     x = p.n * r * m.qm[i] + p.phi
     J = max(J_0 + r * r * p.A * math.cos(x), SMALLEST * J_0)
     slope = -r * r * r * p.n * p.A * math.sin(x)
-    change = J_0 / J - 1.0
-    torque = J_0 * acceleration(m, i) * change - 0.5 * (1.0 + change) * slope * m.vm[i] * m.vm[i]
-    # A light body follows its springs within a substep; held over one, the full force would make it ring ever louder.
-    k, c = -m.A[nq + i, nq + i], -m.A[nq + i, i]
-    m.f[i] += torque / (1.0 + abs(change) * m.h * (max(k, 0.0) + m.h * max(c, 0.0)))
-    m.dry[i] *= 1.0 + change
+    less = (J_0 - J) / m.h
+    push = less * gained(m, i) - 0.5 * slope * m.vm[i] * m.vm[i]
+    m.f[i] += push / (1.0 - less * m.Gamma_T[m.nu + i, m.nq + i])
+    m.dry[i] *= J_0 / J
 
 
 INERTIA = Term(
@@ -103,6 +104,7 @@ INERTIA = Term(
     units={"A": "inertia"},
     needs=Needs(turns=0.25),
     search=(Turn("A", "phi", "inertia", 0.1), Choice("order", (1.0, 2.0))),
+    stiff=True,
     draws={"A": Draw(0.1, 0.4, "inertia")},
     chosen={"order": (1.0, 2.0)},
 )

@@ -15,7 +15,7 @@ import pytest
 from rtctl.idiom import interpreted
 from rtctl.plants import axis, linear
 from rtctl.plants.graph import plant as graph
-from rtctl.plants.physics import TERMS, anywhere, by_kind, sensor_lag
+from rtctl.plants.physics import TERMS, anywhere, by_kind, friction_position, sensor_lag
 from rtctl.plants.physics.sensor_lag import SensorLagSettings
 from rtctl.plants.physics.term import SITES
 
@@ -212,6 +212,14 @@ def test_a_filter_is_the_same_however_often_it_is_read(order):
         swings = 0.4 if order else 1e-6  # of order 2, four time constants later
         assert behind[0] == pytest.approx(3.0 * 5e-3 * (1.0 - math.exp(-4.0)), rel=swings)
         assert sensor_lag.show(p, s, 1.0, 0.0) == pytest.approx(1.0 + s.d)  # a clock that begins anew
+
+
+@pytest.mark.parametrize(("form", "low", "there", "high"), [("step", 0.0, 0.15, 0.3), ("spot", 0.0, 0.3, 0.0)])
+def test_friction_along_the_way_in_a_step_and_a_spot(form, low, there, high):
+    settings = friction_position.PositionSettings(node="axis", A=0.3, length=0.02, form=form, at=0.5)
+    with interpreted():
+        p = friction_position.build_position(settings, 1e-3)
+        assert [friction_position.along(p, x) for x in (0.3, 0.5, 0.7)] == pytest.approx([low, there, high], abs=1e-9)
 
 
 def test_gravity_has_the_period_of_a_turn_and_pulls_a_slide_one_way():

@@ -1,6 +1,7 @@
 """Lag and warmth: exact responses whatever the step, and no effect where there is none."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import stand
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rtctl.idiom import interpreted
 from rtctl.plants import axis, ivu, ldu
 from rtctl.plants.physics import drive_dynamics, place
 from rtctl.plants.physics.drive_dynamics import LagSettings, ThermalSettings, build_lag, build_thermal
@@ -140,3 +142,17 @@ def test_a_drive_of_any_name_loses_its_gain():
     r = machine.run(machine.SCREW, [machine.settings("drive.thermal", "amplifier", a=0.4, tau=0.05)], np.ones(400))
     assert r.u[0, 0] == 1.0
     assert r.u[-1, 0] == pytest.approx(math.exp(-0.4), rel=1e-3)
+
+
+def test_a_body_of_a_described_machine_warms_by_all_drives():
+    p, s = warm("carriage", a=0.4)
+    m = SimpleNamespace(nu=2, volts=np.array([2.0, 0.0, 0.0, 0.0]), dry=np.array([3.0, 5.0]))
+    before = m.volts.copy()
+    with interpreted():
+        for _ in range(2000):
+            drive_dynamics.thermal_gain(p, s, m.volts, -1, p.a)
+            left = drive_dynamics.thermal_dry(p, s, m, 1, -1)
+        at_a_drive = drive_dynamics.thermal_dry(p, zeros(drive_dynamics.THERMAL_STATE), m, 1, 0)
+    assert left == pytest.approx(5.0 * math.exp(-0.4), rel=1e-3)
+    assert (m.volts == before).all()  # a body takes nothing from a drive
+    assert at_a_drive == 5.0  # there it is `ease` that counts
