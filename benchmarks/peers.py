@@ -1,6 +1,6 @@
 """How late our loop wakes and what its tick costs, beside cyclictest and a HAL thread of LinuxCNC.
 
-    python benchmarks/peers.py [--json] [--rate HZ] [--seconds S] [--rounds N]
+    python benchmarks/peers.py [--json] [--rate HZ] [--seconds S] [--rounds N] [--stress]
 
 A round is a window of each, one after the other; the next round goes backwards. All wake at the same rate on the last
 CPU; an emulated LDU runs on the first CPU during all of them:
@@ -10,12 +10,16 @@ CPU; an emulated LDU runs on the first CPU during all of them:
     hal          hal/law.hal: two `pid` and a `lowpass` in a thread of rtapi_app
     law          the same law in our own steps, in a bare thread (hal/law.py): its cost only, not its lateness
 
+--stress loads every CPU with a busy process during all windows, and ours with four viewers and 200 clients besides.
+
 The result is the median over the rounds of ours over theirs. A peer that is not installed is left out; without any
 the program says so and ends with 3. It installs nothing.
 """
 
 import argparse
+import contextlib
 import json
+import os
 import statistics
 import sys
 import tempfile
@@ -37,6 +41,7 @@ from lateness import (
     why_no_cyclictest,
     why_no_realtime,
 )
+from stress import asked, busy
 
 MACHINE = "ldu"
 TARGETS = {"lateness": 1.1, "law": 2.0}
@@ -64,7 +69,15 @@ def hal_window(library: Path, rate: float, seconds: float, folder: Path, counts_
     }
 
 
-def measure(rate: float, seconds: float, rounds: int, absent: dict[str, str], folder: Path) -> dict[str, Any]:
+def loaded(rate: float, seconds: float, folder: Path, stress: bool) -> dict[str, Any]:
+    """A window of ours, under stress with viewers and clients."""
+    with asked(f"bench-{os.getpid()}") if stress else contextlib.nullcontext():
+        return ours(MACHINE, rate, "shm", seconds, folder)
+
+
+def measure(
+    rate: float, seconds: float, rounds: int, absent: dict[str, str], folder: Path, stress: bool = False
+) -> dict[str, Any]:
     """All windows and what they say; a peer that turns out not to run here joins `absent`."""
     ours(MACHINE, rate, "shm", 0.5, folder)  # compile where needed, outside the windows
     counts_per_ns = law.run(rate, 0.5, PRIORITY)[1]
@@ -73,7 +86,7 @@ def measure(rate: float, seconds: float, rounds: int, absent: dict[str, str], fo
     for number in range(rounds):
         beside = [name for name in ("cyclictest", "hal", "law") if name not in absent]
         if number % 2 == 0:
-            done["ours"].append(ours(MACHINE, rate, "shm", seconds, folder))
+            done["ours"].append(loaded(rate, seconds, folder, stress))
         with plant(MACHINE, rate, folder):
             for name in beside if number % 2 == 0 else reversed(beside):
                 try:
@@ -81,7 +94,7 @@ def measure(rate: float, seconds: float, rounds: int, absent: dict[str, str], fo
                 except session.NoPeerError as reason:
                     absent["hal"] = str(reason)
         if number % 2 == 1:
-            done["ours"].append(ours(MACHINE, rate, "shm", seconds, folder))
+            done["ours"].append(loaded(rate, seconds, folder, stress))
     return result_of(done, absent, rate, seconds)
 
 
@@ -160,6 +173,7 @@ def main() -> int:
     parser.add_argument("--rate", type=float, default=10_000.0, help="Hz of all windows")
     parser.add_argument("--seconds", type=float, default=2.0, help="length of a window, whole seconds for cyclictest")
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--stress", action="store_true", help="under load: every CPU busy, viewers, clients")
     given = parser.parse_args()
     why = {"cyclictest": why_no_cyclictest(), "hal": session.why_not()}
     absent = {peer: reason for peer, reason in why.items() if reason is not None}
@@ -169,7 +183,8 @@ def main() -> int:
         return 3
     with tempfile.TemporaryDirectory(prefix="rtb-", dir="/tmp") as folder:
         Path(folder).chmod(0o711)  # rtapi_app goes through it as another user
-        result = measure(given.rate, given.seconds, given.rounds, absent, Path(folder))
+        with busy() if given.stress else contextlib.nullcontext():
+            result = measure(given.rate, given.seconds, given.rounds, absent, Path(folder), given.stress)
     print(json.dumps(result) if given.json else report(result))
     return 0
 

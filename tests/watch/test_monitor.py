@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 
 from rtctl.config.load import set_path
 from rtctl.watch.monitor import Monitor
@@ -99,3 +100,18 @@ def test_a_machine_at_rest_is_waited_for(rehearsed):
     assert monitor.feed(rows) is None
     assert monitor.state == "waiting"
     assert monitor.learned == 0.0
+
+
+def test_a_model_in_place_of_the_config_is_what_the_machine_is_compared_with(rehearsed, tmp_path):
+    """A reel that drags: with it in the model the machine is as near as a healthy one, without it is not."""
+    drags = set_path(rehearsed.config, "plant.physics.0", {"term": "friction.coulomb", "node": "motor1", "F_C": 3e-3})
+    shift = Shift(rehearsed.config).become(drags)
+    rows = shift.play(rehearsed.moves, np.random.default_rng(5), 120.0)
+    path = tmp_path / "model.yaml"
+    path.write_text(yaml.safe_dump(drags.model_dump(mode="json", exclude_unset=True)))
+    left = []
+    for model in (path, None):
+        monitor = Monitor(rehearsed.case, model, seconds=60.0)
+        monitor.feed(rows)
+        left.append(float(monitor.band.slow_sigma[0]))
+    assert left[0] < 0.5 * left[1]
