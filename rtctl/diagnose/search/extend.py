@@ -20,7 +20,7 @@ from rtctl.diagnose.search.suggestions import combined
 STARTS = 2  # of the first few fits
 ALSO = 4  # starts of names that are tried whatever they promise: screening says little of their size
 FIRST = 3
-TURNS = 4  # of terms that are tried, at most
+TURNS = 4  # of terms that are tried as the first effect, at most; a second one is one of the best
 OTHERS = 3  # nodes of the best terms beside the first
 BEST = 2  # terms that are tried at their other nodes
 LEAST = 6.0  # nats that screening must promise for a refit
@@ -61,9 +61,9 @@ def extended(
 ) -> list[Fitted]:
     """Refits of models with the most promising hypotheses beside them; `looked` is what screening said of one model.
 
-    Each term is tried at its most promising node, `most` terms in a turn, and further ones while they promise more than
-    those brought: what screening says of a size is linear, and a law may bring more, or nothing. Then the best terms
-    are tried at their other nodes. `known` gets all of them.
+    Each term is tried at its most promising node, `most` terms in a turn, and as a first effect further ones while they
+    promise more than those brought: what screening says of a size is linear, and a law may bring more, or nothing. Then
+    the best terms are tried at their other nodes. `known` gets all of them.
     The names `also` (term:node) are tried whatever they promise, and their terms at the most promising node.
     """
     told = {name.partition(":")[0] for name in also}
@@ -90,7 +90,7 @@ def extended(
     now, waits = [*(term for term in top if term[1] in told), *waits[:most]], waits[most:]
     tried: list[tuple[int, str]] = []
     first: list[tuple[str, ...]] = []
-    for turn in range(TURNS):
+    for turn in range(1 if any(parent.names for parent in parents) else TURNS):
         ahead = [next(iter(top[term].values())) for term in now]
         first += refitted([(these, STARTS if turn == 0 and k < FIRST else 1) for k, these in enumerate(ahead)])
         tried += now
