@@ -20,7 +20,7 @@ from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, tick
 from rtctl.plants.element import stand
-from rtctl.plants.physics.search import At, Choice, Shape, Size, Turn
+from rtctl.plants.physics.search import Shape, Size, Turn
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
@@ -65,11 +65,6 @@ def along(p, x):
     return p.slope * x + p.A * (0.5 + 0.5 * math.tanh(2.0 * r) if p.form == 1 else math.exp(-0.5 * r * r))
 
 
-WAVE = (Turn("A", "phi", "force", 0.2), Shape("length", "span", (0.5, 1.2), 2.0), Choice("form", ("wave",)))
-STEP = (Size("A", "force", 0.2, signed=True), At("at", "length", 3, 0.1, 0.1), Choice("form", ("step",)))
-SPOT = (Size("A", "force", 0.2, signed=True), At("at", "length", 4, 0.1, 0.1), Choice("form", ("spot",)))
-
-
 POSITION = Term(
     name="friction.position",
     remedies=("feedforward", "integral"),
@@ -79,7 +74,7 @@ POSITION = Term(
     settings=PositionSettings,
     build=build_position,
     act={"force": "{m}.dry[{i}] += {r} * friction_position.along({p}, {r} * {m}.qm[{i}])"},
-    stands=(stand("body", "general", ways=(WAVE, STEP, SPOT)),),
+    stands=(stand("body", "general"),),
     look_alikes={
         "load.bump": "pass slowly over the whole way: a bump is narrow, friction along the way changes gently",
         "load.spring": "there and back slowly: a spring helps one way, friction hinders both",
@@ -100,7 +95,8 @@ POSITION = Term(
     check="Pull slowly over the whole way with a spring balance; look at the rail and at worn stretches.",
     units={"A": "force", "length": "position", "at": "position", "slope": "stiffness"},
     needs=Needs(dry=True),
-    search=WAVE,
+    # A step beyond the way, or a wide spot, would be dry friction by another name: waves alone are looked for.
+    search=(Turn("A", "phi", "force", 0.2), Shape("length", "span", (0.5, 1.2), 2.0)),
     richer=(Size("slope", "stiff", 0.1, signed=True),),
     static=True,
     draws={"A": Draw(0.1, 0.5, "force"), "length": Draw(0.5, 1.5, "travel")},

@@ -20,7 +20,6 @@ from rtctl.diagnose.search.suggestions import combined
 STARTS = 2  # of the first few fits
 ALSO = 4  # starts of names that are tried whatever they promise: screening says little of their size
 FIRST = 3
-TURNS = 4  # of terms that are tried as the first effect, at most; a second one is one of the best
 OTHERS = 3  # nodes of the best terms beside the first
 BEST = 2  # terms that are tried at their other nodes
 LEAST = 6.0  # nats that screening must promise for a refit
@@ -61,9 +60,7 @@ def extended(
 ) -> list[Fitted]:
     """Refits of models with the most promising hypotheses beside them; `looked` is what screening said of one model.
 
-    Each term is tried at its most promising node, `most` terms in a turn, and as a first effect further ones while they
-    promise more than those brought: what screening says of a size is linear, and a law may bring more, or nothing. Then
-    the best terms are tried at their other nodes. `known` gets all of them.
+    Each term is tried at its most promising node, then the best terms at their other nodes. `known` gets all of them.
     The names `also` (term:node) are tried whatever they promise, and their terms at the most promising node.
     """
     told = {name.partition(":")[0] for name in also}
@@ -71,7 +68,8 @@ def extended(
     found = [promise for pair in zip(parents, looks, strict=True) for promise in promises(*pair, merit)]
     top: dict[tuple[int, str], dict[tuple[str, ...], list[Promise]]] = {}
     for promise in in_turns(found):
-        if max(promise.score.gain, promise.score.power) > LEAST or promise.term[1] in told:
+        worth = max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top)
+        if worth or promise.term[1] in told:
             top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
 
     def refitted(wanted: Sequence[tuple[list[Promise], int]]) -> list[tuple[str, ...]]:
@@ -86,20 +84,11 @@ def extended(
     wanted = [
         (these, ALSO) for nodes in top.values() for these in nodes.values() if these[0].score.hypothesis.name in also
     ]
-    waits = [term for term in top if term[1] not in told]
-    now, waits = [*(term for term in top if term[1] in told), *waits[:most]], waits[most:]
-    tried: list[tuple[int, str]] = []
-    first: list[tuple[str, ...]] = []
-    for turn in range(1 if any(parent.names for parent in parents) else TURNS):
-        ahead = [next(iter(top[term].values())) for term in now]
-        first += refitted([(these, STARTS if turn == 0 and k < FIRST else 1) for k, these in enumerate(ahead)])
-        tried += now
-        settle(known, first, merit)
-        best = max((merit(f) for f in (*parents, *(known[names] for names in first))), default=-np.inf)
-        now, waits = waits[:most], waits[most:]
-        if not any(one.gain > best + LEAST for term in now for these in top[term].values() for one in these):
-            break
-    ranked = sorted(zip(tried, first, strict=True), key=lambda pair: -merit(known[pair[1]]))[:BEST]
+    first = refitted(
+        [(next(iter(nodes.values())), STARTS if rank < FIRST else 1) for rank, nodes in enumerate(top.values())]
+    )
+    settle(known, first, merit)
+    ranked = sorted(zip(top, first, strict=True), key=lambda pair: -merit(known[pair[1]]))[:BEST]
     others = refitted([(these, 1) for term, _ in ranked for these in list(top[term].values())[1 : 1 + OTHERS]])
     out = list(dict.fromkeys((*first, *refitted(wanted), *others)))
     settle(known, out, merit)

@@ -34,14 +34,3 @@ def test_a_look_alike_is_fitted_whatever_it_promises():
     alike = extended(found.like, [found.base], {}, 1, found.merit, None, ("drive.deadband",))
     assert {h.term for f in alike for h in f.space.hypotheses} == plain | {"drive.deadband"}
     assert "drive.deadband" not in plain
-
-
-def test_further_terms_are_tried_while_they_promise_more_than_those_before_brought():
-    found = named().found
-    looked = screened(found.base)
-    idle, top = looked.scores[-1].hypothesis.term, max(max(s.gain, s.power) for s in looked.scores)
-    much = [s._replace(gain=top + 1.0, power=top + 1.0) if s.hypothesis.term == idle else s for s in looked.scores]
-    told = looked._replace(scores=sorted(much, key=lambda s: -s.gain))
-    fits = extended(found.like, [found.base], {}, 1, found.merit, told)
-    assert fits[0].space.hypotheses[0].term == idle
-    assert max(found.merit(f) for f in fits) > found.merit(found.base) + 10.0
