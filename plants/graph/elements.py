@@ -223,8 +223,8 @@ def spot(term: Term, settings: Any, layout: Layout, there: tuple[Element, ...], 
         if found[0].needs & BY_LINK:
             link, other = _presses(layout, node)
         moved = machine.joints[contact.joint].to if contact is not None and contact.joint else node
-        rubs = "rubs" in found[0].needs  # no reading, and no drive either
-        channel = NOWHERE if rubs or machine.turns(moved) else _sensor_of(layout, moved)
+        reads = any(site.partition(":")[0] == "reading" for site in term.act)
+        channel = _sensor_of(layout, moved) if reads and not machine.turns(moved) else NOWHERE
         return Spot(layout.coordinate(node), link, channel, layout.ratio(node, values), other)
     if "contact" in element.traits:
         return _contact(contacts(machine)[node], node, layout, values)

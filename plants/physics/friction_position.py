@@ -6,8 +6,7 @@ The limit of dry friction is larger by  slope x + A f(x), in one of three forms:
     step  f = (1 + tanh(2 (x - at) / length)) / 2     another piece of rail, a seal from some place on
     spot  f = exp(-((x - at) / length)^2 / 2)         a stretch that is worn, or where a rail pinches
 
-Where a sum of limits is below zero it counts as none, so that friction never pushes. A spot that is narrow against the
-travel is a `load.bump`.
+Where a sum of limits is below zero it counts as none, so that friction never pushes.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), section 2.3 for friction by position;
 Armstrong, Friction: experimental determination, modeling and compensation, ICRA (1988).

@@ -307,7 +307,7 @@ BUMP = Term(
     check="Move slowly by hand past the place and feel for it; look for dirt, a dent or a joint of the rail.",
     search=(
         Size("F", "force", 0.2, signed=True),
-        At("at", "width", 8, 0.05, 0.012, 0.08),
+        At("at", "width", 8, 0.05, 0.012),
         Choice("form", ("drag", "hill", "push")),
     ),
     variants=Choice("form", ("drag", "hill", "push")),

@@ -59,7 +59,6 @@ class At(NamedTuple):
     places: int
     wide: float  # of the span
     narrow: float
-    most: float = 0.0  # of the span, that a width may be; 0 for four times `wide`
 
 
 class Hint(NamedTuple):

@@ -19,6 +19,7 @@ from typing import Literal, NamedTuple
 
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.plants.element import stand
+from rtctl.plants.physics import second_order
 from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
@@ -50,12 +51,8 @@ def build_resonance(settings: ResonanceSettings, h: float) -> ResonanceParams:
     """Exact step of the free mass over `h` s."""
     w = 2.0 * math.pi * settings.f_Hz
     zeta = min(max(settings.zeta, 0.0), 0.999)
-    wd = w * math.sqrt(1.0 - zeta**2)
-    fade, c, s = math.exp(-zeta * w * h), math.cos(wd * h), math.sin(wd * h)
-    lean = zeta * w / wd
-    return ResonanceParams(
-        settings.mass / h, h, fade * (c + lean * s), fade * s / wd, -fade * s * w * w / wd, fade * (c - lean * s)
-    )
+    to_x, v_to_x, x_to_v, to_v = second_order.transition(w * h, zeta)
+    return ResonanceParams(settings.mass / h, h, to_x, v_to_x / w, x_to_v * w, to_v)
 
 
 @tick

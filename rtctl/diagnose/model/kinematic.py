@@ -15,7 +15,7 @@ from rtctl.diagnose.model.model import rigid
 from rtctl.plants.graph.layout import layout
 
 QUICK = (1000.0, 3000.0)  # rad/s, at which a stiff joint rings with what it moves: least and most
-UNSEEN = 30.0  # rad a row: a joint that rings more quickly is stiff as far as a slow recording shows
+QUICK_OF_ROW = 30.0  # rad a row: a joint that rings more quickly is stiff as far as a slow recording shows
 DAMPED = 1.4  # damping of the same, twice its ratio
 SLIGHT = 0.05  # steps of the reading by which friction may stretch a stiff joint
 BRAKES = 2.0  # times the force that the given motion takes: what follows must not fly on
@@ -34,7 +34,7 @@ def followed(case: GraphCase, main: str, fine: dict[str, float], x: np.ndarray, 
     joints, bodies = dict(machine.joints), dict(machine.bodies)
     needs = [BRAKES * bends * abs(ratios.get(str(machine.sensors[s].body), 0.0)) / (SLIGHT * fine[s])
              for s in fine if s != main and fine[s] > 0.0]  # fmt: skip
-    quick = float(np.clip(np.sqrt(max(needs, default=0.0)), min(QUICK[0], UNSEEN / dt), QUICK[1]))
+    quick = float(np.clip(np.sqrt(max(needs, default=0.0)), min(QUICK[0], QUICK_OF_ROW / dt), QUICK[1]))
     for name, joint in machine.joints.items():
         if joint.stiffness is None:
             ends = [end for end in (getattr(joint, "from"), joint.to) if end in ratios]

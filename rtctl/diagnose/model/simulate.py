@@ -28,7 +28,7 @@ from rtctl.plants.graph.params import build, drive_gain
 
 QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
 SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
-OF_ROW = 0.05  # of a row, where rows are so slow that this is more
+SUBSTEPS = 20  # of a slow row: more show nothing further
 LEAD = 1.0  # s at the first row, at most, in which springs come to rest
 FORGOTTEN = 5.0  # time constants of what swings longest, after which it does so no more
 SLOW = 3.0  # time constants of a usual observer: window over which what is slow is averaged
@@ -53,8 +53,8 @@ class Simulator:
         usual = self.followed[0].bandwidth
         self.quickest = QUICKEST / record.dt  # rad/s
         self.follow = min(usual if follow is None else follow, self.quickest)
-        self.substeps = max(1, int(np.ceil(record.dt / max(SUBSTEP, OF_ROW * record.dt) - 1e-9)))
-        if self.case.problem == "kinematic" or record.dt > SUBSTEP / OF_ROW:
+        self.substeps = max(1, int(np.ceil(min(record.dt / SUBSTEP, SUBSTEPS) - 1e-9)))
+        if self.case.problem == "kinematic" or record.dt > SUBSTEPS * SUBSTEP:
             self.substeps = max(self.substeps, int(np.ceil(record.dt * self._ring() / STEADY)))
         self.watched = np.stack([record.y[one.sensor] for one in self.followed], axis=1)
         self.volts = np.ascontiguousarray(record.u)

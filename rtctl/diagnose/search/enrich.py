@@ -26,15 +26,19 @@ def enriched(best: Fitted) -> Fitted:
         for _ in range(ROUNDS):
             before = best
             for other in others(best, index):
-                space, x = exchanged(best, index, other)
-                trial = refit(best.like, space, x, best.J[..., : space.nb], draft=True)
-                if trial.log_evidence > best.log_evidence - NEAR:
-                    trial = finished(trial)
-                if trial.log_evidence > best.log_evidence + WORTH:
-                    best = trial
+                best = _better(best, index, other)
             if best is before:
                 break
     return best
+
+
+def _better(best: Fitted, index: int, other: Hypothesis) -> Fitted:
+    """The model with one effect in another form where that is worth it, else as it is."""
+    space, x = exchanged(best, index, other)
+    trial = refit(best.like, space, x, best.J[..., : space.nb], draft=True)
+    if trial.log_evidence > best.log_evidence - NEAR:
+        trial = finished(trial)
+    return trial if trial.log_evidence > best.log_evidence + WORTH else best
 
 
 def restarted(best: Fitted) -> Fitted:

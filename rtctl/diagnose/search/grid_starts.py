@@ -111,7 +111,7 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             yield (Coordinate(part.name, SIZE, abs(first)),), {"at": at, "more": tuple(more), "over": tick}
     elif isinstance(part, At):
         s = m.scale(node)
-        low, high = 0.2 * part.narrow * s.span, (part.most or 4.0 * part.wide) * s.span
+        low, high = 0.2 * part.narrow * s.span, 4.0 * part.wide * s.span
         places = [((k + 0.5) / part.places, part.wide, 1.0 / part.places) for k in range(part.places)]
         spots = [(spot, part.narrow, 2 * part.narrow) for spot in m.hints.get("spot", [])]
         for where, share, reach in places + spots:
