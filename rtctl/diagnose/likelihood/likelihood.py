@@ -19,7 +19,6 @@ from rtctl.diagnose.calibration import INNOVATIONS
 from rtctl.diagnose.likelihood.noise import Noise, noises_of, surprise, whitened
 from rtctl.diagnose.likelihood.slack import Inexact, Slack
 from rtctl.diagnose.likelihood.slow import slow
-from rtctl.diagnose.model.kernel import HELD
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.record.edges import Edges
@@ -104,8 +103,7 @@ class Likelihood:
             return False
         if self.sim.case.problem != "static":
             return name != self.sim.main
-        sensors = self.sim.case.machine.sensors
-        return name in sensors and sensors[name].measures == "position"
+        return self._is_position(name)
 
     def _by_edges(self, name: str, out: np.ndarray, blocks: int) -> np.ndarray:
         """Residual (blocks,) of a sensor that shows edges: their mean in each block, 0 where there is none."""
@@ -125,27 +123,39 @@ class Likelihood:
 
     @cached_property
     def present(self) -> list[np.ndarray]:
-        """Blocks in which each sensor shows something: all, or those with an edge."""
+        """Blocks in which each sensor shows something: all, those with an edge, or, of a force that a recorded motion
+        makes, those in which it does not turn: that time is known to a row, and dry friction jumps there."""
         every = np.arange((self.rows[1] - self.rows[0]) // self.mean)
-        return [np.unique(self.edges_in(n)[1]) if n in self.sim.edges else every for n in self.sim.channels]
+        steady = every if self.sim.held is None else np.setdiff1d(every, self._turns(self.sim.held.v))
+        return [
+            np.unique(self.edges_in(n)[1]) if n in self.sim.edges else every if self._is_position(n) else steady
+            for n in self.sim.channels
+        ]
+
+    def _turns(self, v: np.ndarray) -> np.ndarray:
+        """Blocks before and after each turn of a motion of the speed v (n,)."""
+        last = np.flatnonzero(np.diff(np.sign(v)))
+        return (np.concatenate([last, last + 1]) - self.rows[0]) // self.mean
+
+    def _is_position(self, name: str) -> bool:
+        """Whether a channel is the reading of a position."""
+        sensors = self.sim.case.machine.sensors
+        return name in sensors and sensors[name].measures == "position"
 
     @cached_property
     def growth(self) -> list[np.ndarray]:
         """What the variance of each sensor's residual may grow with (blocks present, columns): whether it moves, where
-        it counts, and of a position, or of a force that a recorded motion makes, the square of its rate: by it an error
-        of time shows."""
+        it counts, and of a position the square of its rate: by it an error of time shows."""
         begin, end = self.rows
         blocks = (end - begin) // self.mean
         y = self.target[begin:end][: blocks * self.mean].reshape(blocks, self.mean, -1).mean(axis=1)
         rate = np.gradient(uniform_filter1d(y, SMOOTH, axis=0), axis=0) ** 2  # by the block
-        out, sensors = [], self.sim.case.machine.sensors
+        out = []
         for c, (name, rows) in enumerate(zip(self.sim.channels, self.present, strict=True)):
             grain = self.sim.record.grain[name]
             columns = [rate[:, c] / (rate[:, c] + grain**2)] if grain > 0.0 else []
-            if name in sensors and sensors[name].measures == "position":
+            if self._is_position(name):
                 columns.append(rate[:, c])
-            elif self.sim.mode == HELD:  # when friction turns is known to a row, and a force jumps there
-                columns.append(np.gradient(y[:, c]) ** 2)
             out.append(np.stack(columns, axis=1)[rows] if columns else np.zeros((len(rows), 0)))
         return out
 

@@ -5,6 +5,7 @@ from described_machines import ROD, ROTOR, case_of, moved, record, rounded
 from rtctl.config.errors import NoAnswer, UserError
 from rtctl.diagnose.answer.answer import diagnose_record
 from rtctl.diagnose.evidence.diagnosis import NAMED
+from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.simulate import Simulator
 
@@ -92,3 +93,12 @@ def test_a_pendulum_that_its_owner_calls_a_spring_grows_softer():
     d = diagnose_record(record(case_of(spring, 100.0, problem="free"), x=swing()))
     names = {(e.name, e.node) for e in d.effects if e.confidence > 0.9}
     assert names & {("structure.stiffening", "k"), ("load.gravity", "rod")}
+
+
+def test_a_force_says_nothing_in_the_rows_where_friction_turns():
+    r = record(case_of(MEASURED, RATE, problem="static"), tau=1e-3 * RATE_OF_IT, x=rounded(TURN, 1e-4))
+    (present,) = Likelihood(Simulator(r)).present
+    begin, _ = Likelihood(Simulator(r)).rows
+    turns = np.flatnonzero(np.diff(np.sign(SPEED[begin:])))
+    assert 5 <= len(turns) == (len(T) - begin - len(present)) / 2
+    assert not np.isin(turns, present).any()
