@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtctl.diagnose.calibration import FURTHER
 from rtctl.diagnose.likelihood.fits import Fitted, finished, refit, relaxed
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.solver import parallel
@@ -57,18 +58,23 @@ def extended(
     merit: Merit,
     looked: Screened | None = None,
     also: Collection[str] = (),
+    passed: Collection[tuple[str, ...]] = (),
 ) -> list[Fitted]:
     """Refits of models with the most promising hypotheses beside them; `looked` is what screening said of one model.
 
     Each term is tried at its most promising node, then the best terms at their other nodes. `known` gets all of them.
-    The names `also` (term:node) are tried whatever they promise, and their terms at the most promising node.
+    The names `also` (term:node) are tried whatever they promise, and their terms at the most promising node. Of models
+    that were `passed`, those with other terms are asked for, as far as they promise to stand.
     """
+    gone = {terms_of(names) for names in passed}
     told = {name.partition(":")[0] for name in also}
     looks = [looked if looked is not None else screened(parent) for parent in parents]
     found = [promise for pair in zip(parents, looks, strict=True) for promise in promises(*pair, merit)]
     top: dict[tuple[int, str], dict[tuple[str, ...], list[Promise]]] = {}
     for promise in in_turns(found):
         worth = max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top)
+        if gone and (terms_of(promise.names) in gone or promise.gain < merit(promise.parent) + FURTHER):
+            continue
         if worth or promise.term[1] in told:
             top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
 
@@ -146,6 +152,11 @@ def screened(parent: Fitted) -> Screened:
         h for h in hypotheses(sim, model, combined(parent.like, model), model.terms) if h.name not in parent.names
     ]
     return screen(parent, candidates)
+
+
+def terms_of(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Terms of a combination, in alphabetical order."""
+    return tuple(sorted(name.partition(":")[0] for name in names))
 
 
 def key(names: Iterable[str]) -> tuple[str, ...]:

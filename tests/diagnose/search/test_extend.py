@@ -1,6 +1,6 @@
 from graph_cases import named
 
-from rtctl.diagnose.search.extend import Promise, extended, in_turns, key, screened
+from rtctl.diagnose.search.extend import Promise, extended, in_turns, key, screened, terms_of
 
 
 def promise(gain, power):
@@ -34,3 +34,13 @@ def test_a_look_alike_is_fitted_whatever_it_promises():
     alike = extended(found.like, [found.base], {}, 1, found.merit, None, ("drive.deadband",))
     assert {h.term for f in alike for h in f.space.hypotheses} == plain | {"drive.deadband"}
     assert "drive.deadband" not in plain
+
+
+def test_where_nothing_stood_terms_that_promise_to_stand_are_asked_for():
+    found = named().found
+    tried = extended(found.like, [found.base], {}, 1, found.merit)
+    more = extended(found.like, [found.base], {}, 1, found.merit, passed=[f.names for f in tried])
+    assert more
+    assert {terms_of(f.names) for f in tried}.isdisjoint(terms_of(f.names) for f in more)
+    beside = extended(found.like, [found.best], {}, 1, found.merit)
+    assert not extended(found.like, [found.best], {}, 1, found.merit, passed=[f.names for f in beside])
