@@ -41,10 +41,13 @@ class GraphRecord(NamedTuple):
 
     @property
     def main(self) -> str:
-        """The sensor that the observer follows: the first of a position, else of a speed, else the first."""
-        sensors = self.case.machine.sensors
+        """The sensor that the observer follows: the first of a position, else of a speed, else the first.
+
+        One that looks through a tape shows more than the motion of its body, and is the last of its kind.
+        """
+        sensors = sorted(self.case.machine.sensors.items(), key=lambda item: item[1].through is not None)
         for wanted in ("position", "speed"):
-            for name, sensor in sensors.items():
+            for name, sensor in sensors:
                 if sensor.measures == wanted and sensor.body is not None and name in self.y:
                     return name
         return next(iter(self.y))

@@ -28,7 +28,6 @@ NAMES = (8, 4, 4)  # terms that are refitted as a second, a third and a fourth e
 BEAM = (4, 3, 2)  # models that are extended by a second, a third and a fourth effect
 ALIKE = 0.995  # cosine from which two models do the same
 EXCHANGES = 2
-TURNS = 2  # of further names, where none of those before adds anything
 RIVALS, CLOSE = 3, 5.0  # models that are asked for other forms, and nats by which the best may be ahead of them
 
 
@@ -93,15 +92,9 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
         parents = [finished_in(known, f) for f in apart(base, better, most)]
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
         grown = extended(like, parents, known, NAMES[level - 1], merit)
-        for _ in range(TURNS):
-            if any(adds(base, _parent(f, parents), f, merit) for f in grown):
-                break
-            passed = [f.names for f in grown]
+        if not any(adds(base, _parent(f, parents), f, merit) for f in grown):
             progress(f"asking for other names of effect {level + 1}")
-            further = extended(like, parents, known, NAMES[level - 1], merit, passed=passed)
-            if not further:
-                break
-            grown = [*grown, *further]
+            grown += extended(like, parents, known, NAMES[level - 1], merit, passed=[f.names for f in grown])
     for f in (f for f in before if key(f.names) not in known):
         known[key(f.names)] = again = refit(like, f.space, f.x)
         known |= {key(g.names): g for g in smaller(like, again, known)}

@@ -95,3 +95,20 @@ def test_edges_alone_are_refused():
     case["machine"] = {**PENDULUM, "sensors": {"encoder": blind}}
     with pytest.raises(NoAnswer, match="no sensor tells a direction"):
         of(COLUMNS, case)
+
+
+def test_a_sensor_that_looks_through_a_tape_is_not_the_main_one():
+    machine = {
+        "bodies": {"reel": {"inertia": 1e-4, "radius": 0.03}, "capstan": {"inertia": 1e-4, "radius": 0.0125}},
+        "joints": {
+            "path": {"from": "capstan", "to": "reel", "span": "open", "stiffness": 450.0, "damping": 12.5},
+            "motor": {"from": "frame", "to": "capstan", "stiffness": 10.0, "damping": 0.1},
+        },
+        "drives": {"motor": {"body": "capstan", "column": "u", "kind": "force", "gain": 10.0}},
+        "sensors": {
+            "camera": {"body": "capstan", "through": "path", "column": "image", "resolution": 1e-5, "per_unit": 0.0125},
+            "counter": {"body": "capstan", "column": "counts", "counts_per_unit": 1000.0},
+        },
+    }  # fmt: skip
+    columns = {**COLUMNS, "image": 1e-5 * COUNTS, "counts": COUNTS}
+    assert of(columns, case_of(machine)).main == "counter"
