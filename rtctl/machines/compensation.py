@@ -152,7 +152,10 @@ class Signals(NamedTuple):
 
 
 def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: Any, dt: float) -> Lines:
-    """Blocks and lines for a tick of `dt` s; `mechanics()` gives the machine's, for those that need them."""
+    """Blocks and lines for a tick of `dt` s; `mechanics()` gives the machine's, for those that need them.
+
+    Raises ValueError with the key at fault in the sentence.
+    """
     uses: list[str] = []
     blocks: list[Block] = []
     reset: list[str] = []
@@ -208,6 +211,10 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         law.append(f"u_learned = iterative_learning.step(p.learning, {now})")
         extra.append("u_learned")
     if settings.repetitive is not None:
+        if settings.repetitive.gain > 0.0 and not mechanics().shaped:  # else it would learn nothing, and say nothing
+            raise ValueError(
+                "law.compensation.repetitive learns while the shaped reference moves; law.shaper.bandwidth is missing"
+            )
         uses.append("rtctl.laws.repetitive")
         blocks.append(Block("repetitive", repetitive.build(settings.repetitive, dt), repetitive.REPETITIVE_STATE))
         reset.append("repetitive.reset(p.repetitive, s.repetitive)")

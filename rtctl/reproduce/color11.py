@@ -36,6 +36,15 @@ COLOR = under(
     Row("11.color_direct", "the same with direct measurement, over that before", "11.3", None, "", bound="at most",
         expected=0.2, quote=NO_EFFECT, law=ch.PRESENT_LAW + ", feedback by the scale",
         remark="no number in the text; what is left are the counts of the scale, 0.5 um"),
+    Row("11.turn_direct", "tracking error that comes back with the turn, with direct measurement", "11.3", None, "um",
+        bound="at most", expected=1.0, quote=NO_EFFECT, law=ch.PRESENT_LAW + ", feedback by the scale, shaper 60 rad/s",
+        remark="no number in the text; after 20 turns of the capstan"),
+    Row("11.turn_repetitive", "the same with repetitive control over the turn, over that without", "11.3", None, "",
+        bound="at most", expected=1.0, quote=REDUCED,
+        law=ch.PRESENT_LAW + ", feedback by the scale, shaper 60 rad/s, repetitive control",
+        differs="nothing is left that comes back with the turn; what is learned at the start of the pass, while the "
+                "integral comes in, is in the way afterwards; on the encoder the loop sees no error of the turn",
+        remark="no number in the text"),
     *(
         Row(f"11.coherence_{name}", f"coherence of error and luminance at {words} mm", "11.2, figure 11.9", None, "",
             bound="at least", expected=0.5, quote=CLEARLY,
@@ -46,6 +55,9 @@ COLOR = under(
         bound="at most", expected=0.3, quote=CLEARLY, remark="no number in the text; noise alone gives 1 / prints"),
     law=ch.PRESENT_LAW, set=SET, filter=ch.VELOCITY,
 )  # fmt: skip
+BANDWIDTH = 60.0  # rad/s, of the shaper
+LEARNS = 2400.0  # V/m, that each part of a turn learns a turn: less than half of the law's gain
+LATE = 0.67  # of the pass, after which 20 turns have been learned
 WAYS: dict[str, dict[str, Any]] = {"before": {}, "direct": {"sensors.feedback": "scale"}}
 
 
@@ -73,6 +85,26 @@ def smooth(e: np.ndarray, dt: float) -> np.ndarray:
     from scipy.signal import butter, sosfiltfilt
 
     return np.asarray(sosfiltfilt(butter(2, scale_error.CUTOFF, fs=1.0 / dt, output="sos"), e))
+
+
+@cache
+def comes_back(repetitive: bool) -> float:
+    """Amplitude in m of the tracking error that comes back with the turn, in the last third of a pass that is measured
+    directly."""
+    speed = ch.SPEEDS[0]
+    made = scale_error.scale_config(config("ldu_printer"), ch.TRAVEL, speed)
+    made = set_paths(made, {"sensors.feedback": "scale", "law.shaper.bandwidth": BANDWIDTH})
+    if repetitive:
+        law = {"period": ch.TURN, "gain": LEARNS * speed / ch.TURN, "slow": 0.3 * speed}
+        made = set_paths(made, {"law.compensation.repetitive": law})
+    record = bench.play(made)
+    (one,) = scale_error.passes(record)
+    x = record["ref"]
+    late = (x > one.start + LATE * ch.LENGTH) & (x < one.start + ch.LENGTH)
+    turn, way = 2.0 * np.pi * x[late] / ch.TURN, (x[late] - one.start) / ch.LENGTH
+    M = np.column_stack([np.cos(turn), np.sin(turn), np.ones_like(way), way, way**2])
+    found = np.linalg.lstsq(M, (x - record["truth_x"])[late], rcond=None)[0]
+    return float(np.hypot(*found[:2]))
 
 
 @cache
@@ -110,6 +142,8 @@ def colors(short: bool) -> dict[str, float]:
         "11.color_before": before,
         "11.color_table": image("table").rms / before,
         "11.color_direct": image("direct").rms / before,
+        "11.turn_direct": 1e6 * comes_back(False),
+        "11.turn_repetitive": comes_back(True) / comes_back(False),
         **at,
         "11.coherence_else": float(np.median(C[(length > FAR[0]) & (length < FAR[1])])),
     }

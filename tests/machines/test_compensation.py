@@ -80,3 +80,9 @@ def test_an_effect_at_a_node_that_there_is_not_is_refused(config):
     effect = {"effect": {"term": "friction.coulomb", "node": "wheel", "F_C": 1.0}}
     with pytest.raises(Exception, match=r"effects\.0\.effect\.node: friction\.coulomb cannot stand at 'wheel'"):
         set_paths(config["belt"], {"law.compensation.feedforward": {"effects": [effect]}})
+
+
+def test_repetitive_control_without_a_shaped_reference_is_refused(config):
+    settings = {"law.compensation.repetitive": {"period": 6.28, "gain": 1.0, "slow": 0.1}, "law.shaper": {}}
+    with pytest.raises(Exception, match=r"law\.compensation\.repetitive .* law\.shaper\.bandwidth is missing"):
+        machines.build(set_paths(config["belt"], settings))
