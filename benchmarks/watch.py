@@ -15,6 +15,7 @@ lateness_ratio         p99 lateness of a loop in real mode with a watch and a di
 
 import argparse
 import contextlib
+import copy
 import json
 import os
 import statistics
@@ -38,6 +39,7 @@ DAY = 8 * 3600.0  # s
 PIECE = 300.0  # s of a day at a time: what is held in memory
 HEALTHY = 20.0  # s before an effect begins
 WITHIN = 30.0  # s of motion
+COUNTING = 0.29  # counts: rms error of a counter
 WATCHED = 90.0  # s that a trial lasts at most
 TURN = 0.25  # s of rows at a time, as the live watch takes them
 SEED = 20250614  # of learning and days; trials add their number
@@ -77,6 +79,7 @@ def trial(config: Any, moves: Moves, band: Band, seed: int) -> dict[str, Any]:
     monitor = Monitor(shift.case, band=band)
     early = monitor.feed(shift.play(moves, rng, HEALTHY))
     other = shift.become(hidden)
+    shown = moved(shift, other.become(hidden), moves, copy.deepcopy(rng))
     judged, delay, measure, tripped = monitor.judged, None, "", False
     begin = other.tick / other.machine.rate
     while monitor.judged - judged < WATCHED and not tripped:
@@ -90,8 +93,15 @@ def trial(config: Any, moves: Moves, band: Band, seed: int) -> dict[str, Any]:
             break
     return {
         "seed": seed, "term": entry["term"], "node": entry["node"], "early": early is not None, "delay_s": delay,
-        "measure": measure, "tripped": tripped, "noticed": delay is not None and delay <= WITHIN and early is None,
+        "shown_counts": shown, "measure": measure, "tripped": tripped, "noticed": delay is not None and delay <= WITHIN and early is None,
     }  # fmt: skip
+
+
+def moved(healthy: Shift, hidden: Shift, moves: Moves, rng: np.random.Generator) -> float:
+    """Largest rms change of a sensor by an effect in WITHIN s of the same setpoints, counts."""
+    before, after = healthy.play(moves, copy.deepcopy(rng), WITHIN), hidden.play(moves, rng, WITHIN)
+    columns = [name for name in before.dtype.names if name.endswith("_counts")]
+    return max(float(np.sqrt(np.mean((before[name].astype(float) - after[name]) ** 2))) for name in columns)
 
 
 def share(config: Any, moves: Moves, seconds: float) -> float:
@@ -177,10 +187,12 @@ def main() -> None:
         tried.append(trial(config, moves, band, seed))
         say(json.dumps(tried[-1]))
     delays = [t["delay_s"] for t in tried if t["noticed"]]
+    seen = [t for t in tried if t["shown_counts"] >= COUNTING]
     slow = api.load_config("ivu", {"loop.rate": 500.0})
     fast = api.load_config("ldu")
     out = {
         "false_alarms_per_day": sum(len(d["alarms"]) for d in per_day) / len(per_day) if per_day else None,
+        "noticed_of_shown": statistics.fmean(t["noticed"] for t in seen) if seen else None,
         "noticed_share": sum(t["noticed"] for t in tried) / len(tried) if tried else None,
         "median_delay_s": statistics.median(delays) if delays else None,
         "core_share_500hz": share(slow, usual(slow), 120.0),
