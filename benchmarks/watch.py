@@ -93,7 +93,8 @@ def trial(config: Any, moves: Moves, band: Band, seed: int) -> dict[str, Any]:
             break
     return {
         "seed": seed, "term": entry["term"], "node": entry["node"], "early": early is not None, "delay_s": delay,
-        "shown_counts": shown, "measure": measure, "tripped": tripped, "noticed": delay is not None and delay <= WITHIN and early is None,
+        "shown_counts": shown, "measure": measure, "tripped": tripped,
+        "noticed": delay is not None and delay <= WITHIN and early is None,
     }  # fmt: skip
 
 
