@@ -2,8 +2,8 @@
 
     M x'' = K u - F_v x' - k x - F_c sign(x')
 
-The plainest machine that a drive moves, and the owner's model of many real ones (ball screws, belts, unloaded
-motors). For a rotary axis read J, rad and Nm for M, m and N. It runs as axis.yaml describes it.
+The simplest driven machine, and the nominal model of many real machines (ball screws, belts, unloaded motors). For a
+rotary axis read J, rad and Nm for M, m and N. The machine runs by its description axis.yaml.
 
 Source: Janot, Gautier & Brunot, Data set and reference models of EMPS (2019) for the form.
 """
@@ -39,7 +39,7 @@ NQ, NU, NX, NY, NL = 1, 1, 2, len(SENSORS), len(LINKS)
 
 
 class AxisParameters(Settings):
-    """What the axis weighs, and what holds it back."""
+    """Mass, friction, spring and drive constant of the axis."""
 
     M: float = quantity(95.1, unit="kg", gt=0, help="moving mass seen at the carriage")
     K: float = quantity(35.15, unit="N/V", gt=0, help="force per volt of command")
@@ -79,7 +79,7 @@ def build(settings: AxisSettings, h: float) -> AxisParams:
 
 
 def params(symbols: Mapping[str, float], h: float) -> AxisParams:
-    """As `build`, from the values of the symbols; what is not among them is 0."""
+    """As `build`, from the values of the symbols; missing symbols are 0."""
     own = {name: symbols.get(name, 0.0) for name in AxisParams._fields[1:-1]}
     return AxisParams(h=h, **own, graph=described().build(own, {}, h))
 

@@ -1,8 +1,8 @@
-"""Elements of a machine and their traits: what an effect asks of the place where it may stand.
+"""Elements of a machine and their traits, by which an effect selects its nodes.
 
-A machine is a list of elements; the node of an element is the name by which effects, drives and reports call it. One
-node may name several elements: a motor and the shaft behind it, a wheel and the contact that drives it. Traits are
-physical: they say what an element is or does, never on which machine it is.
+A machine is a list of elements; effects, drives and reports refer to an element by the name of its node. One node may
+name several elements: a motor and the shaft behind it, a wheel and the contact that drives it. Traits are physical
+properties of an element and do not depend on the machine.
 """
 
 from typing import Any, NamedTuple
@@ -60,7 +60,7 @@ TRAITS: dict[str, dict[str, str]] = {  # kind of element -> trait -> its meaning
     },
     "loop": {},
 }
-GENERAL = "general"  # trait of any element but a loop: described by what it is alone, so that no effect is left out
+GENERAL = "general"  # trait of any element but a loop, without a condition on the element
 for _kind in ("body", "joint", "drive", "sensor"):
     TRAITS[_kind][GENERAL] = "described by what it is alone: no effect is left out for what is known of the machine"
 KINDS = tuple(TRAITS)
@@ -81,16 +81,16 @@ class Stand(NamedTuple):
     element: str
     needs: frozenset[str] = NONE
     usual: bool = True  # the typical sizes of the effect are those of a place like this
-    again: bool = False  # the effect does here what it does at another node already: a search leaves it out
-    offered: bool = True  # every record is asked about it; else only where another name may stand for it
-    ways: tuple[tuple[Any, ...], ...] = ()  # how it is looked for here, each another way; without any as everywhere
+    again: bool = False  # the effect is equivalent to the effect at another node: a search leaves it out
+    offered: bool = True  # a search tries it on every record; else only as an alternative to another name
+    ways: tuple[tuple[Any, ...], ...] = ()  # alternative searches at this place; empty: the search of the term
 
 
 LOOP = Element("loop", "loop")
 
 
 def element(node: str, kind: str, traits: str = "") -> Element:
-    """Element with its traits as words. Raises ValueError for a kind or a trait that there is not."""
+    """Element with its traits as words. Raises ValueError for an unknown kind or trait."""
     return Element(node, kind, _traits(kind, traits))
 
 
@@ -105,7 +105,7 @@ def stand(
 ) -> Stand:
     """Stand with the traits that it needs as words; `ways` are parts of a search (plants/physics/search.py).
 
-    Raises ValueError for a kind or a trait that there is not.
+    Raises ValueError for an unknown kind or trait.
     """
     return Stand(kind, _traits(kind, needs), usual, again, offered, ways)
 

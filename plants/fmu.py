@@ -1,10 +1,11 @@
-"""A co-simulation FMU in the place of a machine's own equations: what stands between the drives' volts and the sensors.
+"""Co-simulation FMU instead of a machine's own equations, from the drives' volts to the sensors.
 
     plant:
       fmu: {file: carriage.fmu, inputs: {drive: u}, outputs: {sensor: x}, parameters: {m: 80}}
 
 The names on the left are the machine's (`rtctl.machines.wiring`), those on the right the FMU's. The FMU's units are
-converted; board, converters and encoders stay emulated. It runs in lockstep, one communication step in `ticks` ticks.
+converted; board, converters and encoders stay emulated. The FMU runs in lockstep, one communication step in `ticks`
+ticks.
 
 Source: FMI 2.0.4 and 3.0.1 (fmi-standard.org); FMPy loads and calls it.
 """
@@ -28,7 +29,7 @@ REALS = ("Real", "Float64")
 
 
 class FmuSettings(Settings):
-    """Which FMU, and which of its variables are the machine's drives and sensors."""
+    """FMU file, and the variables of the FMU that are the machine's drives and sensors."""
 
     file: str = Field(description="path of the .fmu file, from the folder of the config")
     inputs: dict[str, str] = Field(description="the machine's drives: variables of the FMU, e.g. {drive: u}")
@@ -95,7 +96,7 @@ class Fmu:
         return f"plant.fmu: {self.settings.file}"
 
     def tick(self, volts: Sequence[float]) -> Sequence[float]:
-        """One tick with these at the drives (V); returns the sensors' readings, in the machine's units.
+        """One tick with `volts` at the drives (V); returns the sensors' readings, in the machine's units.
 
         Raises UserError where the FMU refuses its step, with the time.
         """
@@ -122,7 +123,7 @@ class Fmu:
         return readings
 
     def close(self) -> None:
-        """End the instance and remove what was unpacked."""
+        """End the instance and remove the unpacked files."""
         if self._fmu is not None:
             self._fmu.freeInstance()
             self._fmu.freeLibrary()
@@ -133,7 +134,7 @@ class Fmu:
 
 
 class Plan(NamedTuple):
-    """What is called on an FMU: value references, each with the factor of its unit, or with its start value."""
+    """Value references of an FMU, each with the factor of its unit, or with its start value."""
 
     model: Any
     inputs: list[tuple[int, float]]
@@ -209,7 +210,7 @@ def _find(settings: FmuSettings, where: str, name: str, variables: dict[str, Any
 
 
 def _factor(settings: FmuSettings, where: str, variable: Any, unit: str) -> float:
-    """How many of the variable's unit are one of ours."""
+    """Number of the variable's units in one machine unit."""
     own = variable.unit or (variable.declaredType.unit if variable.declaredType else None)
     given = settings.units.get(variable.name)
     try:

@@ -7,8 +7,8 @@
     F_s1 = c_1 ( phi_c R_c - l_1) + k_1 ( phi_c' R_c - l_1'),  l_i' = R_i phi_i'                        (4.16)
     F_s2 = c_2 (-phi_c R_c - l_2) + k_2 (-phi_c' R_c - l_2')                                            (4.17)
 
-l_i is the tape that reel i has wound, R_i phi_i while the radius stays what it is. A positive torque on either motor
-winds tape and pulls it taut: the tensions are T_i = -F_si. Capstan and reel 1 turn the same way, reel 2 the other.
+l_i is the tape that reel i has wound, R_i phi_i at constant radius. A positive torque on either motor winds tape and
+pulls it taut: the tensions are T_i = -F_si. Capstan and reel 1 turn in one direction, reel 2 in the other.
 
 As tape moves, R_i = R_i(0) + d_tape phi_i / 2 pi (4.3, 4.4) and J_i follows R_i^4 (4.1, 4.2). The layer that lands
 moves at the reel's own surface speed and brings its momentum with it, so that J phi'' has no J' phi' beside it.
@@ -40,7 +40,7 @@ MOTOR1, REEL1, CAPSTAN, REEL2, MOTOR2 = range(5)
 NODES = {"motor1": MOTOR1, "reel1": REEL1, "capstan": CAPSTAN, "reel2": REEL2, "motor2": MOTOR2}
 LINKS = {"tape1": 0, "tape2": 1, "motor1": 2, "motor2": 3}  # the tapes, and the shaft behind each motor
 DRIVES = {"drive1": 0, "drive2": 1}
-RUBS = {"drive1": MOTOR1, "drive2": MOTOR2}  # where the dry friction is that a drive works against
+RUBS = {"drive1": MOTOR1, "drive2": MOTOR2}  # coordinate of the dry friction on which a drive acts
 SENSORS = {"encoder": 0, "reel1": 1, "reel2": 2}
 ELEMENTS = (
     element("motor1", "body", "turns driven dry rubs rotor loaded"),
@@ -162,7 +162,7 @@ def described() -> Machine:
 
 
 def parameters(settings: IvuSettings) -> IvuParameters:
-    """The named set with what the settings say otherwise, J_1 and J_2 filled in."""
+    """The named set, overridden by the settings, with J_1 and J_2 filled in."""
     given = settings.parameters.model_dump(exclude_unset=True)
     p = IvuParameters(**{**SETS[settings.set], **given})
     fill = {}
@@ -176,7 +176,7 @@ def parameters(settings: IvuSettings) -> IvuParameters:
 def build(settings: IvuSettings, h: float, drives: Sequence[Sequence[float]], follow_tape: bool = True) -> IvuParams:
     """Params for substeps of `h` s; `drives` gives A/V, natural frequency (rad/s), damping and zero (s) of each.
 
-    Without `follow_tape` the radii stay what they are at the start.
+    Without `follow_tape` the radii keep their values at the start.
     """
     p = parameters(settings)
     return params(p.model_dump(), h, drives, follow_tape)

@@ -6,12 +6,12 @@
                                               + b_c (th_c' - th_e') + k_c (th_c - th_e) + R_c F_c     (F.5, F.6, F.9)
     b_c (th_c' - th_e') + k_c (th_c - th_e) = J_e th_e''                                                         (F.7)
 
-The machine runs as ldu.yaml describes it, by the kernel of all machines. The carriage stands at x = R_c th_c. F_c is
-the dry friction of the carriage, which the thesis finds (12.6) but does not write into its equations.
+The machine runs by its description ldu.yaml, by the kernel of all machines. The position of the carriage is
+x = R_c th_c. F_c is the dry friction of the carriage, which the thesis finds (12.6) but omits from its equations.
 
 Source: thesis 12.1 and appendix F. Erratum: `b_m` in row 4 of A is b_s; the ninth column of A does not exist.
 The listed k_s, k_c give 239, 919, 951 and 3261 Hz; figure 12.2 shows 114, 254, 286 and 2100 Hz, hence two sets.
-Damping, B_c, B_m, K_m2 are not given; they are chosen for 2 to 10 percent modal damping. F_c is what (12.3) makes of
+Damping, B_c, B_m, K_m2 are not given; they are chosen for 2 to 10 percent modal damping. F_c follows by (12.3) from
 the break-away voltages of 12.6.
 """
 
@@ -39,7 +39,7 @@ LINKS = {
     "encoder": 2,
 }  # the shaft between motor and wheel, the two halves of the capstan
 DRIVES = {"drive": 0}
-RUBS = {"drive": CAPSTAN}  # where the dry friction is that a drive works against
+RUBS = {"drive": CAPSTAN}  # coordinate of the dry friction on which a drive acts
 SENSORS = {"encoder": 0, "scale": 1}
 ELEMENTS = (
     element("motor", "body", "turns driven"),
@@ -59,7 +59,7 @@ NQ, NU, NX = 4, 1, 10  # four rotations and their speeds, two states of the ampl
 
 
 class LduParameters(Settings):
-    """Appendix F, as the set says where not given."""
+    """Parameters of appendix F; those not given come from the named set."""
 
     R_s: float = quantity(1.5e-3, unit="m", gt=0, help="radius of the motor shaft")
     R_t: float = quantity(3.0e-2, unit="m", gt=0, help="radius of the transmission wheel")
@@ -128,7 +128,7 @@ def described() -> Machine:
 
 
 def parameters(settings: LduSettings) -> LduParameters:
-    """The named set with what the settings say otherwise."""
+    """The named set, overridden by the settings."""
     return LduParameters(**{**SETS[settings.set], **settings.parameters.model_dump(exclude_unset=True)})
 
 
@@ -154,7 +154,7 @@ NAME = "ldu"
 SPOTS = {  # node -> coordinate, factor, channel
     "carriage": (CAPSTAN, "R_c", SENSORS["scale"]),
     "scale": (CAPSTAN, "R_c", SENSORS["scale"]),
-    "loop": (CAPSTAN, "R_c", 0),  # what all sensors share: the carriage for the scale
+    "loop": (CAPSTAN, "R_c", 0),  # common to all sensors: the carriage for the scale
 }
 SHOWN = Shown(
     axes=(),

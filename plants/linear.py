@@ -1,8 +1,8 @@
 """Exact propagation of a linear machine with forces at its nodes.
 
 Every plant here is springs, dampers and inertias (linear, stiff, exact by the matrix exponential) plus terms of
-physics that push at nodes (smooth, held over a substep at their value at its middle) plus dry friction (a force
-that is whatever it takes to stop the node, up to a limit):
+physics that act at nodes (smooth, held over a substep at their value at its middle) plus dry friction (the reaction
+force that stops the node, up to a limit):
 
     x' = A x + B u + E (f + r),   x = [q, v, others],   |r_i| <= dry_i, r_i opposes v_i
 
@@ -20,7 +20,7 @@ from rtctl.idiom import state, tick
 from rtctl.plants.rows import LANES, sum_rows
 
 SWEEPS = 3  # of Gauss-Seidel, warm-started: node couplings within one substep are weak
-TAYLOR = 12  # terms; the argument is scaled below a half, so the remainder is under 1e-13 of it
+TAYLOR = 12  # terms; the argument is scaled below a half, so the relative remainder is under 1e-13
 BALANCE_SWEEPS = 20
 ENDLESS = 1e100  # rate times a substep
 
@@ -48,10 +48,10 @@ MACHINE = state(  # a machine: its matrices for one substep, its state, and what
     Gamma_T=(float, (MOST_INPUTS, MOST_STATES)),
     work=(float, (4, MOST_STATES + MOST_INPUTS, MOST_STATES + MOST_INPUTS)),
     volts=(float, MOST_DRIVES),  # at the input of each driver
-    u=(float, MOST_DRIVES),  # what enters the linear machine: volts, or amperes asked for
-    y=(float, MOST_SENSORS),  # what each sensor would show before it is cut into counts, SI
-    y_rate=(float, MOST_SENSORS),  # its rate where it is a position, else 0
-    y_speed=(int, MOST_SENSORS),  # 1: it is a speed
+    u=(float, MOST_DRIVES),  # inputs of the linear machine: volts, or commanded amperes
+    y=(float, MOST_SENSORS),  # reading of each sensor before quantisation, SI
+    y_rate=(float, MOST_SENSORS),  # rate of the reading of a position, else 0
+    y_speed=(int, MOST_SENSORS),  # 1: the sensor shows a speed
     x=(float, MOST_STATES),
     x_next=(float, MOST_STATES),
     qm=(float, MOST_BODIES),  # positions and velocities at the middle of the substep
@@ -64,22 +64,22 @@ MACHINE = state(  # a machine: its matrices for one substep, its state, and what
     dry_base=(float, MOST_BODIES),
     dry=(float, MOST_BODIES),  # limit of the dry friction on each coordinate
     r=(float, MOST_BODIES),  # dry friction in force
-    meant=int,  # 1: more moves it than A and G say, so that accelerations are means of the last substep
+    meant=int,  # 1: forces outside A and G act, so that accelerations are means of the last substep
     link_i=(int, MOST_LINKS),
     link_j=(int, MOST_LINKS),
     link_a=(float, MOST_LINKS),
     link_b=(float, MOST_LINKS),
     link_c=(float, MOST_LINKS),  # stiffness and damping of the linear spring
     link_k=(float, MOST_LINKS),
-    link_T=(float, MOST_LINKS),  # what terms pull with on top of it, this substep
-    link_e=(float, MOST_LINKS),  # elongation that the linear model does not know, as of tape wound at another radius
-    link_v=(float, MOST_LINKS),  # its rate
+    link_T=(float, MOST_LINKS),  # pull of terms in addition to the linear spring, this substep
+    link_e=(float, MOST_LINKS),  # elongation outside the linear model, as of tape wound at another radius
+    link_v=(float, MOST_LINKS),  # rate of link_e
     inertia=(float, MOST_BODIES),  # of each coordinate, with which A and G were made, kg m^2 or kg
-    reel_R=(float, MOST_REELS),  # m, radius of what winds tape, now
-    reel_J=(float, MOST_REELS),  # kg m^2, its inertia
+    reel_R=(float, MOST_REELS),  # m, present radius of the reel
+    reel_J=(float, MOST_REELS),  # kg m^2, present inertia of the reel
     reel_R_lin=(float, MOST_REELS),  # m, the radius with which A was made
     reel_pull=(float, MOST_REELS),  # Nm, of all joints at the reel, at its radius
-    reel_pull_lin=(float, MOST_REELS),  # Nm, the same in the linear model
+    reel_pull_lin=(float, MOST_REELS),  # Nm, of all joints at the reel in the linear model
 )
 
 
@@ -119,7 +119,7 @@ def discretise_into(A, G, nx, ng, h, Phi_T, Gamma_T, work):
         for j in range(n):
             row += abs(M[i, j])
         norm = max(norm, row)
-    if not norm < ENDLESS:  # of a model that has run away: halving would never end
+    if not norm < ENDLESS:  # of a model that has diverged: halving would never end
         Phi_T[:nx, :nx], Gamma_T[: n - nx, :nx] = np.nan, np.nan
         return
     squarings = 0
@@ -150,8 +150,10 @@ def discretise_into(A, G, nx, ng, h, Phi_T, Gamma_T, work):
 def _balance(M, scale, n):
     """Scale rows and columns by powers of two until they are alike: positions and velocities differ by 1e4.
 
-    Without it the scaling of the exponential is ruled by the stiffest spring, and twenty squarings would let the
-    rigid rotation, whose eigenvalue is exactly one, creep. Source: Parlett & Reinsch, Numer. Math. 13 (1969).
+    Without balancing, the stiffest spring determines the scaling of the exponential, and the rounding of twenty
+    squarings makes the rigid rotation, whose eigenvalue is exactly one, drift.
+
+    Source: Parlett & Reinsch, Numer. Math. 13 (1969).
     """
     for i in range(n):
         scale[i] = 1.0
@@ -215,7 +217,7 @@ def midpoint(m):
 
 @tick
 def acceleration(m, i):
-    """Of coordinate `i` at the end of the last substep, by the forces there: a mean of the substep would be late."""
+    """Acceleration of coordinate `i` at the end of the last substep, by the forces there; a mean would be delayed."""
     if m.t == 0.0:
         return 0.0
     at = m.nq + i
@@ -231,14 +233,14 @@ def acceleration(m, i):
 
 @tick
 def link(m, j, i1, a, i2, b, c, k):
-    """Say that link `j` is the spring of stiffness c and damping k with elongation a q_i1 + b q_i2."""
+    """Set link `j` as the spring of stiffness c and damping k with elongation a q_i1 + b q_i2."""
     m.link_i[j], m.link_j[j] = i1, i2
     m.link_a[j], m.link_b[j], m.link_c[j], m.link_k[j] = a, b, c, k
 
 
 @tick
 def side(m, j, i):
-    """Whether link `j` gets longer (1) or shorter (-1) as coordinate `i`, at one of its ends, goes on."""
+    """Sign of the elongation of link `j` with coordinate `i`, at one of its ends: 1 longer, -1 shorter."""
     return 1.0 if (m.link_a[j] if m.link_i[j] == i else m.link_b[j]) > 0.0 else -1.0
 
 
@@ -250,20 +252,20 @@ def stretch(m, j):
 
 @tick
 def stretch_rate(m, j):
-    """Its rate, m/s or rad/s."""
+    """Rate of elongation of link `j` at the middle of the substep, m/s or rad/s."""
     return m.link_a[j] * m.vm[m.link_i[j]] + m.link_b[j] * m.vm[m.link_j[j]] + m.link_v[j]
 
 
 @tick
 def known(m, j):
-    """What the linear model itself pulls with in link `j` at the middle of the substep, N or Nm."""
+    """Pull of the linear model alone in link `j` at the middle of the substep, N or Nm."""
     e, v = stretch(m, j) - m.link_e[j], stretch_rate(m, j) - m.link_v[j]
     return m.link_c[j] * e + m.link_k[j] * v
 
 
 @tick
 def tension(m, j):
-    """Pull in link `j` at the middle of the substep: its spring and damper and what terms added so far, N or Nm."""
+    """Pull in link `j` at the middle of the substep, of spring, damper and the terms so far, N or Nm."""
     return m.link_c[j] * stretch(m, j) + m.link_k[j] * stretch_rate(m, j) + m.link_T[j]
 
 
@@ -277,8 +279,8 @@ def pull(m, j, T):
 
 @tick
 def extend(m, j, e, v):
-    """Stretch link `j` by `e` m or rad, growing at the rate `v`: its spring and damper feel it, and so does every law
-    that asks for the stretch."""
+    """Extend link `j` by `e` m or rad, growing at the rate `v`. Its spring and damper act on the extension, and
+    `stretch` includes it."""
     T = m.link_c[j] * e + m.link_k[j] * v
     m.f[m.link_i[j]] -= m.link_a[j] * T
     m.f[m.link_j[j]] -= m.link_b[j] * T
@@ -288,8 +290,8 @@ def extend(m, j, e, v):
 
 @tick
 def slid(m, j, d, v, T):
-    """Let link `j` go by `d` m or rad in all, at the rate `v`, which changes its pull by `T`: every law that asks for
-    the stretch is told of it, as by `extend`."""
+    """Slide link `j` by `d` m or rad in total, at the rate `v`, which changes its pull by `T`. `stretch` includes the
+    slip, as it includes the extension of `extend`."""
     pull(m, j, T)
     m.link_e[j] -= d
     m.link_v[j] -= v
@@ -310,7 +312,7 @@ def advance(m):
             m.r[j] = 0.0
         m.push[j] = m.f[j] + m.r[j]  # the last reaction is the warm start
     sum_rows(m.x_next, nx, m.Phi_T, m.x, nx, m.Gamma_T, m.u, nu, m.push, nq)
-    if dry_nodes == 1:  # exact at once, and written where it goes
+    if dry_nodes == 1:  # exact without sweeps
         change = _reaction(m, last)
         if change != 0.0:
             for i in range(nx):
@@ -334,13 +336,13 @@ def _gauss_seidel(m):
                     settled = False
                     for i in range(m.nx):
                         m.x_next[i] += m.Gamma_T[m.nu + j, i] * change
-        if settled:  # as it is while they slide
+        if settled:  # converged, as for sliding coordinates
             break
 
 
 @tick
 def _reaction(m, j):
-    """Dry friction at coordinate `j` into r; what it has changed by."""
+    """Dry friction at coordinate `j` into r; returns its change."""
     gain, before = m.Gamma_T[m.nu + j, m.nq + j], m.r[j]
     r = dry_friction(m.x[m.nq + j], m.x_next[m.nq + j] - gain * before, gain, m.dry[j])
     m.r[j] = r
@@ -351,9 +353,9 @@ def _reaction(m, j):
 def dry_friction(v, v_free, gain, limit):
     """Mean dry friction over a substep that starts at speed `v` and would end at `v_free` without it.
 
-    `gain` is the speed that a unit force held over the substep adds. While the node slides the friction is the limit;
-    where it would stop and turn within the substep, the moment of the turn is found, so that the speed after it is
-    right to second order; where the limit suffices to hold it there, the friction is what holds it.
+    `gain` is the speed that a unit force held over the substep adds. While the node slides, the friction is the limit.
+    Where the node would reverse within the substep, the time of the reversal is found, so that the speed after it has
+    second order. Where the limit suffices to hold the node, the friction is the holding force.
     """
     push = v_free - v
     if v == 0.0:

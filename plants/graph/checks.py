@@ -1,4 +1,4 @@
-"""Checks of a description: what is inconsistent is refused with the path at fault and what would be right."""
+"""Checks of a description: an inconsistency is refused with its path and its remedy."""
 
 import math
 import re
@@ -63,7 +63,7 @@ def _check_joint(machine: "Description", name: str, joint: Any) -> None:
 
 
 def _check_spans(machine: "Description") -> None:
-    """A span of tape needs two radii; what winds tape is alone on its coordinate and holds it by one span."""
+    """Check that a span has two radii, and that a reel ends a span and no rigid joint."""
     for name, joint in machine.joints.items():
         if joint.span is None:
             continue
@@ -103,7 +103,7 @@ def _joints_at(machine: "Description", body: str) -> list[str]:
 
 
 def _check_rigid(machine: "Description") -> None:
-    """A rigid joint between bodies that move as one already has no meaning."""
+    """Check that no rigid joint connects bodies that are rigidly connected already."""
     group = {name: name for name in machine.bodies}
 
     def root(name: str) -> str:
@@ -140,7 +140,7 @@ def _check_place(machine: "Description", path: str, element: Any) -> None:
 
 
 def _check_through(machine: "Description", path: str, sensor: Any) -> None:
-    """A sensor looks through a span that ends at its body."""
+    """Check that a sensor looks through a span that ends at its body."""
     span = getattr(sensor, "through", None)
     if span is None:
         return
@@ -166,7 +166,7 @@ def _check_columns(machine: "Description") -> None:
 
 
 def _check_seen(machine: "Description") -> None:
-    """Every body has to be connected with one that a sensor looks at."""
+    """Check that every body is connected with a body that a sensor measures."""
     near: dict[str, set[str]] = {name: set() for name in machine.bodies}
     for joint in machine.joints.values():
         ends = [end for end in (getattr(joint, "from"), joint.to) if not machine.is_frame(end)]
@@ -192,7 +192,7 @@ def _check_seen(machine: "Description") -> None:
 
 
 def _check_symbols(machine: "Description") -> None:
-    """A symbol stands for numbers that the description has."""
+    """Check that every symbol refers to numbers of the description."""
     known = [path for path, _ in machine.paths()]
     for symbol, paths in machine.symbols.items():
         for path in paths:

@@ -30,10 +30,10 @@ from rtctl.plants.graph.layout import NOWHERE, Layout
 from rtctl.plants.graph.mechanics import Mechanics, bodies_of, code_of
 from rtctl.plants.graph.params import POSITION, GraphParams, Q
 
-# params with the mechanics' own fields take the place of the general ones: meant
+# params with the mechanics' own fields replace the general params
 warnings.filterwarnings("ignore", message=".*considered a subtype.*", category=NumbaExperimentalFeatureWarning)
 
-REACH = 0.35  # of an eigenvalue times a step: Runge-Kutta's error of phase is then 1e-4 of a radian for each
+REACH = 0.35  # rad, largest eigenvalue times a step: Runge-Kutta's phase error is then 1e-4 for each radian
 MOST_INNER = 400  # steps a substep
 SWEEPS = 30  # of Gauss-Seidel: friction of one coordinate reaches another within the substep
 SETTLED = 1e-9  # of the limit, change of a reaction that ends the sweeps
@@ -41,7 +41,7 @@ SMALL = 1e-5  # rad or m (and per s), step of the differences that linearise h
 
 
 class Coupled(NamedTuple):
-    """Numbers of the mechanics of a plant. A coordinate k of the file is a[k] q[i[k]]."""
+    """Parameters of the mechanics of a plant. A coordinate k of the file is a[k] q[i[k]]."""
 
     n: int
     inner: int  # Runge-Kutta steps a substep
@@ -112,7 +112,7 @@ def at_start(code: Mechanics, p: Any, c: Coupled, dq: Any = None, v: Any = None)
         with interpreted():
             code.module.M(c.p, c.J, a * q[i], own)
             code.module.h(c.p, c.J, a * q[i], a * v[i], h)
-    except Exception as error:  # whatever a user's file raises
+    except Exception as error:  # a user's file may raise any exception
         frames = traceback.extract_tb(error.__traceback__)
         line = next((f":{f.lineno}" for f in reversed(frames) if f.filename == code.module.__file__), "")
         raise ValueError(f"mechanics.kind: {code.module.__file__}{line}: {type(error).__name__}: {error}") from error
@@ -141,7 +141,7 @@ def felt(layout: Layout, values: dict[str, float]) -> list[str]:
 
 
 def pulled(layout: Layout, values: dict[str, float]) -> list[str]:
-    """Bodies of the mechanics that h pulls at, at rest at the start or a little beside it."""
+    """Bodies of the mechanics with a force h at rest, at the start or near it."""
     code = code_of(layout.machine)
     if code is None:
         return []

@@ -47,7 +47,7 @@ class Reel(Settings):
 
 
 class Body(Settings):
-    """One coordinate: an angle where `inertia` is given, a way where `mass` is."""
+    """One coordinate: an angle where `inertia` is given, a displacement where `mass` is."""
 
     inertia: float | None = Field(None, gt=0, description="moment of inertia, kg m^2; the body turns")
     mass: float | None = Field(None, gt=0, description="mass, kg; the body slides")
@@ -125,7 +125,7 @@ Joint: Any = create_model(  # `from` is a word of Python
 
 
 class Drive(Settings):
-    """What turns a recorded command into a force on a body, or between the two ends of a joint."""
+    """Drive: a recorded command becomes a force on a body, or between the two ends of a joint."""
 
     body: str | None = Field(None, description="body that is driven")
     joint: str | None = Field(None, description="joint whose two ends are pushed apart, instead of a body")
@@ -196,7 +196,7 @@ class Sensor(Settings):
 
     @property
     def grain(self) -> float:
-        """Step of the column in its own units; 0 where nobody knows it."""
+        """Step of the column in its own units; 0 where it is unknown."""
         return 1.0 if self.counts_per_unit is not None else self.resolution or 0.0
 
     @model_validator(mode="after")
@@ -215,7 +215,7 @@ class Sensor(Settings):
 
 
 class Input(Settings):
-    """A recorded column that acts on a body beside the drives: a force, or a position that the body is held to."""
+    """A recorded column that acts on a body besides the drives: a force, or a prescribed position."""
 
     body: str
     column: str
@@ -266,7 +266,7 @@ class Description(Settings):
         return body == FRAME or (body in self.bodies and self.bodies[body].fixed)
 
     def paths(self) -> Iterator[tuple[str, float]]:
-        """Every number of the description that is more than nothing: dotted path and SI value."""
+        """Every number of the description except None: dotted path and SI value."""
         for group in ("bodies", "joints", "drives", "sensors"):
             for name, element in getattr(self, group).items():
                 yield from _numbers(f"{group}.{name}", element)

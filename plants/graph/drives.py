@@ -18,7 +18,7 @@ def drive(A, G, p, m, d):
     i, a, j, b = p.drive_i[d], p.drive_a[d], p.drive_j[d], p.drive_b[d]
     kind, K, w = p.drive_kind[d], p.drive_K[d], p.drive_w[d]
     wi, wj = a / m.inertia[i], b / m.inertia[j]
-    made = -1  # state that holds what the low pass gives, in N, A or V
+    made = -1  # state of the low pass's output, in N, A or V
     if w > 0.0:
         A[at, at + 1] = w
         A[at + 1, at] = -w
@@ -52,7 +52,7 @@ def drive(A, G, p, m, d):
 
 @tick
 def current(p, m, d):
-    """Current of drive `d`, A; of a force drive what it would be at a torque constant of 1."""
+    """Current of drive `d`, A; of a force drive the current at a torque constant of 1."""
     nq, at, w = p.nq, p.drive_at[d], p.drive_w[d]
     given = m.x[at] + p.drive_zero[d] * w * m.x[at + 1] if w > 0.0 else p.drive_gain[d] * m.u[d]
     if p.drive_kind[d] != VOLTAGE:

@@ -20,7 +20,7 @@ class Spot(NamedTuple):
     node: int  # coordinate
     link: int
     channel: int  # of the drive or the sensor
-    factor: float  # what the node moves for one unit of the coordinate
+    factor: float  # motion of the node for one unit of the coordinate
     other: int = NOWHERE  # link on the other side of the body that the tape of `link` lies around
 
 
@@ -47,7 +47,7 @@ def elements(layout: Layout) -> tuple[Element, ...]:
         traits += ["heavy"] if any(weight.incline is None for weight in body.weights) else []
         winds = body.reel is not None and any(machine.joints[span].to == name for span in spans(machine, name))
         traits += ["reel"] if winds else []
-        pushed = name in driven and not {"sprung", "heavy"} & set(traits)  # by nothing but its drive
+        pushed = name in driven and not {"sprung", "heavy"} & set(traits)  # by its drive alone
         traits += ["loaded"] if winds or name in touching or pushed else []
         traits += ["wheel"] if name in rims else []
         traits += ["capstan"] if name in touching and name not in rims else []
@@ -85,14 +85,14 @@ def elements(layout: Layout) -> tuple[Element, ...]:
 
 
 class Contact(NamedTuple):
-    """What passes on force by friction at a body: the joint that it drives, or the spans that lie around it."""
+    """Friction contact at a body: the joint that the body drives, or the spans that lie around it."""
 
     joint: str  # "" where spans lie around it
     spans: tuple[str, ...]
 
 
 def contacts(machine: Description) -> dict[str, Contact]:
-    """Contacts by the body at which they are: the one whose rim drives, or the one that tape lies around."""
+    """Contacts by body: the body whose rim drives, or the body that tape lies around."""
     out = {getattr(joint, "from"): Contact(name, ()) for name, joint in machine.joints.items() if joint.contact}
     for name, body in machine.bodies.items():
         around = spans(machine, name)
@@ -121,7 +121,7 @@ def driven_bodies(machine: Description) -> set[str]:
 
 
 def rubbing(machine: Description, drive: Any) -> str | None:
-    """The nearest body with dry friction that a drive works against; None where no body has any."""
+    """The body with dry friction that is nearest to a drive; None where no body has dry friction."""
     todo = [drive.body] if drive.body is not None else list(ends_of(machine.joints[drive.joint]))
     seen = set(todo)
     while todo:
@@ -137,7 +137,7 @@ def rubbing(machine: Description, drive: Any) -> str | None:
 
 
 def undriven(machine: Description, joint: str) -> set[str]:
-    """Bodies on the side of a joint that no drive moves but through it; both sides where each has one."""
+    """Bodies on the side of a joint that drives move only through the joint; both sides where each has a drive."""
     driven, sides = driven_bodies(machine), []
     for end in ends_of(machine.joints[joint]):
         side, todo = {end}, [end]
@@ -166,8 +166,8 @@ def _sensor_of(layout: Layout, body: str) -> int:
 
 
 def _presses(layout: Layout, body: str) -> tuple[int, int]:
-    """Links that press on a body's bearing: the spans at it (of a reel that on the other side of what its tape lies
-    around), else the first spring that ends at it and not at the frame."""
+    """Links that press on a body's bearing: the spans at the body (for a reel also the span on the other side of the
+    body that its tape lies around), else the first spring that ends at the body and not at the frame."""
     machine = layout.machine
     around = spans(machine, body)
     if around:

@@ -1,6 +1,6 @@
 """Description of a machine in a YAML file: a config with `machine:`, or bodies, joints, drives and sensors alone.
 
-`tolerance:` and `physics:` (or `plant.physics`) of the file say what the owner believes beside the description.
+`tolerance:` and `physics:` (or `plant.physics`) of the file give the prior and the known terms of the nominal model.
 """
 
 from pathlib import Path
@@ -22,7 +22,7 @@ WRITES = {"next_tick": 1.0, "same_tick": 0.0}  # loop.write -> samples from a co
 
 
 class Believed(NamedTuple):
-    """What a YAML file believes of a machine."""
+    """Nominal model of a YAML file: description, known physics and tolerance."""
 
     machine: Description
     physics: tuple[dict[str, Any], ...]  # entries of a `physics:` list, SI
@@ -33,7 +33,7 @@ class Believed(NamedTuple):
 def read_machine(path: Path | str) -> Believed:
     """Machine, known physics and tolerance of a YAML file: a config with `machine:`, or a bare description.
 
-    Raises UserError with file, line and what would be right.
+    Raises UserError with file, line and remedy.
     """
     file = find(path)
     document = load_yaml(file)
@@ -46,7 +46,7 @@ def is_bare(data: Any) -> bool:
 
 
 def checked(data: Any, document: Document) -> Believed:
-    """What plain data believe of a machine. Raises UserError as `read_machine`."""
+    """Nominal model of plain data. Raises UserError as `read_machine`."""
     if not isinstance(data, dict):
         raise UserError(f"{document.path} holds no keys; a description has bodies, joints, drives and sensors")
     given, at = (

@@ -8,8 +8,8 @@ from rtctl.plants.physics import TERMS
 
 
 def sprung(machine: Description, terms: Iterable[Any]) -> tuple[Description, dict[str, float]]:
-    """Description with the joints that `terms` make springs, and the numbers of these by dotted path; the same
-    description and nothing where no term makes one."""
+    """Description with the joints that `terms` make springs, and the numbers of these joints by dotted path; the
+    unchanged description and no numbers where no term makes a spring."""
     found: dict[str, Any] = {}
     values: dict[str, float] = {}
     for settings in terms:

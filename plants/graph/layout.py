@@ -28,7 +28,7 @@ class Layout(NamedTuple):
     nq: int
 
     def ratio(self, body: str, values: dict[str, float]) -> float:
-        """How far a body moves for one unit of its coordinate, by the ratios in `values`; 0 for the frame."""
+        """Motion of a body for one unit of its coordinate, by the ratios in `values`; 0 for the frame."""
         place = self.bodies.get(body)
         if place is None or place.coordinate == NOWHERE:
             return 0.0

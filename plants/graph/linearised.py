@@ -23,12 +23,12 @@ RINGS = 1e-3  # least share of the imaginary part in an eigenvalue that rings
 
 
 class Mode(NamedTuple):
-    """One motion of the machine by itself."""
+    """One mode of the machine."""
 
-    hertz: float  # 0 for a motion that does not swing
-    damping: float  # share of critical; negative where the motion grows
-    rate: float  # 1/s, of a motion that does not swing; positive where it grows
-    bodies: tuple[str, ...]  # that take part most; none where it is a drive's own
+    hertz: float  # 0 for a mode that does not oscillate
+    damping: float  # share of critical; negative for an unstable mode
+    rate: float  # 1/s, of a mode that does not oscillate; positive for an unstable mode
+    bodies: tuple[str, ...]  # with the largest participation; empty for a mode of a drive
 
 
 def linearised(p: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -56,7 +56,7 @@ def ringing(p: GraphParams) -> np.ndarray:
 
 
 def sensor_row(machine: Description, p: GraphParams, name: str) -> np.ndarray:
-    """What a sensor of position or speed shows of the state, (nx,), SI."""
+    """Output row (nx,) of a sensor of position or speed, SI."""
     n, row = list(machine.sensors).index(name), np.zeros(p.nx)
     at = 0 if machine.sensors[name].measures == "position" else p.nq
     row[at + int(p.sensor_i[n])] += p.sensor_a[n]

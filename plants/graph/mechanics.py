@@ -1,10 +1,10 @@
-"""Mechanics of a machine from a file: the functions M(q) and h(q, v) of M(q) q'' + h(q, v) = F, and who may give them.
+"""Mechanics of a machine from a file: the functions M(q) and h(q, v) of M(q) q'' + h(q, v) = F, and their registration.
 
     machine:
       mechanics: {kind: ./furuta.py:Furuta, parameters: {m: 24 g, d: 64.5 mm}, at: {pendulum: 0 deg}}
 
-The code of a file is registered by whoever loads it from a path that the user named (rtctl.own.mechanics). A
-description carries its name, the hash of its text and its numbers, and never the text.
+The module that loads a file from a path of the user registers its code (rtctl.own.mechanics). A description holds the
+name of the code, the hash of its text and its parameters, and never the text.
 """
 
 from collections.abc import Mapping
@@ -41,7 +41,7 @@ class Mechanics(NamedTuple):
 
 
 class MechanicsSettings(Settings):
-    """Which file couples the bodies, and the numbers of its law."""
+    """File of the mechanics that couples the bodies, and its parameters."""
 
     kind: str = Field(description="file and name in it, ./furuta.py:Furuta; its path is relative to the config")
     sha256: str = Field(default="", description="hash of the file's text; written by the program")
@@ -55,7 +55,7 @@ class MechanicsSettings(Settings):
 
 
 _known: dict[str, Mechanics] = {}  # sha256 -> code that the user gave
-_given: dict[str, Mechanics] = {}  # name -> the same, the last that was given
+_given: dict[str, Mechanics] = {}  # name -> code that the user gave last
 
 
 def register(mechanics: Mechanics) -> None:

@@ -18,7 +18,7 @@ Q, L, U, Y = linear.MOST_BODIES, linear.MOST_LINKS, linear.MOST_DRIVES, linear.M
 
 
 class GraphParams(NamedTuple):
-    """Numbers of a machine. A place is a pair of coordinates i, j with what each moves there: a q_i + b q_j."""
+    """Parameters of a machine. A place is a pair of coordinates i, j with factors a, b of its motion a q_i + b q_j."""
 
     h: float  # s, one substep
     nq: int
@@ -137,7 +137,7 @@ def drive_gain(values: dict[str, float], name: str) -> float:
 
 
 def place(layout: Layout, element: Any, values: dict[str, float]) -> tuple[int, float, int, float]:
-    """Where a drive or sensor is: coordinates and what one unit of each moves there."""
+    """Place of a drive or sensor: coordinates, and the motion there for one unit of each."""
     if element.joint is not None:
         return joint_place(layout, element.joint, values)
     at = layout.coordinate(element.body)

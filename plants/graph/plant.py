@@ -2,7 +2,7 @@
 
     M q'' = - F_v q' - sum_links a (c e + k e') + sum_drives a F + weight + terms + dry friction,   e = a q_i + b q_j
 
-Drives are those of drives.py; what winds tape is in reel.py.
+Drives are those of drives.py; reels are in reel.py.
 """
 
 import math
@@ -47,7 +47,7 @@ def prepare(p, m):
 
 @tick
 def discretise(p, m):
-    """Matrices at the radii and inertias of now."""
+    """Matrices at the present radii and inertias."""
     reel.linearise(p, m)
     assemble(p, m)
     linear.discretise_machine(m)
@@ -74,21 +74,21 @@ def assemble(p, m):
 
 @tick
 def ask(p, m):
-    """Commands within their limits, in m.volts: what a drive makes of a command comes after."""
+    """Commands within their limits, in m.volts, before the drives act on them."""
     for d in range(p.nu):
         m.volts[d] = min(max(m.volts[d], -p.drive_limit[d]), p.drive_limit[d])
 
 
 @tick
 def take(p, m):
-    """What the drives give, within the limits of their outputs, from m.volts to the inputs m.u."""
+    """Outputs of the drives within their limits, from m.volts to the inputs m.u."""
     for d in range(p.nu):
         m.u[d] = min(max(m.volts[d], -p.drive_top[d]), p.drive_top[d])
 
 
 @tick
 def weigh(p, m):
-    """Forces of what is not linear, on top of the forces m.f: weight of every body, and reels that wind."""
+    """Nonlinear forces, added to m.f: weight of every body, and reels that wind."""
     for k in range(p.weights):
         m.weight[p.weight_i[k]] = 0.0
     for k in range(p.weights):
@@ -106,7 +106,7 @@ def weigh(p, m):
 
 @tick
 def tension(m, j):
-    """Pull in link `j` at the end of the substep, with what terms added to it at its middle, N or Nm."""
+    """Pull in link `j` at the end of the substep, with the pull of terms at its middle, N or Nm."""
     i1, a, i2, b = m.link_i[j], m.link_a[j], m.link_j[j], m.link_b[j]
     e = a * m.x[i1] + b * m.x[i2] + m.link_e[j] + 0.5 * m.h * m.link_v[j]
     v = a * m.x[m.nq + i1] + b * m.x[m.nq + i2] + m.link_v[j]
@@ -115,7 +115,7 @@ def tension(m, j):
 
 @tick
 def read(p, m):
-    """What each sensor would show, in SI units, into m.y."""
+    """Reading of each sensor before quantisation, in SI units, into m.y."""
     nq = p.nq
     for c in range(p.ny):
         kind = p.sensor_kind[c]  # POSITION is 0, SPEED 1

@@ -1,4 +1,4 @@
-"""Described machine on given commands: what its sensors would show, from rest, without loop, converters, counters."""
+"""Open-loop simulation of a described machine: sensors under given commands, from rest, without converters."""
 
 import numpy as np
 

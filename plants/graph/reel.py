@@ -44,7 +44,7 @@ def start_reels(p, m):
 
 @tick
 def linearise(p, m):
-    """Radii and inertias of now into the numbers with which the matrices are made."""
+    """Present radii and inertias into the parameters of the matrices."""
     for k in range(p.reels):
         m.reel_R_lin[k], m.inertia[p.reel_i[k]] = m.reel_R[k], m.reel_J[k]
     for n in range(p.nl):
@@ -72,7 +72,7 @@ def grow(p, m):
 
 @tick
 def wind(p, m):
-    """Radii and inertias that follow the tape, as forces on top of the model that is linear in between."""
+    """Forces of radii and inertias that follow the tape, in addition to the last linear model."""
     for n in range(p.nl):
         of_i, of_j = p.link_reel_i[n], p.link_reel_j[n]
         if of_i < 0 and of_j < 0:
@@ -92,7 +92,7 @@ def wind(p, m):
                 e += way_j - b * m.qm[j]
             T = c * (way_i + way_j) + k * (at_i * m.vm[i] + at_j * m.vm[j])
             m.link_e[n] = e
-            m.link_T[n] += T - T_lin - c * e  # with these linear.tension tells the tension on the true radius
+            m.link_T[n] += T - T_lin - c * e  # linear.tension is then the tension at the true radius
         if of_i >= 0:
             m.reel_pull[of_i] -= at_i * T
             m.reel_pull_lin[of_i] -= a * T_lin
@@ -105,14 +105,14 @@ def wind(p, m):
             m.f[j] -= b * (T - T_lin)
     for k in range(p.reels):
         i = p.reel_i[k]
-        ratio = m.inertia[i] / m.reel_J[k]  # whatever turns the reel turns its inertia of now
+        ratio = m.inertia[i] / m.reel_J[k]  # every torque on the reel acts on its present inertia
         others = others_on(p, m, i) if p.reel_moved[k] != 0 else 0.0
         m.f[i] = m.f[i] * ratio + ((m.reel_pull[k] + others) * ratio - (m.reel_pull_lin[k] + others))
 
 
 @tick
 def others_on(p, m, i):
-    """Torque on coordinate `i` that is part of the linear model beside its joints: drives and viscous friction, Nm."""
+    """Torque on coordinate `i` of the linear model without its joints: drives and viscous friction, Nm."""
     torque = -p.viscous[i] * m.vm[i]
     for d in range(p.nu):
         if p.drive_i[d] == i:

@@ -1,7 +1,7 @@
 """Symbols of the literature: the numbers of a description by the names that a thesis or data sheet gives them.
 
-A description says what each symbol stands for (`k_c: [joints.capstan.stiffness, joints.encoder.stiffness]`), so that
-a parameter set in symbols fills a described machine.
+A description maps each symbol to its numbers (`k_c: [joints.capstan.stiffness, joints.encoder.stiffness]`), so that a
+parameter set in symbols fills a described machine.
 """
 
 from collections.abc import Mapping
@@ -36,6 +36,6 @@ class Machine(NamedTuple):
 
 @cache
 def machine(file: Path) -> Machine:
-    """The machine that a YAML file describes. Raises UserError or ValidationError where it is not sound."""
+    """The machine that a YAML file describes. Raises UserError or ValidationError where the file is not valid."""
     described = Description.model_validate(load_yaml(file).data["machine"])
     return Machine(layout(described), dict(described.paths()))

@@ -97,7 +97,7 @@ def in_si(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_bodies(data: Mapping[str, Any]) -> None:
-    """Raise ValueError where an element is at a body that is not described: its units would be anybody's guess."""
+    """Raise ValueError where an element is at a body that is not described, so that its units are unknown."""
     known = [*(str(name) for name, _ in _items(data.get("bodies"))), "frame"]
     for group, keys in (("joints", ("from", "to")), ("drives", ("body",)), ("sensors", ("body",))):
         for name, element in _items(data.get(group)):
@@ -124,7 +124,7 @@ def _sensor_units(path: str, sensor: Mapping[str, Any], turns: bool) -> dict[str
     if measures not in ("position", "speed", "acceleration", "force", "current"):
         return {}
     unit = measured_unit(measures, turns)
-    si = "counts_per_unit" not in sensor and sensor.get("per_unit", 1) in (1, -1)  # a minus turns the direction round
+    si = "counts_per_unit" not in sensor and sensor.get("per_unit", 1) in (1, -1)  # a minus reverses the direction
     column = {"resolution": unit, "noise": unit} if si else {}
     return {"counts_per_unit": _per(unit), **column}
 

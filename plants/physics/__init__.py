@@ -1,7 +1,7 @@
-"""Terms of physics: every module here that is no tool holds one or a family. Emulator, fit and diagnosis use these.
+"""Terms of physics: every module here except TOOLS holds one term or a family. Emulator, fit and diagnosis use them.
 
-A term acts after those of a lower `order`: what asymmetry scales and presliding replaces must be there before, and so
-must all that stretches, lets go or slackens a spring, before anything rubs by its tension.
+A term acts after the terms of a lower `order`. Dry friction precedes asymmetry, which scales it, and presliding, which
+replaces it. Elongation, slip and slack of a spring precede friction that depends on its tension.
 """
 
 from importlib import import_module

@@ -1,7 +1,7 @@
-"""Back-EMF of a drive that the owner takes for a source of current or torque: the faster it turns, the less it gives.
+"""Back-EMF of a drive that the nominal model takes for a source of current or torque: torque falls with speed.
 
-A voltage V at a motor of resistance R and constant K gives the torque K (V - K v) / R: beside the gain K / R, which the
-owner knows as such, it brakes by b v with b = K^2 / R. A drive that is switched off brakes by nothing.
+A voltage V at a motor of resistance R and constant K gives the torque K (V - K v) / R: the nominal gain K / R, and a
+braking torque b v with b = K^2 / R. A drive that is switched off does not brake.
 
 Source: Krishnan, Electric Motor Drives (2001), 2.3.
 """

@@ -1,4 +1,4 @@
-"""Compliance of a joint that the owner calls rigid: it is a spring, and its two ends move apart.
+"""Compliance of a joint that is rigid in the nominal model: a spring between its two ends.
 
     T = c e + c tau e',   e = q_to - ratio q_from
 
@@ -36,7 +36,7 @@ def build_compliance(settings: ComplianceSettings, h: float) -> ComplianceParams
 
 
 def joint(settings: ComplianceSettings) -> dict[str, float]:
-    """Stiffness and damping that the joint has."""
+    """Stiffness and damping of the joint."""
     return {"stiffness": settings.c, "damping": settings.c * settings.tau}
 
 

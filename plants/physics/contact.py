@@ -1,20 +1,19 @@
 """Sliding of friction contacts: gross slip beyond a limit, and creep, the micro-slip that any rolling contact has.
 
-The tape lies on the capstan of the IVU, where the difference of the two tensions is what the contact carries; the motor
-shaft of the LDU rolls on the transmission wheel, and the capstan on the strip. What has slid is an offset in the
-elongation of the links beside it:
+The tape lies on the capstan of the IVU, whose contact carries the difference of the two tensions. The motor shaft of
+the LDU rolls on the transmission wheel, and its capstan on the strip. The sliding distance d is an offset in the
+elongation of the adjacent links:
 
     slip    |T - c d - k d'| <= F_max,  d' against it              T - c d - k d' = +-F_max + eta d' while it slides
     creep   d' = (kappa |v| + rate) (T - c d - k d')               the thesis's chapters 11.2 and 12.5
 
-with T the pull of the linear model, c and k of the links that share the contact and v the speed of the surface, of the
-far end of a joint of a described machine, which slips and creeps in the same ways. There `rate` is creep that goes on
-at standstill, as of a belt or a clamped hub. Both
-are linear in d over a substep and are stepped by their exponential: exact for a constant T, any stiffness, no limit on
-h. Force times d' is never negative: sliding only takes energy.
+with T the pull of the linear model, c and k of the links that share the contact, and v the speed of the surface. At a
+joint of a described machine v is the speed of its far end. `rate` is creep at standstill, as of a belt or a clamped
+hub. Slip and creep are linear in d over a substep and are stepped by their exponential: exact for a constant T, any
+stiffness, no limit on h. Force times d' is never negative: sliding only dissipates energy.
 
-The contact of capstan and strip is rigid in the LDU's model: there the carriage, which the scale sees, falls behind
-R_c theta_c by what has slid. Slip keeps the momentum: the carriage gets F_max while the capstan runs ahead of it.
+The contact of capstan and strip is rigid in the LDU's model: the carriage, which the scale measures, falls behind
+R_c theta_c by the sliding distance. Slip keeps the momentum: F_max acts on the carriage while the capstan runs ahead.
 
 Source: thesis 11.2 and 12.5; Perzyna, Fundamental problems in viscoplasticity (1966), for the sliding speed in
 proportion to the force beyond the limit; Kalker, Three-dimensional elastic bodies in rolling contact (1990), ch. 1;
@@ -38,7 +37,7 @@ LINK1, LINK2 = 1, 2  # of the LDU: the halves of its capstan, before and behind 
 
 
 class SlipSettings(Settings):
-    """Without effect while F_max is above all that the contact carries; the size is 1 / F_max."""
+    """Without effect while F_max exceeds the force of the contact; the size is 1 / F_max."""
 
     term: Literal["transmission.slip"] = "transmission.slip"
     node: Node
@@ -83,7 +82,7 @@ CONTACT_STATE = state(d=float, fallen=float, rate=float)  # offset in the links;
 
 
 def build_slip(settings: SlipSettings, h: float) -> SlipParams:
-    """The substep comes in; the exponential depends on the links, which may change."""
+    """Params with the substep; the exponential is computed in the tick, since the links may change."""
     return SlipParams(h, settings.F_max, settings.eta, settings.R_c, int(settings.node == STRIP))
 
 
@@ -94,7 +93,8 @@ def build_creep(settings: CreepSettings, h: float) -> CreepParams:
 
 @tick
 def slide(s, F_max, eta, T, c, k, h):
-    """Slide where `T` less what has slid exceeds the limit; the mean change of the contact force, 0 or against T."""
+    """Slip where `T` less c times the sliding distance exceeds the limit; the mean change of the contact force, 0 or
+    against T."""
     held = T - c * s.d
     if abs(held) <= F_max:
         return -c * s.d
@@ -116,8 +116,7 @@ def micro(s, grip, T, c, k, h):
 
 @tick
 def share(m, d, v, change):
-    """Spread a change of T2 - T1 over the two tapes as their springs do: both have slid the same way, by `d` at the
-    rate `v`."""
+    """Distribute a change of T2 - T1 over the two tapes by their stiffness; both have slid by `d` at the rate `v`."""
     both = m.link_c[0] + m.link_c[1]
     linear.slid(m, 1, d, v, change * m.link_c[1] / both)
     linear.slid(m, 0, -d, -v, -change * m.link_c[0] / both)
@@ -153,7 +152,7 @@ def slip_joint(p, s, m, j):
 
 @tick
 def creep_joint(p, s, m, j):
-    """Creep in link `j`, with the way of its far end and with time."""
+    """Creep in link `j`, with the motion of its far end and with time."""
     grip = p.kappa * abs(m.link_a[j] * m.vm[m.link_i[j]]) + p.rate
     before = s.d
     change = micro(s, grip, linear.tension(m, j), m.link_c[j], m.link_k[j], p.h)
@@ -162,13 +161,13 @@ def creep_joint(p, s, m, j):
 
 @tick
 def strip_force(p, m):
-    """What the strip carries of the LDU's capstan, N."""
+    """Contact force between strip and capstan of the LDU, N."""
     return (linear.tension(m, LINK1) - linear.tension(m, LINK2)) / p.R_c
 
 
 @tick
 def fall_behind(p, s, gain, force):
-    """Slip behind a rigid contact that carries F_max at most; a newton gives what is moved the speed `gain`."""
+    """Slip behind a rigid contact that carries F_max at most; a newton adds the speed `gain` to the carriage."""
     gain /= 1.0 + gain * p.eta
     free = s.rate + gain * (force - p.eta * s.rate)
     rate = free + gain * linear.dry_friction(s.rate, free, gain, p.F_max)
@@ -209,7 +208,7 @@ def share_spans(m, i, j, k, d, v, change):
 
 @tick
 def carried(m, i, r):
-    """Force on what coordinate `i` moves by `r` for one unit, of the links that end at it, N."""
+    """Force in N of the links that end at coordinate `i`, at the lever `r` of its contact."""
     torque = 0.0
     for j in range(m.nl):
         if m.link_i[j] == i:
@@ -221,8 +220,8 @@ def carried(m, i, r):
 
 @tick
 def slip(p, s, m, i, r, j, k):
-    """Slip of a contact: of coordinate `i` in the spans `j` and `k` around it, in link `j`, or, without a link, on what
-    it moves by `r` for one unit."""
+    """Slip of a contact: of coordinate `i` in the spans `j` and `k` around it, in link `j`, or, without a link, of a
+    rigid contact at the lever `r`."""
     if k >= 0:
         T = linear.side(m, j, i) * linear.tension(m, j) + linear.side(m, k, i) * linear.tension(m, k)
         before = s.d
@@ -231,13 +230,13 @@ def slip(p, s, m, i, r, j, k):
     elif j >= 0:
         slip_joint(p, s, m, j)
     else:
-        gain = p.h * m.G[m.nq + i, m.nu + i] * r * r  # speed that a newton gives what is moved
+        gain = p.h * m.G[m.nq + i, m.nu + i] * r * r  # speed that a newton adds at the contact
         fall_behind(p, s, gain, carried(m, i, r))
 
 
 @tick
 def creep(p, s, m, i, r, j, k):
-    """Creep of a contact, which stands as for `slip`."""
+    """Creep of a contact, with the cases of `slip`."""
     if k >= 0:
         arm = m.link_a[k] if m.link_i[k] == i else m.link_b[k]
         T = linear.side(m, j, i) * linear.tension(m, j) + linear.side(m, k, i) * linear.tension(m, k)
@@ -253,7 +252,7 @@ def creep(p, s, m, i, r, j, k):
 
 @tick
 def behind(s, m, c):
-    """Let the reading `c` of what is moved fall behind by what has slid; there is none where `c` is below 0."""
+    """Subtract the sliding distance from the reading `c` of the moved body; no reading where `c` is below 0."""
     if c >= 0:
         m.y[c] -= s.fallen
 

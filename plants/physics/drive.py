@@ -1,6 +1,6 @@
 """Drives without memory: offset, dead band, another gain for each sign, a limit, and a supply that sags.
 
-Each takes the volts at the driver's input and gives what an ideal driver would have to get to do the same.
+Each term maps the volts at the driver's input to the equivalent volts of an ideal driver.
 
 Source: Slotine & Li, Applied Nonlinear Control (1991), 5.2 for dead zone and saturation; Krishnan, Electric Motor
 Drives (2001), ch. 4 for converters and their supply.
@@ -178,7 +178,7 @@ def ramp(s, u, step):
 
 
 class SupplySagSettings(Settings):
-    """k is the size. current: they draw |volts|; power: their square; drawn: what is left of |volts| once it sags.
+    """k is the size. current: they draw |volts|; power: their square; drawn: |volts| after the sag.
 
     A supply feeds all drives, or the one at the node alone.
     """
@@ -211,12 +211,12 @@ def build_supply_sag(settings: SupplySagSettings, h: float) -> SupplySagParams:
 
 @tick
 def supply_sag(p, s, volts, c):
-    """Lower the `volts` (n,) of all drives that the supply of drive `c` feeds by what they together have drawn."""
+    """Lower the `volts` (n,) of all drives that the supply of drive `c` feeds by the sag of their common load."""
     load = 0.0
     first, behind = (c, c + 1) if p.own == 1 else (0, volts.shape[0])
     for i in range(first, behind):
         load += volts[i] * volts[i] if p.form == 1 else abs(volts[i])
-    if p.form == 2:  # what flows has sagged already: load' = (load0 (1 - k load) - load) / tau, exact
+    if p.form == 2:  # the load is that of the sagged volts: load' = (load0 (1 - k load) - load) / tau, exact
         more = 1.0 + p.k * load
         s.load += (1.0 - (1.0 - p.share) ** more) * (load / more - s.load)
     else:

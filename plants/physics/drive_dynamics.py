@@ -1,9 +1,9 @@
 """Drives with memory: a lag of the current, and a motor that warms.
 
 Both steps are exact for a command that is held over the substep; the lag gives the mean of its response over it.
-`drive.thermal` at a drive takes from the gain (resistance and magnets), and with `ease` from the dry friction that it
-works against (grease); at a node with dry friction from that alone.
-At a body of a described machine it is the friction there. The heat is that of the motor's current, or of all of them.
+`drive.thermal` at a drive lowers the gain (resistance and magnets), and with `ease` the dry friction on which the drive
+acts (grease). At a node or body with dry friction it lowers the dry friction alone. The heat is that of the motor's
+current, or of the currents of all motors.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3 for the held input; Krishnan, Electric Motor
 Drives (2001), 2.8 for the thermal model of first order.
@@ -22,7 +22,7 @@ from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 THERMAL_FORMS = ("exponential", "linear", "hyperbolic")
-LEAST = 0.05  # of the cold one, that is always left
+LEAST = 0.05  # least gain or friction, as a share of the cold value
 
 
 class LagSettings(Settings):
@@ -117,7 +117,7 @@ def build_thermal(settings: ThermalSettings, h: float) -> ThermalParams:
 
 @tick
 def left(p, lost):
-    """Share of the cold one that is left."""
+    """Remaining gain or friction as a share of the cold value."""
     if p.form == 0:
         return math.exp(-lost)
     if p.form == 1:
@@ -127,8 +127,8 @@ def left(p, lost):
 
 @tick
 def thermal_gain(p, s, volts, c, loss):
-    """Warm the motor by volts `c` of the `volts` (n,) over a substep and lower them by what it has lost; not where c is
-    below zero, at a body."""
+    """Warm the motor by volts `c` of the `volts` (n,) over a substep and lower these volts by the loss; no action at a
+    body, where c is below zero."""
     if c < 0:
         return
     u = volts[c]
@@ -139,14 +139,14 @@ def thermal_gain(p, s, volts, c, loss):
 
 @tick
 def thermal_friction(p, s, dry, loss):
-    """Dry friction of a warm motor whose cold one is `dry`, Nm or N."""
+    """Dry friction of a warm motor with the cold dry friction `dry`, Nm or N."""
     return dry * left(p, loss * s.heat)
 
 
 @tick
 def thermal_dry(p, s, m, i, c):
-    """Dry friction of coordinate `i` of a described machine, Nm or N: that which a warm drive `c` works against, or of
-    a body (c below zero) that the drives of the machine warm."""
+    """Dry friction of coordinate `i` of a described machine, Nm or N, on which a warm drive `c` acts, or of a body
+    (c below zero) that the drives of the machine warm."""
     if c >= 0:
         return thermal_friction(p, s, m.dry[i], p.ease)
     load = 0.0

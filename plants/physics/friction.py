@@ -1,11 +1,11 @@
-"""Friction: what resists motion at a node, dry (up to a limit, opposing) or viscous (in proportion to speed).
+"""Friction at a node: dry (a reaction up to a limit), viscous (in proportion to speed), or quadratic in speed.
 
-Drag by the square of speed has no name in the first exchange format: there it is only looked for so that viscous
-friction is not named for it.
+Quadratic drag has no name in the first exchange format: a search for that format tests it only so that viscous
+friction is not reported in its place.
 
-Dry terms add to the limit of the node's dry friction and the solver finds the force, so that a node that sticks
-stands still; a sum of limits below zero counts as none. Viscous terms add a force. Sizes may be negative where the
-base model has more than the machine: the sum is what must not feed energy in.
+Dry terms add to the limit of the node's dry friction and the solver finds the force, so that a sticking node stands
+still; a sum of limits below zero counts as 0. Viscous terms add a force. Sizes may be negative where the nominal model
+has more friction than the machine: the sum must be passive.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, A survey of models, analysis tools and compensation methods for
 the control of machines with friction, Automatica 30 (1994); thesis (8.3); Hoerner, Fluid-dynamic drag (1965).
@@ -47,7 +47,7 @@ def coulomb(p):
 
 
 class ViscousSettings(Settings):
-    """B is the size; negative, down to what the base model has, where there is less of it than believed."""
+    """B is the size; negative, down to the nominal viscous friction, where the machine has less than nominal."""
 
     term: Literal["friction.viscous"] = "friction.viscous"
     node: Node

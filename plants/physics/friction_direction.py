@@ -1,9 +1,9 @@
 """Dry friction that is larger one way than the other: a carriage that leans, a brush that bites, a seal with a lip.
 
-A node that takes F_C (1 + a) one way and F_C (1 - a) the other takes F_C either way beside a constant force of F_C a:
-sliding and holding, the two are the same law. So it is written as that force, which is never more than what dry and
-viscous friction of the description hold, and reversals stay exact. In a physics list it stands after the terms whose
-friction it scales. An offset of the drive differs from it only where dry friction changes, by speed, load or place.
+Friction of F_C (1 + a) one way and F_C (1 - a) the other is equivalent to friction of F_C both ways and a constant
+force of F_C a, in sliding and in holding. The term is implemented as this force, limited by dry and viscous friction of
+the description, so that reversals stay exact. In a physics list the term stands after the terms whose friction it
+scales. An offset of the drive differs from asymmetry only where dry friction changes, by speed, load or position.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994); Janot, Gautier & Brunot, Data set and
 reference models of EMPS (2019), whose axis has it.

@@ -1,8 +1,8 @@
-"""Dry friction that grows with what presses on the bearing: the tape's tension, or the force that a contact carries.
+"""Load-dependent dry friction: the limit grows with the tape's tension, or with the force that a contact carries.
 
-A limit of mu |T| R at the node: mu of the contact or bearing, T in the spring beside it, R its lever on the node. The
-axis has no spring in its drive, there the force of the drive itself presses (a screw or a worm under thrust). A body
-of a described machine is pressed by all joints with springs that end at it, or by the weight that it carries.
+A limit of mu |T| R at the node: mu of the contact or bearing, T in the adjacent spring, R its lever on the node. The
+axis has no spring in its drive: the load is the force of the drive itself (a screw or a worm under thrust). The load
+of a body of a described machine is the pull of all joints with springs that end at it, or the weight that it carries.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), section 2; Hamel, Modele de frottement a
 l'entree des reducteurs, for gears under load; thesis 11.2 and 12.5 for the contacts of the linear drive.
@@ -27,7 +27,7 @@ WEIGHT = (*JOINTS, Choice("by", ("weight",)))
 
 
 class LoadSettings(Settings):
-    """mu is the size; negative only to take back what an earlier term has too much of."""
+    """mu is the size; negative only to correct an earlier term that is too large."""
 
     term: Literal["friction.load"] = "friction.load"
     node: Node
@@ -73,7 +73,7 @@ def load(p, m, i, one, two):
 
 @tick
 def lever(m, j, i):
-    """How far from the centre of node `i` link `j` pulls, m (or the gear ratio of a shaft)."""
+    """Lever of link `j` on node `i`, m (or the gear ratio of a shaft)."""
     return abs(m.link_a[j]) if m.link_i[j] == i else abs(m.link_b[j])
 
 
@@ -91,7 +91,7 @@ def load_drive(p, m, i):
 def pressed(p, m, i, j, k):
     """As `load`, of the links `j` and `k` where both end at node `i`, else of `j`.
 
-    Where no link is named it is as `load_all`, and of the drives at a node at which no link ends.
+    Without a link: as `load_all`; at a node where no link ends, as `load_drive`.
     """
     if j >= 0:
         return load(p, m, i, j, k if k >= 0 and (m.link_i[k] == i or m.link_j[k] == i) else j)

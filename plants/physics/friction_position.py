@@ -6,7 +6,7 @@ The limit of dry friction is larger by  slope x + A f(x), in one of three forms:
     step  f = (1 + tanh(2 (x - at) / length)) / 2     another piece of rail, a seal from some place on
     spot  f = exp(-((x - at) / length)^2 / 2)         a stretch that is worn, or where a rail pinches
 
-Where a sum of limits is below zero it counts as none, so that friction never pushes.
+A sum of limits below zero counts as 0, so that friction stays passive.
 
 Source: Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica 30 (1994), section 2.3 for friction by position;
 Armstrong, Friction: experimental determination, modeling and compensation, ICRA (1988).
@@ -27,7 +27,7 @@ FORMS = ("wave", "step", "spot")
 
 
 class PositionSettings(Settings):
-    """A and slope are the sizes; below zero it rubs less."""
+    """A and slope are the sizes; negative values reduce the friction."""
 
     term: Literal["friction.position"] = "friction.position"
     node: Node
@@ -94,7 +94,7 @@ POSITION = Term(
     check="Pull slowly over the whole way with a spring balance; look at the rail and at worn stretches.",
     units={"A": "force", "length": "position", "at": "position", "slope": "stiffness"},
     needs=Needs(dry=True),
-    # A step beyond the way, or a wide spot, would be dry friction by another name: waves alone are looked for.
+    # A step beyond the travel, or a wide spot, is equivalent to constant dry friction: a search tries waves alone.
     search=(Turn("A", "phi", "force", 0.2), Shape("length", "span", (0.5, 1.2), 2.0)),
     richer=(Size("slope", "stiff", 0.1, signed=True),),
     static=True,

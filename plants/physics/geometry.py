@@ -2,9 +2,9 @@
 
     R = R_0 + d q / 2 pi (4.3, 4.4),  l = integral of R dq,  J = J_0 + (pi/2) rho_h (R^4 - R_0^4) (4.1, 4.2)
 
-plants/graph/reel.py does this with the thickness that the owner gives, and takes its matrices anew on the way;
-here it is for one reel, or with `other` for both, on top of what the model has, as forces alone. Where the owner's tape
-has no thickness the two agree to a few percent of the effect over nine turns; a reel that is nearly empty is the worst.
+plants/graph/reel.py models the radius with the nominal thickness, and updates its matrices. This term adds the change
+of radius to the model of one reel, or with `other` of both, by forces alone. For a nominal thickness of 0 the two
+methods agree to a few percent of the effect over nine turns; the error is largest for a nearly empty reel.
 
 Source: thesis (4.1)-(4.8).
 """
@@ -38,7 +38,7 @@ class RadiusChangeSettings(Settings):
 
 class RadiusChangeParams(NamedTuple):
     grow: float  # m/rad
-    other: float  # the same of the other reel
+    other: float  # m/rad, growth of the other reel
     rho_h: float
     R_min: float
 
@@ -51,14 +51,14 @@ def build_radius_change(settings: RadiusChangeSettings, h: float) -> RadiusChang
 
 @tick
 def radius(p, m, j, grow):
-    """Of the reel of tape `j` at its angle, m."""
+    """Radius of the reel of tape `j` at its angle, m."""
     R_0 = m.link_a[j]
     return max(R_0 + grow * m.qm[m.link_i[j]], min(p.R_min, R_0))
 
 
 @tick
 def wound(p, m, j, grow):
-    """Stretch the tape `j` by what its reel has wound at another radius."""
+    """Extend the tape `j` by the difference of tape wound at the changed radius."""
     i = m.link_i[j]
     R_0, q = m.link_a[j], m.qm[i]
     way = reel.wound(q, R_0, grow, min(p.R_min, R_0)) - R_0 * q
@@ -67,11 +67,11 @@ def wound(p, m, j, grow):
 
 @tick
 def turned(p, m, j, grow):
-    """Let all that pulls at the tape `j` do so at its reel's radius, and all that turns the reel turn its inertia."""
+    """Apply the tension of tape `j` at its reel's radius, and all torques on the reel to its inertia."""
     i = m.link_i[j]
     R_0, R = m.link_a[j], radius(p, m, j, grow)
     m.f[i] -= (R - R_0) * linear.tension(m, j)
-    # All that turns the reel turns another inertia: what the matrices divide by the old one is put right as a force.
+    # The matrices divide every torque on the reel by the old inertia: a force corrects the acceleration.
     torque, c, k = m.f[i], 0.0, 0.0
     for n in range(m.nl):
         T = linear.known(m, n)
@@ -87,13 +87,13 @@ def turned(p, m, j, grow):
     J_0 = 1.0 / m.G[nq + i, nu + i]
     J = max(J_0 + 0.5 * math.pi * p.rho_h * (R**4 - R_0**4), SMALLEST * J_0)
     change = J_0 / J - 1.0
-    # A light reel follows its springs within a substep; held over one, the full force would make it ring ever louder.
+    # A light reel follows its springs within a substep: the full force, held over a substep, would be unstable.
     m.f[i] += torque * change / (1.0 + abs(change) * m.h * (k + m.h * c) / J_0)
 
 
 @tick
 def wind(p, m, j, k):
-    """The radius of the reel of tape `j`, and of that of `k` where it is the same tape, follows its angle."""
+    """Elongation by the radius of the reel of tape `j` and, with `other`, of the reel of tape `k`."""
     wound(p, m, j, p.grow)
     if p.other != 0.0 and k >= 0:
         wound(p, m, k, p.other)
@@ -101,7 +101,7 @@ def wind(p, m, j, k):
 
 @tick
 def turn(p, m, j, k):
-    """So do its arm and its inertia, for all that pulls and turns: after every other force."""
+    """Lever and inertia of the reel of tape `j` and, with `other`, of the reel of tape `k`, after every other force."""
     turned(p, m, j, p.grow)
     if p.other != 0.0 and k >= 0:
         turned(p, m, k, p.other)
@@ -116,7 +116,7 @@ def wind_at(p, m, i):
 
 @tick
 def turn_at(p, m, i):
-    """`turn` of the same."""
+    """`turn` of reel `i` of the IVU, whose tapes are the first two links."""
     j = tape_of(m, i)
     turn(p, m, j, 1 - j)
 

@@ -1,7 +1,7 @@
-"""Gravity that the owner's model leaves out: an arm that hangs, a slide on an incline.
+"""Gravity that the nominal model leaves out: a hanging arm, a slide on an incline.
 
-An arm feels a torque of one turn's period, so that a quarter of a turn shows where it hangs; a slide feels one force.
-Both derive from the height of the mass.
+The torque on an arm is periodic in one turn, so that a quarter of a turn determines the angle at which it hangs; the
+force on a slide is constant. Both derive from the height of the mass.
 
 Source: Craig, Introduction to Robotics (2005), 6.8; Altintas et al., Machine tool feed drives, CIRP Annals 60 (2011)
 for vertical axes.

@@ -1,9 +1,9 @@
-"""The guide: what a strip or a rail does to the position of the carriage that rolls along it.
+"""Guide errors: position errors of a carriage by the strip or rail on which it rolls.
 
     e = e_sys + e_l + e_s   (11.9)
 
 of which e_l is here; e_sys is ripple.capstan, ripple.encoder and sensor.scale, e_s is transmission.slip and creep.
-On the LDU the carriage stands off the place that the capstan's angle says, which only the scale sees.
+On the LDU the position of the carriage deviates from that by the capstan's angle, and only the scale shows it.
 An error is taken as zero where the machine starts.
 
 Source: thesis 11.1, (11.6), (11.9); figure 11.7 for wavelengths of 150 and 300 mm.

@@ -1,11 +1,11 @@
-"""Hysteresis of a joint: a part of its pull turns with the direction of its deflection, however slow that is.
+"""Hysteresis of a joint: a rate-independent part of its pull reverses with the direction of its deflection.
 
     T = F_h w,   dw/de = (1 - |w|^n sign(w e')) / z_h,   w in -1 .. 1
 
 n = 1 is Dahl's law, n = 2 the law of Bouc and Wen with equal shares, whose loops have a rounder tip. Belts, harmonic
-drives and cable joints lose energy by this and not by the rate of their deflection. Both laws follow the deflection
-exactly, whatever the substep. Where w is zero the joint is stiffer by F_h / z_h. Energy: F_h w e' - d/dt (what bends w
-back) is a loss for every deflection, since |w|^n only takes from the slope.
+drives and cable joints lose energy by hysteresis and not by the rate of their deflection. Both laws follow the
+deflection exactly, whatever the substep. Where w is zero the joint is stiffer by F_h / z_h. Energy: F_h w e' less the
+rate of the energy stored in w is a loss for every deflection, since |w|^n only reduces the slope.
 
 Source: Dahl, A solid friction model, Aerospace TOR-0158 (1968); Wen, Method for random vibration of hysteretic systems,
 J. Engineering Mechanics 102 (1976); Tjahjowidodo, Al-Bender & Van Brussel, Theoretical modelling and experimental
@@ -26,7 +26,7 @@ from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 FORMS = ("dahl", "bouc_wen")
-ONE = 1.0 - 1e-15  # deflection of the law of Bouc and Wen that counts as all of it
+ONE = 1.0 - 1e-15  # deflection w of the law of Bouc and Wen that counts as saturated
 
 
 class HysteresisSettings(Settings):
@@ -62,7 +62,7 @@ def bouc_wen(w, way, z):
         return w
     s = math.copysign(1.0, way)
     x, u = abs(way) / z, s * w
-    if u < 0.0:  # it springs back: u' = 1 + u^2 until it is straight
+    if u < 0.0:  # unloading: u' = 1 + u^2 until u is 0
         back = -math.atan(u)
         if x < back:
             return s * math.tan(x - back)
@@ -72,7 +72,7 @@ def bouc_wen(w, way, z):
 
 @tick
 def hysteresis(p, s, m, j):
-    """Pull of link `j` beside its spring and damper, N or Nm."""
+    """Hysteretic pull of link `j`, in addition to its spring and damper, N or Nm."""
     e = linear.stretch(m, j)
     s.w = bend(s.w, e - s.e, p.z_h) if p.form == 0 else bouc_wen(s.w, e - s.e, p.z_h)
     s.e = e

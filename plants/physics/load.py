@@ -1,6 +1,6 @@
-"""Loads: what pulls at a node by where it stands, a spring, a cable chain, a mass off centre, a bump on the way.
+"""Position-dependent loads at a node: a spring, a cable chain, an imbalance, a bump along the travel.
 
-All but the drags derive from a potential: what a motion puts in comes back on the way home.
+All loads except drags derive from a potential and are conservative.
 
 Source: diagnosis of feed drives, Altintas et al., Machine tool feed drives, CIRP Annals 60 (2011); Dahl 1968 for the
 chain's drag; thesis 11.2 for dirt on strip and capstan.
@@ -48,9 +48,9 @@ def build_spring(settings: SpringSettings, h: float) -> SpringParams:
 
 @tick
 def spring(p, x):
-    """Force on the node at `x`, N or Nm: in proportion near its rest, far off by the square or never more than a limit.
+    """Force on the node at `x`, N or Nm: linear near its rest, far from it quadratic or limited.
 
-    Both branches have the slope of one law at a bend of 0.
+    The two branches have one slope at a bend of 0.
     """
     d = x - p.x0
     if p.bend == 0.0:
@@ -125,8 +125,9 @@ def imbalance(p, x):
 class BumpSettings(Settings):
     """F is the size.
 
-    drag: it takes F more to pass, either way (dirt, a tight spot of the rail); hill: it pushes back before `at` and on
-    behind it (a rail joint, a magnet), F at its steepest; push: F forwards wherever it comes from (a dip in the level).
+    drag: dry friction of F in both directions (dirt, a tight spot of the rail); hill: a force backwards before `at` and
+    forwards behind it (a rail joint, a magnet), F at its steepest; push: F forwards in both directions (a dip in the
+    level).
     """
 
     term: Literal["load.bump"] = "load.bump"
@@ -147,7 +148,7 @@ class BumpParams(NamedTuple):
     at: float
     width: float
     form: int
-    turn: float  # 0 where it stands at one place only
+    turn: float  # 0 for a bump at one place only
 
 
 def build_bump(settings: BumpSettings, h: float) -> BumpParams:

@@ -1,10 +1,10 @@
-"""Inertia that changes with the angle of its body, as of a crank or of a linkage that is out of balance.
+"""Angle-dependent inertia of a body, as of a crank or of an unbalanced linkage.
 
     d/dt ((J + D(q)) v) - D'(q) v^2 / 2 = torque,   D(q) = A cos(n q + phi)
 
-J is the inertia of the owner's model, which is the mean. All that turns the body turns J + D instead: what the linear
-model makes of it with J is put right by a force, and so is the limit of dry friction. The kinetic energy is
-(J + D) v^2 / 2, which no turn changes.
+J is the nominal inertia, which is the mean. All torques on the body act on J + D: a force corrects the acceleration of
+the linear model with J, and the limit of dry friction is scaled. The kinetic energy is (J + D) v^2 / 2, which a free
+turn conserves.
 
 Source: Goldstein, Classical Mechanics (2002), 1.6; Waldron & Kinzel, Kinematics, Dynamics and Design of Machinery
 (2004), ch. 14 for the inertia of slider-cranks.
@@ -59,10 +59,10 @@ def gained(m, i):
 
 @tick
 def turned(p, m, i, r):
-    """Let all that turns node `i` turn its inertia at its angle; `r` takes its rotation to the unit of A.
+    """Apply all torques on node `i` to its inertia at its angle; `r` takes its rotation to the unit of A.
 
-    In a substep J dv is the impulse of all forces, and J_0 dv the same with that of the torque here. The torque changes
-    dv, and with it what stiff springs beside the node do: it is solved for at once.
+    In a substep J dv is the impulse of all forces, and J_0 dv this impulse and that of the correcting torque. This
+    torque changes dv and the forces of stiff adjacent springs, so the torque is solved for implicitly.
     """
     J_0 = 1.0 / m.G[m.nq + i, m.nu + i]
     x = p.n * r * m.qm[i] + p.phi

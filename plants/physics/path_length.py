@@ -1,7 +1,7 @@
-"""Path length: tape that is stiff in bending cuts its guides short of nothing, and lies closer to them when pulled.
+"""Path length of a tape that is stiff in bending: the tape stands off its guides, and less so at a higher tension.
 
 A strip of bending stiffness B under the tension T leaves a guide of radius r along an elastica of the length scale
-lambda = sqrt(B / T). Round a guide that turns it by alpha it is longer than a limp tape by
+lambda = sqrt(B / T). Around a guide of wrap angle alpha the strip is longer than a limp tape by
 
     excess = 2 (2 lambda (1 - cos(psi / 2)) - r (psi - sin psi)),  psi = min(alpha / 2, 2 arcsin(lambda / (2 r)))
 
@@ -10,7 +10,7 @@ line, and excess = 4 lambda (1 - cos(alpha / 4)) goes with 1 / sqrt(T). A path w
 
     longer = excess ((F_t / T)^power - 1),  power = 1/2
 
-than at the tension F_t at which it was set. A sensor that looks through the path at what the tape carries is off by it.
+than at the reference tension F_t. The reading of a sensor behind the path is off by this length.
 
 Source: thesis chapter 3 ("we need a certain force to bend the paper around the guidance rolls"); Love, A Treatise on
 the Mathematical Theory of Elasticity (1944), ch. 19, elastica of a rod that is pulled straight at its far end.
@@ -70,7 +70,7 @@ def longer(p, T):
 
 @tick
 def shown(p, m, c, j, i):
-    """Put sensor `c`, which looks at coordinate `i` through span `j`, off by the length of the span."""
+    """Offset the reading of sensor `c`, which measures coordinate `i` through span `j`, by the length of the span."""
     at = m.link_b[j] if m.link_j[j] == i else m.link_a[j]  # positive where the coordinate pulls tape out of the span
     m.y[c] -= longer(p, plant.tension(m, j)) / at
 

@@ -1,4 +1,4 @@
-"""Where a node of a plant stands in its record: the words of the tables in plants/, as numbers."""
+"""Place of a node in the record of its plant: indices from the tables in plants/."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ class Place(NamedTuple):
 
 
 def place(kind: str, node: str) -> Place:
-    """Place of a node by its name; what the node does not have is 0, since no term of that node asks for it."""
+    """Place of a node by its name; a missing link or channel is 0, since no term of the node uses it."""
     plant = PLANTS[kind]
     index, factor = plant.NODES.get(node, plant.RUBS.get(node, 0)), ""
     channel = plant.DRIVES.get(node, plant.SENSORS.get(node, 0))

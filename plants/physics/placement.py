@@ -1,4 +1,4 @@
-"""Nodes at which a term can stand: those of the elements of a plant that have what it asks for."""
+"""Nodes at which a term can stand: those of the elements of a plant with the required traits."""
 
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ def nodes(term: Term, plant: Plant) -> tuple[str, ...]:
 
 
 def standing(term: Term, plant: Plant, node: str) -> tuple[Stand, Element] | None:
-    """As what the term stands at a node, and at which element of it; None where it cannot stand there."""
+    """Stand of a term at a node, and the element of the node; None where the term cannot stand there."""
     return _stands(term.stands, elements(plant)).get(node)
 
 
@@ -33,7 +33,7 @@ def by_kind(term: Term) -> dict[str, tuple[str, ...]]:
 
 
 def anywhere(term: Term) -> dict[str, tuple[str, ...]]:
-    """As `by_kind`; of a term for described machines alone, where it could stand if these plants were such."""
+    """As `by_kind`; for a term of described machines alone, its nodes if these plants were described machines."""
     return by_kind(term) or {
         kind: there for kind in PLANTS if (there := nodes(term, tuple(map(_general, elements(kind)))))
     }

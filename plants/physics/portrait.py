@@ -1,9 +1,9 @@
-"""What a term looks like: its own curve along its own axis, as it comes out of its own code.
+"""Characteristic curve of a term along its axis, computed by the term's own code.
 
-A plant is held by the hand: its nodes are moved, its tape is pulled or its drives are commanded as the term's axis asks
-for. Nothing moves by itself, and what the term changes is read off. Nothing of the physics is written here again: the
-line of the term is that of the generated plant, and the machine's record is filled by the plant's own `start`. Neither
-is compiled, which would take longer than all the rest.
+The motion of a plant is prescribed: its nodes are moved, its tape is pulled or its drives are commanded along the
+term's axis, and the change by the term is recorded. The physics is not repeated here: the line of the term is that of
+the generated plant, and the plant's own `start` fills the machine's record. The code is interpreted, since compiling
+would take longer than the run.
 """
 
 from typing import Any, NamedTuple
@@ -24,12 +24,12 @@ MOTIONS = {  # by the term's axis
     "velocity": "speeds", "position": "to and fro", "angle": "turn", "command": "commands", "time": "wait",
     "frequency": "step", "tension": "pull",
 }  # fmt: skip
-SPAN = {  # how far a sweep goes, by the parameter that the shape hangs on
+SPAN = {  # range of a sweep, in units of the parameter that determines the shape
     "v_s": 4.0, "z_s": 6.0, "z_h": 4.0, "gap": 2.0, "offset": 3.0, "band": 3.0, "limit": 1.6, "wavelength": 1.25,
     "width": 4.0, "extra": 3.0, "tau": 5.0, "F_max": 2.0,
 }  # fmt: skip
-DRIVEN = ", driven"  # after a motion: under volts that are held
-CHANGES = "volts", "read", "pull", "dry", "force"  # in this order: the first that a term changes is what it shows
+DRIVEN = ", driven"  # after a motion: under constant volts
+CHANGES = "volts", "read", "pull", "dry", "force"  # in order of preference: the first that a term changes is its curve
 
 TEXT = '''
 import numpy as np
@@ -69,7 +69,7 @@ def run(acts, P, S, p, s, i, r, l, c, q, v, volts, read, pull, dry, force):
 
 
 class Curve(NamedTuple):
-    """A term's curve (n,), and what there is without the term (n,)."""
+    """A term's curve (n,), and the curve without the term (n,)."""
 
     x: np.ndarray
     y: np.ndarray
@@ -81,7 +81,7 @@ class Curve(NamedTuple):
 
 
 class Hand(NamedTuple):
-    """What the hand does, row by row: the node's way and speed, the stretch of its link in m, the volts."""
+    """Prescribed motion, row by row: the node's position and speed, the stretch of its link in m, the volts."""
 
     h: float
     x: np.ndarray
@@ -104,7 +104,7 @@ def portrait(term: Term) -> Curve:
 
 
 def typical(term: Term, kind: str, node: str) -> Settings:
-    """Settings in the middle of what is met in practice."""
+    """Settings in the middle of their typical ranges."""
     of = PLANTS[kind].SHOWN.scales
     of = of | {
         "": 1.0, "dry": of["force"], "force/speed": of["force"] / of["speed"],
@@ -116,13 +116,13 @@ def typical(term: Term, kind: str, node: str) -> Settings:
         name: float(f"{(low * high) ** 0.5 * of[term.scale.get(name, '')]:.2g}")
         for name, (low, high) in term.typical.items()
     }
-    if "at" in term.settings.model_fields:  # not where the machine starts, where an error counts as none
+    if "at" in term.settings.model_fields:  # not where the machine starts, since an error counts as 0 there
         values["at"] = 1.5 * values["width"] if "width" in values else 0.5
     return term.settings.model_validate({"term": term.name, "node": node, **values})
 
 
 def curve(term: Term, settings: Any, kind: str) -> Curve:
-    """Move the stand as the term's axis asks for, and read off what the term makes of it."""
+    """Curve of a term under the prescribed motion of its axis."""
     if term.joint is not None and not term.act:
         return spring(term, settings, kind)
     driven = term.shown.endswith(DRIVEN)
@@ -165,7 +165,7 @@ def curve(term: Term, settings: Any, kind: str) -> Curve:
 
 
 def spring(term: Term, settings: Any, kind: str) -> Curve:
-    """Pull of a joint that the term makes a spring, by its stretch; without the term it does not stretch."""
+    """Pull of a joint that the term makes a spring, by its stretch; without the term the joint is rigid."""
     assert term.joint is not None
     shown_by = PLANTS[kind].SHOWN
     travel, (way, force) = shown_by.scales["travel"], shown_by.units
@@ -175,7 +175,7 @@ def spring(term: Term, settings: Any, kind: str) -> Curve:
 
 
 def motions(motion: str, settings: Any, scales: dict[str, float]) -> Hand:
-    """Way and speed, stretch and volts of a motion, as far as the term's own sizes ask for."""
+    """Position, speed, stretch and volts of a motion, over the range of the term's parameters."""
     z = (np.arange(ROWS) + 0.5) / ROWS
     still = np.zeros(ROWS)
     swing = np.interp(z, [0.0, 0.2, 0.6, 1.0], [0.0, 1.0, -1.0, 1.0])
@@ -210,7 +210,7 @@ def motions(motion: str, settings: Any, scales: dict[str, float]) -> Hand:
 
 
 def measure(run: Any, acts: bool, term: Term, settings: Any, kind: str, hand: Hand, link: int) -> dict[str, np.ndarray]:
-    """What `CHANGES` names, (n, of each), under the hand, with the term or without."""
+    """Quantities of `CHANGES`, (n, number of each), under the prescribed motion, with or without the term."""
     p, s = stand(kind, hand.h)
     m, spot = s.m, place(kind, settings.node)
     r = getattr(p, spot.factor) if spot.factor else 1.0
@@ -252,7 +252,7 @@ def stand(kind: str, h: float) -> tuple[Any, Any]:
     name = kind.capitalize()
     p = plant.build(getattr(plant, f"{name}Settings")(parameters=plant.SHOWN.parameters), h, *plant.SHOWN.drives)
     s = np.zeros(1, GRAPH_STATE).view(np.recarray)[0]
-    graph.prepare.interpret(p.graph, s.m)  # without the matrix exponential, which nobody asks for
+    graph.prepare.interpret(p.graph, s.m)  # without the matrix exponential, which is not needed
     graph.assemble.interpret(p.graph, s.m)
     s.m.Gamma_T[:, :] = h * s.m.G.T
     return p, s

@@ -1,4 +1,4 @@
-"""Presliding: before it slides, a dry contact is a spring of bristles, and it remembers which way it was bent.
+"""Presliding: before it slides, a dry contact is a spring of bristles with hysteresis.
 
     w' = v / z_s (1 - sign(v) w),   F = -F_C (w + tau_s w'),   w in -1 .. 1
 
@@ -6,10 +6,10 @@ w is the deflection of the bristles over z_s, the travel after which they slide.
 bristle damping sigma_1 = F_C tau_s / z_s keeps the bristles from ringing, and its Stribeck part raises F_C near
 standstill to F_C (1 + rise exp(-(v / v_s)^2)). The bristle stiffness is sigma_0 = F_C / z_s.
 
-It replaces the node's dry friction, F_C being the limit that the node has when this term is reached: in a physics
-list it stands after the terms that add dry friction. With z_s = 0 it leaves the dry friction as it is, and z_s -> 0
-approaches that. w follows the travelled way exactly; the force is solved with the speed that it will make, so that
-any stiffness is stable: second order in h, with the damping of a backward step only where sigma_0 h^2 exceeds the mass.
+Presliding replaces the node's dry friction. F_C is the limit from the terms before it: in a physics list presliding
+stands after the terms that add dry friction. With z_s = 0 the dry friction is unchanged, which is the limit of
+z_s -> 0. w follows the travel exactly; the force is solved implicitly with the speed at its end, so that any stiffness
+is stable: second order in h, with the damping of a backward step only where sigma_0 h^2 exceeds the mass.
 Energy: F v + d/dt (F_C z_s w^2 / 2) = -F_C |v| w^2 - F_C tau_s v^2 (1 - |w|) / z_s or less, never positive.
 
 Source: Dahl, A solid friction model, Aerospace TOR-0158 (1968); Canudas de Wit, Olsson, Astrom & Lischinsky, A new
@@ -27,8 +27,8 @@ from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
-NEWTON = 40  # steps at most, from below: far from the root each is one unit of the exponent, near it digits double
-CLOSE = 1e-13  # of the speed: the root is found
+NEWTON = 40  # Newton steps, at most: far from the root each is one unit of the exponent, near it quadratic
+CLOSE = 1e-13  # of the speed: tolerance of convergence
 
 
 class PreslidingSettings(Settings):
@@ -65,7 +65,7 @@ def build_presliding(settings: PreslidingSettings, h: float) -> PreslidingParams
 
 @tick
 def replace(p, s, m, i, r):
-    """Put bristles in the place of the dry friction of node `i`; `r` takes its rotation to the unit of z_s."""
+    """Replace the dry friction of node `i` by bristles; `r` takes its rotation to the unit of z_s."""
     nq, nu = m.nq, m.nu
     z = p.z_s / r
     s.w = bend(s.w, m.x[i] - s.q, z)
@@ -95,9 +95,9 @@ def bend(w, way, z):
 def bristles(w, F_last, F_C, z, tau, v, vm, gain, h):
     """Force of bristles bent by `w` over the coming substep.
 
-    The speed at the share theta of the substep is what was foreseen, corrected for the force that differs from the
-    last one: u = v + 2 theta (vm - v) + theta gain (F - F_last). F falls as u grows and is concave in |u|, so that
-    Newton from the side of small |u| meets the one root without overshoot. theta is a half for soft bristles.
+    The speed at the share theta of the substep is the predicted speed, corrected for the change of force:
+    u = v + 2 theta (vm - v) + theta gain (F - F_last). F falls as u grows and is concave in |u|, so that Newton's
+    method from the side of small |u| converges to the one root without overshoot. theta is a half for soft bristles.
     """
     k = F_C * gain * h / z  # (angular frequency on the bristles times h)^2
     theta = 0.5 + 0.5 * k / (4.0 + k)

@@ -1,4 +1,4 @@
-"""Ripple: what comes back every turn. Torque by the motor's angle, reading errors by the encoder's.
+"""Ripple, periodic in a turn: torque over the motor's angle, reading errors over the encoder's angle.
 
 A reading error is taken as zero where the machine starts, since counters start at zero there.
 
@@ -19,7 +19,7 @@ from rtctl.plants.physics.story import TURNS, Draw, Needs, Phrase
 from rtctl.plants.physics.term import Node, Term
 
 TURN = 2.0 * math.pi
-QUARTER = 0.5 * math.pi  # of a period: the derivative of a sine is ahead of it
+QUARTER = 0.5 * math.pi  # rad, phase lead of the derivative of a sine
 DISC = Turn("A", "phi", "one", 0.002)
 BY_ORDER = ((DISC,), (DISC, Hint("order", "order")))
 
@@ -63,7 +63,7 @@ def harmonics(x, A, phi, A2, phi2, A3, phi3):
 
 @tick
 def cogging(p, q):
-    """Force on the node at position `q`, Nm or N: it has a potential, so a whole tooth takes no work."""
+    """Force on the node at position `q`, Nm or N, with a potential: the work over a whole tooth is 0."""
     return harmonics(p.n * q, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3)
 
 
@@ -104,7 +104,7 @@ def build_encoder(settings: EncoderSettings, h: float) -> EncoderParams:
 
 @tick
 def encoder(p, y):
-    """What is shown for a true reading of `y` rad or m."""
+    """Reading in rad or m for a true position of `y` rad or m."""
     return y + harmonics(p.n * y, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3) - p.zero
 
 

@@ -1,9 +1,9 @@
-"""Ripple of a ratio: a transmission whose far end runs ahead and behind periodically, as of a pulley off centre.
+"""Ripple of a ratio: periodic transmission error of a joint, as of an eccentric pulley.
 
 The elongation of the joint is longer by  A sin(n q + phi) + harmonics  in the angle q of one of its ends. Spring and
-damper of the joint feel it, and the joint pulls at the body that turns with the lever A n cos(n q + phi): both follow
-from one potential, so that a whole turn takes no work from the spring. The error is zero where the machine starts.
-A joint that is said to be rigid becomes a spring, as stiff as one that is as good as rigid.
+damper of the joint act on this elongation, and the joint pulls at the turning body with the lever A n cos(n q + phi).
+Both follow from one potential, so that the work of the spring over a whole turn is 0. The error is zero where the
+machine starts. A joint that is rigid in the nominal model becomes a spring of high stiffness.
 
 Source: Tuttle & Seering, A nonlinear model of a harmonic drive gear transmission, IEEE Trans. Robotics and Automation
 12 (1996); Smith, Gear noise and vibration (2003), ch. 2 for transmission error; ISO 230-2 for the lead of screws.
@@ -29,13 +29,13 @@ ERROR = Turn("A", "phi", "one", 1e-3)
 
 
 def at_end(end: str) -> tuple[tuple[Part, ...], ...]:
-    """How it is looked for in the turns of one end: once and twice a turn, and as often as the record suggests."""
+    """Search over the turns of one end: once and twice a turn, and at the frequencies that the record suggests."""
     here = Choice("end", (end,))
     return ((ERROR, here, Choice("order", (1.0, 2.0))), (ERROR, here, Hint("order", f"order_{end}")))
 
 
 NEAR, FAR = at_end("from"), at_end("to")
-RIGID = tuple((*way, Choice("c", (FIRM,), "firm")) for way in NEAR)  # in whose two ends it is one law
+RIGID = tuple((*way, Choice("c", (FIRM,), "firm")) for way in NEAR)  # for a rigid joint, whose two ends give one law
 
 
 class RatioSettings(Settings):
@@ -74,7 +74,7 @@ def build_ratio(settings: RatioSettings, h: float) -> RatioParams:
 
 
 def joint(settings: RatioSettings) -> dict[str, float]:
-    """Stiffness and damping of a joint that is said to be rigid."""
+    """Stiffness and damping of a joint that is rigid in the nominal model."""
     return firm(settings.c)
 
 
@@ -94,14 +94,14 @@ def lever(p, q):
 
 @tick
 def stretched(p, m, j, i, r):
-    """Stretch link `j` by its error at node `i` of the end that turns it; `r` takes the node to that end's own unit."""
+    """Extend link `j` by its error at node `i` of the turning end; `r` takes the node to the unit of this end."""
     q = r * m.qm[i]
     linear.extend(m, j, error(p, q), lever(p, q) * r * m.vm[i])
 
 
 @tick
 def levered(p, m, j, i, r):
-    """Let link `j` pull at the lever of its error, with all that pulls in it."""
+    """Torque of the total pull of link `j` at the lever of its error."""
     m.f[i] -= r * lever(p, r * m.qm[i]) * linear.tension(m, j)
 
 

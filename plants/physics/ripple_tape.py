@@ -1,11 +1,11 @@
-"""Ripple of what the tape runs on: a reel off centre, and a capstan out of round.
+"""Ripple of reel and capstan: an eccentric reel, and a capstan out of round.
 
 A wheel of radius R + e cos(q + phi) has wound or passed  R q + e (sin(q + phi) - sin(phi))  after an angle q. The
-second part stretches the tape, and the tape pulls at the changed arm: both follow from one potential, so a whole turn
-takes no work from a spring. It is zero where the machine starts.
+second part stretches the tape, and the tape pulls at the changed lever. Both follow from one potential, so the work of
+the spring over a whole turn is 0. The error is zero where the machine starts.
 
-On the LDU a capstan off its bearings or out of round moves the carriage by the integral (11.3). Its arm changes by
-e/R_c, below one part in a thousand, and so does the force: this is left out.
+On the LDU an eccentric or out-of-round capstan moves the carriage by the integral (11.3). The relative change of its
+lever and force is e/R_c, below one part in a thousand, and is left out.
 
 Source: Shelton, Dynamics of web tension control with velocity or torque control (1986); thesis (11.3), (11.4).
 """
@@ -98,20 +98,19 @@ def tape_of(m, i):
 
 @tick
 def reel(p, m, i, j):
-    """Stretch the tape `j` of reel `i` by what the reel has wound too much."""
+    """Extend the tape `j` of reel `i` by the winding error of the reel."""
     linear.extend(m, j, way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i])
 
 
 @tick
 def reel_arm(p, m, i, j):
-    """Let it pull at the arm that it has, with what slip and slack have left of its tension."""
+    """Torque of tape `j` at the lever error of reel `i`, with the tension after slip and slack."""
     m.f[i] -= arm(p, m.qm[i]) * linear.tension(m, j)
 
 
 @tick
 def spans(p, m, i, j, k):
-    """Move the spans `j` and `k` around capstan `i` by what it has passed too much; there are none where `k` is below
-    0."""
+    """Move the spans `j` and `k` around capstan `i` by its error of travel; no spans where `k` is below 0."""
     if k >= 0:
         moved, speed = way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i]
         for n in (j, k):
@@ -128,14 +127,14 @@ def spans_arm(p, m, i, j, k):
 
 @tick
 def rolled(p, m, i, c):
-    """Move the reading `c` of what rolls on capstan `i`; there is none where `c` is below 0."""
+    """Move the reading `c` of the body that rolls on capstan `i`; no reading where `c` is below 0."""
     if c >= 0:
         m.y[c] += way(p, m.x[i])
 
 
 @tick
 def capstan(p, m, i):
-    """Move both tapes by what the capstan `i` has passed too much: tape 1 gets shorter by it and tape 2 longer."""
+    """Move both tapes by the error of travel of capstan `i`: tape 1 gets shorter and tape 2 longer."""
     moved, speed = way(p, m.qm[i]), arm(p, m.qm[i]) * m.vm[i]
     linear.extend(m, 0, -moved, -speed)
     linear.extend(m, 1, moved, speed)

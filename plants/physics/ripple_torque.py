@@ -1,7 +1,7 @@
 """Ripple of the torque of a motor: the gain of its drive repeats in the angle of the driven body.
 
-Where a commutation is out of true, or phases have different gains, a command gives more at some angles than at others.
-Without a command there is nothing of it, which tells it from cogging.
+With an error of commutation, or different gains of the phases, the torque for a command depends on the angle. Without
+a command torque ripple is zero, unlike cogging.
 
 Source: Jahns & Soong, Pulsating torque minimization techniques for permanent magnet AC motor drives, IEEE Trans.
 Industrial Electronics 43 (1996); Hanselman, Brushless Permanent Magnet Motor Design (2003), ch. 4.
@@ -50,7 +50,7 @@ def build_torque(settings: TorqueSettings, h: float) -> TorqueParams:
 
 @tick
 def torque(p, m, c, i, r):
-    """Give drive `c` the gain of the angle of node `i` in the middle of the substep; `r` takes it to its own unit."""
+    """Gain of drive `c` at the angle of node `i` in the middle of the substep; `r` takes the node to its own unit."""
     q = r * (m.x[i] + 0.5 * m.h * m.x[m.nq + i])
     m.volts[c] *= 1.0 + harmonics(p.n * q, p.A, p.phi, p.A2, p.phi2, p.A3, p.phi3)
 

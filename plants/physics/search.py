@@ -1,6 +1,6 @@
-"""How a search walks through the parameters of a term: which is its size, by what it is measured, where it starts.
+"""Search of a term's parameters: the size, its measure, and the starts.
 
-Starts are shares of what a recording shows of the node: its rms speed, its span, the rms force of its drive.
+Starts are shares of measures of the node in a recording: its rms speed, its span, the rms force of its drive.
 """
 
 from typing import NamedTuple
@@ -9,7 +9,7 @@ INF = float("inf")
 
 
 class Size(NamedTuple):
-    """A parameter that is zero (or `offset`) where the effect is not; `share` of its measure is a typical size."""
+    """A parameter that is zero (or `offset`) without the effect; `share` of its measure is a typical size."""
 
     name: str
     measure: str
@@ -18,10 +18,10 @@ class Size(NamedTuple):
     most: float = INF  # in units of share times measure
     least: float = -INF
     offset: str = ""  # "dry": on top of the base's dry friction
-    undoes: str = ""  # what of the base's a negative one takes away, and no more: friction never pushes
-    finest: float = 0.0  # in steps of the sensor: less is no effect that this sensor could show
-    slight: float = 0.0  # in units of share times measure: less is missed by nobody, however clearly it shows
-    blur: str = ""  # a measure: less may be what the owner's own value of the same is off by
+    undoes: str = ""  # nominal friction that bounds a negative size, so that friction stays passive
+    finest: float = 0.0  # in steps of the sensor: least size that this sensor can resolve
+    slight: float = 0.0  # in units of share times measure: least relevant size, whatever its significance
+    blur: str = ""  # a measure of the tolerance of the nominal value: a smaller size may be an error of this value
 
 
 class Shape(NamedTuple):
@@ -62,25 +62,25 @@ class At(NamedTuple):
 
 
 class Hint(NamedTuple):
-    """A shape or a place whose starts the record itself suggests: peaks of `kind`
+    """A shape or a place with starts from the record: peaks of `kind`
     (diagnose/search/suggestions.py)."""
 
     name: str
     kind: str
     reach: float = 0.15  # in logarithm for a shape, in shares of the span for a place
     place: bool = False
-    lengths: tuple[float, float] = (0.0, INF)  # m, between which a wave that a lone sensor misreads is of this kind
+    lengths: tuple[float, float] = (0.0, INF)  # m, range of wavelengths of this kind, for errors of a lone sensor
 
 
 class Where(NamedTuple):
-    """A place that is where the machine starts or the middle of the travel. Elsewhere is a constant push besides, which
-    has names of its own."""
+    """A place at the start of the machine or in the middle of the travel. Another place adds a constant force, which
+    other terms name."""
 
     name: str
 
 
 class Rest(NamedTuple):
-    """Where a spring rests, anywhere: what it pulls with in the middle of the travel is the number that is fitted.
+    """Rest position of a spring, anywhere. The fitted number is the pull of the spring in the middle of the travel.
     Follows the Size of its stiffness; `share` of its measure is a typical pull there."""
 
     name: str
@@ -89,7 +89,7 @@ class Rest(NamedTuple):
 
 
 class Jumps(NamedTuple):
-    """The size of the largest of the jumps that the record shows; the others keep their share of it."""
+    """Size of the largest jump in the record; the other jumps keep their ratio to it."""
 
     name: str
 

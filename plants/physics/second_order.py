@@ -1,4 +1,4 @@
-"""Exact step of a system of second order that nothing pushes, at any damping.
+"""Exact free response of a second-order system over a step, at any damping.
 
     e' = d,  d' = -e - 2 zeta d        in units of its own time
 

@@ -1,6 +1,6 @@
-"""Sensors: counts that get lost, a sensor that cannot tell direction, and a factor that is off.
+"""Sensors: lost counts, a sensor without direction, and an error of scale.
 
-What needs memory is kept at the force site, once a substep; the reading only looks at it, so that it may be asked for
+State is updated at the force site, once a substep; the reading only uses the state, so that a reading may be computed
 at any time.
 
 Source: Heidenhain, Encoders for servo drives (2023), signal errors; thesis 7.1.1 and 7.1.3 for counters and the optical
@@ -91,7 +91,7 @@ def pass_marks(p, s, x):
 
 @tick
 def missed_counts(p, s, x, t):
-    """What the reading is off at time `t` and position `x`."""
+    """Error of the reading at time `t` and position `x`."""
     off = 0.0
     for k in range(p.n):
         off += p.size[k] * min(max((t - p.at[k]) * p.per_s, 0.0), 1.0)
@@ -123,14 +123,14 @@ def build_rectified(settings: RectifiedSettings, h: float) -> RectifiedParams:
 
 @tick
 def go(s, x):
-    """Add the way to position `x` of the sensor, rad or m."""
+    """Add the travel to position `x` of the sensor, rad or m."""
     s.way += abs(x - s.x)
     s.x = x
 
 
 @tick
 def rectified(p, s, x, y, speed):
-    """What the reading `y` is off at position `x`, rad or m; `speed` is 1 where it is a speed, which has no memory."""
+    """Error of the reading `y` at position `x`, rad or m; `speed` is 1 for a reading of speed, which has no memory."""
     if speed != 0:
         return p.share * (abs(y) - y)
     return p.share * (s.way + abs(x - s.x) - x)
@@ -155,7 +155,7 @@ def build_scale(settings: ScaleSettings, h: float) -> ScaleParams:
 
 @tick
 def scale(p, y):
-    """What is shown for a true reading of `y`."""
+    """Reading for a true value of `y`."""
     return y * (1.0 + p.relative)
 
 

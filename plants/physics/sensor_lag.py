@@ -1,10 +1,10 @@
-"""Lag of a sensor: it shows a filtered reading, which stays behind while the body moves.
+"""Lag of a sensor: its reading is a low-pass of the measured position or speed.
 
     tau y' = x - y,  or  T^2 y'' + tau y' + y = x  with  T = tau / (2 zeta)
 
-What it shows is off by d = y - x. With the rate g = T y' of order 2, d and g leave what they are where x goes on for
-ever as it does, exactly from one reading to the next: for a reading that changes evenly in between, whatever it is of,
-any tau. A reading that is asked for twice at one time is the same.
+The error of the reading is d = y - x; at order 2 its state includes the rate g = T y'. d and g decay towards their
+steady values at the present rate of x. The step from one reading to the next is exact for an x that changes linearly
+between them, for any tau. A second reading at one time equals the first.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3; Harris & Piersol, Shock and Vibration Handbook
 (2002), ch. 13 for the filters of sensors.
@@ -50,17 +50,17 @@ SENSOR_LAG_STATE = state(
 
 
 def build_sensor_lag(settings: SensorLagSettings, h: float) -> SensorLagParams:
-    """Nothing to discretise: the time between two readings is theirs."""
+    """Nothing to discretise: the step is the time between two readings."""
     tau = max(settings.tau, 0.0)
     return SensorLagParams(tau, tau / (2.0 * settings.zeta) if settings.order == 2 else 0.0, settings.zeta)
 
 
 @tick
 def show(p, s, x, t):
-    """What the filter shows of a reading `x` at time t; where the clock begins anew, it goes on from there."""
+    """Output of the filter for a reading `x` at time `t`; where the clock restarts, the filter keeps its error."""
     dt = t - s.t
     if s.begun == 1 and dt > 0.0:
-        rest = -p.tau * (x - s.x) / dt  # where x goes on like this
+        rest = -p.tau * (x - s.x) / dt  # steady error at the present rate of x
         if p.tau <= 0.0:
             s.d, s.g = 0.0, 0.0
         elif p.T == 0.0:

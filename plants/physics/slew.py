@@ -1,4 +1,4 @@
-"""Rate limit of a drive: its output follows the command no faster than so much a second.
+"""Rate limit of a drive: the slope of its output is bounded.
 
 Source: Slotine & Li, Applied Nonlinear Control (1991), 5.2; Duda, Prediction of pilot-in-the-loop oscillations due to
 rate saturation, J. Guidance, Control and Dynamics 20 (1997). Solomon, The monolithic op amp, IEEE J. Solid-State
@@ -19,8 +19,8 @@ FAR = 20.0  # from which on tanh is 1 in double precision
 
 
 class SlewSettings(Settings):
-    """Without effect while rate is beyond all that the command asks for. With tau small steps take their time too, and
-    the rate bends towards its limit."""
+    """Without effect while rate exceeds the slope of the command. With tau small steps are delayed too, and the slope
+    approaches its limit smoothly."""
 
     term: Literal["drive.slew"] = "drive.slew"
     node: Node

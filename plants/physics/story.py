@@ -1,4 +1,4 @@
-"""What is told about a term: how it is spoken of, what a record must hold to show it, and how large one is hidden."""
+"""Declarations of a term for reports and searches: its phrase, its needs of a record, and its range when hidden."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -11,7 +11,7 @@ PASSES = "several passages of the same place"
 
 
 class Phrase(NamedTuple):
-    """How one effect is spoken of. `head` and `detail` are filled in by the names of the parameters:
+    """Phrase of one effect in reports. `head` and `detail` are filled in by the names of the parameters:
 
     {F_C} its size with unit, {a:%} a share in percent, {a:more|less} a word by its sign, {offset:+} the signed value,
     {at:3} three figures, {here} the node, {form:words} the words of the form that was chosen, {harmonics:words} the
@@ -21,20 +21,20 @@ class Phrase(NamedTuple):
     noun: str
     head: str
     detail: str
-    need: str  # what a record must hold to show it
+    need: str  # contents of a record that shows the effect
     forms: Mapping[str, str] = {}  # value of `form` -> its words; "" for all others; {command} is the command's name
     again: str = ""  # what follows "twice" and "three times" of its harmonics
 
 
 class Needs(NamedTuple):
-    """What a record must contain so that the effect can be tested."""
+    """Contents of a record that are needed to test the effect."""
 
     turns: float = 0.0  # turns of its node
     compared: bool = False  # another sensor to compare with
-    alone: str = ""  # what a lone sensor shows it by all the same: it "slides" alone, or is an "unsigned" speed
+    alone: str = ""  # condition under which a lone sensor suffices: a node that "slides", or an "unsigned" speed
     stiffness: bool = False  # a spring at its node
     dry: bool = False  # dry friction at its node, which it alters
-    friction: bool = False  # dry or viscous friction there, the same
+    friction: bool = False  # dry or viscous friction at its node, which it alters
     both_ways: bool = False  # motion of its node in both directions, between which it differs
 
 

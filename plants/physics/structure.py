@@ -5,9 +5,9 @@ The mass m hangs on a node by a spring of its own frequency f_Hz (with the node 
     m x_a'' = -k (x_a - x) - b (x_a' - x'),   F = -m x_a'',   k = m (2 pi f_Hz)^2,   b = 4 pi zeta m f_Hz
 
 The total inertia at the node grows by m: a base inertia that was fitted with the mass on it must come down by as much.
-Over a substep the node moves at its middle speed, the mass relative to it is then free, its 2 by 2 step is exact, and
-the force on the node is minus the momentum that the mass took, so that momentum is kept to rounding. Second order;
-stable while 2 pi f_Hz h stays below 0.7 with a mass as large as the node's own.
+Over a substep the node moves at its middle speed, the relative motion of the mass is free, and its 2 by 2 step is
+exact. The force on the node is minus the change of the mass's momentum over the substep, so that momentum is conserved
+to rounding. Second order; stable while 2 pi f_Hz h stays below 0.7 with a mass as large as the node's own.
 
 Source: Den Hartog, Mechanical vibrations (1956), ch. 3; Kovacic & Brennan, The Duffing equation (2011), ch. 1;
 Elliott, Ghandchi Tehrani & Langley, Nonlinear damping and quasi-linear modelling, Phil. Trans. R. Soc. A 373 (2015);
@@ -101,7 +101,7 @@ def build_stiffening(settings: StiffeningSettings, h: float) -> StiffeningParams
 
 @tick
 def stiffening(p, e, v):
-    """Pull at elongation `e` and its rate `v` beside the linear spring and damper."""
+    """Pull at elongation `e` and its rate `v`, in addition to the linear spring and damper."""
     if p.power == 2.0:
         return (p.c2 + p.c3 * e + p.b2 * v) * e * e
     return p.c3 * p.bend * p.bend * (abs(e) / p.bend) ** p.power * e + (p.c2 + p.b2 * v) * e * e

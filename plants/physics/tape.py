@@ -1,11 +1,11 @@
-"""Tape: it relaxes beside its one spring and damper, and it pulls but cannot push.
+"""Tape: viscoelastic relaxation parallel to the linear spring and damper, and slack.
 
-A Maxwell branch is a spring c_branch in series with a dashpot of c_branch tau beside the tape's own spring:
+A Maxwell branch is a spring c_branch in series with a dashpot of c_branch tau, parallel to the tape's own spring:
 
     T_b = c_branch (e - z),  z' = (e - z) / tau
 
-z is how far the dashpot has given. With the elongation moving evenly over a substep its step is exact for any tau; the
-pull is its mean over the substep. Slow loads see the tape's own c, fast ones c + c_branch.
+z is the elongation of the dashpot. For an elongation that changes linearly over a substep the step is exact for any
+tau; the pull is the mean over the substep. The stiffness is c for slow loads and c + c_branch for fast loads.
 
 Source: Ferry, Viscoelastic properties of polymers (1980), ch. 1, generalised Maxwell body; Shelton, Dynamics of web
 tension control with velocity or torque control (1986), for tape and slack.
@@ -35,7 +35,7 @@ class ViscoelasticSettings(Settings):
 
 class ViscoelasticParams(NamedTuple):
     c_branch: float
-    end: float  # of what stands on the spring after a substep: y+ = end y + gain e'
+    end: float  # decay of the spring's elongation y over a substep: y+ = end y + gain e'
     mean: float  # over the substep: y = mean y + mean_gain e'
     mean_gain: float
     rate: float  # h / tau
@@ -96,13 +96,13 @@ def build_slack(settings: SlackSettings, h: float) -> SlackParams:
 
 @tick
 def slack(share, T):
-    """Pull that takes away the push of a tape whose model has the tension `T`, N."""
+    """Pull in N that cancels a negative tension `T` of the linear model."""
     return share * max(-T, 0.0)
 
 
 @tick
 def let_go(p, m, j, k):
-    """Take away the push of tape `j`, and of what is on the other side, `k`, where there is one."""
+    """Cancel the negative tension of tape `j`, and of the tape `k` on the other side where there is one."""
     linear.pull(m, j, slack(p.share, linear.tension(m, j)))
     if k >= 0:
         linear.pull(m, k, slack(p.other, linear.tension(m, k)))

@@ -1,4 +1,4 @@
-"""What a term of physics tells the emulator, the fit, and the mechanic who reads the report.
+"""Term of physics: its declarations for the emulator, the fit, and the report.
 
 A term acts at one or more sites of a plant's substep. At each site it is one line of the generated plant, in which
 these names are filled in:
@@ -14,13 +14,13 @@ these names are filled in:
 
 The sites of a substep in their order:
 
-    command   {m}.volts[{c}], what stands at the driver's input, may be changed; {m}.volts holds all drives
+    command   {m}.volts[{c}], the voltage at the driver's input, may be changed; {m}.volts holds all drives
     force     {m}.qm and {m}.vm are position and speed at the middle of the substep; {r} times a force goes to
               {m}.f[{i}], {r} times a limit of dry friction to {m}.dry[{i}]; linear.pull({m}, {l}, T) pulls at a link
-    last      as force, once every term has pushed and pulled: for what acts on all of it, as a reel that grows heavier,
-              or pulls with what the others have left of a tension, as the arm of a wheel out of round
-    reading   {m}.y[{c}], what the sensor would show before it is cut into counts, may be changed; {m}.x is the state at
-              the sample, {m}.t its time. It may be called once a substep or once a tick: it keeps no memory.
+    last      as force, after the forces of all terms: for a term that acts on the total force, as a growing inertia of
+              a reel, or on the total tension, as the lever of a wheel out of round
+    reading   {m}.y[{c}], the reading of the sensor before quantisation, may be changed; {m}.x is the state at the
+              sample, {m}.t its time. A reading is computed once a substep or once a tick: it keeps no memory.
 """
 
 from collections.abc import Callable, Mapping
@@ -55,9 +55,9 @@ Node = Annotated[str, Field(description="where it acts; `rtctl physics TERM` lis
 
 @dataclass(frozen=True)
 class Term:
-    """One effect that a machine can have beyond its equations, and all that is told about it.
+    """One effect that a machine can have beyond its equations, with its declarations.
 
-    A term in a file of a user's own gives what has no default here; the rest has a meaning without it.
+    A term in a user file gives the fields without a default; all other fields are optional.
     """
 
     name: str
@@ -73,47 +73,47 @@ class Term:
     scale: dict[str, str] = field(default_factory=dict)  # parameter -> what its typical range is a multiple of
     axis: str = "velocity"  # where the effect shows: time, velocity, position, angle, command, tension, frequency
     passive: bool = True  # never feeds energy in
-    moves: bool = False  # its reading line is where the carriage stands, not an error of a sensor
+    moves: bool = False  # its reading line is a motion of the carriage, not an error of a sensor
     since: int = 1  # first exchange format that has its name; 0: none has
-    order: int = 0  # in which terms act, the lowest first: what stretches or lets go a spring before what rubs
-    shown: str = ""  # motion of its portrait, where that of `axis` shows less (portrait.py)
+    order: int = 0  # in which terms act, the lowest first: elongation and slip of springs before friction
+    shown: str = ""  # motion of its curve, where the motion of `axis` shows less (portrait.py)
     state: np.dtype | None = None
 
-    # how it is spoken of
+    # for reports
     phrase: Phrase | None = None
     check: str = ""  # what a mechanic should look at on the machine, one sentence
     units: Mapping[str, str] = field(
         default_factory=dict
-    )  # parameter -> unit, or dimension by its node (quantities.py)
+    )  # parameter -> unit, or dimension by its node (dimensions.py)
     contact: bool = False  # acts in m and N where its contact drives a tape or a carriage
 
-    # what a record must hold, and how it is looked for
+    # needs of a record, and search
     needs: Needs = NOTHING
     search: tuple[Part, ...] = ()  # of the plain form; without it the first of `typical` is the size
-    sliding: tuple[Part, ...] = ()  # the same where its node slides, if that is another
-    richer: tuple[Part, ...] = ()  # further parameters, tried once the plain form stands
-    richer_at: str = ""  # kind of element at which it has its richer form; all of them without it
-    variants: Choice | None = None  # a setting that is tried in its other values once the term stands
+    sliding: tuple[Part, ...] = ()  # of the plain form where its node slides; empty: `search`
+    richer: tuple[Part, ...] = ()  # further parameters, tried once the plain form is accepted
+    richer_at: str = ""  # kind of element at which it has its richer form; empty: all kinds
+    variants: Choice | None = None  # a setting whose other values are tried once the term is accepted
     counted: tuple[str, ...] = ()  # parameters that are whole numbers: slots and poles
     static: bool = False  # a function of what `axis` says, without memory
     joint: Callable[[Any], dict[str, float]] | None = None  # numbers of the joint at its node
-    seldom: float = 0.0  # nats of prior odds against it: another name of the same law is the usual one
-    round: str = ""  # name of the same law at a body that goes round whole turns
-    late: str = ""  # "delay" of what is commanded, or what "bends" to one
+    seldom: float = 0.0  # nats of prior odds against it, where an equivalent law has a more usual name
+    round: str = ""  # name of the equivalent law at a body that makes whole turns
+    late: str = ""  # "delay": a delay of the command; "bends": a law that is nearly a delay
     stiff: bool = False  # alters a spring: simulated in shorter steps
-    slips: bool = False  # lets go what a contact carries: the bodies behind it move freely
+    slips: bool = False  # a contact that slips: the bodies behind it move freely
     unsigned: bool = False  # a reading without direction
     clock: bool = False  # of the ticks: shows in the noise, not in the error of a fit
 
     # friction
-    friction: str = ""  # it is this friction of a body, at its first size: "dry", "viscous"
-    falls_to: str = ""  # friction of its node to which its own falls with speed: "dry"
-    replaces: str = ""  # friction of its node whose place it takes: "dry"
+    friction: str = ""  # kind of friction of a body that its first size adds to: "dry", "viscous"
+    falls_to: str = ""  # friction of its node to which its own friction falls with speed: "dry"
+    replaces: str = ""  # friction of its node that it replaces: "dry"
 
-    # what is put against it, in the order in which it is tried; see REMEDIES
+    # remedies in the order in which they are tried; see REMEDIES
     remedies: tuple[str, ...] = ()
 
-    # how large one is hidden by `plant --conceal`
+    # sizes of a hidden effect of `plant --conceal`
     draws: Mapping[str, Draw] = field(default_factory=dict)  # ranges in place of the typical ones
     chosen: Mapping[str, tuple] = field(default_factory=dict)  # settings that are chosen rather than sized
 
@@ -127,5 +127,5 @@ class Term:
         return 0 < self.since <= number
 
     def act_at(self, site: str, kind: str) -> str | None:
-        """Its line at a site of a plant, None where it does nothing there."""
+        """Line of the term at a site of a plant, None where the term does not act there."""
         return self.act.get(f"{site}:{kind}", self.act.get(site))

@@ -1,4 +1,4 @@
-"""Time: more delay than the loop is said to have, and ticks off their times.
+"""Timing: delay beyond the nominal delay of the loop, and jitter of the ticks.
 
 Source: Astrom & Wittenmark, Computer-Controlled Systems (1997), 2.3 and 3.5 for a delay that is no whole sample;
 Cervin et al., How does control timing affect performance, IEEE Control Systems 23(3) (2003) for jitter.
@@ -55,9 +55,10 @@ def build_delay(settings: DelaySettings, h: float) -> DelayParams:
 
 @tick
 def delay(p, s, volts):
-    """Replace all `volts` (n,) by what they were.
+    """Replace all `volts` (n,) by the delayed volts.
 
-    Volts are held over a substep, so the mean over a late one is a share of two neighbours: exact for any delay.
+    Volts are held over a substep, so the mean over a delayed substep is a weighted mean of two neighbours: exact for
+    any delay.
     """
     now = s.n % LENGTH
     one, two = (s.n - p.whole) % LENGTH, (s.n - p.whole - 1) % LENGTH
@@ -68,7 +69,7 @@ def delay(p, s, volts):
 
 
 class JitterSettings(Settings):
-    """sigma is the size. The reading is taken up to half a period early or late, by chance but the same every time."""
+    """sigma is the size. The reading is taken up to half a period early or late, at random with a fixed seed."""
 
     term: Literal["timing.jitter"] = "timing.jitter"
     node: Node
@@ -92,7 +93,7 @@ def build_jitter(settings: JitterSettings, h: float) -> JitterParams:
 
 @tick
 def late(p, t):
-    """How late the tick nearest to time `t` (s) is, s; the tick at 0 is on time."""
+    """Delay of the tick nearest to time `t` (s), s; the tick at 0 is on time."""
     k = math.floor(t * p.rate + 0.5)
     if k == 0:
         return 0.0
@@ -108,7 +109,7 @@ def late(p, t):
 
 @tick
 def jitter(p, m):
-    """Move the readings of all positions of a described machine on to the time at which they are really taken."""
+    """Move the readings of all positions of a described machine to their true sampling time."""
     delta = late(p, m.t)
     for c in range(m.ny):
         m.y[c] += m.y_rate[c] * delta
@@ -116,7 +117,7 @@ def jitter(p, m):
 
 @tick
 def jitter_ivu(p, m):
-    """Move the readings of capstan and reels on to the time at which they are really taken."""
+    """Move the readings of capstan and reels to their true sampling time."""
     delta = late(p, m.t)
     m.y[0] += m.x[ivu.NQ + ivu.CAPSTAN] * delta
     m.y[1] += m.x[ivu.NQ + ivu.REEL1] * delta
@@ -125,7 +126,7 @@ def jitter_ivu(p, m):
 
 @tick
 def jitter_ldu(p, m, r):
-    """The same for encoder and scale; `r` is the radius of the capstan."""
+    """Move the readings of encoder and scale to their true sampling time; `r` is the radius of the capstan."""
     delta = late(p, m.t)
     m.y[0] += m.x[ldu.NQ + ldu.ENCODER] * delta
     m.y[1] += r * m.x[ldu.NQ + ldu.CAPSTAN] * delta
@@ -133,7 +134,7 @@ def jitter_ldu(p, m, r):
 
 @tick
 def jitter_axis(p, m):
-    """The same for the axis."""
+    """Move the reading of the axis to its true sampling time."""
     m.y[0] += m.x[1] * late(p, m.t)
 
 

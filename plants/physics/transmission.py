@@ -1,14 +1,14 @@
-"""Lost motion: play in a coupling. A dead zone takes the place of the link's linear spring.
+"""Backlash in a coupling: a dead zone replaces the link's linear spring.
 
     T = c d(e) + k (damping + (1 - damping) d'(e)) e',   d = e beyond half the gap, less half the gap; 0 within
 
-Beyond the gap it is the linear spring and damper of the link, shifted. What touches first is softer than the whole
-(grease, a tip, an edge out of true), so that neither force nor its derivative jumps: the corners are hyperbolas, which
-at the edge itself give half of `edge` of half the gap. Where little pulls, as at a tape's tension, they are most of
-what is seen. At rest the link stands in the middle of its gap. The difference to the linear spring is a pull held over
-the substep, such that free ends leave it at the speed that they had: second order, for h times the link's own angular
-frequency w = sqrt(c (a^2/J_i + b^2/J_j)) up to 1; what it errs is the way across the gap, by (w h)^2 / 12 of it. The
-axis has no spring between motor and carriage: there the play is between carriage and sensor, and the reading follows
+Beyond the gap the pull is that of the shifted linear spring and damper of the link. The first contact is softer than
+the link (grease, a tip, an edge out of true), so that neither force nor its derivative jumps: the corners are
+hyperbolas, which at the edge itself give half of `edge` of half the gap. At small pulls, as at a tape's tension, the
+hyperbolas dominate. At rest the link is in the middle of its gap. The difference to the linear spring is a pull held
+over the substep, under which free ends keep their relative speed: second order, for h times the link's own angular
+frequency w = sqrt(c (a^2/J_i + b^2/J_j)) up to 1. The relative error of the travel across the gap is (w h)^2 / 12. The
+axis has no spring between motor and carriage: its backlash is between carriage and sensor, and the reading follows
 with the hysteresis of a gap.
 
 Source: Nordin & Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38 (2002); Lurie & Enright,
@@ -25,8 +25,8 @@ from rtctl.plants.physics.search import Choice, Shape, Size
 from rtctl.plants.physics.story import Draw, Phrase
 from rtctl.plants.physics.term import Node, Term
 
-FIRM = 25.0  # times the stiffness at which the lighter side rings slowly: as good as rigid
-FIRM_TAU = 1e-3  # s, its damping over its stiffness
+FIRM = 25.0  # times the stiffness at which the lighter side rings slowly: stiffness of a nearly rigid joint
+FIRM_TAU = 1e-3  # s, damping over stiffness of a nearly rigid joint
 
 
 class BacklashSettings(Settings):
@@ -48,7 +48,7 @@ class BacklashParams(NamedTuple):
     edge: float
 
 
-BACKLASH_STATE = state(at=float)  # what the sensor of an axis is at
+BACKLASH_STATE = state(at=float)  # position of the sensor of an axis
 
 
 def build_backlash(settings: BacklashSettings, h: float) -> BacklashParams:
@@ -57,12 +57,12 @@ def build_backlash(settings: BacklashSettings, h: float) -> BacklashParams:
 
 
 def joint(settings: BacklashSettings) -> dict[str, float]:
-    """Stiffness and damping of a joint that is said to be rigid."""
+    """Stiffness and damping of a joint that is rigid in the nominal model."""
     return firm(settings.c)
 
 
 def firm(c: float) -> dict[str, float]:
-    """Stiffness and damping of a joint that is rigid but for an effect in it; none for a `c` of 0."""
+    """Stiffness and damping of a joint that is rigid except for an effect in it; empty for a `c` of 0."""
     return {"stiffness": c, "damping": c * FIRM_TAU} if c > 0.0 else {}
 
 
@@ -85,11 +85,11 @@ def start(m, j):
 
 @tick
 def ahead(m, j):
-    """By which share a pull that shall undo link `j` for a substep must reach beyond its middle.
+    """Share beyond the middle of the substep of the point at which a pull cancels link `j` over the substep.
 
-    The spring of the linear model goes on acting about the point where the pull puts it. Its free ends keep their
-    relative speed if that point lies tan(w h/2) / (w h/2) times as far ahead as the middle; at the middle itself they
-    would lose (w h)^4 / 24 of it, which at the 2 kHz of the LDU's shaft is as much as a contact carries.
+    The spring of the linear model continues to act about the point of the cancelling pull. The free ends keep their
+    relative speed if this point lies tan(w h/2) / (w h/2) times as far ahead as the middle. At the middle itself the
+    ends would lose (w h)^4 / 24 of their speed, which at the 2 kHz of the LDU's shaft is the force of a contact.
     """
     nq, nu = m.nq, m.nu
     a, b = m.link_a[j], m.link_b[j]
@@ -100,7 +100,7 @@ def ahead(m, j):
 
 @tick
 def undone(m, j):
-    """What a pull must take away for a substep so that link `j` does not pull at all, N or Nm."""
+    """Pull that cancels link `j` over a substep, N or Nm."""
     way = linear.stretch(m, j) - start(m, j)
     more = m.link_c[j] * way + m.link_k[j] * linear.stretch_rate(m, j)
     return linear.tension(m, j) + ahead(m, j) * more
@@ -108,7 +108,7 @@ def undone(m, j):
 
 @tick
 def dead_zone(e, half, edge):
-    """What sticks out of the dead zone -half .. half, and its slope; hyperbolas join the straight parts."""
+    """Elongation beyond the dead zone -half .. half, and its slope; hyperbolas join the straight parts."""
     w = edge * half
     if w < 1e-12:
         out = max(abs(e) - half, 0.0)
@@ -120,14 +120,14 @@ def dead_zone(e, half, edge):
 
 @tick
 def follow(s, p, x):
-    """Sensor behind a gap, drawn along by its edges; the position that it shows. Any number of calls a way."""
+    """Position of a sensor behind a gap, moved by the edges of the gap; repeated calls at one `x` agree."""
     s.at = min(max(s.at, x - p.half), x + p.half)
     return s.at
 
 
 @tick
 def play(p, s, m, i, r, j):
-    """Play in link `j`, or of the sensor of coordinate `i`, which moves `r` for a unit, where there is no link."""
+    """Backlash in link `j`, or, without a link, of the sensor of coordinate `i`, which moves `r` for a unit."""
     if j >= 0:
         linear.pull(m, j, backlash(p, m, j))
     else:
@@ -136,7 +136,7 @@ def play(p, s, m, i, r, j):
 
 @tick
 def shown(p, s, y, j):
-    """Reading of a sensor behind a gap for `y`; the same where the play is in link `j`."""
+    """Reading of a sensor behind a gap for `y`; `y` itself where the backlash is in link `j`."""
     return y if j >= 0 else min(max(s.at, y - p.half), y + p.half)
 
 

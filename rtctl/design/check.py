@@ -1,10 +1,10 @@
-"""A design shown on the emulator: the loop gain measured in a fused run, and its margins.
+"""Loop gain of a config measured on the emulator in a fused run, and its margins.
 
     S = U_c / W        L = 1 / S - 1
 
-A periodic multisine w is added to the command while the machine holds its place; u_c is what the loop makes of it.
-Dry friction is left out on both sides, since it is no part of the linear loop that was designed. A multisine has whole
-periods in the record, so nothing leaks, and what is left is quantisation.
+A periodic multisine w is added to the command while the machine holds its position; u_c is the command of the loop
+with w in it. Dry friction is left out of model and emulator, since the designed loop is linear. The record holds whole
+periods of the multisine, so there is no leakage, and the only noise is quantisation.
 
 Source: thesis 8.1 and 12.3 (sensitivity); Pintelon & Schoukens, System Identification (2012), section 4.3.
 """
@@ -22,7 +22,7 @@ from rtctl.machines.base import DESCRIBED
 from rtctl.machines.profiles import profile_of
 from rtctl.tick import safety
 
-PERIODS = 3  # averaged, after one in which the loop forgets how it began
+PERIODS = 3  # averaged, after one period in which the transient of the start decays
 SURE = 0.05  # deviation of the mean loop gain over the periods, above which a line is left out
 
 
@@ -35,7 +35,7 @@ class Measured(NamedTuple):
 
 
 def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None = None) -> Any:
-    """The config to play: fused, without dry friction, with a multisine of `rms` V up to `f_max` Hz.
+    """Config of the experiment: fused, without dry friction, with a multisine of `rms` V up to `f_max` Hz.
 
     A reel unit gets motor 1 alone for its position, so that the loop does not change hands at every zero of the
     command. `f_max` is 0.4 of the sample rate if absent.
@@ -59,7 +59,7 @@ def experiment(config: Any, rms: float, period: float = 2.0, f_max: float | None
 def measure(config: Any, rms: float, period: float = 2.0, f_max: float | None = None) -> Measured:
     """Loop gain and margins of a config on its emulator.
 
-    Raises NoAnswer where the run trips, the output is limited or most lines are noise: then it says nothing of the
+    Raises NoAnswer where the run trips, the output is limited or most lines are noise: the run then does not show the
     linear loop.
     """
     played = experiment(config, rms, period, f_max)

@@ -1,13 +1,13 @@
-"""Error table for the encoder's position: what comes back every turn of the capstan, from a scale or a printed image.
+"""Error table of the encoder's position: the error periodic in the capstan's turn, from a scale or a printed image.
 
     e = x - x_hat = a + b x_hat + sum of c_h cos(2 pi h x_hat / period) + d_h sin(...)     h = 1..H      (11.8), (11.11)
 
 over `period` = 2 pi R_c_hat, exactly a turn of the encoder whatever the true radius is. The trend a + b x_hat is the
-capstan's mean radius and belongs into R_c (`trend`), the sum goes into the table. A harmonic enters only where it
-stands above what the same fit finds between the harmonics, where there should be nothing.
+error of the capstan's mean radius and belongs into R_c (`trend`); the sum goes into the table. A harmonic enters only
+where its amplitude is above the noise floor, the amplitudes that a fit of orders between the harmonics gives.
 
-From luminance only the first harmonic is taken: the band of figure 11.10 lets no other through. How many L* a metre of
-error is, and how late, must come from a record that has both (`luminance_gain`).
+From luminance only the first harmonic is taken: the band of figure 11.10 blocks all others. The gain from error to
+luminance, with its phase, must come from a record that has both (`luminance_gain`).
 
 Source: thesis 11.3, (11.11), (11.12), figure 11.10 (second-order Butterworth from 1/20 to 1/17 per mm, both ways).
 """
@@ -27,11 +27,11 @@ BAND = (17e-3, 20e-3)  # m, of figure 11.10
 
 
 class Table(NamedTuple):
-    """A table and what it rests on."""
+    """Error table with the harmonics, noise floor and trend of its record."""
 
     settings: ErrorTableSettings
     amplitude: np.ndarray  # (H,) m, of each harmonic
-    floor: float  # m, amplitude of what is there between the harmonics
+    floor: float  # m, noise floor: amplitude between the harmonics
     trend: float  # m/m: R_c is (1 + trend) R_c_hat
     turns: float  # of the capstan in the record
 
@@ -99,7 +99,7 @@ def luminance_gain(position: np.ndarray, luminance: np.ndarray, error: np.ndarra
 
 
 def periodic(position: np.ndarray, error: np.ndarray, period: float, harmonics: int = HARMONICS) -> float:
-    """Rms in m of that part of the error (n,) m that comes back every turn."""
+    """Rms in m of the part of the error (n,) m that is periodic in the turn."""
     c = _fit(np.asarray(position, float), np.asarray(error, float), period, np.arange(1.0, harmonics + 1))[2]
     return float(np.sqrt(np.sum(np.abs(c) ** 2) / 2))
 
@@ -120,7 +120,7 @@ def _table(c: np.ndarray, orders: np.ndarray, period: float, points: int) -> Err
 
 
 def _filtered(position: np.ndarray, y: np.ndarray, period: float) -> tuple[np.ndarray, slice, float]:
-    """`y` through the band around the turn, the part of it that the ends do not disturb, and its turns."""
+    """Band-pass of `y` around the turn, without the transients at the ends, and its number of turns."""
     from scipy.signal import butter, sosfiltfilt  # slow to import, and needed here only
 
     steps = np.diff(position)

@@ -1,7 +1,7 @@
-"""The fastest of many laws that keeps its margins: what the designs of described machines have in common.
+"""Law with the highest crossover among candidates that keeps its margins, for the designs of described machines.
 
-A law holds where gain and phase margin of the loop as it is ticked hold, every closed-loop pole lies inside the unit
-circle, and one step of the sensor makes less of the command than GRAIN of its limit.
+A law holds where the sampled loop keeps gain and phase margin, every closed-loop pole lies inside the unit circle,
+and one step of the sensor changes the command by less than GRAIN of its limit.
 """
 
 from collections.abc import Iterable
@@ -14,14 +14,14 @@ from rtctl.design import margins, response, systems
 from rtctl.design.margins import Margins
 from rtctl.machines.described_parts import Parts, parts_of
 
-ROOM = (2.0, 8.0)  # dB and degrees beyond the least margins, so that a machine a little off its model is held
-GRAIN = 0.2  # share of the limit that one step of the sensor may make
+ROOM = (2.0, 8.0)  # dB and degrees beyond the least margins, a reserve for small errors of the model
+GRAIN = 0.2  # largest change of the command by one step of the sensor, as a share of the limit
 
 Law = TypeVar("Law")
 
 
 class Held(NamedTuple, Generic[Law]):
-    """A law that holds."""
+    """A law that holds, with its crossover and margins."""
 
     law: Law
     crossover: float  # Hz
@@ -29,7 +29,7 @@ class Held(NamedTuple, Generic[Law]):
 
 
 class Machine(NamedTuple):
-    """What a law is tried on: the machine's response behind its hold, on a grid that is fine around its resonances."""
+    """Response of a machine behind its hold, on a grid that is fine around its resonances."""
 
     start: response.Loop
     f: np.ndarray  # (n,) Hz
@@ -68,7 +68,7 @@ def fastest(
 
 
 def grain(config: Any, loop: response.Loop, parts: Parts) -> float:
-    """Share of the limit that one step of the sensor makes of the command."""
+    """Change of the command by one step of the sensor, as a share of the limit."""
     sensor = parts.machine.sensors[parts.feedback]
     quick = abs(response.law_response(loop, np.array([0.45 / loop.dt]))[0])
     return float(quick * sensor.grain / abs(sensor.scale) / config.law.limit.high)
@@ -84,7 +84,7 @@ def near(parts: response.Loop, rate: float) -> np.ndarray:
 
 
 def inside(loop: response.Loop) -> bool:
-    """Whether every pole of the closed loop lies inside the unit circle, also where the machine alone would fall."""
+    """Whether every pole of the closed loop lies inside the unit circle, also for an unstable machine."""
     import control  # slow to import
 
     model = loop.model

@@ -1,10 +1,10 @@
-"""Feedforward: the inverse of what is known of the machine, so that feedback has only the rest to do (figure 12.10).
+"""Feedforward: inverse of the machine's model, so that feedback corrects only the remainder (figure 12.10).
 
     computed torque    u = x_ref'' / (x'' per V)          friction    u = sign(x_ref') F_C / (force per V)
 
-Values for `laws/inertia_feedforward` and `laws/friction_feedforward` from the model of a config, and what they are
-worth on the emulator. Friction is compensated by a share only, of the lowest value known: too much overshoots, since
-friction no longer stops what arrives (8.2, 8.3).
+Values for `laws/inertia_feedforward` and `laws/friction_feedforward` from the model of a config, and their effect
+on the emulator. Only a share of the lowest known friction is compensated: overcompensation overshoots, since
+friction no longer stops the motion at the target (8.2, 8.3).
 
 Source: thesis 5.5, 8.4, 12.7 (figure 12.10); the rigid sums of (4.9)-(4.13) and (F.1)-(F.9).
 """
@@ -27,7 +27,7 @@ INERTIA = 0.9  # of the inertia
 
 
 class Value(NamedTuple):
-    """One setting of a law, and why."""
+    """One setting of a law, with its reason."""
 
     path: str
     value: float
@@ -62,13 +62,13 @@ def without(config: Any) -> Any:
 
 
 def computed_torque(config: Any) -> float:
-    """Volts per m/s^2 of the carriage at low frequencies: what a computed torque for the linear drive takes."""
+    """Volts per m/s^2 of the carriage at low frequencies, the gain of a computed torque for the linear drive."""
     p = ldu.parameters(config.plant)
     return 1.0 / (mechanics.acceleration(p) * ldu_amplifier.AMPERE_PER_VOLT)
 
 
 def worth(config: Any, seconds: float, values: list[Value] | None = None) -> Worth:
-    """What feedforward does to a config and its reference on the emulator, played fused for `seconds`.
+    """Errors of a config without and with feedforward on the emulator, played fused for `seconds`.
 
     Raises NoAnswer where a run trips, or the reference never stands still.
     """
@@ -95,7 +95,7 @@ def _played(config: Any, seconds: float) -> tuple[float, float, float]:
 
 
 def _rests(target: np.ndarray, few: int) -> np.ndarray:
-    """The last rows of each rest after a move: where the next change comes, or the end."""
+    """Last rows of each rest after a move, before the next change of the reference or the end."""
     changes = np.flatnonzero(np.diff(target) != 0)
     if not changes.size:
         return changes

@@ -1,10 +1,10 @@
 """First law of a described machine: the fastest PD or PI that keeps its margins on the linear model.
 
     PD   K (1 + tau_d s)                     a position that needs no holding force
-    PI   K (1 + 1/(tau_i s)) + K_v s         a position that weight pulls at
+    PI   K (1 + 1/(tau_i s)) + K_v s         a position under weight
     PI   K (1 + 1/(tau_i s))                 a speed
 
-The crossover is lowered until the law holds, as fastest.py says it.
+The crossover is lowered until the law holds by the criteria of fastest.py.
 
 Source: Astrom & Murray, Feedback Systems (2008), 11.3 (loop shaping by the crossover).
 """
@@ -32,7 +32,7 @@ INTEGRAL = 6.0  # integral time, in units of 1 / crossover
 
 
 class Numbers(NamedTuple):
-    """A law by its numbers."""
+    """Kind and gains of a law."""
 
     kind: str  # pd | pi_velocity
     gain: float  # command per unit of error
@@ -42,7 +42,7 @@ class Numbers(NamedTuple):
 
 
 class First(NamedTuple):
-    """A law that holds, and what it reaches."""
+    """A law that holds, with its crossover and margins."""
 
     config: Any
     law: Numbers
@@ -77,7 +77,7 @@ def design(config: Any, least: tuple[float, float], bandwidth: float | None = No
 
 
 def kind_for(config: Any) -> tuple[str, str]:
-    """Kind of law for a machine, and why."""
+    """Kind of law for a machine, with the reason."""
     parts = parts_of(config)
     if parts.is_speed:
         return "pi_velocity", f"PI: {parts.feedback} shows a speed"

@@ -1,10 +1,10 @@
-"""State feedback by LQ with an integral, and a Kalman filter, for a described machine: the fastest that keeps margins.
+"""LQ state feedback with integral and Kalman filter for a described machine, the fastest that keeps its margins.
 
     minimise sum y^2 + (w_i int y)^2 + rho u^2          rho = |P(w_c)|^2, so that the loop crosses near w_c
     observer: force noise at the drive, noise of the sensor, so that it follows up to w_e
 
-The filter knows every spring between drive and sensor, so the loop may close where a PD has no phase left. LQ promises
-margins to who measures the whole state and none with an observer: they are asked for on the loop as it is ticked.
+The filter models every spring between drive and sensor, so the crossover may lie where a PD has no phase margin. LQ
+guarantees margins for a measured state and none with an observer: the margins are checked on the sampled loop.
 
 Source: Franklin, Powell & Workman, Digital Control of Dynamic Systems (1998), 9.3 and 9.5; Doyle, Guaranteed margins
 for LQG regulators, IEEE Trans. Automatic Control 23 (1978).
@@ -29,11 +29,11 @@ SLOWEST, FASTEST = 1 / 2000, 1 / 12  # of the sample rate
 FOLLOWS = (3.0, 5.0, 8.0, 15.0)  # w_e / w_c, in the order in which they are tried
 INTEGRALS = (6.0, 15.0, 40.0)  # w_c / w_i, likewise
 ROUNDED = 10  # digits of the numbers in a config
-UNSEEN = 1e-9  # of the largest singular value, below which a direction of the state does not show
+UNSEEN = 1e-9  # of the largest singular value, below which a direction of the state is unobservable
 
 
 class Sampled(NamedTuple):
-    """A machine from tick to tick: what the drive moves and the feedback shows of it, the delay of the output last."""
+    """Sampled machine, reduced to its controllable and observable states, the delay of the output last."""
 
     A: np.ndarray  # (n, n)
     B: np.ndarray  # (n,)
@@ -42,7 +42,7 @@ class Sampled(NamedTuple):
 
 
 class Designed(NamedTuple):
-    """A config with a state feedback that holds, and what it reaches."""
+    """A config with a state feedback that holds, with its crossover and margins."""
 
     config: Any
     crossover: float  # Hz
@@ -84,11 +84,10 @@ def design(config: Any, least: tuple[float, float], bandwidth: float | None = No
 
 
 def sampled(start: response.Loop) -> Sampled:
-    """The machine of a loop behind its hold and its delay, without what the feedback does not show or the drive does
-    not move."""
+    """Sampled machine of a loop behind its hold and its delay, without unobservable and uncontrollable states."""
     Phi_T, Gamma_T = linear.discretise(start.model.A, start.model.b[:, None], start.dt)
     A, B, C = Phi_T.T, Gamma_T.T[:, 0], start.model.c
-    for _ in range(2):  # what is not seen, then, transposed, what is not moved
+    for _ in range(2):  # unobservable states, then, by the transposed system, uncontrollable states
         rows = [C / np.linalg.norm(C)]
         for _ in range(len(A) - 1):
             row = rows[-1] @ A
@@ -108,9 +107,9 @@ def sampled(start: response.Loop) -> Sampled:
 
 
 def laws(machine: Sampled, f: np.ndarray, P: np.ndarray, crossover: float, dt: float) -> Iterator[dict[str, Any]]:
-    """Settings of the state feedbacks that cross near `crossover` Hz, by how slow the integral is and how far the
-    observer follows. `P` (n,) is the size of the machine's response at `f` (n,) Hz. None where an equation has no
-    solution."""
+    """Settings of the state feedbacks that cross near `crossover` Hz, by bandwidth of the observer and rate of the
+    integral. `P` (n,) is the size of the machine's response at `f` (n,) Hz. No settings where a Riccati equation has
+    no solution."""
     from scipy.linalg import solve_discrete_are  # slow to import, and needed here only
 
     A, B, C, noise = machine
@@ -130,7 +129,7 @@ def laws(machine: Sampled, f: np.ndarray, P: np.ndarray, crossover: float, dt: f
     try:
         observers = []
         for factor in FOLLOWS:
-            loud = 1.0 / at(min(factor * crossover, f[-1])) ** 2  # of the force, over that of the sensor
+            loud = 1.0 / at(min(factor * crossover, f[-1])) ** 2  # variance of force noise over that of the sensor
             Y = solve_discrete_are(A.T, C[:, None], loud * np.outer(noise, noise), np.array([[1.0]]))
             observers.append(_short(Y @ C / (1.0 + C @ Y @ C)))
         for slower in INTEGRALS:

@@ -1,13 +1,14 @@
-"""How far a loop is from instability: gain and phase margin, bandwidth, peak of the sensitivity.
+"""Stability margins of a loop: gain and phase margin, bandwidth, peak of the sensitivity.
 
     S = 1 / (1 + L)        T = P H K_ref / (1 + L)
 
 `margins` takes the loop as a function of frequency, so that the grid can be made fine where the loop crosses |L| = 1
-and the negative real axis, and lets python-control read it there. `points` takes a loop that is known at some
-frequencies only, as a measured one, and interpolates log |L| and phase; it needs no more than numpy, so an optimiser
-can afford it. Where both can be had they agree.
+and the negative real axis; python-control computes the margins on this grid. `points` takes a loop that is known at
+some frequencies only, such as a measured loop, and interpolates log |L| and phase; it uses numpy alone, so it is fast
+enough for an optimiser. The two functions agree on loops that both can take.
 
-Stability is judged by the turns of 1 + L around the origin, for loops whose open loop has no pole right of the axis.
+Stability is judged by the encirclements of the origin by 1 + L, for loops without an open-loop pole in the right half
+plane.
 
 Source: Astrom & Murray, Feedback Systems (2008), 9.2-9.3 (Nyquist, margins, s_m = 1 / max |S|).
 """
@@ -21,13 +22,13 @@ from rtctl.config.errors import NoAnswer
 from rtctl.design import response
 
 Response = Callable[[np.ndarray], np.ndarray]  # frequencies (n,) Hz to a complex response (n,)
-COARSE, FINE = 1500, 40  # points of the grid, and more of them around every crossing
+COARSE, FINE = 1500, 40  # points of the grid, and further points around every crossing
 LOW, HIGH = 0.05, 0.499  # Hz, and part of the sample rate
 HALF_POWER = np.sqrt(0.5)
 
 
 class Margins(NamedTuple):
-    """Margins of a loop. A crossing that is not there leaves an infinite margin at a frequency of nan."""
+    """Margins of a loop. Without a crossing the margin is infinite and its frequency nan."""
 
     stable: bool
     GM: float  # dB by which the gain may change, nearest crossing of -180 degrees; negative where it must fall
@@ -40,9 +41,9 @@ class Margins(NamedTuple):
 
 
 def of_config(config: Any, motor: int = 1, printed: bool = False, quick: bool = False) -> Margins:
-    """Margins of a config's loop as it is ticked; `printed` takes the law as the thesis prints it, with a pure delay.
+    """Margins of a config's sampled loop; `printed` takes the law as the thesis prints it, with a pure delay.
 
-    `quick` interpolates on the refined grid instead of asking python-control: the same numbers twenty times as fast.
+    `quick` interpolates on the refined grid instead of calling python-control: equal results, twenty times as fast.
     Raises NoAnswer where the loop crosses nothing between 0.05 Hz and half the sample rate.
     """
     parts = response.take(config, motor)
@@ -142,9 +143,9 @@ def points(f: np.ndarray, L: np.ndarray, forward: np.ndarray | None = None) -> M
 
 
 def stable(f: np.ndarray, L: np.ndarray) -> bool:
-    """Whether the closed loop is stable, from the turns of 1 + L. L is (n,) at the rising frequencies `f` (n,) Hz.
+    """Whether the closed loop is stable, by encirclements of 1 + L. L is (n,) at the rising frequencies `f` (n,) Hz.
 
-    The open loop may have poles at 0, which `f[0]` must be low enough to show, and none to the right of the axis.
+    The open loop may have poles at 0, for which `f[0]` must be low enough, and none in the right half plane.
     """
     slope = np.log(np.abs(L[1] / L[0])) / np.log(f[1] / f[0])
     start = np.angle(1 + L[0])

@@ -1,9 +1,9 @@
-"""Mechanics of the linear drive: which radii give the most acceleration, and what friction wheels can carry.
+"""Mechanics of the linear drive: radii of the largest acceleration, and torque that friction wheels can carry.
 
     x'' / I = K_m N R_c / (J_m N^2 + J_t + J_c + J_e + M R_c^2)      N = R_t / R_s
 
-A wheel's inertia and a shaft's stiffness go with the fourth power of the radius (F.12-F.14), so a larger capstan wins
-force and pays with the mass that it must turn; a smaller wheel wins inertia and pays with transmission.
+A wheel's inertia and a shaft's stiffness grow with the fourth power of the radius (F.12-F.14). A larger capstan has
+more travel per turn and more inertia; a smaller wheel has less inertia and a lower ratio.
 
 Source: thesis 12.4, 12.5, 13, appendix F; 11.1 for the errors. The optimum is flat: 4.4 dB at the thesis's 6.2 and
 23 mm, 4.5 dB at 5.7 and 19.2 mm.
@@ -54,7 +54,7 @@ def with_radii(p: LduParameters, R_c: float, R_t: float) -> LduParameters:
 
 
 def gain(p: LduParameters, R_c: float, R_t: float) -> float:
-    """What other radii (m) win in dB of acceleration."""
+    """Gain in dB of acceleration by other radii (m)."""
     return float(20 * np.log10(acceleration(with_radii(p, R_c, R_t)) / acceleration(p)))
 
 

@@ -1,10 +1,10 @@
-"""Selection of motors for reels: torque and speed that a move asks for, beside what a motor gives behind its gear.
+"""Selection of motors for reels: torque and speed of a move, compared with those of a motor behind its gear.
 
     I = min(V / R, I_max),  tau_F = K I_0,  w = (V - R I) / K                          at the rotor
     tau = n (K I - tau_F),  w / n,  n^2 J                                               behind a gear of ratio n
 
-A gear loses no more than the motor's own friction here: appendix E gives one no-load current for every gear. A reel
-that pays out is turned by its tape, whose tension is then n tau_F / R more than the motor leaves.
+A gear adds no loss to the motor's own friction here: appendix E gives one no-load current for every gear. A reel that
+pays out is turned by its tape, whose tension must exceed the motor's pull by n tau_F / R.
 
 Source: thesis appendix E, chapter 9 ("it is also recommended to use other DC motors").
 """
@@ -48,16 +48,16 @@ class Motor(NamedTuple):
         return self.gear**2 * self.J
 
     def at(self, speed: float) -> float:
-        """Torque that is left at a speed behind the gear (rad/s), Nm."""
+        """Available torque at a speed behind the gear (rad/s), Nm."""
         return min(self.stall * (1.0 - speed / self.no_load), self.most)
 
     def current(self, torque: float) -> float:
-        """Current that a torque behind the gear (Nm) takes, A."""
+        """Motor current for a torque behind the gear (Nm), A."""
         return (torque + self.friction) / (self.K * self.gear)
 
 
 class Move(NamedTuple):
-    """What a move asks of the motor that winds."""
+    """Speed, torque and acceleration of a move at the motor that winds."""
 
     speed: float  # rad/s of its reel
     torque: float  # Nm, without the friction and the inertia of a motor
@@ -67,10 +67,10 @@ class Move(NamedTuple):
 class Fit(NamedTuple):
     """A motor against a move."""
 
-    torque: float  # Nm that the move takes of it, with its own inertia and that of the other motor
-    left: float  # Nm that it has more at the speed of the move
+    torque: float  # Nm, for the move with the inertia of both motors
+    left: float  # Nm, reserve at the speed of the move
     current: float  # A
-    back: float  # N of tension at which a reel of radius R turns it back
+    back: float  # N of tension at which a reel of radius R turns the motor back
     good: bool
 
 
@@ -92,7 +92,7 @@ def move(distance: float, seconds: float, R: float, F_t: float = 0.1) -> Move:
 
 def fit(motor: Motor, asked: Move, R: float, paper: float) -> Fit:
     """A motor against a move of a reel of radius `R` m; both reels with their motors move, `paper` kg m^2 in all."""
-    torque = asked.torque + (2.0 * motor.inertia + paper) * asked.acceleration + motor.friction  # of the other, dragged
+    torque = asked.torque + (2.0 * motor.inertia + paper) * asked.acceleration + motor.friction  # of the other motor
     left = motor.at(asked.speed) - torque
     back = motor.friction / R
     return Fit(torque, left, motor.current(torque), back, left > 0.0 and back < 1.0)

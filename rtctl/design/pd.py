@@ -41,7 +41,7 @@ def of_points(f: np.ndarray, P: np.ndarray, w_n: float, zeta: float = 1.0, at: f
 
 
 def applied(config: Any, found: PdDesign) -> Any:
-    """The config with that PD; a derivative filter that it had stays. The law becomes a `pd` where it was another."""
+    """The config with a PD as its position law; a derivative filter of the former law stays."""
     from rtctl.config.load import set_path
 
     values: dict[str, Any] = {"gain": found.gain, "tau_d": found.tau_d}

@@ -1,11 +1,11 @@
-"""Frequency responses of a config: its plant, its law as it is ticked, and the loop that they close.
+"""Frequency responses of a config: its plant, its sampled law, and their loop.
 
     L = P H K        H = (1 - e^(-s dt)) / (s dt) e^(-s dt write)          T = P H K_ref / (1 + L)
 
-The law is sampled and is taken from its built params, so a filter that is changed in a law is changed here. The plant
-is its linear model in continuous time, without dry friction and terms of physics; H is the zero-order hold of the
-board, and one tick more where outputs are written at the next tick. Images beyond half the sample rate are left out
-of `loop` (they are 60 dB down on the shipped machines); `systems.sampled` has them all.
+The law is sampled and is taken from its built params, so that every filter of a law is included. The plant is its
+linear model in continuous time, without dry friction and terms of physics; H is the zero-order hold of the board, and
+one tick more where outputs are written at the next tick. `loop` leaves out the images beyond half the sample rate
+(60 dB down on the shipped machines); `systems.sampled` includes them.
 
 Source: thesis 8.2 (3 ms of delay), 12.7; Franklin, Powell & Workman, Digital Control of Dynamic Systems, 4.3.
 """
@@ -25,7 +25,7 @@ from rtctl.plants.graph.linearised import linearised, sensor_row
 
 
 class Loop(NamedTuple):
-    """A config taken apart for design: everything that `loop` multiplies, as models and coefficients."""
+    """Parts of a config's loop for design: models and coefficients of plant, law, hold and delay."""
 
     model: Model
     blocks: dict[str, Any]  # params of the blocks of the tick, by name
@@ -78,7 +78,7 @@ def loop(config: Any, f: np.ndarray, motor: int = 1) -> np.ndarray:
 
 
 def printed(config: Any, f: np.ndarray, motor: int = 1) -> np.ndarray:
-    """Loop gain (n,) as the thesis has it (8.2): G (tau_d s + 1) without its filter, hold and tick as a pure delay.
+    """Loop gain (n,) in the form of thesis 8.2: G (tau_d s + 1) without its filter, hold and tick as a pure delay.
 
     The gain is that of the config, schedule included. Raises UserError where the law is not a PD.
     """
@@ -96,8 +96,8 @@ def closed(config: Any, f: np.ndarray, motor: int = 1) -> np.ndarray:
 def plant_response(model: Model, f: np.ndarray) -> np.ndarray:
     """Response (n,) of a model at the frequencies `f` (n,) Hz, above 0.
 
-    By the Schur form of A and back substitution for all frequencies at once, which takes the double pole at 0 of a
-    free machine as it is.
+    By the Schur form of A and back substitution for all frequencies at once, which is exact for the double pole at 0
+    of a free machine.
     """
     from scipy.linalg import schur  # slow to import, and needed here only
 

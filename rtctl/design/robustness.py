@@ -1,7 +1,7 @@
-"""Margins of the reel unit's loop over all reel radii: where a fixed gain is safe, and where it is not.
+"""Margins of the reel unit's loop with a fixed gain over all reel radii.
 
-A full reel is light at the tape and a little lossy there, so the loop gain and the resonance of the motor's shaft both
-rise with the radius: the margin is least where both reels are full.
+A full reel has little mass and little damping at the tape, so the loop gain and the resonance of the motor's shaft
+both rise with the radius: the margin is least where both reels are full.
 
 Source: thesis 5.2, which expects the worst case at R1 = 40 mm, and chapter 9. The text has no margins over the radii:
 its 'stable for the complete range of reel radii' holds, with 1.2 dB of gain margin at 40/40 mm.
@@ -33,7 +33,7 @@ class Map(NamedTuple):
 
     @property
     def worst(self) -> tuple[float, float, float]:
-        """Least gain margin in dB, and the radii in m where it is."""
+        """Least gain margin in dB, and its radii in m."""
         i, j = np.unravel_index(int(np.argmin(self.GM)), self.GM.shape)
         return float(self.GM[i, j]), float(self.R_drive[i]), float(self.R_other[j])
 
@@ -53,7 +53,7 @@ def over_radii(config: Any, R_drive: Any = RADII, R_other: Any = RADII, motor: i
 
 
 def at(config: Any, R_drive: float, R_other: float, motor: int = 1, printed: bool = False) -> Margins:
-    """Margins at one pair of radii in m, `motor` (1 or 2) being the one that pulls."""
+    """Margins at one pair of radii in m, with `motor` (1 or 2) pulling."""
     R1, R2 = (R_drive, R_other) if motor == 1 else (R_other, R_drive)
     return margins.of_config(with_radii(config, R1, R2), motor, printed, quick=True)
 

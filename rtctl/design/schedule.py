@@ -1,10 +1,10 @@
-"""Gain schedule over the reel radii that keeps a gain margin where a fixed gain loses it.
+"""Gain schedule over the reel radii with a gain margin at every radius.
 
-    factor = the one nearest to K_p(reference) / K_p(radii) with which the loop has GM and PM
+    factor = factor nearest to K_p(reference) / K_p(radii) with which the loop has GM and PM
 
-so the loop gain stays what it was designed for as far as the margins allow. The phase margin is asked for as well: a
-resonance that comes up to |L| = 1 would keep its gain margin and ring. The table is interpolated by the
-law, so it is judged between its nodes, and asked for a little more until every radius keeps the margins.
+The loop gain stays at its design value as far as the margins allow. The phase margin is a limit as well: a resonance
+near |L| = 1 may keep its gain margin and ring. The law interpolates the table, so the margins are checked between the
+nodes as well, and the limits at the nodes are raised until every radius keeps its margins.
 
 Source: thesis chapter 9 (gain scheduling on the reel radii is recommended); `laws/gain_schedule`, mode margin.
 """
@@ -25,7 +25,7 @@ STEPS = 100  # of 2 % each, a factor of 7 either way
 
 
 class Schedule(NamedTuple):
-    """A table for the law, and the margins without and with it, the latter between its nodes too."""
+    """Table of the law, and margins without and with it, with the table between its nodes too."""
 
     table: RadiusTableSettings
     fixed: Map
@@ -42,7 +42,7 @@ def design(
 ) -> Schedule:
     """Schedule with at least `GM` dB and `PM` deg for every pair of `radii` (m), and no factor above `strongest`.
 
-    `printed` judges the law as the thesis has it, without its filter, where the gain margins are less.
+    `printed` takes the law as the thesis prints it, without its filter, which has smaller gain margins.
     Raises NoAnswer where no factor gives the margins.
     """
     radii = np.asarray(radii, float)
@@ -83,14 +83,14 @@ def design(
 
 
 def _factor(f: np.ndarray, L: np.ndarray, wanted: float, strongest: float, asked: np.ndarray) -> float:
-    """Factor nearest to `wanted` with which the loop `L` has the margins asked for; nan if none has."""
+    """Factor nearest to `wanted` with which the loop `L` has the margins `asked`; nan where no factor has them."""
     wanted = min(wanted, strongest)
     steps = np.arange(-STEPS, STEPS + 1)
     tried = wanted * 1.02 ** steps[np.argsort(np.abs(steps), kind="stable")]
     for k in tried[tried <= strongest]:
         try:
             m = margins.points(f, k * L)
-        except NoAnswer:  # no crossover is left
+        except NoAnswer:  # the loop has no crossover
             continue
         if m.stable and m.GM >= asked[0] and m.PM >= asked[1]:
             return float(k)

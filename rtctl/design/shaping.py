@@ -2,11 +2,10 @@
 
     K = H_l H_n1 H_n2 H_lp        largest bandwidth with GM >= GM_min, PM >= PM_min, |S| <= S_max
 
-The plant is a response, identified or of a model, so nothing is assumed of its shape but what can be measured. The
-filters are the sampled sections that the tick runs, and hold and delay are in the loop from the beginning. What the
-optimiser may move are the gain, the lead (its middle and its width), both notches (place, depth, width) and the corner
-of the low-pass; the lag stays a fixed distance below the lead, where it costs 1 degree (12.7: it must leave the
-cross-over alone).
+The plant is a frequency response, identified or of a model; no structure of the plant is assumed. The filters are the
+sampled sections of the tick, and the loop includes hold and delay. The optimiser varies the gain, the lead (middle and
+width), both notches (frequency, depth, width) and the corner of the low-pass. The lag stays at a fixed ratio below the
+lead, where it costs 1 degree at the cross-over (12.7).
 
 Source: thesis 12.7, (12.4), (12.5), figure 12.9. Storn & Price, Differential evolution, J. Global Optimization 11
 (1997), with fixed seeds, and then Nelder & Mead, Computer Journal 7 (1965): margins have corners, not gradients.
@@ -24,7 +23,7 @@ from rtctl.laws.sections import SectionsSettings
 
 
 class Slack(NamedTuple):
-    """Asked for beyond the limits, since the grid is coarser than the check afterwards."""
+    """Reserve beyond the limits, since the grid of the optimiser is coarser than that of the final check."""
 
     GM: float  # dB
     PM: float  # deg
@@ -39,14 +38,14 @@ GENERATIONS, POPULATION, EDGE = 200, 12, 1.5
 ROUNDS, EVALUATIONS = 2, 1500
 SLACK = Slack(0.2, 0.5, 0.1, 0.005)
 WEIGHT = 10.0  # of a missed limit against the logarithm of the bandwidth
-NEAR = np.radians(3.0)  # of the negative real axis: a gain this near counts as a crossing, or one could hide in a gap
-AWAY = (5.0, 11.0)  # dB that a resonance must stay below |L| = 1, and the margin that it then counts as
+NEAR = np.radians(3.0)  # rad from the negative real axis within which a point of the grid counts as a crossing
+AWAY = (5.0, 11.0)  # dB that a resonance must stay below |L| = 1, and the gain margin that this distance counts as
 RISE = 1.25  # of a resonance above the gain before it
-LOWEST = 30.0  # dB below a mass, from where on a resonance does not matter to the loop
+LOWEST = 30.0  # dB below a mass, from which on a resonance is ignored
 SAMPLES = 500  # of a response that a model gives, and 80 more at every resonance
 HIGHEST = 0.45  # of the sample rate, for any corner of a filter
-LEAST_DEPTH = 0.03  # of a notch: a deeper one is no use where the resonance moves by a percent
-BOUNDS = {  # of what the optimiser moves, as factors of where it starts
+LEAST_DEPTH = 0.03  # gain of a notch at its frequency, at least: a resonance moves by a percent
+BOUNDS = {  # of the optimiser's variables, as factors of their first values
     "gain": (0.05, 20.0),
     "cross": (0.3, 3.0),  # Hz, middle of the lead
     "beta": (0.2, 7.0),
@@ -56,7 +55,7 @@ BOUNDS = {  # of what the optimiser moves, as factors of where it starts
 
 
 class Limits(NamedTuple):
-    """What the loop must keep."""
+    """Limits on margins, sensitivity and bandwidth of the loop."""
 
     GM: float = 11.0  # dB
     PM: float = 60.0  # deg
@@ -65,7 +64,7 @@ class Limits(NamedTuple):
 
 
 class Shaped(NamedTuple):
-    """Filters and what they reach: margins on the response that was given."""
+    """Filters, and the margins of their loop on the response that was given."""
 
     law: SectionsSettings
     margins: Margins
@@ -138,7 +137,7 @@ def of_points(f: np.ndarray, P: np.ndarray, dt: float, delay: int | None = 1, li
 
 
 def _reached(f: np.ndarray, H: np.ndarray, x: np.ndarray, dt: float) -> Shaped:
-    """Filters for the values `x`, and the margins that they have as they are built."""
+    """Filters for the values `x`, and the margins of their sampled sections."""
     law, back = _settings(x, dt), np.exp(-2j * np.pi * f * dt)
     K = np.prod([response.biquad_response(p, back) for p in sections.build(law, dt)], axis=0)
     return Shaped(law, margins.points(f, H * K))
@@ -184,7 +183,7 @@ def _around(value: float, name: str, most: float = np.inf) -> tuple[float, float
 
 
 def _unfold(x: np.ndarray, box: np.ndarray) -> np.ndarray:
-    """Values within the box for what the optimiser moves freely; 0 is where each starts."""
+    """Values within the box for the unbounded variables of the optimiser; 0 is the first value of each."""
     low, middle, high = box.T
     share = (middle - low) / (high - low)
     return np.exp(low + (high - low) / (1 + (1 - share) / share * np.exp(-4.0 * x)))
@@ -226,23 +225,23 @@ def _filters(x: np.ndarray, f: np.ndarray, dt: float) -> np.ndarray:
 
 
 def _gain_margin(L: np.ndarray) -> float:
-    """Gain margin in dB, counting all that comes near the negative real axis above the cross-over.
+    """Gain margin in dB, from all points near the negative real axis above the cross-over.
 
-    A resonance above it counts wherever its phase lies as soon as it is within `AWAY` of the cross-over's gain: what
-    is stable by its phase alone is not stable on another machine.
+    A resonance above the cross-over counts at any phase where its gain is within `AWAY` of 1: a resonance that is
+    stable by its phase alone may be unstable on another machine.
     """
     above = np.flatnonzero(np.abs(L) > 1)
     gaps = np.flatnonzero(np.diff(above) > 1)
     rest = np.abs(L[(above[gaps[0]] if gaps.size else above[-1]) + 1 :])
     near = np.abs(np.angle(-L[-len(rest) :])) < NEAR
     margin = float(-20 * np.log10(np.max(rest[near]))) if near.any() else np.inf
-    risen = rest > RISE * np.minimum.accumulate(rest)  # above what is before it: a resonance, and no noise
+    risen = rest > RISE * np.minimum.accumulate(rest)  # above the gain before it: a resonance, not noise
     peak = -20 * np.log10(np.max(rest[risen])) if risen.any() else np.inf
     return float(min(margin, AWAY[1] * peak / AWAY[0])) if peak < AWAY[0] else margin
 
 
 def _missing(m: Margins, limits: Limits, slack: Slack | None = None) -> np.ndarray:
-    """How far each limit is missed, one for 5 dB, 20 degrees or a fifth of the bandwidth."""
+    """Violation of each limit in units of 5 dB, 20 degrees or a fifth of the bandwidth; 0 where it is met."""
     more = slack or Slack(0.0, 0.0, 0.0, 0.0)
     return np.maximum(
         [

@@ -1,7 +1,7 @@
 """The loop of a config as sampled linear systems of python-control: exact between the samples, with every pole.
 
 The plant is discretised with its hold by the matrix exponential, the tick until a command is written is a state, and
-the law is the law as it is ticked. Where `response` gives curves, this gives poles and step responses.
+the law is the sampled law of the tick. These systems give poles and step responses; `response` gives curves.
 
 Source: Franklin, Powell & Workman, Digital Control of Dynamic Systems (1998), 4.3 (exact discretisation).
 """
@@ -103,7 +103,7 @@ def _difference(a: float, dt: float) -> Any:
 
 
 def _system(num: list[float], den: list[float], dt: float) -> Any:
-    """num / den in falling powers of z; coefficients that are 0 at the end of both are delays that are not there."""
+    """System num / den in falling powers of z, without the common factor z of coefficients 0 at both ends."""
     while len(den) > 1 and num[-1] == den[-1] == 0.0:
         num, den = num[:-1], den[:-1]
     return control.ss(control.tf(num, den, dt))

@@ -1,11 +1,11 @@
-"""Tuning a config: which law, which numbers, and why each of them.
+"""Tuning of a config: kind and settings of the law, with a reason for each.
 
     ivu     PD by bandwidth and damping (5.4), a gain schedule over the radii, feedforward of friction and inertia
     ldu     lead-lag, two notches and a low-pass by optimisation (12.7), feedforward of friction
     axis    PD by bandwidth and damping
     others  PD or PI, the fastest that keeps its margins (first_law.py); or state feedback by LQ (lq.py)
 
-What is tuned is the model that the config's `plant` holds, as it was identified or given.
+The law is tuned on the model in the config's `plant`, identified or given.
 
 Source: thesis 5.2, 8.2, 9, 12.7.
 """
@@ -29,14 +29,14 @@ PLAIN = (6.0, 45.0)  # dB and deg, of machines that are not listed
 
 
 class Reason(NamedTuple):
-    """A key of the config that was set, and why."""
+    """A key of the config that was set, with the reason."""
 
     path: str
     words: str
 
 
 class Tuned(NamedTuple):
-    """A tuned config with its reasons, the margins before and after, and the maps over the radii where there are."""
+    """A tuned config with its reasons, margins before and after, and maps over the radii of a reel unit."""
 
     config: Any
     reasons: list[Reason]
@@ -49,7 +49,7 @@ METHODS = ("usual", "lq")  # lq: state feedback from an observer, of a described
 
 
 def _described(config: Any, hertz: float | None, GM: float | None, PM: float | None, method: str) -> Tuned:
-    """A law of a described machine, whatever law it had."""
+    """Law of a described machine; the former law does not matter."""
     least = (PLAIN[0] if GM is None else GM, PLAIN[1] if PM is None else PM)
     check(1e-3 * config.loop.rate if hertz is None else hertz, 1.0, least, config.loop.rate)
     before = None
@@ -113,7 +113,7 @@ def tune(
 
 
 def check(bandwidth: float, damping: float, least: tuple[float, float], rate: float) -> None:
-    """Raise UserError where a wish makes no sense."""
+    """Raise UserError where an option is out of its range."""
     if not 0 < bandwidth < rate / 10:
         raise UserError(f"--bandwidth {bandwidth:g}: it lies above 0 and below a tenth of the rate, {rate / 10:g} Hz")
     if not 0.1 <= damping <= 10:
@@ -125,7 +125,7 @@ def check(bandwidth: float, damping: float, least: tuple[float, float], rate: fl
 
 
 def starting(config: Any) -> Margins:
-    """Margins of the loop to start from. Raises NoAnswer where it is unstable, with the frequency at which."""
+    """Margins of the initial loop. Raises NoAnswer, which names the frequency, where the loop is unstable."""
     found = margins.of_config(config)
     if not found.stable:
         where = f"at {found.f_GM:.3g} Hz" if np.isfinite(found.f_GM) else f"near {found.f_PM:.3g} Hz"

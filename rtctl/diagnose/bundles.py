@@ -1,4 +1,4 @@
-"""A bundle, or several of one machine, diagnosed into a folder."""
+"""Diagnosis of one bundle, or of several bundles of one machine, written into a folder."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,13 +13,13 @@ class Diagnosed(NamedTuple):
 
     diagnosis: Any  # GraphDiagnosis
     data: dict[str, Any]  # as in diagnosis.json
-    faults: tuple[str, ...]  # a sentence on each file that could not be made
+    faults: tuple[str, ...]  # one sentence for each file that could not be made
 
 
 def of_one_machine(bundles: Sequence[Path], together: bool) -> None:
     """Raise UserError unless the bundles are recordings of one machine.
 
-    They are where each case names the same `group`, or the user says so (`together`).
+    Bundles are of one machine where each case names the same `group`, or the user says so (`together`).
     """
     groups = {bundle: str(load_case(bundle).get("group") or "") for bundle in bundles}
     if together:
@@ -44,11 +44,11 @@ def diagnose_into(
     progress: Callable[[str], None] = lambda _: None,
     more: Sequence[Path] = (),
 ) -> Diagnosed:
-    """Diagnose the bundle and write the results into `out`; `other` is a second recording of the same machine.
+    """Diagnosis of the bundle, written into `out`; `other` is a second recording of the same machine.
 
     `more` are recordings of the same machine that are fitted together with the first. Where `base` is given, no link
-    may lead out of it. Raises UserError for a bundle that cannot be read and for a disk that does not take the results,
-    NoAnswer for a bundle that supports no verdict.
+    may lead out of `base`. Raises UserError for a bundle that cannot be read and for a disk that does not take the
+    results, NoAnswer for a bundle that supports no verdict.
     """
     from rtctl.diagnose.answer import answer, files
     from rtctl.diagnose.answer.results import finite

@@ -1,8 +1,8 @@
-"""Hides one effect in an emulated machine: which one, where and how large is drawn by a seed and told to nobody.
+"""Hidden effect in an emulated machine: a seed draws term, node and size, and nothing reports them.
 
-Sizes are the typical ranges of the terms, scaled to what the machine does in ordinary use (see `ordinary`). A term has
-ranges of its own for this, `draws`, where the typical ones, given in plain units, would be far too much or too little
-for a machine (an axis in metres, a shaft at 4000 rpm).
+Sizes are the typical ranges of the terms, scaled to the nominal duty of the machine (see `nominal_duty`). A term has
+ranges `draws` of its own where the typical ranges, given in plain units, are far too large or too small for a machine
+(an axis in metres, a shaft at 4000 rpm).
 """
 
 from math import log, pi
@@ -29,7 +29,7 @@ TYPICAL = {  # what Term.scale says -> measure
 
 
 def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
-    """The config with one more entry in `plant.physics`, and that entry. The same seed and config give the same one.
+    """Config with one more entry in `plant.physics`, and the entry. Equal seed and config give an equal entry.
 
     Raises UserError where nothing can be hidden in this machine.
     """
@@ -48,22 +48,22 @@ def conceal(config: Any, seed: int) -> tuple[Any, dict[str, Any]]:
             hidden = set_path(config, f"plant.physics.{at}", entry)
             machines.build(hidden)
         except (UserError, ValidationError, ValueError):
-            continue  # too much for this machine
+            continue  # the effect is too large for this machine
         return hidden, entry
     raise UserError(f"{config.name}: no effect of the library can be hidden in this machine")
 
 
 def nodes(name: str, config: Any) -> list[str]:
-    """Where an effect can be hidden in a machine without its loop running away at once."""
+    """Nodes at which an effect can be hidden without instability of the loop."""
     term = TERMS[name]
     found = physics.nodes(term, config.kind) if term.tabled else ()
-    if term.unsigned:  # a loop on a sensor without signs runs away
+    if term.unsigned:  # a loop on a sensor without signs is unstable
         found = tuple(node for node in found if node not in physics.having(config.kind, "sensor", "feedback"))
     return [node for node in found if not term.needs.stiffness or use(node, config).stiffness > 0.0]
 
 
 def sized(name: str, node: str, config: Any, rng: np.random.Generator) -> dict[str, Any]:
-    """An entry of `physics:` with its sizes drawn."""
+    """Entry of `physics:` with drawn sizes, SI."""
     term = TERMS[name]
     typical = {k: Draw(low, high, TYPICAL[term.scale.get(k, "")]) for k, (low, high) in term.typical.items()}
     ranges = {**typical, **term.draws}

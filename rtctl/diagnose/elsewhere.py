@@ -1,7 +1,7 @@
-"""A folder of bundles, diagnosed by the workers of a Dask scheduler.
+"""Diagnosis of a folder of bundles by the workers of a Dask scheduler.
 
-Each worker calls the command that diagnoses one bundle, so that a diagnosis that takes too long can be ended and none
-leaves anything behind in the worker. Bundles and results lie where the workers find them by the same path.
+Each worker starts the command that diagnoses one bundle: a diagnosis that takes too long can be ended, and no diagnosis
+leaves state in the worker. The paths of bundles and results are valid on every worker.
 """
 
 import json
@@ -17,9 +17,9 @@ from rtctl.diagnose.folder import OURS, Outcome, Task
 
 
 def diagnose_elsewhere(waiting: list[Task], scheduler: str, limit: float, report: bool) -> Iterator[Outcome]:
-    """Outcomes as they come; a diagnosis that takes longer than `limit` s is ended.
+    """Outcomes in the order of completion; a diagnosis that takes longer than `limit` s is ended.
 
-    Raises UserError where there is no such scheduler, or its workers do not see the bundles, PoolError where a worker
+    Raises UserError where the scheduler does not exist or its workers do not see the bundles, PoolError where a worker
     dies.
     """
     found = workers.dask(partial(_one, limit=limit, report=report), [_absolute(task) for task in waiting], scheduler)
@@ -32,7 +32,7 @@ def _absolute(task: Task) -> Task:
 
 
 def _one(task: Task, limit: float, report: bool) -> Outcome:
-    """Diagnose one bundle by a process of its own, in a worker."""
+    """Outcome of one bundle, diagnosed in a process of its own on a worker."""
     if not task.bundle.is_dir():
         raise UserError(
             f"a worker of the scheduler does not see {task.bundle}; recordings lie where it finds them by the same "

@@ -1,8 +1,7 @@
-"""A folder of bundles, diagnosed by several processes.
+"""Diagnosis of a folder of bundles by several processes.
 
-A bundle whose diagnosis is there and newer than its recording is not diagnosed again, so that work that was broken off
-goes on where it stopped. Of several processes each simulates with one thread, so that as many as there are cores use
-them all.
+A bundle whose diagnosis is newer than its recording is not diagnosed again: interrupted work resumes where it stopped.
+Each of several processes simulates with one thread: one process for each core uses all cores.
 """
 
 import json
@@ -24,14 +23,14 @@ from rtctl.config.failures import told
 from rtctl.diagnose.answer.results import FOLDER, RESULT
 from rtctl.trace.bundle import ARROWS, CASE, PARQUET
 
-SECOND = "-heldout"  # a bundle of this name beside another is a second recording of the same machine
+SECOND = "-heldout"  # suffix of a bundle that is a second recording of the same machine
 ALONE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-LIMIT = 600.0  # s
+LIMIT = 600.0  # s, for one diagnosis
 OURS, BAD, NO_VERDICT = 1, UserError.exit_code, NoAnswer.exit_code
 
 
 class Task(NamedTuple):
-    """A bundle, where its diagnosis goes, and a second recording of the same machine or None."""
+    """Bundle, folder of its diagnosis, and a second recording of the same machine or None."""
 
     name: str
     bundle: Path
@@ -40,17 +39,17 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of one bundle. `code` is the exit code that it would have had by itself."""
+    """Outcome of one bundle. `code` is the exit code of a diagnosis of this bundle alone."""
 
     name: str
     code: int  # 0 a verdict, 1 our fault, 2 a bad bundle, 3 no verdict possible
     seconds: float
     diagnosis: dict[str, Any] | None = None  # as in diagnosis.json
     message: str = ""
-    skipped: bool = False  # it was there already
+    skipped: bool = False  # the diagnosis existed already
 
     def as_json(self) -> dict[str, Any]:
-        """The diagnosis, or what is wrong with the bundle."""
+        """Diagnosis, or the error of the bundle."""
         if self.diagnosis is not None:
             return {**self.diagnosis, "skipped": self.skipped}
         return {"error": self.message, "exit_code": self.code, "seconds": round(self.seconds, 2)}
@@ -60,12 +59,12 @@ Work = Callable[[Task, bool], Outcome]
 
 
 def is_bundle(folder: Path) -> bool:
-    """Whether the folder is a bundle, or what is left of one."""
+    """Whether the folder is a bundle, or a part of a bundle."""
     return any((folder / name).is_file() for name in (CASE, PARQUET, ARROWS))
 
 
 def tasks(folder: Path, out: Path | None = None, other: Path | None = None) -> list[Task]:
-    """A task for each bundle in `folder`, by name; none where it is no folder of bundles.
+    """Tasks, one for each bundle in `folder`, by name; none where `folder` is no folder of bundles.
 
     Results go to `out`/NAME, or into each bundle. A second recording is `other`/NAME, or NAME-heldout beside NAME.
     """
@@ -82,12 +81,12 @@ def tasks(folder: Path, out: Path | None = None, other: Path | None = None) -> l
 
 
 def done(task: Task) -> Outcome | None:
-    """The diagnosis of an earlier time, where it is newer than all that it was made from."""
+    """Outcome of an earlier diagnosis that is newer than its sources; None where there is none."""
     path = task.out / RESULT
     try:
         made = path.stat().st_mtime_ns
         sources = [folder / name for folder in (task.bundle, task.other) if folder for name in (PARQUET, CASE)]
-        sources = [source for source in sources if source.exists()]  # of a long recording the case on top
+        sources = [source for source in sources if source.exists()]  # a long recording has its case on top
         if any(source.stat().st_mtime_ns > made for source in sources):
             return None
         diagnosis = json.loads(path.read_text("utf-8"))
@@ -97,7 +96,7 @@ def done(task: Task) -> Outcome | None:
 
 
 def one(task: Task, report: bool) -> Outcome:
-    """Diagnose one bundle into its folder. Nothing is raised: what went wrong is told in the outcome."""
+    """Outcome of one bundle, diagnosed into its folder. Raises nothing: the outcome reports errors."""
     from rtctl.diagnose.bundles import diagnose_into
 
     began = time.monotonic()
@@ -118,7 +117,7 @@ def _line(error: Exception) -> str:
 def diagnose_all(
     waiting: list[Task], jobs: int = 1, limit: float = LIMIT, report: bool = True, work: Work = one
 ) -> Iterator[Outcome]:
-    """Outcomes as they come, of up to `jobs` processes; one that takes longer than `limit` s is ended."""
+    """Outcomes of up to `jobs` processes in the order of completion; a process is ended after `limit` s."""
     left = deque(waiting)
     crew: list[_Worker] = []
     try:
@@ -142,7 +141,7 @@ def diagnose_all(
 
 
 class _Worker:
-    """One process that diagnoses what it is given."""
+    """Process that diagnoses one task at a time."""
 
     def __init__(self, jobs: int, report: bool, work: Work):
         context = get_context("spawn")
@@ -156,12 +155,12 @@ class _Worker:
         self.alive = True
 
     def give(self, task: Task) -> None:
-        """Begin with a bundle."""
+        """Start a task."""
         self.task, self.began = task, time.monotonic()
         self.pipe.send(task)
 
     def outcome(self, limit: float) -> Outcome | None:
-        """What came of the task; None while it runs."""
+        """Outcome of the task; None while the task runs."""
         assert self.task is not None
         name, seconds = self.task.name, time.monotonic() - self.began
         found: Outcome | None = None
@@ -180,7 +179,7 @@ class _Worker:
         return found
 
     def end(self) -> None:
-        """End the process, whatever it does."""
+        """Kill the process."""
         self.alive = False
         self.process.kill()
         self.process.join()
@@ -188,10 +187,10 @@ class _Worker:
 
 
 def _serve(pipe: Connection, jobs: int, report: bool, work: Work) -> None:
-    """Work through what comes in until the other side is gone. Ctrl-C is the other side's to handle."""
+    """Run the tasks from the pipe until the parent closes the pipe. The parent handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    warnings.simplefilter("ignore", RuntimeWarning)  # a model that runs away overflows; the outcome says so
+    warnings.simplefilter("ignore", RuntimeWarning)  # an unstable model overflows; the outcome reports it
     if jobs > 1:
         from rtctl.diagnose.likelihood.solver import THREADS
 
@@ -205,7 +204,7 @@ def _serve(pipe: Connection, jobs: int, report: bool, work: Work) -> None:
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that gives it work is killed: nobody would have the rest of a diagnosis."""
+    """End this process when its parent is killed: nobody would read the diagnosis."""
     parent = parent_process()
     assert parent is not None
     wait([parent.sentinel])
@@ -214,7 +213,7 @@ def _end_with_parent() -> None:
 
 @contextmanager
 def _alone() -> Iterator[None]:
-    """Processes that are started here use one thread for linear algebra."""
+    """Context in which started processes use one thread for linear algebra."""
     before = {name: os.environ.get(name) for name in ALONE}
     os.environ.update(dict.fromkeys(ALONE, "1"))
     try:

@@ -1,7 +1,7 @@
-"""A sealed file: an answer that can be checked later, and that nobody reads by looking at the file.
+"""Sealed file: an answer that can be checked later and is not legible in the file.
 
 JSON with `sha256`, taken over salt and canonical text of the answer, and `sealed`, the text compressed and in base64.
-The hash may be shown when the file is written; who has seen it knows at the opening that nothing was changed.
+The hash may be shown when the file is written; an equal hash at the opening proves that the answer was not changed.
 """
 
 import base64
@@ -21,12 +21,12 @@ LONGEST = 1_000_000  # bytes of an answer
 
 
 def canonical(answer: dict[str, Any]) -> str:
-    """One text for an answer, whatever the order of its keys."""
+    """Canonical text of an answer, independent of the order of its keys."""
     return json.dumps(answer, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def close_seal(path: Path | str, answer: dict[str, Any]) -> str:
-    """Write the answer to a file that only its owner may read; returns the hash. Raises UserError where it exists."""
+    """Hash of the answer, written to a file that only its owner may read. Raises UserError where the file exists."""
     path = Path(path)
     salt, text = secrets.token_hex(16), canonical(answer)
     digest = hashlib.sha256((salt + text).encode()).hexdigest()
@@ -44,7 +44,7 @@ def close_seal(path: Path | str, answer: dict[str, Any]) -> str:
 
 
 def open_seal(path: Path | str) -> tuple[dict[str, Any], str]:
-    """The answer and its hash, checked. Raises UserError where it is no seal, or not what was sealed."""
+    """Answer and its checked hash. Raises UserError where the file is no seal, or was changed after sealing."""
     path = Path(path)
     try:
         content = json.loads(path.read_text("utf-8"))

@@ -1,4 +1,4 @@
-"""Improvement of a machine's law: from what was found to what is put against it, proved on the emulated machine."""
+"""Improvement of a machine's law: remedies against the effects of a diagnosis, proved on the emulated machine."""
 
 from rtctl.callable_module import called
 

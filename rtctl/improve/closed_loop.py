@@ -1,7 +1,7 @@
-"""Proof on the machine that runs: the law that it had, the improved one, and runs that learn the move.
+"""Proof on the running machine: former law, improved law, and runs of iterative learning.
 
-Runs are recorded as `rtctl run` records them. A machine that runs has no truth: the error is that of its own sensor. A
-run that trips ends the proof with what was found until then.
+Runs are recorded as `rtctl run` records them. A running machine has no truth columns: the error is that of its own
+sensor. A run that trips ends the proof with the runs before it.
 """
 
 from collections.abc import Callable
@@ -33,7 +33,7 @@ class Proof(NamedTuple):
 
     @property
     def before(self) -> Figures:
-        """The law that the machine had."""
+        """Run of the former law."""
         return self.figures[0]
 
     @property
@@ -46,10 +46,10 @@ def prove(
     r: Improved, machine: Any, folder: Path, runs: int = 0, progress: Callable[[str], None] = lambda _: None,
     run: Run | None = None,
 ) -> Proof:  # fmt: skip
-    """Run the machine of `machine` (its link, board and clock) under the law that it had and under the improved one,
-    then `runs` times more, each learning from the one before.
+    """Run the machine of `machine` (its link, board and clock) under its former law and under the improved law,
+    then `runs` times more, each run learning from the run before.
 
-    Raises UserError where it cannot be run, RunFailed where it went wrong.
+    Raises UserError where the machine cannot be run, RunFailed where a run fails.
     """
     from rtctl.diagnose.answer.repair import run as record
 

@@ -1,7 +1,7 @@
-"""Inverse of a drive's static curve: the effects' own lines swept over the commands, and turned round.
+"""Inverse of a drive's static curve: the effects' own lines swept over the commands, and inverted.
 
-A stretch in which the drive does nothing is crossed with a slope of at most `STEEP`, so that noise about zero is not
-thrown from one end of the dead band to the other.
+The inverse crosses a dead band with a slope of at most `STEEP`, so that noise about zero does not jump from one end of
+the dead band to the other.
 """
 
 from typing import Any
@@ -19,8 +19,8 @@ STEEP = 40.0  # largest slope of the inverse
 
 
 def inverse(found: Found) -> list[tuple[float, float]] | None:
-    """Points (wanted, command) over the range of the law's limit, of the effects that are static curves of the drive
-    that the law commands; None where there are none or the curve is not one that can be turned round."""
+    """Points (wanted, command) of the inverse over the range of the law's limit, of all static effects of the drive
+    that the law commands; None where there are no static effects or the curve has no inverse."""
     config = found.config
     entries = [e.entry for e in found.effects if e.term.static and e.term.axis == "command" and _commanded(config, e)]
     if not entries:
@@ -33,7 +33,7 @@ def inverse(found: Found) -> list[tuple[float, float]] | None:
     given -= np.interp(0.0, asked, given) - float(swept(entries, "command", config.kind, np.zeros(1))[0])
     given = np.maximum.accumulate(given + 1e-9 * np.arange(ROWS))
     curvature = np.abs(np.gradient(np.gradient(given, asked), asked))
-    weight = np.cumsum(0.02 * curvature.max() + curvature)  # more points where it bends
+    weight = np.cumsum(0.02 * curvature.max() + curvature)  # more points where the curve bends
     at = np.unique(np.searchsorted(weight, np.linspace(weight[0], weight[-1], POINTS)))
     at = np.unique(np.concatenate([[0, ROWS // 2, ROWS - 1], np.minimum(at, ROWS - 1)]))
     return [(float(f"{given[i]:.6g}"), float(f"{asked[i]:.6g}")) for i in _rising(given, asked, at)]

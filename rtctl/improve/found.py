@@ -1,4 +1,4 @@
-"""What a diagnosis found, as an improvement takes it: machine, law, and every effect with its interval.
+"""Input of an improvement: machine, law, and every effect of a diagnosis with its interval.
 
 A model is a config: `model.yaml` of `rtctl diagnose`, or one of the user's own with effects in `plant.physics`. A
 diagnosis is the folder with diagnosis.json and model.yaml, or the bundle that holds it.
@@ -17,7 +17,7 @@ from rtctl.plants.physics import TERMS
 
 MODEL, RESULT, FOLDER = "model.yaml", "diagnosis.json", "diagnosis"
 NOTHING: Mapping[str, Any] = {}
-UNSURE = 0.1  # share of a size by which it may be off where no interval is known
+UNSURE = 0.1  # half width of the interval of a size, as a share of it, where no interval is known
 
 
 class Effect(NamedTuple):
@@ -36,18 +36,18 @@ class Effect(NamedTuple):
 
 
 class Found(NamedTuple):
-    """A machine as it was found."""
+    """A machine with its effects and their source."""
 
     config: Any  # law, reference and fitted model
     effects: tuple[Effect, ...]
-    unnamed: bool  # the diagnosis says that something is missing that it has no name for
+    unnamed: bool  # the diagnosis reports a missing force without a name
     source: str
 
 
 def load(path: Path, config: str | None, reference: str | None) -> Found:
-    """Read a model, a diagnosis, or a bundle with its diagnosis; `config` gives the law where it is another's.
+    """Read a model, a diagnosis, or a bundle with its diagnosis; `config`, if given, supplies the law.
 
-    Raises UserError for what is not one, and NoAnswer where there is neither an effect nor a law.
+    Raises UserError for a path that is none of these, and NoAnswer where there is neither an effect nor a law.
     """
     file, result = _files(path)
     made = _config(file, config)
@@ -62,7 +62,7 @@ def load(path: Path, config: str | None, reference: str | None) -> Found:
 
 
 def of_config(config: Any, source: str, told: Mapping[str, Any] = NOTHING) -> Found:
-    """What a config holds in `plant.physics`, with the intervals of a diagnosis `told` as in diagnosis.json."""
+    """Effects in `plant.physics` of a config, with the intervals `told` of a diagnosis, as in diagnosis.json."""
     sizes = {(e["name"], e["node"]): e["parameters"] for e in told.get("effects", ())}
     effects = tuple(_effect(i, entry, sizes) for i, entry in enumerate(config.plant.physics))
     return Found(config, effects, told.get("verdict") == "unnamed", source)

@@ -1,4 +1,4 @@
-"""What remedies are proposed from: the machine as it was found, and the loop that it has."""
+"""Basis of the proposed remedies: the machine with its effects, and its present loop."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from rtctl.improve.played import Judge
 
 
 class Ground(NamedTuple):
-    """What proposals are made from."""
+    """Machine, loop and reference that proposals are made from."""
 
     found: Found
     judge: Judge

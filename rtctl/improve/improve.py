@@ -1,8 +1,8 @@
-"""Improvement: every remedy is tried alone on the emulated fitted model, and kept where it proves itself.
+"""Improvement: every remedy is tried alone on the emulated fitted model, and kept where it reduces the error.
 
-A remedy is kept where the rms of the tracking error falls, where it does not rise at either end of the interval of the
-effect's size, and where the loop keeps its margins: 6 dB and 45 degrees, or what it had before. All that were kept are
-checked together once more. A wrong name therefore either does no harm or is left out.
+A remedy is kept where the rms of the tracking error falls, where this error does not rise at either end of the interval
+of the effect's size, and where the loop keeps its margins: 6 dB and 45 degrees, or the former margins. All kept
+remedies are checked together at the end. A remedy against a misnamed effect is therefore harmless or left out.
 """
 
 from collections.abc import Callable, Mapping
@@ -33,8 +33,8 @@ class Improved(NamedTuple):
 
     found: Found
     config: Any  # fused, with the reference that was played
-    trial: Any  # the same law with every block that was tried, those that were left out doing nothing
-    without: Any  # the law as it was, with the same blocks doing nothing
+    trial: Any  # the improved law with every tried block; blocks that were left out do nothing
+    without: Any  # the former law with every tried block; all blocks do nothing
     mode: str  # loop.mode that the config had
     judge: Judge
     tried: tuple[Tried, ...]
@@ -54,7 +54,7 @@ def improve(
 ) -> Improved:
     """Propose, try and keep remedies; with `written_too` the config as it is written is played as well.
 
-    Raises NoAnswer where the machine does not run with the law that it has.
+    Raises NoAnswer where the machine does not run with its present law.
     """
     mode = found.config.loop.mode
     found = found._replace(config=played.with_reference(found.config))
@@ -104,7 +104,7 @@ def mechanics_of(config: Any) -> Any:
 
 
 class Trial:
-    """Trials of remedies, one after the other, on top of those that were kept."""
+    """Trials of remedies, one after the other, in addition to the kept remedies."""
 
     def __init__(self, ground: Ground, plan: list[Remedy]):
         found, self.judge, self.plan = ground.found, ground.judge, plan
@@ -165,7 +165,7 @@ class Trial:
         return Tried(remedy, way, before, after, "", figures, margins.of_config(self.config({})))
 
     def of_margins(self, remedy: Remedy) -> Tried:
-        """Keep the first way, that of the highest gain, that gives the margins for a little of the error."""
+        """Keep the first way, by falling gain, that gives the margins and raises the error by GIVEN at most."""
         before = self.rms
         reason = (
             f"no notch and no lower gain gives {LEAST[0]:g} dB and {LEAST[1]:g} degrees for {GIVEN:.0%} of the error"
@@ -184,30 +184,30 @@ class Trial:
         return Tried(remedy, {}, before, np.inf, reason, None, None)
 
     def config(self, way: Mapping[str, Any]) -> Any:
-        """The trial config with what was kept and this way. Raises UserError where it does not fit."""
+        """Trial config with the kept remedies and this way. Raises UserError where it is inconsistent."""
         return set_paths(self.base, {self._path(path): value for path, value in {**self.values, **way}.items()})
 
     def _path(self, path: str) -> str:
-        """Effects of the trial are counted among those that are fed forward."""
+        """Path in the trial config, where effects are numbered among the effects that are fed forward."""
         parts = path.split(".")
         if "effects" in parts:
             parts[4] = str(self.order[parts[4]])
         return ".".join(parts)
 
     def holds(self, config: Any) -> bool:
-        """Whether the loop has its margins, or those that it had before."""
+        """Whether the loop is stable with the least margins."""
         now, least = margins.of_config(config), self.least
         return now is None or bool(now.stable and now.GM >= least[0] and now.PM >= least[1])
 
     @property
     def least(self) -> tuple[float, float]:
-        """Margins that must be kept, dB and degrees."""
+        """Least margins, dB and degrees: LEAST, or the former margins where these are smaller."""
         if self.at_first is None:
             return LEAST
         return min(LEAST[0], self.at_first.GM - 1e-6), min(LEAST[1], self.at_first.PM - 1e-6)
 
     def margins_words(self, config: Any) -> str:
-        """Why the margins are not enough."""
+        """Sentence on margins that are too small."""
         now, least = margins.of_config(config), self.least
         if now is None or not now.stable:
             return "the loop would be unstable"
@@ -216,7 +216,7 @@ class Trial:
         )
 
     def worse_at_ends(self, remedy: Remedy, way: Mapping[str, Any]) -> str:
-        """Why a remedy is left out at an end of the interval of the effect that it is against; "" where it is not."""
+        """Reason to leave out a remedy by the error at the ends of its effect's interval; "" where there is none."""
         effect = self.effects.get(remedy.against)
         if effect is None:
             return ""
@@ -228,7 +228,7 @@ class Trial:
                     for values in ({}, way)
                 )
             except (UserError, ValueError):
-                continue  # a machine like that cannot be built
+                continue  # no machine can be built with this size
             if with_it.rms > (1.0 + WORSE) * without.rms:
                 name, value = next(iter(end.items()))
                 return f"at {name} = {value:.4g}, an end of its interval, the error would rise"

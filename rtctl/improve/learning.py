@@ -1,10 +1,10 @@
-"""Iterative learning between two runs of one move: the command that the feedback had to give is given ahead next time.
+"""Iterative learning between two runs of one move: the feedback's command becomes a feedforward of the next run.
 
     u_j+1 = Q (u_j + gain e_j + D e_j')               e_j: error of run j, taken `lead` s later
 
-The learning filter is that of the feedback itself, so that a run takes away what the loop follows; Q is a low-pass
-without phase below the crossover, near which the loop amplifies and learning would grow. A run that is worse than
-the one before is not learned from: the values go back half of the way.
+The learning filter is that of the feedback itself, so that a run removes the error within the loop's bandwidth. Q is a
+zero-phase low-pass below the crossover, near which the loop amplifies and learning would diverge. A run that is worse
+than the run before is not learned from: the last change of the values is halved.
 
 Source: Bristow, Tharayil & Alleyne, A survey of iterative learning control, IEEE Control Systems Magazine 26 (2006).
 """
@@ -19,7 +19,7 @@ UP_TO = 0.6  # crossovers up to which is learned
 
 
 class Learner(NamedTuple):
-    """What one machine learns with."""
+    """Settings of iterative learning for one machine."""
 
     gain: float  # V per unit of error
     D: float  # V s per unit of error

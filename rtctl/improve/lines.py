@@ -1,4 +1,4 @@
-"""Lines of effects run alone, interpreted, on a record of a machine: what they make of a command or of a reading."""
+"""Response of effects alone to a command or a reading: their lines, interpreted, on a record of a machine."""
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -12,7 +12,7 @@ from rtctl.plants.physics import TERMS, ordered
 
 
 def runner(entries: Sequence[Any], site: str, kind: str, h: float) -> Callable[[float], float] | None:
-    """One step of `h` s of these effects at the site `command` or `reading`: the signal before them to that after.
+    """Step of `h` s of these effects at the site `command` or `reading`: function from the signal before to after them.
 
     None where none of them acts there.
     """

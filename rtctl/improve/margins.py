@@ -1,9 +1,9 @@
-"""Margins of an improved loop on the fitted model, with what its effects do to small signals.
+"""Margins of an improved loop on the fitted model, with the small-signal responses of its effects.
 
     L = P H K        P: linear model, times the responses of delays and lags, with the dynamic stiffness of effects
 
-An effect's response is that of its own line to a small pulse, so that no effect has equations here. A static effect of
-speed or place (friction, cogging) has no linear model and is left out, as dry friction is.
+An effect's response is that of its own line to a small pulse, so that no effect needs a separate small-signal model. A
+static effect of speed or position (friction, cogging) has no linear model and is left out, like dry friction.
 
 Source: Pintelon & Schoukens, System Identification (2012), 2.2 (response by an impulse).
 """
@@ -21,7 +21,7 @@ from rtctl.improve.lines import runner
 from rtctl.plants.physics import TERMS, ordered
 
 PULSE = 1e-6  # of the signal's unit; small against every limit
-QUIET = 40  # substeps without a response, after which none is left
+QUIET = 40  # substeps without a response, after which the response has ended
 LENGTH = 4000  # substeps that a response may last
 
 
@@ -58,7 +58,7 @@ class Chain:
         ]
 
     def behind(self, L: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
-        """A loop with these responses in it."""
+        """Loop gain `L` times these responses."""
         return lambda f: self(f) * L(f)
 
     def __call__(self, f: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
-"""Runs of a law on an emulated machine: the law of one config with the plant of another, and what came of it.
+"""Runs of a law on an emulated machine: the law of one config with the plant of another, and figures of the run.
 
-The error is that of the body that shall follow, against the reference of the run before: a remedy that slows the
-reference down is judged by the reference that was asked for.
+The error is that of the judged body against the reference before the remedies: a remedy that slows the reference down
+is judged by the original reference.
 """
 
 from typing import Any, NamedTuple
@@ -22,7 +22,7 @@ REST = 1.0  # s played after the last change of the reference
 
 
 class Judge(NamedTuple):
-    """Column of the truth that shall follow the reference."""
+    """Column of the truth that is compared with the reference."""
 
     column: str
     ratio: float  # units of the column for one unit of the reference
@@ -52,9 +52,9 @@ class Played(NamedTuple):
 
 
 def judge_of(config: Any, body: str | None = None) -> Judge:
-    """Body that shall follow: the one that is named, else of a described machine the last body that no drive acts on.
+    """Judged body: the named one, else of a described machine the last body that no drive acts on.
 
-    Raises UserError for a body that there is not.
+    Raises UserError for a body that the machine does not have.
     """
     machine = machines.build(config)
     truth = machine.signals.truth
@@ -70,7 +70,7 @@ def judge_of(config: Any, body: str | None = None) -> Judge:
         raise UserError(f"--body {body}: the machine has {', '.join(moving)}")
     try:
         made = mechanics(config, machine.dt)
-    except ValueError:  # a speed, or mechanics of a file: the feedback's own
+    except ValueError:  # a speed, or mechanics of a file: the column of the feedback
         return Judge(truth, 1.0, truth.removeprefix("truth_"))
     driven = {drive.body for drive in described.drives.values()}
     name = body or next((name for name in reversed(moving) if name not in driven), moving[0])
@@ -101,7 +101,7 @@ def seconds_of(config: Any) -> float:
 
 
 def move_of(config: Any) -> float:
-    """Length of the move, s, after which it may come back."""
+    """Length of the move in s: one period of a repeated reference, else the whole playback."""
     table = machines.build(config).reference
     return table.period * table.dt if table.period else seconds_of(config)
 
@@ -109,7 +109,7 @@ def move_of(config: Any) -> float:
 def play(law: Any, plant: Any, seconds: float, judge: Judge, asked: np.ndarray | None = None) -> Played:
     """Play the law of one config on the emulated machine of another for `seconds` of its reference.
 
-    `asked` (n,) is the reference by which the error is judged; its own if absent.
+    `asked` (n,) is the reference by which the error is judged; the reference of the law's config if absent.
     """
     machine = machines.build(law)
     other = machines.build(plant)

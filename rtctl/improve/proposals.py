@@ -1,4 +1,4 @@
-"""Remedies proposed for a machine: of its description, of each effect as its term declares, of the rest."""
+"""Remedies proposed for a machine: by its description, by the declaration of each effect's term, and without a name."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,12 +17,12 @@ from rtctl.improve.unnamed import unnamed
 from rtctl.laws import predictor
 from rtctl.machines.profiles import profile_of
 
-BELOW = 0.9  # share of dry friction that is compensated: above it the machine creeps on by itself
+BELOW = 0.9  # share of dry friction that is compensated: above it the machine may creep without a command
 SHARES = (0.9, 1.0, 0.75, 0.5)  # of any other effect
 SLOWER = (0.8, 0.6)  # bandwidth of the reference
 FILTERED = 3.0  # crossovers at which the speed of a predictor is filtered
-LESS = (1.0, 0.8, 0.6, 0.45, 0.3)  # of the gains, where the margins ask for it
-GAINS = ("gain", "velocity_gain")  # of a position law, in proportion to which the loop gain is
+LESS = (1.0, 0.8, 0.6, 0.45, 0.3)  # factors of the gains, tried where the margins are too small
+GAINS = ("gain", "velocity_gain")  # of a position law: the loop gain is in proportion to them
 LEAST = (6.0, 45.0)  # dB and degrees
 WHOLE = ("curve", "table", "joint")  # remedies that hold all effects of their kind at once
 FEED = f"{BASE}.feedforward"
@@ -43,7 +43,7 @@ def proposals(g: Ground) -> list[Remedy]:
 
 
 def margins_first(g: Ground) -> list[Remedy]:
-    """Notch where the gain margin is least, or less gain, where the loop has not the margins that are asked for."""
+    """Notch at the frequency of the gain margin, or lower gains, for a loop with less than the least margins."""
     found, law = g.margins, g.found.config.law.position
     if found is None or (found.GM >= LEAST[0] and found.PM >= LEAST[1]):
         return []
@@ -67,14 +67,14 @@ def margins_first(g: Ground) -> list[Remedy]:
 
 
 def notch_at(hertz: float, depth: float, width: float) -> dict[str, Any]:
-    """Settings of a notch at `hertz` that takes the gain to `depth` there."""
+    """Settings of a notch at `hertz` with the gain `depth` at its frequency."""
     return {
         "kind": "notch", "frequency": float(f"{hertz:.4g}"), "zeta_z": float(f"{depth * width:.4g}"), "zeta_p": width,
     }  # fmt: skip
 
 
 def description(g: Ground) -> list[Remedy]:
-    """Feedforward of what the description has: inertia, friction, weight, and what the velocity feedback takes."""
+    """Feedforward by the description: inertia, friction, weight, and the command of the velocity feedback."""
     config = g.found.config
     machine = machines.build(config)
     lead = machine.dt * (0.5 + (config.loop.write == "next_tick"))
@@ -82,7 +82,7 @@ def description(g: Ground) -> list[Remedy]:
     inertia = {f"{FEED}.inertia": 1.0} if config.law.shaper.bandwidth is not None else {}
     own = profile_of(config.kind).feedforward
     ways = [{**values, **inertia, **dict.fromkeys(own, 0.0)}]
-    if own:  # beside the machine's own feedforward, or in the place of its friction compensation
+    if own:  # in addition to the machine's own feedforward, or instead of its friction compensation
         rest = {f"{FEED}.inertia": 1.0 - INERTIA} if inertia else {}
         friction = dict.fromkeys((key for key in own if not key.startswith("law.inertia")), 0.0)
         ways += [{**values, **rest, f"{FEED}.friction": 0.0}, {**values, **rest, **friction}]
@@ -131,7 +131,7 @@ def ahead(g: Ground, effect: Effect) -> Remedy | None:
 
 
 def behind(g: Ground, effect: Effect) -> Remedy | None:
-    """Reference of the time that the sensor shows."""
+    """Reference delayed by the lag of the sensor."""
     late = delay(effect.entry, "reading", g.found.config)
     if not g.gain or late <= 0.0:
         return None

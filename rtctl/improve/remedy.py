@@ -1,4 +1,4 @@
-"""One remedy: what it is against, the settings that make it, and what became of it."""
+"""Remedy: its effect, its settings, and the result of its trial."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -12,22 +12,22 @@ BASE = "law.compensation"
 class Remedy(NamedTuple):
     """A proposal. Each of its `ways` is tried, and the best is kept."""
 
-    kind: str  # as in plants/physics/term.py, or one of the law's own
+    kind: str  # of plants/physics/term.py, or a kind that belongs to the law
     title: str
-    against: str  # effect, or what of the machine
-    size: str  # with interval, or how it was sized
+    against: str  # effect, or part of the machine
+    size: str  # with interval, or the rule by which it was sized
     ways: tuple[Mapping[str, Any], ...]  # path of the config -> value
-    note: str = ""  # what has to hold on the machine
+    note: str = ""  # condition on the machine
 
 
 class Tried(NamedTuple):
     """A remedy and the result of its check on the emulated fitted model."""
 
     remedy: Remedy
-    values: Mapping[str, Any]  # of the way that was kept; none where it is left out
+    values: Mapping[str, Any]  # of the way that was kept; empty where the remedy is left out
     before: float  # rms of the tracking error without it
     after: float  # with it
-    reason: str  # why it is left out, "" where it is kept
+    reason: str  # for leaving it out, "" where it is kept
     figures: Figures | None
     margins: Margins | None
 
@@ -38,7 +38,7 @@ class Tried(NamedTuple):
 
 
 def neutral(effects: tuple[Any, ...], feedforward: bool, inverse: bool, table: bool) -> dict[str, Any]:
-    """Compensation of every kind that does nothing: trials then differ in numbers alone and compile once."""
+    """Neutral compensation of every kind, so that trials differ in numbers alone and compile once."""
     made: dict[str, Any] = {
         "integral": {"gain": 0.0},
         "observer": {"bandwidth": 1.0, "acceleration": 1.0, "share": 0.0},
@@ -57,7 +57,7 @@ def neutral(effects: tuple[Any, ...], feedforward: bool, inverse: bool, table: b
 
 
 def written(values: Mapping[str, Any], effects: list[dict[str, Any]]) -> dict[str, Any]:
-    """Settings of the improved config: compensation that does something, and the other keys that were changed."""
+    """Settings of the improved config: compensation with an effect, and the other changed keys."""
     made: dict[str, Any] = {}
     others: dict[str, Any] = {}
     for path, value in values.items():

@@ -1,4 +1,4 @@
-"""Report of an improvement: an HTML file that needs nothing else, and a table for the terminal."""
+"""Report of an improvement: a self-contained HTML file, and a table for the terminal."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ from rtctl.improve.improve import Improved
 
 
 def html(r: Improved, running: list[words.Row] | None = None) -> str:
-    """The report as one text; `running` are figures of the machine that runs."""
+    """The report as one text; `running` are figures of the running machine."""
     loader = ChoiceLoader([PackageLoader("rtctl.improve", "."), PackageLoader("rtctl.diagnose.answer", ".")])
     env = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     caption = (
@@ -57,7 +57,7 @@ def motion(r: Improved) -> Any:
 
 
 def terminal(r: Improved, running: list[words.Row] | None = None) -> RenderableType:
-    """Headline, figures, remedies and what was left out, for the console."""
+    """Headline, figures, kept remedies and left-out remedies, for the console."""
     parts: list[RenderableType] = [Text(words.headline(r)), Text()]
     margins = (r.margins_before, r.margins_after)
     parts.append(

@@ -1,4 +1,4 @@
-"""Table of a sensor's error over its travel, by the effects' own lines: what is to be added to what it shows."""
+"""Table of a sensor's correction over its travel, by the effects' own lines, to be added to the reading."""
 
 from typing import Any
 

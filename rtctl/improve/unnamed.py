@@ -1,4 +1,4 @@
-"""Remedies that need no name: disturbance observer, repetitive control over a turn, integral with a dead zone."""
+"""Remedies without a named effect: disturbance observer, repetitive control over a turn, integral with a dead zone."""
 
 from typing import Any
 
@@ -13,12 +13,12 @@ BANDS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15)  # bandwidth of the observer in crosso
 INTEGRALS = (0.5, 0.25, 0.1)  # crossovers at which the integral meets the gain
 GRAINS = 2.0  # steps of the sensor within which the integral rests
 REPEATS = (1.0, 0.3)  # crossovers at which the integral of a part of the turn meets the gain
-TURNS = 1.5  # turns that the reference must make for what comes back with them
+TURNS = 1.5  # turns of the reference that repetitive control needs, at least
 SLOW = 0.02  # of the travel, per second, below which nothing is learned
 
 
 def unnamed(g: Ground) -> list[Remedy]:
-    """Remedies against what is left, in the order in which they are tried."""
+    """Remedies against the residual error, in the order in which they are tried."""
     return [made for make in (observer, repetitive, integral) if (made := make(g)) is not None]
 
 
@@ -39,7 +39,7 @@ def observer(g: Ground) -> Remedy | None:
 
 
 def repetitive(g: Ground) -> Remedy | None:
-    """Repetitive control, where what is left may come back with the turn and the reference makes enough of them."""
+    """Repetitive control, where the residual error may be periodic in the turn and the reference makes enough turns."""
     config = g.found.config
     turn, way = turn_of(config), g.travel[1] - g.travel[0]
     comes_back = g.found.unnamed or any(effect.term.axis == "angle" for effect in g.found.effects)
@@ -56,7 +56,7 @@ def repetitive(g: Ground) -> Remedy | None:
 
 
 def integral(g: Ground) -> Remedy | None:
-    """Integral beside a law that has none."""
+    """Integral action for a law without one."""
     config = g.found.config
     if _gain(g) <= 0.0 or getattr(config.law.position, "tau_i", None) is not None:
         return None
@@ -85,7 +85,7 @@ def _against(g: Ground) -> str:
 
 
 def turn_of(config: Any) -> float | None:
-    """Travel of the reference for a turn of what it is measured at; None where nothing turns, or on a speed."""
+    """Travel of the reference for a turn of the measured body; None where no body turns, or for a speed."""
     machine = machines.build(config)
     if machine.unit == "rad":
         return float(2.0 * np.pi)
@@ -93,7 +93,7 @@ def turn_of(config: Any) -> float | None:
 
 
 def step_of(config: Any) -> float:
-    """One step of the feedback's sensor in the unit of the reference; 0 where nobody knows it."""
+    """One step of the feedback's sensor in the unit of the reference; 0 where it is unknown."""
     profile = profile_of(config.kind)
     if profile.counts is not None:
         return 1.0 / profile.counts(config)

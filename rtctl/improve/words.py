@@ -14,7 +14,7 @@ from rtctl.improve.remedy import Tried
 from rtctl.machines.base import DESCRIBED
 
 Row = tuple[str, str, str, str]
-SMALL = 0.02  # share by which a figure may change without a word
+SMALL = 0.02  # relative change of a figure, up to which it is not mentioned
 
 
 def headline(r: Improved) -> str:
@@ -32,7 +32,7 @@ def headline(r: Improved) -> str:
 
 
 def proof(r: Improved) -> str:
-    """How it was proved."""
+    """Sentence on the method of the proof."""
     return (
         f"Proved on the emulated fitted model, same reference, {r.after.t[-1]:.3g} s; each remedy was tried alone, at "
         "the size that was found and at both ends of its interval, with the margins of the loop."
@@ -54,7 +54,7 @@ def command_of(config: Any) -> str:
 
 
 def rows(config: Any, before: Figures, after: Figures, margins: Sequence[Margins | None] = ()) -> list[Row]:
-    """Figures before and after, with what changed."""
+    """Figures before and after, with their changes."""
     unit, command = unit_of(config), command_of(config)
     out = [
         _row("tracking error, rms", before.rms, after.rms, unit),
@@ -105,12 +105,12 @@ def left_rows(r: Improved) -> list[tuple[str, str, str]]:
 
 
 def hopeless(effect: Any) -> bool:
-    """Whether no law puts right what an effect does."""
+    """Whether no law can compensate an effect."""
     return tuple(effect.term.remedies) == ("sensor",)
 
 
 def notes(r: Improved) -> list[str]:
-    """What has to hold on the machine for the remedies that were put in."""
+    """Conditions on the machine for the kept remedies."""
     return list(
         dict.fromkeys(f"{one.remedy.title}: {one.remedy.note}." for one in r.tried if one.kept and one.remedy.note)
     )

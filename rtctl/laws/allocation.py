@@ -1,16 +1,16 @@
-"""Who pulls: shares the capstan command between the two motors.
+"""Control allocation: the capstan command shared between the two motors.
 
-`u_c` is the wanted capstan command in V, positive towards reel 1. T1 and T2 are the tension voltages.
+`u_c` is the commanded capstan voltage in V, positive towards reel 1. T1 and T2 are the tension voltages.
 
     pull          u1 = T1 + max(u_c, 0)    u2 = T2 + max(-u_c, 0)    the winding motor positions, the other holds
     differential  u1 = T1 + u_c / 2        u2 = T2 - u_c / 2         both position
     motor1        u1 = T1 + u_c            u2 = T2
     motor2        u1 = T1                  u2 = T2 - u_c
 
-A motor cannot push tape: where its voltage falls, the paper folds. `pull` never lets it fall. For the others there is
-a floor, a share of the tension voltage: where a motor would fall below it, the tension of the whole tape is raised
-until it does not, so the other motor takes over the part that this one cannot do. Raising the tension adds the same
-multiple of T1 and T2, which moves nothing.
+A motor cannot push tape: where its voltage falls below the tension voltage, the paper may fold. `pull` never lowers a
+motor below its tension voltage. The other modes have a floor, a share of the tension voltage: where a motor would fall
+below the floor, the tension of the whole tape is raised until the motor is at the floor. The other motor then supplies
+the missing command. Raising the tension adds the same multiple of T1 and T2, which moves nothing.
 
 Source: thesis 5.2 (a change of direction is taken over by the other motor) and 8.3.
 """

@@ -2,8 +2,8 @@
 
     y[k] = b0 x[k] + b1 x[k-1] + b2 x[k-2] - a1 y[k-1] - a2 y[k-2]
 
-Direct form I, evaluated from left to right. The order of operations is part of the exchange format: whoever
-recomputes a recording from `controller.sections` gets the same bits.
+Direct form I, evaluated from left to right. The order of operations is part of the exchange format: a recording
+recomputed from `controller.sections` is bit-identical.
 
 Source: Oppenheim & Schafer, Discrete-Time Signal Processing, section 6.3.
 """

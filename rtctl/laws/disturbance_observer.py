@@ -1,4 +1,4 @@
-"""Disturbance observer: estimates what pushes beside the command, and takes it off the command.
+"""Disturbance observer: estimate of the external force in units of the command, subtracted from the command.
 
     r  = y - x^                                        innovation
     x^ += (1 - z^3) r,   v^ += 3/2 (1 - z)^2 (1 + z) r / dt,   d^ += (1 - z)^3 r / dt^2          z = exp(-w dt)
@@ -6,8 +6,8 @@
     u  -= share d^ / K
 
 y is the measured position, K the acceleration for one unit of command, B the viscous friction over the inertia. The
-command that has acted since the last sample is the one written `delay` ticks before. What a feedforward puts against a
-known force is taken off first (`u_known`), so that no force is compensated twice.
+command that has acted since the last sample is the one written `delay` ticks before. The part of the command with
+which a feedforward compensates known forces (`u_known`) is subtracted first, so that no force is compensated twice.
 
 Source: Ohnishi, Shibata & Murakami, Motion control for advanced mechatronics, IEEE/ASME Trans. Mechatronics 1 (1996);
 gains of a critically damped filter by Brookner, Tracking and Kalman Filtering Made Easy (1998), 1.3 and 2.4.
@@ -81,7 +81,7 @@ def step(p, s, y):
 
 @tick
 def track(p, s, u_written, u_known):
-    """Predict the next sample from the command written, V, less what of it is against known forces."""
+    """Predict the next sample from the command written, V, less its part against known forces."""
     for i in range(p.delay, 0, -1):
         s.u[i] = s.u[i - 1]
     s.u[0] = u_written - u_known
@@ -93,7 +93,7 @@ def track(p, s, u_written, u_known):
 
 @tick
 def reset(p, s):
-    """Forget what was estimated."""
+    """Set the estimates to zero."""
     s.v = 0.0
     s.d = 0.0
     s.primed = 0

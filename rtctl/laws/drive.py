@@ -1,4 +1,4 @@
-"""What the laws know of a current-driven motor: volts to torque.
+"""Torque constant of a current-driven motor in the laws: volts to torque.
 
     tau = K_m amp_per_volt u
 

@@ -1,10 +1,10 @@
-"""Error table: a position estimate is put right by what was found out about it, from one turn to the next.
+"""Error table: position estimate corrected by a table of its periodic error.
 
     x_hat = R_c theta_m + e_hat(R_c theta_m)            e_hat periodic, a straight line between its values
 
-The table covers one period of the estimate, as a rule a turn of the capstan, 2 pi R_c. Its phase is that of the angle
-at which the counter is 0: it holds for as long as the counter is not lost, or for good with an absolute encoder. A
-table of a wrong phase makes the error larger, so it is to be made anew at every start.
+The table covers one period of the estimate, as a rule a turn of the capstan, 2 pi R_c. Its phase refers to the angle
+at which the counter is 0. The table is valid as long as the counter keeps its count, or permanently with an absolute
+encoder. A table of a wrong phase makes the error larger, so the table must be made anew at every start.
 
 Source: thesis 11.3, (11.11), (11.12). `design/error_table` makes the table from a scale or from a printed image.
 """

@@ -2,8 +2,9 @@
 
     u1 += share J R_c a / (R1 K_m amp_per_volt)        u2 -= share J R_c a / (R2 K_m amp_per_volt)
 
-`a` is the acceleration of the capstan's reference. Without it the winding motor drags the other reel along by the
-tape, whose tension swings by the force that this takes; with it the tension stays where the tension law puts it.
+`a` is the acceleration of the capstan's reference. Without this feedforward the winding motor accelerates the other
+reel through the tape, whose tension swings by the inertia force; with it the tension stays at the value of the
+tension law.
 
 Source: the computed torque of thesis 12.7 (figure 12.10), from (4.9)-(4.13) with tape and shafts taken as rigid.
 """

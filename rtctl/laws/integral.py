@@ -3,8 +3,8 @@
     i += k_i dt dead(e)            dead(e) = e beyond +-zone, less zone; 0 within
     i += dt / tau_t (u_written - u_wanted)             back-calculation, once a tick after the limit
 
-Dry friction and an integral hunt: the machine sticks, the integral fills up, breaks it loose and overshoots. Within the
-dead zone the integral rests, so that a machine that has arrived stays there.
+Dry friction and an integral cause hunting: the machine sticks, the integral grows, breaks it loose and overshoots.
+Within the dead zone the integral stays constant, so that the machine stays at rest at its target.
 
 Source: Astrom & Hagglund, PID Controllers (1995), section 3.5; Armstrong-Helouvry, Dupont & Canudas de Wit, Automatica
 30 (1994), 4.2 (hunting, dead zone at the integrator's input).
@@ -50,7 +50,7 @@ def step(p, s, e):
 
 @tick
 def track(p, s, u_wanted, u_written):
-    """Back-calculate the integral from what was wanted of the limiter and what it let through, both V."""
+    """Back-calculate the integral from input and output of the limiter, both V."""
     s.i += p.tracking * (u_written - u_wanted)
 
 

@@ -1,4 +1,4 @@
-"""Inverse of the drive's static curve: the command that makes the drive give what the law wants.
+"""Inverse of the drive's static curve: the command at which the drive gives the voltage of the law.
 
     u = straight lines through (wanted, command)       beyond the table on its last line
 
@@ -42,7 +42,7 @@ def build(settings: InverseCurveSettings, dt: float) -> InverseCurveParams:
 
 @tick
 def step(p, u):
-    """Command in V for the `u` V that are wanted."""
+    """Command in V at which the drive gives `u` V."""
     i = 0
     while i < p.n - 2 and p.wanted[i + 1] <= u:
         i += 1

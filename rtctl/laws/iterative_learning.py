@@ -4,7 +4,7 @@
     u_j+1 = Q (u_j + L e_j)                                                            between two runs
 
 The values are learned offline (rtctl/improve/learning.py), run by run: nothing changes while the machine moves. They
-belong to one reference, which has to begin at the same place. Before and after the move they are 0.
+belong to one reference, which has to begin at one fixed position. Before and after the move they are 0.
 
 Source: Bristow, Tharayil & Alleyne, A survey of iterative learning control, IEEE Control Systems Magazine 26 (2006).
 """

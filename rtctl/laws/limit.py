@@ -1,4 +1,4 @@
-"""Output limit with an optional slew rate: what the actuator is allowed to get.
+"""Output limit with an optional slew rate, in V.
 
     low <= u <= high        |u - u_prev| <= slew dt
 

@@ -2,8 +2,8 @@
 
     u = straight line between the values at ref + lead v               periodic, or held beyond its ends
 
-For cogging, torque ripple, imbalance, a spring or a bump that was measured rather than named: `torque_over_turn.csv` of
-a diagnosis holds such a map. It counts from where the counter is 0.
+For cogging, torque ripple, imbalance, a spring or a bump that was measured rather than named. `torque_over_turn.csv` of
+a diagnosis holds a map of this kind. The map counts from where the counter is 0.
 
 Source: Holtz & Springob, Identification and compensation of torque ripple in high-precision permanent magnet motor
 drives, IEEE Trans. Industrial Electronics 43 (1996).

@@ -1,13 +1,13 @@
-"""Model feedforward: the command that the model needs to move along the reference, with every effect that was found.
+"""Model feedforward: inverse dynamics along the reference, with every effect that was found.
 
     q = phi r,  v = phi r',  a = phi r''               reference motion of every coordinate, rigid
     F = f(q, v) - dry(q, v) sign(r') - D v - K q - M a         effects by their own laws, and the description
     u = -phi' F / g + k_v r'                           g: force along the motion for one unit of command
-    shift = c C F                                      how far the feedback runs ahead of the body behind springs
+    shift = c C F                                      deflection between the feedback and the body behind springs
 
 The reference is taken `lead` s ahead, the time until a command acts. Dry friction keeps the sign of the last motion at
-rest and is compensated by a share below breakaway. k_v r' is what a velocity feedback takes from the command.
-`behind` s is how much later the sensor shows the position: the feedback is asked for the reference of then.
+rest and is compensated by a share below breakaway. k_v r' is the part of the command that a velocity feedback
+subtracts. `behind` s is the delay of the sensor: the feedback gets the reference of `behind` s before.
 
 Effects run their own compiled laws on a record of the machine (plants/linear.py) that moves along the reference: see
 rtctl/machines/compensation.py for the lines.
@@ -107,7 +107,7 @@ def keep(s):
 def blend(s, share):
     """Take a share of what an effect has added since `keep`."""
     for i in range(s.m.nq):
-        if share == 0.0:  # whatever it has added
+        if share == 0.0:  # exact, whatever forces the effect has added
             s.m.f[i], s.m.dry[i] = s.f[i], s.dry[i]
         else:
             s.m.f[i] = s.f[i] + share * (s.m.f[i] - s.f[i])

@@ -2,8 +2,8 @@
 
     H_n = (s^2 + 2 zeta_z w_n s + w_n^2) / (s^2 + 2 zeta_p w_n s + w_n^2)
 
-The gain is 1 far from w_n and zeta_z / zeta_p at w_n; zeta_p sets the width. Prewarped at w_n, so the notch sits
-where it was asked for at any sample rate.
+The gain is 1 far from w_n and zeta_z / zeta_p at w_n; zeta_p sets the width. Prewarped at w_n, so the notch is exactly
+at w_n at any sample rate.
 
 Source: thesis 12.5.
 Erratum: the text gives the gain at the notch as (1 + zeta_z) / (1 + zeta_p).

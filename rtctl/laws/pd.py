@@ -22,7 +22,7 @@ class PdSettings(Settings):
 
 
 class PdMetreSettings(PdSettings):
-    """The same law where the error is in metres."""
+    """PD law for an error in metres."""
 
     gain: float = quantity(unit="V/m", ge=0, help="proportional gain G (P), V per unit of error")
 

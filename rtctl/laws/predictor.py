@@ -1,10 +1,10 @@
-"""Predictor: the position that the machine will have when the command of now acts, for a loop with a delay.
+"""Predictor: position of the machine at the time at which the present command acts, for a loop with a delay.
 
     v+ = v + dt K u_n                                  u_n: command that acts now, written n ticks before
     y_n = y + n dt v + sum over the n commands on their way of K dt^2 (n - i + 1/2) u_i
 
-The law closes on y_n instead of y: the delay is out of the loop as far as K is right. The reference is to be that of
-n ticks ahead, which a feedforward with `lead` gives, else the machine follows n ticks late.
+The law closes on y_n instead of y, which removes the delay from the loop as far as K is right. The reference must be
+taken n ticks ahead, as a feedforward with `lead` does; otherwise the machine follows n ticks late.
 
 Source: Artstein, Linear systems with delayed controls: a reduction, IEEE TAC 27 (1982); Smith, Chemical Engineering
 Progress 53 (1957), for the idea.

@@ -68,7 +68,7 @@ def build(settings: ProcessGainSettings, dt: float) -> ProcessGainParams:
 
 @tick
 def clamp_radius(p, R):
-    """`R` m, no further out than a reel can be."""
+    """Reel radius in m, `R` limited to the range of a reel."""
     return min(max(R, p.R_min), p.R_max)
 
 

@@ -3,8 +3,8 @@
     R = R_c |phi_b - phi_a| / ((n_b - n_a) angle)
 
 The capstan angles phi_a and phi_b belong to the first and the last counted edge, each taken half-way through the tick
-in which it came. What is left of the quantisation is half of what the capstan turns in a tick, instead of a whole
-count of the reel as in the plain ratio.
+in which it came. The remaining quantisation error is half of the capstan's travel in a tick, instead of a whole count
+of the reel as in the plain ratio.
 
 Source: thesis 5.2; accuracy of the plain ratio in 5.3.
 """

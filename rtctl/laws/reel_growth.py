@@ -38,5 +38,5 @@ def step(p, s, phi):
 @tick
 def grown(R_0, area, core):
     """Radius in m of a reel of `R_0` m whose paper has grown by `area` pi m^2, and at least that of the `core`."""
-    least = min(core, R_0) if R_0 > 0.0 else core  # none is known before the first arming
+    least = min(core, R_0) if R_0 > 0.0 else core  # no radius is known before the first arming
     return np.sqrt(max(R_0 * R_0 + area, least * least))

@@ -1,4 +1,4 @@
-"""Reel radii at start-up: wind the tape a little in one direction and compare what the reels turned with the capstan.
+"""Reel radii at start-up: wind the tape a little in one direction and compare the angles of reels and capstan.
 
     tighten   both motors pull with the tension voltages
     pull      one motor adds `drive`, rising slowly, until the capstan has turned 1.9 rad
@@ -8,11 +8,11 @@
     u_c = +-drive - brake v      u1 = T1 + max(u_c, 0)      u2 = T2 + max(-u_c, 0)
 
 The angles are taken at counted edges (`reel_edges`), which leaves an error under 1 % where the plain ratio has 5 %.
-The reel sensors cannot tell direction: counting begins after a run-in, when everything moves one way, and begins again
-should the tape run back.
+The reel sensors have no direction: counting begins after a run-in, when everything moves one way, and begins again
+where the tape runs back.
 
-Source: thesis 5.2, 5.3, 6.2. The thesis sets the tension for the smallest radius; here it is that for the largest,
-so that the tape is taut whatever is on the reels.
+Source: thesis 5.2, 5.3, 6.2. The thesis sets the tension for the smallest radius; here the tension is set for the
+largest radius, so that the tape is taut for every radius of the reels.
 """
 
 from math import ceil, pi
@@ -158,7 +158,7 @@ def step(p, s, phi_c, n1_counts, n2_counts, passed=1):
 
 @tick
 def _travel(p, s, phi_c):
-    """1 where the tape runs one way and counts are to be trusted; begins again where it has run back."""
+    """1 where the tape runs one way and counts are valid; begins again where the tape has run back."""
     travel = s.direction * (phi_c - s.phi_from)
     s.far = max(s.far, travel)
     if s.far - travel > p.rest:
@@ -188,7 +188,7 @@ def _go_on(p, s, phi_c):
 
 @tick
 def _estimate(p, s):
-    """Take this run into the mean of the runs."""
+    """Include this run in the mean of the runs."""
     R1 = reel_edges.radius(s.reel1, p.R_c, p.angle)
     R2 = reel_edges.radius(s.reel2, p.R_c, p.angle)
     s.run += 1

@@ -1,6 +1,7 @@
 """Reference generator: plays a table of knots, then follows setpoints from the command record.
 
-The table is piecewise linear; a step is two knots at one time. Time is k dt from the tick count, so nothing adds up.
+The table is piecewise linear; a step is two knots at one time. Time is k dt from the tick count, so rounding errors
+do not accumulate.
 In YAML a table is a list of steps, each a jump or, with `ramp`, a straight line at that rate:
 
     steps: [{at: 0.5 s, to: 1 rad}, {at: 3 s, to: 0, ramp: 2 rad/s}]

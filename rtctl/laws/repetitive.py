@@ -1,11 +1,11 @@
-"""Repetitive control over position: what comes back with every turn is learned turn by turn, while the machine moves.
+"""Repetitive control over position: the command against an error of every turn, learned turn by turn in motion.
 
     w[i] += k dt e,  w[i] *= 1 - forget dt             i: the part of a turn that the machine is in, while it moves
     u     = w at x + lead v                            straight line between the parts
 
-Each part of the turn has an integral of its own, so that it needs no model of what comes back. It acts as far as the
-loop follows: a ripple of higher frequency than the crossover takes a lower gain, or a lower speed to learn at. The
-table counts from where the counter is 0; with an index mark it can be kept for the next start.
+Each part of the turn has its own integral, so that the law needs no model of the periodic error. The law acts up to
+the crossover of the loop: a ripple of higher frequency needs a lower gain, or a lower speed while it is learned. The
+table counts from where the counter is 0; with an index mark the table can be kept for the next start.
 
 Source: Hara, Yamamoto, Omata & Nakano, Repetitive control system, IEEE TAC 33 (1988); over position by Hillerstrom,
 IEEE Trans. Control Systems Technology 4 (1996).

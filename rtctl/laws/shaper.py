@@ -1,4 +1,4 @@
-"""Reference shaping: a step becomes a smooth move, so that the tape is never let go and the carriage never jerked.
+"""Reference shaping: a step becomes a smooth move, so that the tape stays taut and the carriage is not jerked.
 
     x1 += a (target - x1),  x2 += a (x1 - x2),  ref += a (x2 - ref)         a = 1 - exp(-w dt)
 
@@ -48,7 +48,7 @@ def step(p, s, target):
 
 @tick
 def follow(p, s, ref):
-    """State of the shaper, its speed and acceleration too, whose output was `ref`: three lags have no other input."""
+    """Follow the output `ref`: set the state of the shaper, with speed and acceleration, that gives this output."""
     x2 = s.ref + (ref - s.ref) / p.a
     s.x1 = s.x2 + (x2 - s.x2) / p.a
     s.x2 = x2

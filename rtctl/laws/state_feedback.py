@@ -1,12 +1,13 @@
-"""State feedback from an observer, with an integral: what a design by LQ or by poles asks for.
+"""State feedback from an observer, with an integral, for a design by LQ or by pole placement.
 
-    x^ += L (y - C x^)                                  the sample tells where the machine is
-    i  += K_i dead(e)                                   against a force that stays
+    x^ += L (y - C x^)                                  correction by the sample
+    i  += K_i dead(e)                                   against a constant force
     u   = K (N ref - x^) + N_u ref + i                  N, N_u: state and command at rest at ref = 1
     x^  = A x^ + B u_written                            once a tick after the limit; i is back-calculated there
 
-A, B and C are the sampled model with the tick until a command is written, so that the observer sees what acts and not
-what was wanted. `rtctl tune CONFIG --method lq` writes all of it for the machine that a config describes.
+A, B and C are the sampled model with the tick until a command is written, so that the observer uses the command that
+acts and not the command before the limit. `rtctl tune CONFIG --method lq` writes these settings for the machine that
+a config describes.
 
 Source: Franklin, Powell & Workman, Digital Control of Dynamic Systems (1998), ch. 8 (current estimator, integral
 control, reference input); Astrom & Wittenmark, Computer-Controlled Systems (1997), 9.4 for the limit in the observer.
@@ -85,7 +86,7 @@ def _padded(row: list[float]) -> np.ndarray:
 @tick
 def step(p, s, e, x, ref):
     """Command in V for the position error `e`, the measured position `x` and its reference `ref` (rad or m)."""
-    if s.primed == 0:  # it stands where it is
+    if s.primed == 0:  # begin at rest at the measured position
         for j in range(p.n):
             s.x[j] = p.N[j] * x
         s.primed = 1
@@ -114,7 +115,7 @@ def track(p, s, u_wanted, u_written):
 
 @tick
 def reset(p, s):
-    """Forget what was estimated: the next step begins at rest where the machine is."""
+    """Forget the estimate: the next step begins at rest at the measured position."""
     s.i = 0.0
     s.primed = 0
 

@@ -1,9 +1,9 @@
-"""Tape tensions from what the motors are told, less what it takes to turn them.
+"""Tape tensions in N from the motor voltages, less friction and inertia of the motors and reels.
 
     T_i = (K_m amp_per_volt u_i -+ tau_F sign(v) -+ J_i phi_i'') / R_i,   phi_i' = +- R_c v / R_i
 
 each through a first-order low-pass, since one count of the encoder is worth half a newton. Upper signs for reel 1,
-which winds when the capstan turns forward. Good to the friction that is not known; meant for tripping on a torn or
+which winds when the capstan turns forward. The error is that of the friction; the estimate serves to trip on a torn or
 folding tape, not for control.
 
 Source: thesis (4.9)-(4.13), shafts taken as rigid.

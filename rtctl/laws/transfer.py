@@ -1,4 +1,4 @@
-"""Sampled linear systems of laws, as a design needs them: x' = A x + b v, u = c x + d v from tick to tick."""
+"""Sampled linear systems of laws, for design: x' = A x + b v, u = c x + d v from tick to tick."""
 
 import numpy as np
 

@@ -1,8 +1,8 @@
-"""Change points of a series: Bayes factors of a shift, of two, and of a drift, against a series that stays.
+"""Change points of a series: Bayes factors of a shift, of two shifts, and of a drift, against a stationary series.
 
 The level and the scatter of the series are integrated out under their invariant priors, so a Bayes factor does not
-depend on unit or scatter, and its mean over stationary series is one. A change is alarmed at a probability of SURE, so
-by Markov's inequality at most ODDS (1 - SURE) / SURE of the trends of stationary machines alarm.
+depend on unit or scatter, and its mean over stationary series is one. An alarm needs a posterior probability of SURE,
+so by Markov's inequality at most ODDS (1 - SURE) / SURE of the trends of stationary machines alarm.
 
 Source: Adams & MacKay, Bayesian online changepoint detection (2007) and Fearnhead, Exact and efficient Bayesian
 inference for multiple changepoint problems, Stat. Comput. 16 (2006), for the positions; Liang et al., Mixtures of g
@@ -18,10 +18,10 @@ from scipy.special import logsumexp
 from rtctl.trend.noise_models import Whitened, whitened
 
 SHIFT, DRIFT, PAIR = "shift", "drift", "pair"
-ODDS = 0.2  # of any change, in all series of a trend together
+ODDS = 0.2  # prior odds of any change, in all series of a trend together
 KINDS = {SHIFT: 0.5, PAIR: 0.25, DRIFT: 0.25}  # prior shares
-SIZES = (1.0, 3.0, 10.0, 30.0)  # standard deviations of a change, in scatters of a record
-SURE = 0.95  # probability of a change that is one
+SIZES = (1.0, 3.0, 10.0, 30.0)  # prior standard deviations of a change, in scatters of a record
+SURE = 0.95  # least posterior probability of a reported change
 FEWEST, SIDE = 8, 3  # records of a series, and on each side of a shift
 MOST = 240  # records that are judged one by one; of more, neighbours are averaged
 CHANGES = 6  # of a series
@@ -42,7 +42,7 @@ class Change(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Log Bayes factors of what may be added to the changes that are known already."""
+    """Log Bayes factors of one further change, given the known changes."""
 
     shift: np.ndarray  # (n - 1,)
     pair: np.ndarray  # (n - 1, n - 1) upper triangle
@@ -61,14 +61,15 @@ class Candidates(NamedTuple):
 
 
 def _mean(logs: np.ndarray) -> float:
-    """Log of the mean of exponentials of what is possible."""
+    """Log of the mean of exponentials of the finite `logs`."""
     possible = logs[np.isfinite(logs)]
     return float(logsumexp(possible) - np.log(len(possible))) if len(possible) else -np.inf
 
 
 def changes(y: np.ndarray, s: np.ndarray, at: np.ndarray, series: int = 1) -> tuple[list[Change], float]:
-    """Changes of a series y (n,) of estimates with standard deviations s (n,) at increasing places `at` (n,), by their
-    places, and the probability that there is any. `series` is how many are looked at; none of fewer than FEWEST."""
+    """Changes of a series y (n,) of estimates with standard deviations s (n,) at increasing places `at` (n,), in order
+    of place, and the posterior probability of any change. `series` is the number of tested series. A series of fewer
+    than FEWEST has no changes."""
     if len(y) < FEWEST or not np.ptp(y) > 0.0:
         return [], 0.0
     y, s, at, begins = merged(y, s, at)
@@ -100,7 +101,7 @@ def probability(log_odds: float) -> float:
 
 
 def merged(y: np.ndarray, s: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The series with neighbours averaged where there are more than MOST records, and the first record of each."""
+    """The series with neighbours averaged where it has more than MOST records, and the first record of each average."""
     n = len(y)
     size = -(-n // MOST)
     begins = np.arange(0, n, size)
@@ -113,7 +114,7 @@ def merged(y: np.ndarray, s: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np
 
 
 def candidates(models: list[Whitened], known: list[int], odds: float) -> Candidates:
-    """Log Bayes factors of one more shift, two more, or a drift, beside changes that are `known`."""
+    """Log Bayes factors of one further shift, of two, or of a drift, given the `known` changes."""
     n = len(models[0].y)
     each = [_under(model, known) for model in models]
     base = logsumexp([one[0] for one in each])
@@ -157,13 +158,13 @@ def _under(model: Whitened, known: list[int]) -> tuple[float, np.ndarray, np.nda
 
 
 def _log(left: np.ndarray, whole: float, dof: int) -> np.ndarray:
-    """Log of the likelihood with the scatter integrated out, of sums of squares that are left."""
+    """Log likelihood of residual sums of squares, with the scatter integrated out."""
     return np.asarray(-0.5 * dof * np.log(np.maximum(left, 1e-9 * whole)))
 
 
 def _projected(model: Whitened, known: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, int]:
-    """Series, shifts and drift without their parts along the level and the changes that are known, the log of the
-    volume of these, and the degrees of freedom that are left."""
+    """Series, shifts and drift projected off the level and the known changes, the log volume of the model less that of
+    these, and the residual degrees of freedom."""
     beside = np.stack([model.ones, *(model.line if k < 0 else model.steps[:, k] for k in known)], axis=1)
     Q, R = np.linalg.qr(beside)
     volume = float(np.sum(np.log(np.maximum(np.abs(np.diag(R)), 1e-12))))
@@ -172,7 +173,7 @@ def _projected(model: Whitened, known: list[int]) -> tuple[np.ndarray, np.ndarra
 
 
 def judged(models: list[Whitened], known: list[int], number: int, odds: float, begins: np.ndarray) -> Change:
-    """One of the known changes beside all others: its probability, place and size."""
+    """One of the known changes, given all others: its posterior probability, place and size."""
     others = known[:number] + known[number + 1 :]
     found = candidates(models, others, odds)
     if known[number] < 0:

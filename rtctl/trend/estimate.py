@@ -1,7 +1,7 @@
 """Estimates of one piece: parameters and known terms fitted under the tracking observer, with 90 % intervals.
 
-Every piece is fitted from the owner's values, so that an estimate depends on its piece alone: whoever computes it and
-in whatever order, it is the same to the bit.
+Every fit starts from the nominal values, so that an estimate depends on its piece alone: it is bit-identical on every
+machine and in every order of the pieces.
 """
 
 import math
@@ -30,19 +30,19 @@ Row = dict[str, Any]
 
 
 def estimates(pieces: list[Piece]) -> list[list[Row]]:
-    """Rows of the trend of each of some pieces, by one thread: what one task of a worker is."""
+    """Rows of the trend of each piece, computed by one thread: one task of a worker."""
     return copy_context().run(_by_one_thread, pieces)
 
 
 def _by_one_thread(pieces: list[Piece]) -> list[list[Row]]:
     solver.THREADS.set(1)
     with threadpool_limits(1), warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a model that runs away overflows; its residual says so
+        warnings.simplefilter("ignore", RuntimeWarning)  # a model that diverges overflows; its residual shows it
         return [estimate(piece) for piece in pieces]
 
 
 def estimate(piece: Piece) -> list[Row]:
-    """Rows of one piece, one for each number and each sensor; one row with `error` where it gives none."""
+    """Rows of one piece, one for each number and each sensor; one row with `error` where the fit fails."""
     head = {
         "machine": piece.machine, "folder": piece.folder, "first_row": piece.first, "begin_s": piece.begin,
         "seconds": piece.seconds, "at": piece.at if math.isfinite(piece.at) else None, "stamp": piece.stamp,
@@ -53,12 +53,12 @@ def estimate(piece: Piece) -> list[Row]:
         return [{**head, **row} for row in (*_parameters(fitted, record), *_residuals(fitted))]
     except (UserError, NoAnswer) as error:
         return [{**head, "error": " ".join(str(error).split())}]
-    except Exception as error:  # one bad recording of a thousand must not end the others
+    except Exception as error:  # one bad recording must not end the others
         return [{**head, "error": told(error)[1]}]
 
 
 def _parameters(f: Fitted, record: GraphRecord) -> list[Row]:
-    """The numbers of the description and of the terms that its owner knows."""
+    """Rows of the description's numbers and of those of the known terms."""
     case, out = record.case, []
     found, nominal = parameters(f, record), f.space.owner.base
     narrowed = half_widths(f) * np.sqrt(prior(f.space)) / Z90  # spread of the posterior over that of the prior
@@ -78,12 +78,12 @@ def _parameters(f: Fitted, record: GraphRecord) -> list[Row]:
 
 
 def _residuals(f: Fitted) -> list[Row]:
-    """Rms of what the fitted description leaves of each sensor, SI: it grows where something new is missing."""
+    """Rms residual of each sensor under the fitted description, SI; a new missing effect raises it."""
     rms = np.sqrt(np.mean(f.e**2, axis=0))
     least = f.like.least
     out = []
     for name, value, floor in zip(f.like.sim.channels, rms, least, strict=True):
-        size = float(math.hypot(value, floor))  # what counting leaves is not told apart from nothing
+        size = float(math.hypot(value, floor))  # residuals below the counting noise are not distinguished from zero
         out.append({"kind": RESIDUAL, "name": name, "value": size, "low": size, "high": size, "unit": "",
                     "nominal": float(floor), "own": False, "told": 1.0})  # fmt: skip
     return out

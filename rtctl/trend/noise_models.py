@@ -1,8 +1,8 @@
 """Scatter of estimates over recordings: models of their correlation, by which a series is whitened.
 
-The covariance of a series is sigma^2 V. V is a mixture of what the intervals of the estimates say (independent, one
-standard deviation each) and of what comes and goes from recording to recording (an autoregression of first order). Of
-sigma nothing is known; it is integrated out.
+The covariance of a series is sigma^2 V. V is a mixture of the variances of the estimates (independent, from their
+intervals) and of a variation between recordings (an autoregression of first order). sigma is unknown; it is
+integrated out.
 """
 
 from typing import NamedTuple
@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-SHARES = {0.0: 0.4, 0.5: 0.3, 1.0: 0.3}  # of the variance that comes and goes between recordings: prior probability
-PHIS = {0.0: 0.5, 0.5: 0.25, 0.8: 0.15, 0.95: 0.1}  # correlation of neighbours in it: prior probability
-STRAY, AROUND = 5.0, 7  # scatters from the median of so many neighbours: a recording that stands alone
+SHARES = {0.0: 0.4, 0.5: 0.3, 1.0: 0.3}  # share of the variance between recordings: prior probability
+PHIS = {0.0: 0.5, 0.5: 0.25, 0.8: 0.15, 0.95: 0.1}  # correlation of neighbouring recordings: prior probability
+STRAY, AROUND = 5.0, 7  # outlier: least deviation, in scatters, from the median of AROUND neighbours
 
 
 class Whitened(NamedTuple):
@@ -45,9 +45,9 @@ def whitened(y: np.ndarray, s: np.ndarray, at: np.ndarray) -> list[Whitened]:
 
 
 def strays(y: np.ndarray) -> np.ndarray:
-    """By how many scatters each record (n,) stands apart from its neighbours on both sides, 0 where it does not.
+    """Deviation of each record (n,) from the median of its neighbours on both sides, in scatters; 0 for no outlier.
 
-    A shift is no stray: half of the neighbours are with it.
+    A record at a shift is no outlier: half of its neighbours are at its level.
     """
     reach = AROUND // 2
     padded = np.pad(y, reach, mode="reflect")

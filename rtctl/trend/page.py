@@ -51,7 +51,7 @@ def html(judged: Sequence[Judged], rows: Sequence[dict[str, Any]], least: float 
 
 
 def verdict(found: dict[str, Any]) -> str:
-    """What came of it, in a sentence or two."""
+    """Result of the trend in one or two sentences."""
     count, machines = found["records"], len(found["machines"])
     words = f"{count} recordings of {machines} machine{'s' if machines != 1 else ''}. "
     alarmed = sorted({change["machine"] for change in found["changes"] if change["alarm"]})
@@ -77,7 +77,7 @@ def change_row(change: dict[str, Any]) -> tuple[list[str], bool]:
 
 
 def machine_part(number: int, name: str, judged: Sequence[Judged], least: float) -> dict[str, Any]:
-    """Pictures of one machine, and the numbers that its recordings do not tell."""
+    """Pictures of one machine, and the numbers that its recordings do not determine."""
     mine = [one for one in judged if one.series.machine == name]
     looked = sorted((one for one in mine if one.series.looked_at), key=lambda one: not one.changes)
     return {

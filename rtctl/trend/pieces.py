@@ -1,4 +1,4 @@
-"""Pieces of recordings of which each gives one estimate: a short bundle whole, a long one in windows.
+"""Pieces of recordings, one for each estimate: a short bundle whole, a long bundle in windows.
 
 A piece is read by itself: of a Parquet file only the row groups that hold it, so that the memory does not grow with the
 length of a recording.
@@ -19,11 +19,11 @@ from rtctl.diagnose.folder import is_bundle
 from rtctl.trace.bundle import CASE, Bundle, columns_of_table, load_case, recordings, units_of
 
 WINDOW = 60.0  # s, of a piece of a long recording
-SHORTEST = 0.5  # of a window: a last piece that is shorter belongs to the one before
+SHORTEST = 0.5  # of a window: a shorter last piece belongs to the piece before
 
 
 class Piece(NamedTuple):
-    """Rows of one bundle, and what is known of them before they are read."""
+    """Rows of one bundle, with their place, time and stamp."""
 
     folder: str
     machine: str
@@ -32,7 +32,7 @@ class Piece(NamedTuple):
     begin: float  # s, clock of the first row
     seconds: float
     at: float  # s since 1970 of the first row; nan where the recording has no date
-    stamp: str  # of what an estimate depends on: times and sizes of the files, version of the program
+    stamp: str  # of the inputs of an estimate: times and sizes of the files, version of the program
 
 
 def bundles_in(paths: Sequence[Path]) -> list[Path]:
@@ -114,7 +114,7 @@ def _span(path: Path) -> tuple[int, float, float]:
 
 
 def _dated(case: dict[str, Any]) -> float:
-    """When the recording began, s since 1970; nan where nobody wrote it down."""
+    """Begin of the recording in s since 1970; nan where it has no date."""
     try:
         return datetime.fromisoformat(str(case.get("recorded_at"))).timestamp()
     except ValueError:

@@ -8,10 +8,10 @@ import numpy as np
 from rtctl.trend.change_points import Z90, Change, changes
 from rtctl.trend.estimate import PARAMETER
 
-TOLD = 0.3  # share of the owner's uncertainty that a recording takes away, from which a number is looked at
-LEAST = 0.02  # change of a number, as a share of it, below which nobody is alarmed
-FLOOR = 1e-4  # least standard deviation of an estimate, as a share of it: rounding is no scatter
-RESIDUAL_SD = 0.05  # of a residual's logarithm, until the series says how it scatters
+TOLD = 0.3  # least relative reduction of the prior variance by a recording, from which on a number is tested
+LEAST = 0.02  # least relative change of a number that is alarmed
+FLOOR = 1e-4  # least relative standard deviation of an estimate: rounding is no scatter
+RESIDUAL_SD = 0.05  # nominal standard deviation of a residual's logarithm; the series scales it
 
 
 class Series(NamedTuple):
@@ -22,11 +22,11 @@ class Series(NamedTuple):
     name: str
     unit: str
     rows: list[dict[str, Any]]
-    told: float  # median over the pieces
+    told: float  # relative reduction of the prior variance, median over the pieces
 
     @property
     def looked_at(self) -> bool:
-        """Whether changes are looked for: the recordings tell the number, and it is none that differs by purpose."""
+        """Whether the series is tested for changes: its recordings determine the number."""
         return self.told >= TOLD
 
     @property
@@ -41,7 +41,7 @@ class Series(NamedTuple):
 
     @property
     def logs(self) -> np.ndarray:
-        """Logarithms (n,) of the values; by the owner's value where the case says that it differs by purpose."""
+        """Logarithms (n,) of the values; of value over nominal value where the case lists it in `per_recording`."""
         value = np.array([abs(row["value"]) for row in self.rows])
         nominal = np.array([abs(row["nominal"] or 1.0) if row["own"] else 1.0 for row in self.rows])
         return np.asarray(np.log(np.maximum(value, 1e-300) / nominal))
@@ -67,7 +67,7 @@ class Judged(NamedTuple):
         return float(np.expm1(change.size))
 
     def alarms(self, change: Change, least: float = LEAST) -> bool:
-        """Whether somebody should look: the change is at least so large, by the near end of its interval."""
+        """Whether the change is an alarm: the near end of its interval is at least `least`."""
         near = 0.0 if change.low < 0.0 < change.high else min(abs(change.low), abs(change.high))
         return bool(near >= np.log1p(least))
 
@@ -88,7 +88,7 @@ def series_of(rows: Sequence[dict[str, Any]]) -> list[Series]:
 
 
 def judge(found: Sequence[Series]) -> list[Judged]:
-    """Changes of each series; the prior odds of a change are shared by all that are looked at."""
+    """Changes of each series; all tested series share the prior odds of a change."""
     count = max(sum(one.looked_at for one in found), 1)
     out = []
     for one in found:

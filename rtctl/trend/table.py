@@ -62,7 +62,7 @@ def _plain(value: Any) -> Any:
 
 
 def read(folder: Path) -> Rows:
-    """Rows of an earlier trend; none where there is none, or it is damaged: its pieces are then fitted again."""
+    """Rows of an earlier trend; empty without one or with a damaged table, whose pieces are fitted again."""
     try:
         with pq.ParquetFile(folder / TABLE) as file:
             table = file.read()
@@ -72,7 +72,7 @@ def read(folder: Path) -> Rows:
 
 
 def kept(folder: Path, pieces: Sequence[Piece]) -> dict[Piece, Rows]:
-    """Rows of those pieces that an earlier trend in the folder has, of recordings that did not change since."""
+    """Rows of pieces from an earlier trend in the folder, for recordings that are unchanged."""
     by_stamp: dict[tuple[str, str], Rows] = {}
     for row in read(folder):
         by_stamp.setdefault((row["folder"], row["stamp"]), []).append(row)

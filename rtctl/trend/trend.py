@@ -32,10 +32,11 @@ def run(
     again: bool = False,
     progress: Progress = lambda *_: None,
 ) -> dict[str, Any]:
-    """Fit what is not in `folder` yet, look for changes, write table and page there. Returns the object of `--json`.
+    """Fit the pieces without rows in `folder`, test for changes, write table and page there. Returns the object of
+    `--json`.
 
-    Raises UserError where a path is no bundle or the disk takes nothing, NoAnswer where no piece gives an estimate, and
-    PoolError where a worker dies; what is fitted then is kept.
+    Raises UserError where a path is no bundle or the disk refuses a file, NoAnswer where no piece gives an estimate,
+    and PoolError where a worker dies; finished estimates are then kept.
     """
     began = time.monotonic()
     rows, fitted = gathered(paths, folder, jobs, scheduler, window, again, progress)
@@ -61,7 +62,7 @@ def gathered(
     again: bool,
     progress: Progress,
 ) -> tuple[Rows, int]:
-    """Rows of the table of all pieces, as they are written, and how many pieces were fitted now."""
+    """Rows of the table of all pieces, and the number of newly fitted pieces."""
     pieces, broken = _pieces([bundle.resolve() for bundle in bundles_in(paths)], window)
     known = {} if again else table.kept(folder, pieces)
     left = [piece for piece in pieces if piece not in known]
@@ -107,7 +108,7 @@ def computed(pieces: Sequence[Piece], jobs: int, scheduler: str | None) -> Itera
     first: dict[str, Piece] = {}
     for piece in pieces:
         first.setdefault(piece.machine, piece)
-    if scheduler is None:  # what is compiled for a machine is compiled once
+    if scheduler is None:  # compile the code of a machine once
         for piece in first.values():
             yield [piece], estimates([piece])
         pieces = [piece for piece in pieces if first[piece.machine] is not piece]
@@ -120,7 +121,7 @@ def computed(pieces: Sequence[Piece], jobs: int, scheduler: str | None) -> Itera
 
 
 def there(batch: list[Piece]) -> list[Rows]:
-    """Estimates of a batch by a worker elsewhere. Raises UserError where it does not see the recordings."""
+    """Estimates of a batch by a remote worker. Raises UserError where the worker cannot read the recordings."""
     for piece in batch:
         if not Path(piece.folder).is_dir():
             raise UserError(
@@ -131,7 +132,7 @@ def there(batch: list[Piece]) -> list[Rows]:
 
 
 def summary(judged: Sequence[Judged], rows: Rows, least: float) -> dict[str, Any]:
-    """Counts, changes and what could not be fitted, as `--json` prints them."""
+    """Counts, changes and failed pieces, in the form of `--json`."""
     changes = [change_words(one, number, least) for one in judged for number in range(len(one.changes))]
     errors = {row["folder"]: row["error"] for row in rows if row["error"] is not None}
     pieces = {(row["folder"], row["first_row"]) for row in rows}
@@ -147,7 +148,7 @@ def summary(judged: Sequence[Judged], rows: Rows, least: float) -> dict[str, Any
 
 
 def change_words(one: Judged, number: int, least: float) -> dict[str, Any]:
-    """One change of a series in plain data: what, where, by how much, how sure."""
+    """One change of a series in plain data: kind, place, size and probability."""
     change, series = one.changes[number], one.series
 
     def place(k: int) -> str:

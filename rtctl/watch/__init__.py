@@ -1,4 +1,4 @@
-"""The model beside a running machine: residuals and missing force as they come, and an alarm when the model fails."""
+"""Condition monitoring of a running machine by its model: residuals, missing force, and an alarm on a departure."""
 
 from rtctl.callable_module import called
 

@@ -18,8 +18,8 @@ ALONE = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NU
 
 
 def lowest(cpu: int | None = None) -> None:
-    """Give this process the lowest priority, and every processor but `cpu`, that of the loop. What the system refuses
-    stays as it is."""
+    """Give this process the lowest priority, and every processor but `cpu`, that of the loop. A setting that the system
+    refuses stays unchanged."""
     with contextlib.suppress(OSError):
         os.nice(NICE - os.nice(0))
     with contextlib.suppress(OSError, AttributeError):
@@ -36,18 +36,18 @@ def aside(cpu: int | None) -> None:
 
 
 class Background:
-    """A capture from BEFORE an alarm on, then its diagnosis. `look` takes it further and never waits."""
+    """A capture that begins BEFORE seconds ahead of an alarm, then its diagnosis. `look` polls both and never waits."""
 
     def __init__(self, client: Client, out: Path, cpu: int | None = None, diagnose: bool = True):
         self._client, self._out, self._cpu, self._diagnose = client, out, cpu, diagnose
         self._capture: str | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self.bundle: Path | None = None
-        self.diagnosis: str | None = None  # a sentence, once it is there
+        self.diagnosis: str | None = None  # a sentence, once the diagnosis has ended
         self.page: Path | None = None
 
     def begin(self) -> str | None:
-        """Start the capture; a sentence on why there is none."""
+        """Start the capture; a sentence with the reason where it does not start."""
         try:
             started = self._client.call("capture", seconds=ALL, pre=BEFORE, out=str(self._out.absolute()))
         except UserError as error:
@@ -57,11 +57,11 @@ class Background:
 
     @property
     def done(self) -> bool:
-        """Whether nothing is under way."""
+        """Whether neither capture nor diagnosis is running."""
         return self._capture is None and self._process is None
 
     def look(self) -> str | None:
-        """Go on with what is under way; a sentence where something failed."""
+        """Poll capture and diagnosis; a sentence where one failed."""
         if self._capture is not None:
             return self._look_at_capture(self._capture)
         if self._process is not None and self._process.poll() is not None:
@@ -112,6 +112,6 @@ class Background:
 
 
 def told(diagnosis: dict[str, Any]) -> str:
-    """What a diagnosis found, and what to look at first."""
+    """Sentence on the result of a diagnosis and its first check."""
     checks = [effect["check"] for effect in diagnosis["effects"] if effect.get("check")]
     return " ".join([str(diagnosis["headline"]), *checks[:1]])

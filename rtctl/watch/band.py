@@ -1,9 +1,9 @@
-"""Calibrated band of a healthy machine: how far its windows are from the model, and what of that is usual.
+"""Calibrated band of a healthy machine: location and spread of the residual measures of its windows.
 
-No model is exact. What the healthy machine lacks in each slow block is fitted by its motion (a constant, the
-direction, speed, acceleration); what is left, and the innovations of each sensor, are measured in windows. The power
-of each measure grows with the squares of speed and acceleration; location and spread of what that leaves depend on how
-fast the machine moves.
+No model is exact. A robust regression on the motion (a constant, the direction, speed, acceleration) fits the slow
+residuals of the healthy machine. The remainder of this regression and the innovations of each sensor are measured in
+windows. The power of each measure grows with the squares of speed and acceleration; location and spread of the
+normalised measures depend on the speed of the machine.
 
 Source: Huber & Ronchetti, Robust Statistics (2009), ch. 7 for the weights; Kennedy & O'Hagan, Bayesian calibration of
 computer models, JRSS B 63 (2001) for a discrepancy that is learned beside a model.
@@ -21,23 +21,23 @@ from rtctl.watch.cusum import Thresholds, thresholds
 from rtctl.watch.windows import SLIGHT, STEPS, Batch, Shape
 
 FEWEST = 60  # windows in motion from which a band can be learned
-OF_A_PACE = 60  # windows in motion for each pace at which the band is known
-PACES = 4  # of them, at most
-MOVES = 0.3  # share of the blocks of a window in motion that counts
-FASTER = 1.25  # times the fastest window that was learned: a faster one is not judged
-LATE, LATER = 0.1, 1.5  # of a tick, and times nine in ten of the learned windows: an error of time that is usual
+OF_A_PACE = 60  # windows in motion for each pace (speed class) of the band
+PACES = 4  # paces of a band, at most
+MOVES = 0.3  # share of moving blocks, from which on a window is in motion
+FASTER = 1.25  # times the fastest learned window: a faster window is not judged
+LATE, LATER = 0.1, 1.5  # usual error of time: in ticks, and times the 0.9 quantile of the learned windows
 HUBER = 1.5  # standard deviations, beyond which a block weighs less
 ROUNDS = 10
-OUTLYING = 9.0  # times its expectation: a square of a measure beyond counts no more
+OUTLYING = 9.0  # times its expectation, at which the square of a measure is clipped
 LEAST = 1e-3  # of the mean square of a measure: its power at rest, at least
 ALONG = ("push", "direction", "speed", "acceleration")  # what a missing force may be proportional to
-FAINT = 0.1  # of the usual speed or acceleration: less in a window tells nothing of a force in proportion to it
-EVEN = 0.1  # of the usual speed and acceleration: changes of an even motion
+FAINT = 0.1  # of the usual speed or acceleration: a regressor below it in a window does not determine its force
+EVEN = 0.1  # of the usual speed and acceleration: largest changes of an even motion
 LEAST_WEIGHT = 0.1
 PER_DAY = 1.0  # false alarms in eight hours of motion
 
 
-Before = tuple[np.ndarray, int]  # mean speed (followed,) of the window before, and how many were as even
+Before = tuple[np.ndarray, int]  # mean speed (followed,) of the window before, and number of even windows so far
 
 
 class Measure(NamedTuple):
@@ -48,7 +48,7 @@ class Measure(NamedTuple):
 
 
 class Band(NamedTuple):
-    """What is usual, by windows of a healthy machine. Signals are the forces at the followed bodies and the slow
+    """Band of a healthy machine, learned from its windows. Signals are the forces at the followed bodies and the slow
     residuals of the other sensors."""
 
     shape: Shape
@@ -58,11 +58,11 @@ class Band(NamedTuple):
     asked: float  # step of the reference in a slow block, from which on it moves
     units: np.ndarray  # (2, followed) usual speed and acceleration
     whitening: list[np.ndarray]  # of each sensor
-    usual: np.ndarray  # (signals, len(ALONG)) what the model lacks on the healthy machine
+    usual: np.ndarray  # (signals, len(ALONG)) regression coefficients of the healthy machine's missing force
     late: float  # s, error of the time of a row, beyond which a window is not judged
-    jolt: float  # acceleration of the window that was learned with the highest, in units of the usual one
-    paces: np.ndarray  # (paces,) of the windows by which location and spread are known, in units of the usual speed
-    growth: np.ndarray  # (3, measures) power of each measure: a constant, and what speed and acceleration add
+    jolt: float  # highest acceleration of the learned windows, in units of the usual acceleration
+    paces: np.ndarray  # (paces,) speeds at which location and spread are known, in units of the usual speed
+    growth: np.ndarray  # (3, measures) power of each measure: a constant, and coefficients of speed and acceleration
     location: np.ndarray  # (paces, measures)
     spread: np.ndarray  # (paces, measures)
     sigma: np.ndarray  # (sensors,) innovations of the healthy machine, SI
@@ -88,17 +88,17 @@ class Band(NamedTuple):
         return [m for m in measures if m.what not in ALONG] + two
 
     def moving(self, batch: Batch) -> np.ndarray:
-        """Whether each block (windows, BLOCKS) is in motion, or is asked to be."""
+        """Whether each block (windows, BLOCKS) is in motion, or its reference is."""
         return (np.abs(batch.v) > self.grain).any(axis=2) | (np.abs(batch.asked) > self.asked)
 
     def counts(self, batch: Batch) -> np.ndarray:
-        """Windows (n,) in motion whose rows came in time, no faster than those that were learned."""
+        """Windows (n,) in motion whose rows came in time, no faster than the learned windows by FASTER."""
         slow = (self.pace(batch) <= FASTER * self.paces[-1]) & (self.pace(batch, 1) <= FASTER * self.jolt)
         return self.in_motion(batch) & slow & ~self.untimely(batch)
 
     def untimely(self, batch: Batch) -> np.ndarray:
-        """Windows (n,) with rows that came later than those that were learned: they would show an error of the clock
-        as one of the machine."""
+        """Windows (n,) with rows that came later than the learned rows: an error of the clock would appear as an error
+        of the machine."""
         return np.asarray(batch.late > self.late)
 
     def in_motion(self, batch: Batch) -> np.ndarray:
@@ -106,16 +106,16 @@ class Band(NamedTuple):
         return np.asarray(self.moving(batch).mean(axis=1) >= MOVES)
 
     def pace(self, batch: Batch, order: int = 0) -> np.ndarray:
-        """Rms speed (n,) of windows, in units of the usual one; of `order` 1 the acceleration."""
+        """Rms speed (n,) of windows in units of the usual speed; with `order` 1 rms acceleration in its usual unit."""
         return np.sqrt(np.mean(((batch.v, batch.a)[order] / self.units[order]) ** 2, axis=(1, 2)))
 
     def grown(self, batch: Batch) -> np.ndarray:
-        """What the power of a measure grows with (windows, 3)."""
+        """Regressors (windows, 3) of the power of a measure: 1, squared speed, squared acceleration."""
         return np.stack([np.ones(batch.size), self.pace(batch) ** 2, self.pace(batch, 1) ** 2], axis=1)
 
     def weights(self, batch: Batch, before: "Before | None" = None) -> tuple[np.ndarray, "Before"]:
-        """Weights (n,) of windows, and what the next ones need. A window whose motion goes on evenly repeats the one
-        before: the n-th of them counts 1/n, as far as LEAST_WEIGHT."""
+        """Weights (n,) of windows, and the state `Before` for the next windows. Consecutive windows of an even motion
+        repeat each other: the n-th of them has the weight 1/n, at least LEAST_WEIGHT."""
         mean, out = batch.v.mean(axis=1) / self.units[0], np.ones(batch.size)
         last, count = before if before is not None else (np.full(mean.shape[1], np.inf), 0)
         even = self.pace(batch, 1) < EVEN
@@ -132,7 +132,7 @@ class Band(NamedTuple):
         return np.concatenate([batch.force, other - other.mean(axis=1, keepdims=True)], axis=2)
 
     def along(self, batch: Batch, signal: int) -> np.ndarray:
-        """What a missing force may be proportional to (windows, BLOCKS, len(ALONG)), of the body of a signal."""
+        """Regressors (windows, BLOCKS, len(ALONG)) of a missing force, by the motion of the body of a signal."""
         lead = min(signal, len(self.followed) - 1) if signal < len(self.followed) else 0
         v, a = batch.v[:, :, lead], batch.a[:, :, lead]
         way = np.where(np.abs(v) > self.grain[lead], np.sign(v), 0.0)
@@ -143,13 +143,13 @@ class Band(NamedTuple):
         return np.stack([np.std(filtered(a, batch.e[:, :, k].T), axis=0) for k, a in enumerate(self.whitening)], axis=1)
 
     def missing(self, batch: Batch) -> np.ndarray:
-        """Signals (windows, BLOCKS, signals) less what the healthy machine shows in the same motion."""
+        """Signals (windows, BLOCKS, signals) less the prediction for the healthy machine in this motion."""
         signals = self.signals(batch)
         usual = [self.along(batch, s) @ self.usual[s] for s in range(signals.shape[2])]
         return np.asarray(signals - np.stack(usual, axis=2))
 
     def raw(self, batch: Batch) -> np.ndarray:
-        """Measures (windows, measures), SI: root mean squares, and amounts of each of ALONG."""
+        """Measures (windows, measures), SI: root mean squares, and projections on each of ALONG."""
         left = self.missing(batch)
         columns = list(self.innovations(batch).T)
         for s in range(left.shape[2]):
@@ -160,13 +160,13 @@ class Band(NamedTuple):
         return np.stack(columns, axis=1)
 
     def relative(self, batch: Batch) -> np.ndarray:
-        """Measures (windows, measures) in units of their size at such a motion; of root mean squares the logarithm."""
+        """Measures (windows, measures) in units of their size at this motion; of root mean squares the logarithm."""
         raw = self.raw(batch) / np.sqrt(self.grown(batch) @ self.growth)
         signed = np.array([m.what in ALONG for m in self.measures])
         return np.where(signed, raw, np.log(np.maximum(np.abs(raw), 1e-6)))
 
     def scores(self, batch: Batch) -> np.ndarray:
-        """Scores (windows, scores) in standard deviations of the healthy machine at the same pace, as `signed`."""
+        """Scores (windows, scores) in standard deviations of the healthy machine at this pace, ordered as `signed`."""
         pace = self.pace(batch)
         raw = self.relative(batch)
         z = np.empty_like(raw)
@@ -180,9 +180,9 @@ class Band(NamedTuple):
 
 def learn(batch: Batch, shape: Shape, sensors: list[str], followed: list[int], grain: np.ndarray,
           per_day: float = PER_DAY) -> Band:  # fmt: skip
-    """The band of windows of a healthy machine; `grain` (followed,) is the step of each followed sensor, SI.
+    """Band learned from windows of a healthy machine; `grain` (followed,) is the step of each followed sensor, SI.
 
-    Raises NoAnswer where too few of them are in motion.
+    Raises NoAnswer where too few windows are in motion.
     """
     slow = shape.slow * shape.dt
     asked = np.abs(batch.asked)
@@ -256,8 +256,8 @@ def _robust(A: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _power(grown: np.ndarray, raw: np.ndarray) -> np.ndarray:
-    """Coefficients (3,), none negative, of the squares of a measure (n,) on `grown` (n, 3), each weighed by the round
-    before; a square counts for OUTLYING times its expectation at most."""
+    """Coefficients (3,), none negative, of the squares of a measure (n,) on `grown` (n, 3), by iteratively reweighted
+    least squares; squares are clipped at OUTLYING times their expectation."""
     power = raw**2
     scale = max(float(power.mean()), 1e-300)
     variance = np.full(len(raw), scale)
@@ -270,8 +270,8 @@ def _power(grown: np.ndarray, raw: np.ndarray) -> np.ndarray:
 
 
 def _paced(band: Band, batch: Batch) -> Band:
-    """The band with location and spread of its measures by pace. The spread is that of the quartiles or, where tails
-    are long, of the outermost twentieths, wider by what so few windows leave open."""
+    """The band with location and spread of its measures by pace. The spread is that of the quartiles or, for long
+    tails, of the 5 % and 95 % quantiles, widened for the standard error of few windows."""
     pace, raw = band.pace(batch), band.relative(batch)
     count = int(np.clip(batch.size // OF_A_PACE, 1, PACES))
     order = np.argsort(pace, kind="stable")
@@ -282,7 +282,7 @@ def _paced(band: Band, batch: Batch) -> Band:
         location.append(middle)
         spread.append(np.maximum((high - low) / 3.29, (upper - lower) / 1.349) * (1.0 + 1.0 / np.sqrt(len(part))))
     top = float(pace.max())
-    if count > 1 and top > paces[-1]:  # the fastest windows that were learned are within the band
+    if count > 1 and top > paces[-1]:  # the band reaches up to the fastest learned window
         paces.append(top)
         location.append(location[-1])
         spread.append(spread[-1])

@@ -1,11 +1,11 @@
 """Cumulative sums of bounded scores, with thresholds for a stated rate of false alarms.
 
-A score is a number of standard deviations of a window from what the healthy machine showed. It is bounded, so that no
-window alone makes an alarm. Each sum falls by DRIFT a window and rises by the score; it never falls below zero.
+A score is the deviation of a window from the healthy machine in standard deviations. Scores are bounded, so that no
+single window makes an alarm. Each sum falls by DRIFT a window, rises by the score, and is never below zero.
 
 Source: Page, Continuous inspection schemes, Biometrika 41 (1954); Siegmund, Sequential Analysis (1985), ch. 2: the
 mean time between false alarms grows as exp(theta h), where theta is the positive root of E exp(theta (score - drift))
-= 1. Of correlated scores the variance in theta is that of long sums.
+= 1. For correlated scores theta is computed with the variance of long sums.
 """
 
 from typing import NamedTuple
@@ -13,36 +13,36 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-DRIFT = 0.6  # standard deviations: half the least shift that is to be noticed at once
+DRIFT = 0.6  # standard deviations: half the least shift that the sums are designed for
 BOUND = 4.0  # standard deviations, beyond which a score counts by its logarithm
 TAIL = 2.0  # standard deviations for each factor e beyond BOUND
 HIGHEST = 9.0  # standard deviations, of a score: no window alone makes an alarm
-MARGIN = 1.5  # of the thresholds: for tails that a learned sample is too short to show
+MARGIN = 1.5  # factor of the thresholds, for tails that a short learned sample does not show
 LONG = 16  # windows of the sums by which the correlation of scores is measured
-MOST = 2.0  # of theta: no learned sample is long enough to promise a steeper tail
+MOST = 2.0  # upper bound of theta: no learned sample is long enough for a steeper tail
 DAY = 8 * 3600.0  # s of motion
 
 
 class Thresholds(NamedTuple):
-    """Thresholds (scores,) of the sums, and the rate that they stand for."""
+    """Thresholds (scores,) of the sums, and their rate of false alarms."""
 
     h: np.ndarray
     per_day: float  # false alarms in eight hours of motion, at most, by theory
 
 
 def bounded(scores: np.ndarray) -> np.ndarray:
-    """Scores as they count: an effect that shows in a few windows only, but there by far, has to be noticed too."""
+    """Bounded scores; beyond BOUND logarithmic, so that a large effect in a few windows is noticed too."""
     size = np.abs(scores)
     tail = BOUND + TAIL * np.log(np.maximum(size, BOUND) / BOUND)
     return np.copysign(np.where(size < BOUND, size, np.minimum(tail, HIGHEST)), scores)
 
 
 def exponent(scores: np.ndarray, weights: np.ndarray) -> float:
-    """Rate theta at which the chance of a false alarm falls with the threshold, by scores (n,) of a healthy machine and
-    their weights (n,).
+    """Exponent theta by which the probability of a false alarm falls with the threshold, for scores (n,) of a healthy
+    machine and their weights (n,).
 
-    The smaller of that of the distribution of single scores and that of the variance of long sums. Zero where the
-    scores do not fall on the average.
+    The smaller of two estimates: from the distribution of single scores, and from the variance of long sums. Zero where
+    the mean of score less drift is not negative.
     """
     x = weights * (bounded(scores) - DRIFT)
     if x.mean() >= 0.0:
@@ -74,7 +74,7 @@ def thresholds(scores: np.ndarray, weights: np.ndarray, seconds: float, per_day:
 
 
 class Sums:
-    """The sums (k,) of as many scores."""
+    """Cumulative sums (k,) of k scores."""
 
     def __init__(self, limits: Thresholds):
         self.limits = limits

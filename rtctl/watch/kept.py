@@ -1,4 +1,4 @@
-"""Band of a healthy machine in a file: JSON, with a hash of what it was learned with."""
+"""Band of a healthy machine in a file: JSON, with a hash of the model by which it was learned."""
 
 import hashlib
 import json
@@ -18,8 +18,8 @@ MODEL = ("plant", "machine", "parameters", "sensors", "drive", "physics", "sampl
 
 
 def identity(case: dict[str, Any], model: Path | None) -> str:
-    """Hash of the model of a case, or of the config that takes its place. The law and the reference are no part of it:
-    the model follows the recorded command."""
+    """Hash of the model of a case, or of the config that replaces it. The hash does not include law and reference,
+    since the model follows the recorded command."""
     said: dict[str, Any] = {key: case.get(key) for key in MODEL}
     config = case.get("config") or {}
     said["config"] = {key: config.get(key) for key in ("plant", "machine", "loop", "driver")}
@@ -36,7 +36,7 @@ def save_band(path: Path, band: Band, said: str) -> None:
 
 
 def load_band(path: Path, said: str) -> Band:
-    """Read a band. Raises UserError where the file is none, or one of another model."""
+    """Read a band. Raises UserError where the file holds no band, or the band of another model."""
     try:
         found = json.loads(path.read_text("utf-8"))
         data = found["band"]

@@ -1,7 +1,7 @@
 """Monitor of one machine: rows of its trace in, measures, notes and alarms out. It reads no clock and opens nothing.
 
-It waits for motion, reads a first record as the diagnosis does, learns the band of the healthy machine, and then
-judges. Rows that are missing, clocks that jump and models that run away are noted; none of them is an alarm.
+The monitor waits for motion, reads a first record as the diagnosis does, learns the band of the healthy machine, and
+then judges. Missing rows, jumps of the clock and divergence of the model give notes and no alarm.
 """
 
 from collections import deque
@@ -24,11 +24,11 @@ from rtctl.watch.words import sentence
 
 LEARN = 600.0  # s in motion, from which the band is learned
 FIRST = 10.0  # s in one stretch, after which a record is tried
-LONGEST = 120.0  # s of a first record; where it supports nothing, its older half is dropped
-JUMP = 0.25  # s by which the clock of a row is off from its tick, from one row to the next: it has jumped
-RECENT = 120  # windows kept for what is told of an alarm
-BLIND = (60, 0.5)  # windows in motion, and the share of them that is judged, below which it says that it sees little
-AWAY = 3  # times in RECENT windows that a model runs away, after which it is no judge
+LONGEST = 120.0  # s of a first record; where it supports no model, its older half is dropped
+JUMP = 0.25  # s, deviation of the time between two rows from the tick, beyond which the clock has jumped
+RECENT = 120  # windows kept for the sentence of an alarm
+BLIND = (60, 0.5)  # windows in motion, and the share of judged ones below which a note is made
+AWAY = 3  # divergences of a model in RECENT windows, from which on the model is not used
 
 
 class Alarm(NamedTuple):
@@ -46,10 +46,10 @@ class Alarm(NamedTuple):
 
 
 class Monitor:
-    """The model of `case` (a bundle's case.json) beside the rows that are fed. `notes` are sentences on what is wrong
-    with rows or model; whoever feeds takes them out.
+    """Monitor of rows by the model of `case` (a bundle's case.json). `notes` are sentences on faults of rows or model;
+    the caller takes them out.
 
-    `band` is one that was learned before. Raises UserError where the machine cannot be followed.
+    `band` is a band that was learned before. Raises UserError where the machine cannot be followed.
     """
 
     def __init__(self, case: dict[str, Any], model: Path | None = None, seconds: float = LEARN,
@@ -66,7 +66,7 @@ class Monitor:
         self._learned: list[Batch] = []
         self._recent: deque[Batch] = deque(maxlen=RECENT)
         self._before: Any = None
-        self._seen = (0, 0, 0)  # windows judged, with late rows, and faster ones, when it last looked around
+        self._seen = (0, 0, 0)  # windows judged, with late rows, and too fast, at the last note on them
         self._blind = False
         self._end: tuple[int, float] | None = None  # tick and time of the last row
         self._away: deque[int] = deque(maxlen=AWAY)
@@ -74,7 +74,7 @@ class Monitor:
 
     @property
     def state(self) -> str:
-        """What it does: waiting, learning, watching, astray."""
+        """State of the monitor: waiting, learning, watching, astray."""
         if self._observer is None:
             return "waiting"
         if self.astray:
@@ -83,24 +83,24 @@ class Monitor:
 
     @property
     def astray(self) -> bool:
-        """Whether the model runs away again and again."""
+        """Whether the model diverges repeatedly."""
         return len(self._away) == AWAY and self.windows - self._away[0] < RECENT
 
     @property
     def learned(self) -> float:
-        """Share of the motion that is to be learned, 0 to 1."""
+        """Progress of learning: share of the motion that the band needs, 0 to 1."""
         if self.band is not None:
             return 1.0
         return min(self._in_motion() / self.seconds, 1.0) if self._learned else 0.0
 
     def restart(self) -> None:
-        """Rows that come next are of another run of the machine."""
+        """Begin a new run of the machine with the next row."""
         self._end = None
         self._break()
 
     def feed(self, rows: np.ndarray, lost: int = 0) -> Alarm | None:
-        """Take in rows of the trace, oldest first; `lost` rows are missing before them. The first alarm that they
-        make, None where they make none."""
+        """Process rows of the trace, oldest first; `lost` rows are missing before them. Returns the first alarm of
+        these rows, None without an alarm."""
         if lost:
             self._lose(lost)
         found: Alarm | None = None
@@ -112,7 +112,7 @@ class Monitor:
     # rows
 
     def _pieces(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Stretches of running rows without a gap. A break is made before each that does not follow the last one."""
+        """Stretches of running rows without a gap, with a break before each that does not follow the last row."""
         if not len(rows):
             return []
         tick, t = rows["tick"].astype(np.int64), rows["t"].astype(float)
@@ -275,7 +275,7 @@ class Monitor:
         return found
 
     def _look_around(self) -> None:
-        """Say where most of the motion is not judged, and when it is again: a watch that sees little must tell."""
+        """Note when most of the motion is not judged, and when most of it is judged again."""
         now = self.judged, self.untimely, self.faster
         judged, untimely, faster = (a - b for a, b in zip(now, self._seen, strict=True))
         count = judged + untimely + faster

@@ -1,8 +1,8 @@
 """Tracking observer of the diagnosis, carried from one chunk of rows to the next.
 
-The compiled simulation is that of a recording (diagnose/model/kernel.py). It begins each call where the state is, so
-that chunks of any length give what one call over all rows gives. Commands are delayed here, by whole ticks; of a part
-of a tick the kernel delays within the chunk.
+The compiled simulation is that of a recording (diagnose/model/kernel.py). Each call begins at the state of the last
+call, so that the result does not depend on the lengths of chunks. This module delays commands by whole ticks; the
+kernel delays them by the fraction of a tick within the chunk.
 """
 
 import numpy as np
@@ -14,13 +14,13 @@ from rtctl.diagnose.model.prepare import ABSENT, Ready, ready
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.simulate import Simulator
 
-AWAY = 1e3  # times the spread of a sensor in the record: a residual from which on the model has run away
+AWAY = 1e3  # times the spread of a sensor in the record: least residual of a model that has diverged
 
 
 class Observer:
     """The model of a machine under the corrections that keep it on the followed sensors.
 
-    `record` is a recording of the same machine in motion. Raises UserError for a problem in which nothing is followed.
+    `record` is a recording of this machine in motion. Raises UserError for a problem without a followed sensor.
     """
 
     def __init__(self, record: GraphRecord, model: GraphModel):
@@ -45,7 +45,7 @@ class Observer:
 
     def step(self, u: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals (n, sensors), SI, and corrections (n, followed), N or Nm at the followed bodies, under commands
-        (n, drives) and readings (n, sensors). Residuals are nan from the row on at which the model ran away; the next
+        (n, drives) and readings (n, sensors). Residuals are nan from the row on at which the model diverged; the next
         chunk begins anew."""
         seen = np.ascontiguousarray(y[:, self.followed])
         if self._start is None:

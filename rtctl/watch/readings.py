@@ -1,7 +1,7 @@
 """Commands and readings of trace rows in SI, as the diagnosis reads them from a recording, chunk after chunk.
 
-What a column means is taken from a record that the diagnosis has read: the offset of each reading is the one that
-gives the readings of that record. Columns that cannot be translated row by row are refused.
+The meaning of columns comes from a record that the diagnosis has read: the offset of each reading reproduces the
+readings of this record. Columns that cannot be translated row by row are refused.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from rtctl.config.errors import UserError
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.record.columns import through_amplifier, unwrap
 
-SAME = 1e-6  # of the spread: what a translated column may differ from that of the record
+SAME = 1e-6  # of the spread: largest difference between a translated column and the column of the record
 Columns = Mapping[str, np.ndarray]
 
 
@@ -51,13 +51,13 @@ class Readings:
         return isinstance(config, dict) and measured_amplifier(config)
 
     def restart(self) -> None:
-        """Forget the last row: what comes next need not follow it."""
+        """Forget the last row: the next row need not follow it."""
         self._last: np.ndarray | None = None
         self._wrapped = np.zeros(len(self.sensors))
 
     def take(self, columns: Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Commands (n, drives), readings (n, sensors) and reference (n,) of rows that follow those before; the
-        reference is nan where there is none."""
+        """Commands (n, drives), readings (n, sensors) and reference (n,) of rows that follow the last rows; nan
+        without a reference."""
         u = np.stack([self._command(columns, d) for d in range(len(self._case.machine.drives))], axis=1)
         y = self._readings(columns)
         for k, name in enumerate(self.sensors):

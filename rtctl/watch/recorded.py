@@ -1,4 +1,4 @@
-"""A recording under the watch: its rows streamed from the disk in pieces, whatever their number."""
+"""Monitor of a recording: its rows streamed from the disk in pieces, in constant memory."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -35,9 +35,9 @@ def rows_of(bundle: Path) -> Iterator[np.ndarray]:
 
 def watch_bundle(bundle: Path, say: Callable[[str], None], model: Path | None = None, band: Path | None = None,
                  seconds: float = LEARN) -> list[Alarm]:  # fmt: skip
-    """Alarms of a recording. `band` is a file of a band that was learned before, or to which one is written.
+    """Alarms of a recording. `band` is a file with a band that was learned before, or a new file for the band.
 
-    Raises UserError for what is no recording of a machine, NoAnswer where it ends before a band is learned.
+    Raises UserError where the bundle is no recording of a machine, NoAnswer where it ends before a band is learned.
     """
     case = load_case(bundle)
     said = identity(case, model)

@@ -19,13 +19,13 @@ SHARED = ("status", "mailbox", "tables")
 
 
 class Moves(NamedTuple):
-    """Random setpoints, as far and as fast as a person says, with rests between them."""
+    """Random setpoints within a given travel and speed, with rests between them."""
 
     travel: float  # unit of the reference: setpoints lie within it on both sides of zero
     speed: float  # the fastest ramp, unit of the reference a second; the slowest is 1/SLOWEST of it
     jump: float  # unit of the reference: the largest step without a ramp
-    rest: float = 0.3  # share of the orders that are a rest
-    jumps: float = 0.2  # share of the orders that are a step
+    rest: float = 0.3  # share of rests among the setpoints
+    jumps: float = 0.2  # share of steps among the setpoints
 
 
 SLOWEST = 12.0
@@ -35,7 +35,7 @@ RESTS = 2.0  # s of a rest, on the average
 
 
 def usual(config: Any) -> Moves:
-    """Moves of a machine in ordinary use, as its profile has it. Raises ValueError for a machine that has none."""
+    """Moves of a machine in ordinary use, by its profile. Raises ValueError where the profile has no moves."""
     duty = profile_of(config.kind).duty
     if duty is None:
         raise ValueError(f"{config.name}: nobody says what this machine does in ordinary use")
@@ -108,9 +108,9 @@ class Shift:
         return np.concatenate(out)
 
     def become(self, config: Any) -> "Shift":
-        """The same machine, in the same state at the same tick, under the equations of another config."""
+        """This machine, in its present state at its present tick, under the equations of another config."""
         other = Shift(config)
-        other._entry(*other._arguments[:-2], 0, 1)  # starts the plant; what it reads is overwritten below
+        other._entry(*other._arguments[:-2], 0, 1)  # starts the plant; its state is overwritten below
         other._reader.take()
         for name in RECORDS:
             carry(getattr(self._loop, name), getattr(other._loop, name))

@@ -1,4 +1,4 @@
-"""What a watch tells the daemon: residuals in standard deviations, missing forces, lanes for the scope."""
+"""Report of a watch to the daemon: residuals in standard deviations, missing forces, lanes for the scope."""
 
 from typing import Any
 

@@ -1,6 +1,6 @@
 """Rows of a running machine for a watch: a tap on its ring, found again when the machine is restarted.
 
-The tap reads shared memory and asks nobody for anything, so that whoever watches cannot hold up the loop.
+The tap only reads shared memory, so that a watch cannot delay the loop.
 """
 
 import json
@@ -15,21 +15,21 @@ from rtctl.daemon import shared_memory
 from rtctl.daemon.client import Client
 from rtctl.daemon.tap import Tap
 
-LOOK = 1.0  # s between two looks for a daemon that has gone
-STILL = 3.0  # s of the wall clock without a row, after which the rows are missed
+LOOK = 1.0  # s between two searches for a daemon that has gone
+STILL = 3.0  # s of the wall clock without a row, after which the rows count as missing
 
 
 class Taken(NamedTuple):
-    """What came of one look."""
+    """Result of one read of the ring."""
 
     rows: np.ndarray | None  # None where there is no machine
     lost: int = 0
-    begun: bool = False  # of another run than those before
+    begun: bool = False  # whether the rows are of another run than the last rows
     notes: tuple[str, ...] = ()
 
 
 class Source:
-    """Rows of the machine that `client` commands, by `take`. `case` is that of its recordings."""
+    """Rows of the machine that `client` commands, by `take`. `case` is the case of its recordings."""
 
     def __init__(self, client: Client, clock: Callable[[], float] = time.monotonic):
         self._client, self._clock = client, clock
@@ -42,7 +42,7 @@ class Source:
         self.status: dict[str, Any] = {}
 
     def begin(self) -> None:
-        """Find the ring. Raises UserError where no daemon answers or its ring is out of sight."""
+        """Find the ring. Raises UserError where no daemon answers or its ring cannot be read."""
         self.status = self._client.call("status")
         ring = self._client.call("signals")["ring"]
         try:
@@ -57,7 +57,7 @@ class Source:
         self._pid, self._lost, self._heard, self._still = self.status["pid"], 0, self._clock(), False
 
     def take(self) -> Taken:
-        """Rows since the last call, oldest first, with those lost before them."""
+        """Rows since the last call, oldest first, with the number of rows lost before them."""
         now = self._clock()
         if self._tap is None:
             return self._again(now)

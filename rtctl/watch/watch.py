@@ -1,7 +1,7 @@
-"""The watch of a running machine: a process of its own that reads its rows, judges them, and tells the daemon.
+"""Watch of a running machine: a separate process that reads its rows, judges them, and reports to the daemon.
 
-Nothing here is waited for by loop or daemon: rows come through a tap, reports go through the command socket, captures
-are the daemon's, and a diagnosis is a process of the lowest priority.
+Neither loop nor daemon waits for the watch: rows come through a tap, reports go through the command socket, the daemon
+makes the captures, and a diagnosis is a process of the lowest priority.
 """
 
 import contextlib
@@ -22,15 +22,15 @@ from rtctl.watch.source import Source
 
 TURN = 0.25  # s between two looks at the ring
 TELL = 1.0  # s between two reports
-QUIETER = 5  # nice of this process above that of who started it
-NOTES = 8  # kept
+QUIETER = 5  # niceness of this process above that of its parent
+NOTES = 8  # latest notes that are kept
 
 
 class Watch:
     """Watches the machine of `client` until `turn` is no longer called. `say` gets one-line messages.
 
-    `model` is a config whose machine and physics take the place of the owner's; `band` a file of a band that was
-    learned before, or to which one is written. Raises UserError where the machine cannot be watched.
+    `model` is a config whose machine and physics replace the nominal model; `band` is a file with a band that was
+    learned before, or a new file for the band. Raises UserError where the machine cannot be watched.
     """
 
     def __init__(self, client: Client, say: Callable[[str], None], model: Path | None = None, band: Path | None = None,
@@ -77,7 +77,7 @@ class Watch:
                 self.background.close()
 
     def turn(self) -> None:
-        """Take in what has come, go on with captures and diagnoses, and tell the daemon when it is time."""
+        """Process new rows, poll capture and diagnosis, and report to the daemon when a report is due."""
         taken = self.source.take()
         for note in taken.notes:
             self._note(note)
@@ -99,7 +99,7 @@ class Watch:
             self.tell()
 
     def tell(self) -> None:
-        """Report to the daemon, and say what has changed."""
+        """Report to the daemon, and print changes."""
         self._told = time.monotonic()
         state = self.monitor.state
         if state != self._state:
@@ -111,7 +111,7 @@ class Watch:
             self.say(f"the daemon did not take the report: {error}")
 
     def _anew(self) -> None:
-        """A machine that was started anew: the band stays where its model is the same."""
+        """Continue with a restarted machine; the band stays where the model is unchanged."""
         before = self.monitor
         if identity(self.source.case, self._model) == identity(before.case, self._model):
             self.monitor = Monitor(self.source.case, self._model, self._seconds, before.band)
@@ -124,7 +124,7 @@ class Watch:
     def _alarmed(self, alarm: Alarm) -> None:
         self._alarms += 1
         self.say(f"t = {alarm.t:.0f} s: the machine departs from its model, from {alarm.began:.0f} s on: {alarm.words}")
-        if self.alarm is not None:  # the first one stands, and what is found out about it
+        if self.alarm is not None:  # the first alarm and its diagnosis are kept
             return
         self.alarm = {"t": alarm.t, "words": alarm.words}
         name = self.source.status["name"]

@@ -1,8 +1,8 @@
 """Windows of a running machine: residuals, missing forces and motion in even pieces of time.
 
-A window is ten slow blocks. A slow block is the time over which the diagnosis averages what is slow (three time
-constants of the observer), so that neighbours are nearly independent. Residuals are averaged to the rate at which the
-diagnosis makes them white (likelihood.RATE), whatever the rate of the loop.
+A window is ten slow blocks. A slow block is the averaging time of slow signals in the diagnosis (three time constants
+of the observer), so that neighbouring blocks are nearly independent. Residuals are averaged to the rate at which the
+diagnosis whitens them (likelihood.RATE), whatever the rate of the loop.
 """
 
 from typing import NamedTuple
@@ -13,8 +13,8 @@ from rtctl.diagnose.likelihood.likelihood import FORGET, RATE
 from rtctl.watch.observer import Observer
 
 BLOCKS = 10  # slow blocks in a window
-STEPS = 3.0  # of a sensor in a slow block: less is rest
-SLIGHT = 0.02  # of the usual step of the reference in a slow block: less is a reference that rests
+STEPS = 3.0  # steps of a sensor in a slow block, below which the body is at rest
+SLIGHT = 0.02  # of the usual step of the reference in a slow block, below which the reference is at rest
 
 
 class Shape(NamedTuple):
@@ -43,7 +43,7 @@ class Batch(NamedTuple):
     force: np.ndarray  # (windows, BLOCKS, followed) correction, N or Nm at the followed bodies
     v: np.ndarray  # (windows, BLOCKS, followed) speed of the followed readings, SI
     a: np.ndarray  # (windows, BLOCKS, followed) their acceleration
-    asked: np.ndarray  # (windows, BLOCKS) change of the reference in each block, its unit; 0 where nobody knows it
+    asked: np.ndarray  # (windows, BLOCKS) change of the reference in each block, its unit; 0 where it is unknown
     late: np.ndarray  # (windows,) s, largest error of the time of a row or of the age of its sample
 
     @property
@@ -57,7 +57,7 @@ class Batch(NamedTuple):
 
 
 def joined(batches: list[Batch]) -> Batch:
-    """Several batches as one. Raises ValueError where there is none."""
+    """Several batches as one batch. Raises ValueError for an empty list."""
     return Batch(*(np.concatenate(parts) for parts in zip(*batches, strict=True)))
 
 
@@ -75,11 +75,11 @@ class Cutter:
         self._observer, self.shape = observer, shape_of(observer)
         self._followed = observer.followed
         self._settle = int(np.ceil(FORGET / observer.sim.follow / self.shape.seconds)) + 1  # windows
-        self.away = 0  # times that the model ran away
+        self.away = 0  # divergences of the model
         self.restart()
 
     def restart(self) -> None:
-        """Rows that come next do not follow those before."""
+        """Begin a new stretch: the next rows do not follow the last rows."""
         self._observer.restart()
         self._parts: list[tuple[np.ndarray, ...]] = []
         self._waiting = 0
@@ -89,8 +89,8 @@ class Cutter:
     def feed(
         self, t: np.ndarray, u: np.ndarray, y: np.ndarray, ref: np.ndarray, late: np.ndarray | float = 0.0
     ) -> Batch | None:
-        """Windows that are whole by now, None where there is none; times (n,), commands (n, drives), readings (n,
-        sensors), reference (n,) and errors of time (n,) in s follow those before."""
+        """Windows that are complete, None without one. Times (n,), commands (n, drives), readings (n, sensors),
+        reference (n,) and errors of time (n,) in s follow the last rows."""
         self._parts.append((t, u, y, ref, np.broadcast_to(np.asarray(late, float), t.shape)))
         self._waiting += len(t)
         length = self.shape.window
@@ -102,7 +102,7 @@ class Cutter:
         self._parts = [tuple(part[whole:] for part in (t, u, y, ref, late))]
         self._waiting -= whole
         steps = [self._observer.step(u[k : k + length], y[k : k + length]) for k in range(0, whole, length)]
-        e, push = (np.concatenate(part) for part in zip(*steps, strict=True))  # one by one, whatever came at a time
+        e, push = (np.concatenate(part) for part in zip(*steps, strict=True))  # one by one, for any chunk
         worst = np.abs(late[:whole]).reshape(count, length).max(axis=1)
         batch = self._cut(t[:whole], e, push, y[:whole], ref[:whole], worst)
         keep = np.isfinite(batch.e).all(axis=(1, 2))

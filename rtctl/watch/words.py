@@ -1,4 +1,4 @@
-"""Sentence of an alarm: where, what, how large, in the words of the report of a diagnosis."""
+"""Sentence of an alarm: place, effect and size, in the terms of the report of a diagnosis."""
 
 from rtctl.diagnose.answer.si_format import nice
 from rtctl.diagnose.answer.words import channel_unit, here
@@ -7,13 +7,13 @@ from rtctl.watch.band import ALONG, Band, Measure
 from rtctl.watch.observer import Observer
 from rtctl.watch.windows import Batch
 
-WAYS = {  # what a missing force is proportional to, for more of it and for less
+WAYS = {  # regressor of a missing force, for a positive and a negative coefficient
     "push": ("a push that the model does not have", "a push backwards that the model does not have"),
     "direction": ("less resistance to the motion than the model has", "resistance to the motion that the model lacks"),
     "speed": ("less drag than the model has", "drag that grows with speed and that the model lacks"),
     "acceleration": ("less inertia than the model has", "inertia that the model lacks"),
 }
-OFF = {  # how the error of a reading goes with the motion
+OFF = {  # regressor of the error of a reading
     "push": "always the same way",
     "direction": "the other way with the direction of motion",
     "speed": "in proportion to the speed",
@@ -27,7 +27,7 @@ def force_unit(observer: Observer, number: int) -> str:
 
 
 def sentence(observer: Observer, band: Band, measure: Measure, windows: Batch) -> str:
-    """One sentence on what has risen in the windows (n,) that made an alarm."""
+    """One sentence on the measure that has risen in the windows (n,) of an alarm."""
     machine = observer.sim.case.machine
     k = band.sensors.index(measure.of)
     if measure.what == "noise":

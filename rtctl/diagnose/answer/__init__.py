@@ -1,1 +1,1 @@
-"""What a reader gets: words, figures, report, model, config, experiment, free run."""
+"""Results of a diagnosis: words, figures, report, model, config, experiment, free run."""

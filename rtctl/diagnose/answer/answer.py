@@ -1,4 +1,4 @@
-"""Answer of a diagnosis: verdict, effects with sizes, where it lives, held-out errors, what cannot be told."""
+"""Answer of a diagnosis: verdict, effects with sizes, location, held-out errors, untestable effects."""
 
 import time
 from pathlib import Path
@@ -28,14 +28,14 @@ from rtctl.diagnose.search.doubts import doubted
 from rtctl.diagnose.search.search import Found, Progress, search
 from rtctl.plants.physics import TERMS
 
-SEEN = 5.0  # standard deviations that a typical size must make beside the nominal parameters to be testable
-TOLD = 0.05  # probability from which on a rival is told in the headline
+SEEN = 5.0  # standard deviations: least signal of a typical size, beside the nominal parameters, of a testable effect
+TOLD = 0.05  # probability from which on the headline reports a rival
 
 
 class GraphDiagnosis(NamedTuple):
-    """What a recording of a described machine says."""
+    """Diagnosis of recordings of a described machine."""
 
-    record: GraphRecord  # of several that of the longest way, which the figures show
+    record: GraphRecord  # of several recordings the one with the longest travel, which the figures show
     found: Found
     decided: Verdict
     effects: tuple[Effect, ...]
@@ -43,31 +43,31 @@ class GraphDiagnosis(NamedTuple):
     parameters: dict[str, Interval]
     heldout: Heldout
     cannot_test: tuple[str, ...]
-    predictor: Fitted  # the model that runs freely best, which may have effects of which the verdict is not sure
+    predictor: Fitted  # the model with the best free run; its effects may be improbable in the verdict
     seconds: float
     records: tuple[GraphRecord, ...]
     planned: Planned = Planned()
 
     @property
     def experiment(self) -> dict[str, Any] | None:
-        """The separating experiment as in diagnosis.json; None where there is none."""
+        """Separating experiment as in diagnosis.json; None where there is none."""
         found = self.planned.experiment
         return None if found is None else found.as_dict()
 
     @property
     def nominal(self) -> dict[str, float]:
-        """The owner's values by path and by symbol, those of one recording by path and recording."""
+        """Nominal values by path and by symbol, values of one recording by path and recording, SI."""
         values, called = dict(self.found.base.space.owner.base), self.record.case.called
         return values | {called[path]: value for path, value in values.items() if path in called}
 
     @property
     def verdict(self) -> str:
-        """named, ambiguous, unnamed or nothing."""
+        """Verdict: named, ambiguous, unnamed or nothing."""
         return self.decided.verdict
 
     @property
     def headline(self) -> str:
-        """The verdict in one sentence or two."""
+        """Verdict in one or two sentences."""
         machine, model = self.record.case.machine, self.decided.best.model
         if self.verdict == NOTHING:
             return "Nothing is missing that this recording shows: the description follows it down to the noise."
@@ -87,7 +87,7 @@ class GraphDiagnosis(NamedTuple):
         return f"{text} is missing, most probably {self._open()}."
 
     def _open(self) -> str:
-        """The effects of which an ambiguous answer is not sure, with their odds, and what may be there instead."""
+        """Uncertain effects of an ambiguous answer with their probability, and their alternatives, in words."""
         machine = self.record.case.machine
         open_ = [e for e in self.effects if e.confidence < SURE]
         names = " and ".join(words.called(machine, f"{e.name}:{e.node}") for e in open_)
@@ -105,7 +105,7 @@ class GraphDiagnosis(NamedTuple):
         return said + (f", or {what} ({100 * nameless:.0f} %)" if nameless >= TOLD else "")
 
     def as_json(self) -> dict[str, Any]:
-        """diagnosis.json in the form of the exchange format."""
+        """Content of diagnosis.json in the exchange format."""
         return {
             "verdict": self.verdict,
             "headline": self.headline,
@@ -143,7 +143,7 @@ class GraphDiagnosis(NamedTuple):
 
 
 def diagnose(*folders: Path | str, progress: Progress = lambda _: None) -> GraphDiagnosis:
-    """Diagnose the bundle of a described machine, or several of one machine together.
+    """Diagnosis of a bundle of a described machine, or of several bundles of one machine together.
 
     Raises UserError for a bundle that cannot be read and NoAnswer for one that supports no verdict.
     """
@@ -151,11 +151,11 @@ def diagnose(*folders: Path | str, progress: Progress = lambda _: None) -> Graph
 
 
 def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) -> GraphDiagnosis:
-    """As `diagnose`, for records in memory."""
+    """Diagnosis of records in memory, as by `diagnose`."""
     began = time.monotonic()
-    with threadpool_limits(1):  # small matrices: threads of the linear algebra would only stand in each other's way
+    with threadpool_limits(1):  # threads of linear algebra slow down small matrices
         like, space = together(records)
-        if any(part.sim.record.edges for part in like.parts):  # a model that follows the others tells their directions
+        if any(part.sim.record.edges for part in like.parts):  # a model under the observer decodes their directions
             progress("telling the directions of edges")
             like = like.directed(refit(like, space).model)
         found = search(likelier(like, space), space, progress)
@@ -190,7 +190,7 @@ def diagnose_record(*records: GraphRecord, progress: Progress = lambda _: None) 
 
 
 def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
-    """Effects of the verdict, with sizes of a model that has all of them."""
+    """Effects of the verdict, with sizes from a model that has all of them."""
     if decided.verdict not in (NAMED, AMBIGUOUS):
         return ()
     best, spread = decided.best, half_widths(numbers)
@@ -244,7 +244,7 @@ def _located(found: Found, decided: Verdict, effects: tuple[Effect, ...]) -> Loc
 
 
 def _cannot(found: Found) -> list[str]:
-    """Hypotheses of which a typical size would not show beside the nominal parameters."""
+    """Hypotheses whose typical size is not significant beside the nominal parameters."""
     norms: dict[str, float] = {}
     for score in found.scores:
         norms[score.hypothesis.name] = max(norms.get(score.hypothesis.name, 0.0), score.norm)

@@ -1,4 +1,4 @@
-"""Records under the machine and the physics of a config in the place of what their owner believes."""
+"""Records under the machine and the physics of a config, which replace the nominal model."""
 
 from pathlib import Path
 
@@ -12,11 +12,10 @@ from rtctl.plants.graph.file import read_machine
 
 
 def believing(record: GraphRecord, path: Path | str) -> GraphRecord:
-    """The record of a described machine under machine and physics of a config or a bare description.
+    """Record of a described machine under machine and physics of a config or a bare description.
 
-    All else is as in its case.
-
-    Raises UserError where the file cannot be read or is of a machine with other elements.
+    The rest of its case is unchanged. Raises UserError where the file cannot be read or is of a machine with other
+    elements.
     """
     file = find(str(path))
     told = read_machine(file)
@@ -30,7 +29,7 @@ def believing(record: GraphRecord, path: Path | str) -> GraphRecord:
 
 
 def check_believed(record: GraphRecord) -> None:
-    """Raise UserError where the owner does not say what a simulation cannot do without, and a recording would give."""
+    """Raise UserError where the case lacks a parameter that a simulation needs and a fit would estimate."""
     source = record.source
     if source is None:
         return

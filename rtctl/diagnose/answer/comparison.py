@@ -1,4 +1,4 @@
-"""Comparison of a simulation with a recording: both signals of each channel, and their distance."""
+"""Comparison of a simulation with a recording: both signals of each channel, and their rms difference."""
 
 from typing import Any, NamedTuple
 
@@ -8,7 +8,7 @@ NAMES = {False: "open loop", True: "closed loop"}
 
 
 class Channel(NamedTuple):
-    """Both signals over the rows that count."""
+    """Recorded and simulated signal over the rows that count."""
 
     recorded: np.ndarray  # (n,)
     simulated: np.ndarray
@@ -16,12 +16,12 @@ class Channel(NamedTuple):
 
     @property
     def rmse(self) -> float:
-        """Root mean square of the difference."""
+        """Root mean square of the difference, in `unit`."""
         return float(np.sqrt(np.mean((self.simulated - self.recorded) ** 2)))
 
     @property
     def nrmse(self) -> float:
-        """By the standard deviation of the recorded signal over the same rows; nan where that stands still."""
+        """Rmse by the standard deviation of the recorded signal; nan where the recorded signal is constant."""
         spread = float(np.std(self.recorded))
         return self.rmse / spread if spread > 0.0 else float("nan")
 
@@ -32,7 +32,7 @@ class Comparison(NamedTuple):
     t: np.ndarray  # (n,) s
     channels: dict[str, Channel]
     closed: bool  # whether a law closed the loop; False: the recorded commands were the input
-    skipped: int  # rows at the start that do not count
+    skipped: int  # rows at the start that are excluded
 
     @property
     def mode(self) -> str:
@@ -40,7 +40,7 @@ class Comparison(NamedTuple):
         return NAMES[self.closed]
 
     def as_json(self) -> dict[str, Any]:
-        """What `rtctl simulate --json` prints."""
+        """Output of `rtctl simulate --json`."""
         return {
             "rmse": {name: c.rmse for name, c in self.channels.items()},
             "nrmse": {name: c.nrmse for name, c in self.channels.items()},

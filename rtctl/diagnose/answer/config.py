@@ -1,7 +1,7 @@
 """Model of a described machine as a config, and back: `machine:` with fitted numbers and `plant.physics` with effects.
 
-A config of any described machine, a bare description and the file written here are read alike, so that what one
-diagnosis found is what the next one believes (`rtctl import --machine model.yaml`).
+A config of any described machine, a bare description and the written file are read alike: the model of one diagnosis
+can be the nominal model of the next (`rtctl import --machine model.yaml`).
 """
 
 import re
@@ -26,13 +26,13 @@ from rtctl.plants.graph.file import checked
 from rtctl.plants.graph.mechanics import code_of
 
 NO_NAME = "machine"
-CHANGED = 5e-4  # share of a value below which it has not changed
+CHANGED = 5e-4  # share of a value: least change that is reported
 
 
 def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Plain data of a config with the fitted numbers, each with its unit, and the terms of physics.
+    """Config as plain data with the fitted numbers, each with its unit, and the terms of physics.
 
-    `config` is the recorded machine's own, where our daemon made the recording: the rest stays as it was.
+    `config` is that of the recorded machine, where rtctl made the recording: its other keys are unchanged.
     """
     case = record.case
     machine = case.machine.model_dump(mode="json", exclude_unset=True)
@@ -46,7 +46,7 @@ def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] 
             value = float(f"{value:.6g}")
         _put(machine, path.split("."), _with_unit(value, value_unit(case.machine, path)))
     code = code_of(case.machine)
-    if code is not None:  # the path by which the user gave it, good from any folder
+    if code is not None:  # absolute path of the user's file
         machine["mechanics"]["kind"] = f"{code.file}:{code.name}"
     physics = [entry_of(term) for term in model._replace(base=values).resolved().terms]
     if config is not None:
@@ -67,9 +67,9 @@ def to_config(model: GraphModel, record: GraphRecord, config: Mapping[str, Any] 
 def write_model(
     model: GraphModel, record: GraphRecord, path: Path | str, config: Mapping[str, Any] | None = None
 ) -> Path:
-    """Write the config as YAML under a head that says where it comes from and what changed; its path.
+    """Path of the config, written as YAML under a head with its source and the changes.
 
-    Raises UserError where the machine would not be read again or the file cannot be written.
+    Raises UserError where the machine could not be read again or the file cannot be written.
     """
     data = to_config(model, record, config)
     code = data.get("own", {}) | texts(entry["term"] for entry in data["plant"]["physics"])
@@ -88,7 +88,7 @@ def _put(data: Any, path: list[str], value: Any) -> None:
     for key in outer:
         data = data[int(key)] if isinstance(data, list) else data.get(key)
         if data is None:
-            return  # a default that the owner did not write
+            return  # a default that the case does not contain
     if last in data:
         data[last] = value
 
@@ -101,7 +101,7 @@ def _drop(data: Any, path: list[str]) -> None:
 
 
 def _with_unit(value: float, unit: str) -> float | str:
-    """The number with its unit; bare where the unit is not one that a config reads."""
+    """Number with its unit; bare where a config does not read the unit."""
     if not unit:
         return value
     text = f"{value!r} {unit}"

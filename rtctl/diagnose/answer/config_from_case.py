@@ -1,7 +1,7 @@
-"""A config for a machine whose recording somebody else made: what of its case our own config has a place for.
+"""Config for a machine from the case of a recording that rtctl did not make.
 
-It starts from the config that comes with rtctl for this kind of machine. What it has no place for is said in words,
-which go into the head of the file.
+The config starts from the shipped config for this kind of machine. The head of the file lists parts of the case without
+a counterpart in a config.
 """
 
 from typing import Any
@@ -16,11 +16,11 @@ from rtctl.diagnose.record.format1 import Record
 from rtctl.laws import sections
 from rtctl.machines.exchange import digits
 
-FASTEST = 50e3  # Hz, of our loop
+FASTEST = 50e3  # Hz, highest rate of the loop of rtctl
 
 
 def carried(model: Model, record: Record) -> tuple[dict[str, Any], list[str]]:
-    """Plain data of a config without the model's own part, and a sentence on each thing that it has no place for."""
+    """Config as plain data, without the part of the model, and a sentence on each part of the case left out."""
     from rtctl import machines
 
     kind, case = record.plant, record.case
@@ -45,7 +45,7 @@ def carried(model: Model, record: Record) -> tuple[dict[str, Any], list[str]]:
 
 
 def _law(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]]:
-    """The law of the case, or one that stands in for it."""
+    """Law of the case, or a stand-in, as values by path; sentences on the parts left out."""
     changes, law = _limit(case), case.controller
     if isinstance(law, TapeLaw):
         more, left = _with_tape(law)
@@ -65,7 +65,7 @@ def _law(model: Model, case: Case, dt: float) -> tuple[dict[str, Any], list[str]
 
 
 def _with_tape(law: TapeLaw) -> tuple[dict[str, Any], list[str]]:
-    """Law of two motors that pull at a tape."""
+    """Law of two motors that pull at a tape, as values by path; sentences on the parts left out."""
     position: dict[str, Any] = {"gain": max(law.P, 0.0), "tau_d": digits(law.D / law.P) if law.P > 0 else 0.0}
     if law.derivative_filter_hz is not None:
         position["derivative_filter"] = law.derivative_filter_hz

@@ -1,8 +1,8 @@
-"""Closed loop of our own recordings: the machine of their config with a model as its plant, on virtual time.
+"""Emulation of a recording by rtctl in closed loop: the machine of its config with a model as plant, on virtual time.
 
-The loop is the generated tick of that config, told at each tick what the recording's journal says it was told. So the
-law is what it was, to the bit, an own file's too, where the user gives that file by path; code that came with the
-recording is never run.
+The loop is the generated tick of the config, with the orders from the journal of the recording. The law is equal to the
+recorded one to the bit, also a law of a user file that is given by path; code that came with the recording is never
+run.
 """
 
 from typing import Any
@@ -27,11 +27,11 @@ from rtctl.own.files import OwnError
 from rtctl.trace.bundle import Bundle
 from rtctl.trace.orders import Order, orders, restore
 
-NEEDED = ("tick", "order", "link_age")  # columns of every recording of our own
+NEEDED = ("tick", "order", "link_age")  # columns of every recording by rtctl
 
 
 def can_emulate(bundle: Bundle) -> bool:
-    """Whether a bundle is a recording of our own, complete from its first tick on."""
+    """Whether a bundle is a recording by rtctl, complete from its first tick on."""
     columns = bundle.columns
     if not isinstance(bundle.case.get("config"), dict) or any(name not in columns for name in NEEDED):
         return False
@@ -43,7 +43,7 @@ def emulate(bundle: Bundle, record: GraphRecord) -> tuple[dict[str, np.ndarray],
     """Readings (n,) by sensor, SI, and commands (n, drives) at the rows of `record`, the loop closed by the config
     around the nominal model of the record's case.
 
-    Raises UserError where the config cannot be built, as where an own file was not given, and NoAnswer where the
+    Raises UserError where the config cannot be built, for example without a user file, and NoAnswer where the
     emulated machine trips.
     """
     config = config_of(bundle, record)
@@ -68,7 +68,7 @@ def emulate(bundle: Bundle, record: GraphRecord) -> tuple[dict[str, np.ndarray],
 
 
 def config_of(bundle: Bundle, record: GraphRecord) -> dict[str, Any]:
-    """Plain data of the bundle's config, in fused mode, with the nominal model of the record's case as its plant."""
+    """Config of the bundle as plain data, in fused mode, with the nominal model of the record's case as its plant."""
     config, case = dict(bundle.case["config"]), record.case
     plant = {key: value for key, value in dict(config.get("plant") or {}).items() if key != "fmu"}
     if record.source is not None:
@@ -81,7 +81,8 @@ def config_of(bundle: Bundle, record: GraphRecord) -> dict[str, Any]:
 
 
 def _columns(rows: np.ndarray, bundle: Bundle, record: GraphRecord) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """The recorded readings plus what the emulated columns differ from the recorded ones, and the commands."""
+    """Readings (n,) by sensor, SI: the recorded ones plus the difference of the emulated from the recorded columns; and
+    commands (n, drives)."""
     source, machine = record.source, record.case.machine
     columns = bundle.columns if source is None else source.columns
     ticks = columns["tick"].astype(np.int64)
@@ -97,7 +98,7 @@ def _columns(rows: np.ndarray, bundle: Bundle, record: GraphRecord) -> tuple[dic
 
 
 def _machine(bundle: Bundle, config: dict[str, Any], changed: dict[str, Any] | None = None) -> Machine:
-    """The machine of a config with other values by dotted path."""
+    """Machine of a config with other values by dotted path."""
     kind: Any = None
     try:
         kind, data = machines.widened(config)

@@ -1,10 +1,10 @@
-"""Experiment to run next where a recording leaves several models probable.
+"""Experiment design where a recording leaves several models probable: T-optimality.
 
-Each rival in turn is the machine: with every motion of a menu its closed loop is simulated, and what its sensors would
-record is judged as a recording is, by the likelihood of each other rival under the tracking observer, with the noise
-that the recording showed. A rival may refit its own parameters and the nominal ones to it. The loss that remains is the
-expected gain in log probability of the right rival, in nats. The motion with the largest gain between the least
-distinct pair is the experiment: T-optimality.
+Each rival in turn is the machine: its closed loop is simulated with every motion of a menu. The simulated recording is
+judged by the likelihood of each other rival under the tracking observer, with the noise of the real recording. A rival
+may refit its own and the nominal parameters to the simulated recording. The remaining loss is the expected gain in log
+probability of the right rival, in nats. The experiment is the motion with the largest gain between the least distinct
+pair.
 
 Source: Atkinson & Fedorov, The design of experiments for discriminating between two rival models, Biometrika 62 (1975).
 """
@@ -38,20 +38,20 @@ from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.plants.graph.description import Description
 
-CLEAR = math.log(SURE / (1.0 - SURE))  # nats, from which one of two rivals is named
-NEAR = 0.5 * (1.0 - SURE)  # probability from which a rival is left
+CLEAR = math.log(SURE / (1.0 - SURE))  # nats, least gain with which one of two rivals is named
+NEAR = 0.5 * (1.0 - SURE)  # least probability of a rival
 
 
 class Planned(NamedTuple):
-    """What to do next: an experiment, or a sentence on why there is none; neither where one model is left."""
+    """Plan of the next recording: an experiment, or the reason for none; neither where one model is probable."""
 
     experiment: Experiment | None = None
     untold: str = ""
 
 
 class Trial(NamedTuple):
-    """Gains (rivals, rivals) in nats of row over column where the row's model is the machine, and the number of
-    innovations; or the trouble for which a motion cannot be run."""
+    """Gains (rivals, rivals) in nats of the row's model, which is the machine, over the column's, and the number of
+    innovations; or the reason why a motion cannot be run."""
 
     gains: np.ndarray
     size: int
@@ -59,7 +59,7 @@ class Trial(NamedTuple):
 
 
 def planned(record: GraphRecord, decided: Verdict) -> Planned:
-    """The experiment that tells apart the models that a verdict leaves probable."""
+    """Experiment that separates the probable models of a verdict."""
     rivals = left(decided)
     if len(rivals) < 2 or record.case.problem != "driven" or not record.case.machine.drives:
         return Planned()
@@ -76,7 +76,7 @@ def planned(record: GraphRecord, decided: Verdict) -> Planned:
 
 
 def left(decided: Verdict) -> tuple[Fitted, ...]:
-    """Models that are still probable, at most three, the most probable first."""
+    """Probable models, at most three, the most probable first."""
     fits: dict[tuple[str, ...], Fitted] = {}
     for rival in decided.table:
         if not rival.unlisted:
@@ -85,9 +85,9 @@ def left(decided: Verdict) -> tuple[Fitted, ...]:
 
 
 def design(record: GraphRecord, rivals: Sequence[Fitted], best: Fitted) -> Experiment:
-    """The motion of the menu that tells the rivals apart best, within what the machine did in the recording.
+    """Experiment with the motion of the menu that separates the rivals best, within the limits of the recorded motion.
 
-    `best` says what the noise is. Raises NoAnswer where no motion stays within the limits.
+    The noise is that of `best`. Raises NoAnswer where no motion stays within the limits.
     """
     bench = Bench(record, best)
     labels = [" + ".join(f.names) or "nothing" for f in rivals]
@@ -120,7 +120,7 @@ def design(record: GraphRecord, rivals: Sequence[Fitted], best: Fitted) -> Exper
 
 
 class Bench:
-    """A recorded machine on which experiments are simulated."""
+    """Recorded machine on which experiments are simulated."""
 
     def __init__(self, record: GraphRecord, best: Fitted):
         self.record, self.noise = record, best.like.parts[0]
@@ -129,7 +129,7 @@ class Bench:
 
     @cached_property
     def limits(self) -> Limits:
-        """Travel, speed and command of the recording, from the sensor on which the loop closes."""
+        """Limits of travel, speed and command of the recording, from the feedback sensor."""
         record, at = self.record, self.loop
         most = at.limit if math.isfinite(at.limit) else float(np.abs(record.u).max()) / FULL
         drive = next(iter(record.case.machine.drives.values()))
@@ -138,7 +138,7 @@ class Bench:
         return limits_in(x, record.dt, at.unit, drive.unit, grain, FULL * most, SPEED_OVER)
 
     def trial(self, motion: Motion, rivals: Sequence[Fitted]) -> Trial:
-        """What one motion is expected to tell."""
+        """Expected gains of one motion between the rivals."""
         count, likes = len(rivals), []
         for f in rivals:
             sim, trouble = self.recorded(motion, f.model)
@@ -149,7 +149,7 @@ class Bench:
         return Trial(remains - np.diag(remains)[:, None] if count else remains, likes[0].size)
 
     def recorded(self, motion: Motion, model: GraphModel) -> tuple[Simulator | None, str]:
-        """The recording of a motion on a machine that is the model; None and why where it cannot be made."""
+        """Simulated recording of a motion on the machine of a model; None and the reason where it cannot be made."""
         record, at, limits = self.record, self.loop, self.limits
         n = round(motion.seconds / record.dt)
         t = np.arange(n) * record.dt
@@ -174,7 +174,7 @@ class Bench:
         return (made.directed(model) if edges else made), ""
 
     def trouble(self, out: np.ndarray, volts: np.ndarray, limits: Limits, first: float) -> str:
-        """Why a motion cannot be run on the machine; "" where it can."""
+        """Reason why a motion cannot be run on the machine; "" where it can."""
         if not np.isfinite(out).all():
             return "a rival runs away"
         most = float(np.abs(volts).max())
@@ -188,18 +188,18 @@ class Bench:
         return ""
 
     def judge(self, sim: Simulator) -> Likelihood:
-        """Likelihood of a simulated recording, with the noise that the real one showed."""
+        """Likelihood of a simulated recording, with the noise of the real recording."""
         known = dict(zip(self.noise.sim.channels, self.noise.noise, strict=True))
         sim = copy(sim)
         sim.channels = [name for name in sim.channels if name in known]
         noise = [known[name].averaged() for name in sim.channels]
-        if len(noise) < len(known):  # what a sensor tells of the others is told by its place among them
+        if len(noise) < len(known):  # cross terms of the noise go by the order of the sensors
             noise = [one._replace(beside=()) for one in noise]
         return Likelihood(sim, noise)
 
 
 def remaining(like: Likelihood, f: Fitted) -> float:
-    """Half the sum of squares, nats, that a fitted model leaves of a recording once all its numbers suit that best."""
+    """Half the sum of squares of innovations and prior, nats, of a model refitted to a recording in one step."""
     power = coarsened(like.size)
     J = derivatives(like, f.space, f.x, range(len(f.x)))
     linear = Linear(f._replace(like=like, e=like.raw(f.model), J=J))
@@ -212,7 +212,7 @@ def remaining(like: Likelihood, f: Fitted) -> float:
 
 
 def counted(machine: Description, name: str, y: np.ndarray) -> np.ndarray:
-    """Reading (n,), SI, as a recording has it: of a counter the middle of its count."""
+    """Quantised reading (n,), SI: for a counter the middle of the count."""
     sensor = machine.sensors.get(name)
     if sensor is None or not sensor.grain:
         return y
@@ -227,7 +227,7 @@ def passed(machine: Description, name: str, y: np.ndarray) -> np.ndarray:
 
 
 def called(machine: Description, rivals: Sequence[Fitted]) -> list[str]:
-    """Rivals in words; effects that all of them have are left out where the rest tells them apart."""
+    """Rivals in words, without their common effects where the other effects distinguish the rivals."""
     common = set(rivals[0].names).intersection(*(f.names for f in rivals[1:]))
     parts = [[n for n in f.names if n not in common] for f in rivals]
     said = [" with ".join(words.called(machine, n) for n in part) or "no further effect" for part in parts]

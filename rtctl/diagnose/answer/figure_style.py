@@ -1,7 +1,7 @@
-"""Pictures of a diagnosis. Each function takes the diagnosis and its simulator and returns a matplotlib Figure.
+"""Style of the figures of a diagnosis: colours, panels, labels, thinning and SI prefixes.
 
-INK stands for the colour of the text around a figure: the report puts the page's own colour in its place, so that a
-figure reads on light and on dark paper. All other colours are of middle lightness for the same reason.
+The report replaces INK by the text colour of the page: a figure is legible on a light and on a dark page. All other
+colours have a middle lightness for legibility on both.
 """
 
 from typing import Any
@@ -14,13 +14,13 @@ from matplotlib.figure import Figure
 from rtctl.diagnose.answer import phrases as words
 
 INK, BEFORE, AFTER, SEEN, NOISE = "#1d1d1f", "#d9730d", "#1f83d6", "#84898f", "#84898f"
-POINTS = 1200  # about the pixels of a panel's width
-BINS = 36
+POINTS = 1200  # points of a curve, about the pixels of a panel's width
+BINS = 36  # bins of a curve of the missing force
 WIDTH = 7.2  # inches
 
 
 def new(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, np.ndarray]:
-    """A figure without a background and its panels, as an array of Axes."""
+    """Figure without a background, and its panels as an array (rows * columns,) of Axes."""
     figure = Figure((WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     figure.patch.set_alpha(0.0)
@@ -31,7 +31,7 @@ def new(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple
 
 
 def style(ax: Axes) -> None:
-    """Ink on nothing, with a faint grid."""
+    """Style a panel: text in INK, no background, a faint grid."""
     ax.set_facecolor("none")
     ax.tick_params(colors=INK, labelsize=9)
     for name, spine in ax.spines.items():
@@ -43,7 +43,7 @@ def style(ax: Axes) -> None:
 
 
 def label(ax: Axes, x: str = "", y: str = "", title: str = "") -> None:
-    """Words on a panel."""
+    """Label the axes of a panel, and set its title."""
     ax.set_xlabel(x, color=INK, fontsize=9.5)
     ax.set_ylabel(y, color=INK, fontsize=9.5)
     if title:
@@ -51,13 +51,13 @@ def label(ax: Axes, x: str = "", y: str = "", title: str = "") -> None:
 
 
 def legend(ax: Axes, **options: Any) -> None:
-    """Its legend, where there is something to name; above the panel, so that it hides nothing."""
+    """Draw the legend of a panel with labelled curves."""
     if ax.get_legend_handles_labels()[0]:
         ax.legend(**{"fontsize": 8.5, "frameon": False, "labelcolor": INK, **options})
 
 
 def thin(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest of each bucket, so that no peak is lost."""
+    """Thinned curve: lowest and highest value of each bucket, so that no peak is lost."""
     step = len(y) // POINTS
     if step < 3:
         return t, y

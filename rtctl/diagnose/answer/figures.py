@@ -1,4 +1,4 @@
-"""Pictures of a diagnosis of a described machine, in the style of rtctl/diagnose/answer/figure_style.py."""
+"""Figures of a diagnosis of a described machine, in the style of rtctl/diagnose/answer/figure_style.py."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,18 +18,18 @@ from rtctl.diagnose.evidence.diagnosis import NOTHING
 from rtctl.diagnose.evidence.hats import binned
 from rtctl.diagnose.likelihood.widths import Z90
 
-MOST_BARS = 8
-MOST_PANELS = 3
-OWN = 0.85  # of the tolerance's interval, from which on the recording says nothing of a parameter
-LEAST_BAR = 1e-4
-PLACES = ("position", "angle")  # axes along which both directions may differ
-FINER = 60  # bins along a place
-ALIKE = 2.0  # over the observer's bandwidth: rows whose errors count as one
-APART = 0.5  # of the largest, from which on they are drawn apart
+MOST_BARS = 8  # rivals in a figure
+MOST_PANELS = 3  # panels in a figure
+OWN = 0.85  # of the tolerance interval: least interval of a parameter that the recording does not identify
+LEAST_BAR = 1e-4  # probability below which a bar shows its power of ten
+PLACES = ("position", "angle")  # axes along which the directions of motion are drawn apart
+FINER = 60  # bins along position or angle
+ALIKE = 2.0  # over the observer's bandwidth: correlation time of the errors
+APART = 0.5  # of the largest value: least difference of the two directions that is drawn
 
 
 def missing_force(d: GraphDiagnosis) -> Figure:
-    """What the model lacks against the axis where it lives, binned, with the law that was found through it."""
+    """Figure of the missing force along the axis of each effect, binned, with the fitted law."""
     runs, panels = Missing(d), subjects(d)[:MOST_PANELS]
     figure, axes = new(0.4 + 3.0 * len(panels), len(panels), 1)
     for ax, (term, node, axis) in zip(axes, panels, strict=True):
@@ -91,7 +91,7 @@ def _curves(ax, d: GraphDiagnosis, runs: Missing, term: str, node: str, axis: st
 
 
 def _differ(found: dict[str, np.ndarray], row: int) -> bool:
-    """Whether a row of the curves (4, bins) depends on the direction of motion, with "" for both directions at once."""
+    """Whether a row of the curves (4, bins) depends on the direction of motion; the key "" holds both directions."""
     ways = [v[[0, row]][:, np.isfinite(v[0])] for k, v in found.items() if k]
     if len(ways) < 2 or min(v.shape[1] for v in ways) < 2:
         return False
@@ -107,7 +107,7 @@ def _middle(half: np.ndarray) -> float:
 
 
 def _spectrum(ax, runs: Missing, term: str, node: str) -> None:
-    """Missing force by frequency, without the effect and with it."""
+    """Spectrum of the missing force, without the effect and with the effect."""
     c = runs.of(term, node, "time")
     rate = 1.0 / runs.d.record.dt
     y, rest = c.y[runs.rows], (c.y - c.law)[runs.rows]
@@ -123,7 +123,7 @@ def _spectrum(ax, runs: Missing, term: str, node: str) -> None:
 
 
 def heldout(d: GraphDiagnosis) -> Figure:
-    """Residual of each sensor on rows that no fit saw, in units of its noise, before and after; the motion on top."""
+    """Figure of the held-out residual of each sensor, in units of its noise, before and after; the motion on top."""
     late = d.heldout.late.parts[0]
     sim, record = late.sim, late.sim.record
     names = sim.channels
@@ -157,7 +157,7 @@ def _unit(d: GraphDiagnosis, sensor: str) -> str:
 
 
 def posterior(d: GraphDiagnosis) -> Figure:
-    """Probability of each combination of effects, of the description alone, and of a force without a name."""
+    """Figure of the posterior of the combinations of effects, the nominal model alone, and unnamed effects."""
     bars = rivals(d)[:MOST_BARS]
     figure, (ax,) = new(0.8 + 0.33 * len(bars))
     for row, bar in enumerate(bars):
@@ -175,8 +175,8 @@ def posterior(d: GraphDiagnosis) -> Figure:
 
 
 def runner_up(d: GraphDiagnosis) -> Figure | None:
-    """Nats by which each part of the recording is more probable under the answer than under the next likeliest one;
-    None where no part says anything."""
+    """Figure of the gain in nats of the answer over the next likeliest one in each part of the recording; None where
+    all gains are zero."""
     lost = lost_by(d)
     if lost is None or not lost.nats.any():
         return None
@@ -190,7 +190,7 @@ def runner_up(d: GraphDiagnosis) -> Figure | None:
 
 
 def _folded(text: str, most: int = 44) -> str:
-    """A long text in two lines, at the plus or space next to its middle."""
+    """Text, a long one broken at the space next to its middle."""
     if len(text) <= most:
         return text
     gaps = [i for i, sign in enumerate(text) if sign == " "]
@@ -199,7 +199,7 @@ def _folded(text: str, most: int = 44) -> str:
 
 
 def parameters(d: GraphDiagnosis) -> Figure | None:
-    """Fitted numbers over the nominal ones with 90 % intervals; grey where the interval is the owner's tolerance."""
+    """Figure of the fitted over the nominal numbers with 90 % intervals; grey where the interval is the tolerance."""
     names = [path for path in d.parameters if not is_start(path)]
     if not names:
         return None
@@ -222,20 +222,20 @@ def parameters(d: GraphDiagnosis) -> Figure | None:
 
 
 def path_of(d: GraphDiagnosis, name: str) -> str:
-    """Path of a fitted number by the symbol or path under which it is told."""
+    """Path of a fitted number by its symbol or path."""
     called = d.record.case.called
     return next(path for path in d.found.base.space.names if called.get(path, path) == name)
 
 
 def untold(d: GraphDiagnosis, name: str) -> bool:
-    """Whether the interval of a fitted number is that of the owner's tolerance: the recording says nothing of it."""
+    """Whether the interval of a fitted number is its tolerance: the recording does not identify the number."""
     space = d.predictor.space
     weight = float(space.prior()[space.names.index(path_of(d, name))])
     v = d.parameters[name]
     if weight <= 0.0 or v.value == 0.0:
         return False
     ends = np.abs(np.log((v.low / v.value, v.high / v.value))) if v.low * v.high > 0 else np.inf
-    half = float(np.max(ends))  # the owner's own bound may cut off one of them
+    half = float(np.max(ends))  # the bound of the tolerance may cut off one end
     return half > OWN * Z90 / np.sqrt(weight)
 
 

@@ -1,4 +1,4 @@
-"""Files of a diagnosis by likelihood: verdict, model, separating experiment, torque over the turn, report."""
+"""Files of a diagnosis: verdict, model, separating experiment, torque over the turn, report."""
 
 import json
 from pathlib import Path
@@ -20,10 +20,10 @@ from rtctl.trace.bundle import load_case
 
 
 def write(d: GraphDiagnosis, folder: Path, report: bool = True, base: Path | None = None) -> list[str]:
-    """Write the files into `folder`; each is there whole or not at all.
+    """Sentences on the files, except diagnosis.json, that could not be made; all others are written into `folder`.
 
-    Where `base` is given, no link may lead out of it. Returns a sentence on each file but diagnosis.json that could not
-    be made: the verdict stands without them. Raises UserError where the disk does not take them.
+    Each file is written whole or not at all. Where `base` is given, no link may lead out of `base`. The verdict is
+    valid without the missing files. Raises UserError where the disk does not take the files.
     """
     faults: list[str] = []
     fresh(folder, base)
@@ -50,21 +50,21 @@ def write(d: GraphDiagnosis, folder: Path, report: bool = True, base: Path | Non
             put(folder / REPORT, lambda path: write_text(path, text))
         except UserError:
             raise
-        except Exception as error:  # a figure that fails must not take the verdict with it
+        except Exception as error:  # the verdict is written even if a figure fails
             faults.append(f"the report is not written: {told(error)[1]}")
     put(folder / RESULT, lambda path: write_text(path, json.dumps(finite(d.as_json()), indent=1) + "\n"))
     return faults
 
 
 def after(d: GraphDiagnosis) -> GraphModel:
-    """The model that was found; the nominal one where nothing was, which would take up what is missing."""
+    """Predictor of a diagnosis; the nominal model where nothing is named: a fit without the effect would be biased."""
     return d.predictor.model if d.verdict in (NAMED, AMBIGUOUS) else nominal(d.record.case)
 
 
 def write_model(d: GraphDiagnosis, path: Path) -> Path:
-    """Write the fitted model as the machine's config: of exchange format 1 by its parameters, else by a description.
+    """Path of the fitted model, written as config: of exchange format 1 by its parameters, else by a description.
 
-    Raises UserError where the machine would not be read again, or the file cannot be written.
+    Raises UserError where the machine could not be read again, or the file cannot be written.
     """
     record, model = d.record, d.predictor.model
     if record.source is not None:
@@ -73,7 +73,7 @@ def write_model(d: GraphDiagnosis, path: Path) -> Path:
 
 
 def experiment_yaml(d: GraphDiagnosis) -> str:
-    """The separating experiment as a config that `rtctl run` takes as it is. Raises UserError where that fails."""
+    """Separating experiment as the text of a config for `rtctl run`. Raises UserError where it cannot be made."""
     assert d.experiment is not None
     record, own = d.record, own_config(d)
     if own is not None:
@@ -87,7 +87,7 @@ def experiment_yaml(d: GraphDiagnosis) -> str:
 
 
 def own_config(d: GraphDiagnosis) -> dict[str, Any] | None:
-    """The config in case.json of a recording that our own daemon made; None of any other."""
+    """Config in case.json of a recording by rtctl; None of any other recording."""
     if d.record.source is None:
         return d.record.case.config
     case = load_case(d.record.case.file.parent)
@@ -96,7 +96,7 @@ def own_config(d: GraphDiagnosis) -> dict[str, Any] | None:
 
 
 def changes(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
-    """(key, nominal value, new value) of each key of the config that the model changes, the terms last."""
+    """Rows (key, nominal value, new value) of the keys of the config that the model changes, the terms last."""
     record, model = d.record, d.predictor.model
     if record.source is not None:
         return repair.between(known_model(nominal(record.case), record), known_model(model, record))

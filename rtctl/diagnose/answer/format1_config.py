@@ -1,7 +1,7 @@
-"""A model as the machine's config, and back: `rtctl run` and `rtctl plant` take it as it is.
+"""Model of a machine of exchange format 1 as its config, and back: `rtctl run` and `rtctl plant` accept the config.
 
-Of a recording by our own daemon, its config is taken and `plant.parameters` and `plant.physics` are replaced. Of any
-other one, the config is made from its case (see `carry`).
+For a recording by rtctl, `plant.parameters` and `plant.physics` of its config are replaced. For any other recording the
+config is made from its case (see `config_from_case`).
 """
 
 import math
@@ -31,14 +31,14 @@ from rtctl.own.model import without_code
 from rtctl.own.term import texts
 from rtctl.plants.physics import TERMS
 
-WIDTH = 110
+WIDTH = 110  # characters of a comment line
 
 
 def to_config(model: Model, record: Record, config: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Plain data of the machine's config with the model in it, SI, its values with six significant digits.
+    """Config of the machine with the model as plain data, SI, values with six significant digits.
 
-    `config` is what case.json of the recording holds under that name, where our own daemon made it. Raises UserError
-    where a value is out of its bounds.
+    `config` is the entry `config` in case.json of a recording by rtctl. Raises UserError where a value is out of its
+    bounds.
     """
     return _settings_data(model, record, config)[0]
 
@@ -50,11 +50,10 @@ def write_model(
     config: dict[str, Any] | None = None,
     left_out: Sequence[str] = (),
 ) -> Path:
-    """Write the config as YAML, its head saying where it comes from and what it lacks; arguments as `to_config`.
+    """Path of the config, written as YAML under a head with its source and omissions; arguments as for `to_config`.
 
-    `left_out` has a sentence on each number that was found and is not in the model, since it does not predict.
-
-    Raises UserError where a value is out of its bounds, where the machine cannot be built, or the file not written.
+    `left_out` has a sentence on each fitted number that is omitted because it does not improve the prediction. Raises
+    UserError where a value is out of its bounds, the machine cannot be built, or the file cannot be written.
     """
     from rtctl import machines
 
@@ -69,7 +68,7 @@ def write_model(
         terms = any(is_own(entry["term"]) for entry in data["plant"]["physics"])
         if not isinstance(error.__cause__, ForeignError) or terms:
             raise UserError(str(error)) from None
-        kind, data = without_code(machines.CONFIGS[model.kind], data)  # of a law that came with the data
+        kind, data = without_code(machines.CONFIGS[model.kind], data)  # without the code of a law in the data
         settings = _checked(data, kind)
     except ValueError as error:
         raise UserError(f"the model cannot be run: {error}") from error
@@ -82,9 +81,9 @@ def write_model(
 
 
 def write_turn(found: Turn, path: Path | str) -> Path:
-    """The torque over one turn as a table with a head: angle in rad, torque and half its 95 % band in Nm, visits.
+    """Path of the torque over one turn, written as a table: angle in rad, torque and half its 95 % band in Nm, visits.
 
-    Places where the axis never was have no torque. Raises UserError where the file cannot be written.
+    Unvisited places have no torque. Raises UserError where the file cannot be written.
     """
     path = Path(path)
     rows = zip(found.angle, found.torque, found.band, found.visits, strict=True)
@@ -101,9 +100,9 @@ def _number(value: float) -> str:
 
 
 def read_model(path: Path | str, record: Record) -> Model:
-    """The `plant` section of any config as a model of the recorded machine; the rest is as in the bundle's case.
+    """Model of the recorded machine from the `plant` section of any config.
 
-    `path` is a file or the name of a config that comes with rtctl. Raises UserError where it is of another machine.
+    `path` is a file or the name of a shipped config. Raises UserError where the config is of another machine.
     """
     from rtctl import machines
 
@@ -121,7 +120,7 @@ def read_model(path: Path | str, record: Record) -> Model:
 
 
 def plant_section(model: Model) -> dict[str, Any]:
-    """Keys `parameters` and `physics` of a config's `plant`, plain data in SI, with every digit."""
+    """Keys `parameters` and `physics` of the `plant` of a config as plain data, SI, with all digits."""
     exchange = exchange_of(model.kind)
     base = exchange.settings(model.base)
     return {
@@ -142,7 +141,7 @@ def _settings_data(model: Model, record: Record, config: dict[str, Any] | None) 
 
 
 def _parameters(model: Model) -> dict[str, float]:
-    """All of them, so that no named set and no default of a later version speaks with them."""
+    """All parameters of the plant, SI: the config then needs no named set and no default."""
     exchange = exchange_of(model.kind)
     base, fields = exchange.settings(model.base), exchange.parameters
     absent = [name for name, field in fields.model_fields.items() if name not in base and field.default]
@@ -154,7 +153,7 @@ def _parameters(model: Model) -> dict[str, float]:
 
 
 def entry_of(term: Settings) -> dict[str, Any]:
-    """One entry of `physics:`, what differs from the term's defaults only."""
+    """Entry of `physics:` with the settings that differ from the defaults of the term."""
     entry: dict[str, Any] = {"term": term.term, "node": term.node}  # type: ignore[attr-defined]
     settings = TERMS[entry["term"]].settings
     for name, field in settings.model_fields.items():

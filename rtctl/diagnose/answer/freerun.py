@@ -1,11 +1,11 @@
-"""How far a model's free run is from a recording, sensor by sensor.
+"""Free run of a model compared with a recording, sensor by sensor.
 
-In open loop the recorded commands are the input. A machine of one body begins at the position and speed from which it
-passes the first rows best: they are its whole state. Any other machine begins at rest where the first rows show that,
-else in the state that the observer has reached once it has forgotten what came before the recording.
+In open loop the recorded commands are the input. A machine of one body begins at the position and speed, its whole
+state, that fit the first rows best. Any other machine begins at rest where the first rows are at rest, else in the
+state of the observer after its transient.
 
-In closed loop the reference is the input: of our own recordings the tick of their config closes the loop, else the
-known law. What moves as it was recorded (kinematic, static) is predicted from the first row.
+In closed loop the reference is the input: the tick of the config closes the loop of a recording by rtctl, else the
+known law. A machine with a held motion (kinematic, static) is predicted from the first row.
 """
 
 import numpy as np
@@ -27,18 +27,18 @@ from rtctl.plants.graph.term_units import turns_at
 from rtctl.plants.graph.units import measured_unit
 from rtctl.trace.bundle import Bundle
 
-FIRST = 20  # rows that the first position and speed are taken from
-ROUNDS = 3  # of that: the error of so few rows is all but linear in them
-STILL = 5.0  # steps of the main sensor, of noise and vibration at rest
+FIRST = 20  # rows of the estimate of the first position and speed
+ROUNDS = 3  # Gauss-Newton steps of the estimate: the error of few rows is nearly linear
+STILL = 5.0  # resolutions of the main sensor: largest noise and vibration at rest
 COUNTS = "counts"  # unit of a counter's column
 
 
 def compare(record: GraphRecord, closed: bool | None = None, skip: int = 0, bundle: Bundle | None = None) -> Comparison:
-    """Simulate the machine of a record's case freely and compare it; where it was held or followed does not count.
+    """Comparison of a free run of the machine of a case with the record, without held or followed rows.
 
-    Closed from the reference, or open from the recorded commands; closed where the law is known and the recording has a
-    reference, or where the tick of the `bundle`'s config gave the command to the bit. Raises UserError where a loop
-    cannot be closed or `skip` leaves less than two rows, NoAnswer where the model runs away.
+    The loop is closed from the reference, or open from the recorded commands. For None it is closed where the law is
+    known and the recording has a reference, or where the tick of the `bundle`'s config gave the command to the bit.
+    Raises UserError where a loop cannot be closed or `skip` leaves less than two rows, NoAnswer for divergence.
     """
     n, sim = len(record.t), Simulator(record)
     around = loop_of(record)
@@ -62,7 +62,7 @@ def compare(record: GraphRecord, closed: bool | None = None, skip: int = 0, bund
         k = int(lost[0])
         raise NoAnswer(f"the model ran away at tick {k} ({record.t[k] - record.t[0]:.6g} s) in {NAMES[closed]}")
     readings = {name: out[:, sim.column(name)] for name in (*sim.channels, *record.edges)}
-    for name in record.edges:  # which count the way, in either direction
+    for name in record.edges:  # they count the motion in either direction
         readings[name] = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(readings[name])))])
     return _compared(sim, readings, volts, closed, skip)
 
@@ -81,7 +81,7 @@ def ticks_again(record: GraphRecord, bundle: Bundle | None, known: bool) -> bool
 
 
 def _why(record: GraphRecord, known: bool) -> str:
-    """Why no law closes the loop."""
+    """Reason why no law closes the loop."""
     said = next((warning for warning in record.case.warnings if INPUT in warning), "its law is not known")
     return "the recording has no reference" if known else said
 
@@ -89,7 +89,7 @@ def _why(record: GraphRecord, known: bool) -> str:
 def _open(sim: Simulator, model: GraphModel, skip: int) -> tuple[np.ndarray, int]:
     """Readings (n, sensors) under the recorded commands, and the first row that counts.
 
-    Where no controller wrote the commands they were held between their samples, or smooth: whichever suits better.
+    Commands that no controller wrote were held between their samples or smooth: the better fit is taken.
     """
     if sim.mode != TRACK:
         return sim.run(model), skip
@@ -97,7 +97,7 @@ def _open(sim: Simulator, model: GraphModel, skip: int) -> tuple[np.ndarray, int
     runs = [_freely(one, model, skip) for one in (sim, *([other] if other is not None else []))]
     column = sim.column(sim.main)
     errors = [float(np.mean((out[begin:, column] - sim.seen[begin:]) ** 2)) for out, begin in runs]
-    return runs[1] if len(runs) > 1 and errors[1] < errors[0] else runs[0]  # one that runs away is held
+    return runs[1] if len(runs) > 1 and errors[1] < errors[0] else runs[0]  # a diverged run counts as held
 
 
 def _freely(sim: Simulator, model: GraphModel, skip: int) -> tuple[np.ndarray, int]:
@@ -112,7 +112,7 @@ def _freely(sim: Simulator, model: GraphModel, skip: int) -> tuple[np.ndarray, i
 
 
 def _started(sim: Simulator, model: GraphModel, skip: int) -> Simulator:
-    """The simulator at the first position and speed of a machine of one body; as it is for any other machine."""
+    """Simulator at the first position and speed of a machine of one body; unchanged for any other machine."""
     if sim.layout.nq > 1 or sim.case.problem != "driven":
         return sim
     first = begin(sim, model, max(FIRST, skip))
@@ -120,10 +120,10 @@ def _started(sim: Simulator, model: GraphModel, skip: int) -> Simulator:
 
 
 def begin(sim: Simulator, model: GraphModel, rows: int = FIRST) -> tuple[float, float] | None:
-    """Position and speed of the main body, SI, from which a free run passes the first `rows` rows best.
+    """First position and speed of the main body, SI, by least squares of a free run over the first `rows` rows.
 
-    Gauss-Newton from the first reading at rest, or from the first speed either way, since a sensor may not know
-    direction. None where the model runs away: it begins at rest in the first position then.
+    Gauss-Newton starts from the first reading at rest, or from the first speed in both directions, since a sensor may
+    have no direction. None where the model diverges: the run then begins at rest at the first position.
     """
     rows = min(rows, len(sim.seen))
     seen, column = sim.seen[:rows], sim.column(sim.main)
@@ -155,7 +155,7 @@ def begin(sim: Simulator, model: GraphModel, rows: int = FIRST) -> tuple[float, 
 def _compared(
     sim: Simulator, readings: dict[str, np.ndarray], volts: np.ndarray | None, closed: bool, skip: int
 ) -> Comparison:
-    """Readings (n,) by sensor, SI, and commands (n, drives) that a law wrote against those of the record."""
+    """Comparison of readings (n,) by sensor, SI, and commands (n, drives) of a law with the record."""
     record, channels = sim.record, {}
     for name, made in readings.items():
         label, channel = _channel(sim, name, made[skip:], skip)
@@ -168,14 +168,14 @@ def _compared(
 
 
 def _channel(sim: Simulator, name: str, made: np.ndarray, skip: int) -> tuple[str, Channel]:
-    """One sensor, with the name that it is told by: its own and in SI, by its column of exchange format 1.
+    """Name and channel of one sensor: its own name and SI, or its column and unit in exchange format 1.
 
-    Where a position beside the main one began to count is chance: compared up to a constant.
+    The offset of a position beside the main one is arbitrary: the position is compared up to a constant.
     """
     machine, record = sim.case.machine, sim.record
     sensor = machine.sensors.get(name)
     seen = record.edges[name] / sensor.scale if sensor is not None and name in record.edges else record.y[name]
-    measures = "force" if sensor is None else sensor.measures  # what is no sensor is the force of a drive
+    measures = "force" if sensor is None else sensor.measures  # a channel without a sensor is the force of a drive
     if measures == "position" and name != sim.main:
         made = made + np.mean(seen[skip:] - made)
     unit = measured_unit(measures, turns_at(machine, sensor or machine.drives[name]))

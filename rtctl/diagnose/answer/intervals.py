@@ -13,7 +13,7 @@ from rtctl.diagnose.model.space import COSINE, INVERSE, PLACE, REST, SHAPE, SINE
 
 
 def sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
-    """Of one effect by parameter; `spread` are half widths of all unknowns."""
+    """Sizes of one effect with 90 % intervals, by parameter; `spread` (unknowns,) are the half widths."""
     h, columns = f.space.hypotheses[index], f.space.columns(index)
     x, half = f.x[columns], spread[columns]
     values, machine = h.values(x), f.like.sim.case.machine
@@ -30,9 +30,9 @@ def sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
         elif c.kind == COSINE:
             reach = c.scale * along(x[i : i + 2], half[i : i + 2])[1]
             low, high = max(value - reach, 0.0), value + reach
-        elif c.kind == INVERSE:  # of a limit, fitted as its inverse
+        elif c.kind == INVERSE:  # a limit, fitted as its inverse
             low, high = c.scale / (x[i] + half[i]), c.scale / max(x[i] - half[i], 1e-3 * x[i])
-        elif c.kind == REST:  # of a push, by the stiffness before it
+        elif c.kind == REST:  # a force at rest, over the stiffness before it
             reach = abs(c.scale * half[i] / values[h.coordinates[i - 1].name])
             low, high = value - reach, value + reach
         else:
@@ -42,9 +42,9 @@ def sizes(f: Fitted, index: int, spread: np.ndarray) -> dict[str, Interval]:
 
 
 def parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
-    """Of the description by path, or by the symbol by which the owner calls it."""
+    """Parameters of the description with 90 % intervals, by path or by symbol."""
     out, spread = {}, half_widths(f)
-    lowest, highest = f.space.bounds()  # what the owner says that it can be
+    lowest, highest = f.space.bounds()  # by the tolerance
     for i, path in enumerate(f.space.names):
         if path.startswith(OWN_START):
             continue
@@ -62,7 +62,7 @@ def parameters(f: Fitted, record: GraphRecord) -> dict[str, Interval]:
 
 
 def first_of(record: GraphRecord, path: str, values: tuple[float, ...]) -> tuple[float, ...]:
-    """First position or speed of a free response from the exponentials that a fit moves, SI."""
+    """First position or speed of a free response, SI, from the exponentials of its unknowns."""
     place, rate, guess = record.scales
     x = record.y[record.main][0]
     scale, offset = (place, x) if path == FIRST_POSITION else (rate, guess)

@@ -1,4 +1,4 @@
-"""Records of bundles of either exchange format, as the simulation of described machines takes them."""
+"""Records of described machines from bundles of either exchange format."""
 
 from pathlib import Path
 
@@ -13,18 +13,18 @@ from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
 
 
 def load(folder: Path | str) -> GraphRecord:
-    """The record of a bundle, read and checked.
+    """Checked record of a bundle.
 
-    Raises UserError that names file, column and row and says what would be right, NoAnswer where the recording
-    supports no verdict.
+    Raises UserError that names file, column, row and the correct value, NoAnswer where the recording supports no
+    verdict.
     """
     return of_bundle(load_bundle(folder))
 
 
 def of_bundle(bundle: Bundle, model: Path | str | None = None) -> GraphRecord:
-    """The record of a bundle that is read already; its nominal model is that of a config `model` where one is given.
+    """Record of a bundle in memory; its nominal model is that of a config `model` where one is given.
 
-    Raises as `load`, and UserError where the model is of another machine.
+    Raises the errors of `load`, and UserError where the model is of another machine.
     """
     case = read_case(bundle.case, bundle.folder)
     if isinstance(case, Case):

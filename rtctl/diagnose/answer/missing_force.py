@@ -1,6 +1,6 @@
-"""What a model of a described machine lacks, as a force or a reading, against the axis where it lives.
+"""Missing force or reading of a model of a described machine, along the axis of an effect.
 
-The force is the correction of the tracking observer, which keeps the main sensor of a simulation on the recording.
+The missing force is the correction of the tracking observer, with which the main sensor follows the recording.
 
 Source: Ohnishi, Shibata & Murakami, Motion control for advanced mechatronics, IEEE/ASME Trans. Mechatronics 1 (1996).
 """
@@ -22,26 +22,26 @@ from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.physics import TERMS
 from rtctl.plants.physics.dimensions import DIMENSIONS
 
-CLEARER = 3.0  # times more than the followed sensor, from which on another sensor's reading shows an effect
+CLEARER = 3.0  # signal-to-noise over that of the followed sensor, with which another sensor shows an effect
 TURN = 360.0  # degrees
-UNVISITED = 20.0  # degrees of the turn where the machine has not been: the axis is cut there
+UNVISITED = 20.0  # degrees, least unvisited range at which the axis of the angle is cut
 
 
 class Curve(NamedTuple):
-    """What is missing along an axis, rows (n,) each."""
+    """Missing force or reading along an axis, rows (n,) each."""
 
     x: np.ndarray
     x_words: str  # with the unit as `x_unit`
     x_unit: str
-    y: np.ndarray  # missing without the effect
-    law: np.ndarray  # what the effect gives instead
+    y: np.ndarray  # missing force or reading without the effect
+    law: np.ndarray  # force or reading of the effect
     y_words: str
     y_unit: str
     title: str
 
 
 class Missing:
-    """Runs of the models of a diagnosis, from which curves are made."""
+    """Runs of the models of a diagnosis, for the curves."""
 
     def __init__(self, d: GraphDiagnosis):
         self.d, self.machine = d, d.record.case.machine
@@ -52,7 +52,8 @@ class Missing:
         self._runs: dict[tuple[str, ...], tuple[np.ndarray, np.ndarray]] = {}
 
     def run(self, model: GraphModel) -> tuple[np.ndarray, np.ndarray]:
-        """Readings (n, sensors) of a model on track and the correction (n,); slower where a fast one runs away."""
+        """Readings (n, sensors) of a model under the fast observer, and corrections (n, followed); under the usual
+        observer where the run diverges."""
         key = (*map(repr, model.terms), repr(sorted(model.base.items())))
         if key not in self._runs:
             for sim in (self.fast, self.sim):
@@ -63,7 +64,7 @@ class Missing:
         return self._runs[key]
 
     def of(self, term: str, node: str, axis: str) -> Curve:
-        """The curve of an effect of the best model; of the force that no model names where `term` is ""."""
+        """Curve of an effect of the best model; of the unnamed force where `term` is ""."""
         free = self.d.decided.unlisted
         if not term and free is not None and free.place.reads and free.node == node:
             return self._misread(free)
@@ -92,8 +93,8 @@ class Missing:
         return Curve(x, x_words, x_unit, factor * push0, factor * (push0 - push1), words, unit, title)
 
     def _misread(self, free: Free) -> Curve:
-        """The error of a reading that no model names: what is left of the reading where the machine is where the error
-        says."""
+        """Curve of the unnamed error of a reading: the error plus the residual of an observer that follows the reading
+        without the error."""
         error, channel = free.over(0), free.node
         out = self.sim.misread(channel, error).run(self.unnamed())
         left = self.d.record.y[channel] - out[:, self.sim.column(channel)]
@@ -103,7 +104,7 @@ class Missing:
         return Curve(*axis, left + error, error, f"missing reading of {at}", unit, at.removeprefix("the "))
 
     def node_body(self, node: str) -> str:
-        """The body at which the force of a node is shown; that of the followed sensor where the node has none."""
+        """Body at which the force of a node is drawn; that of the followed sensor where the node has none."""
         body = body_of(self.machine, node)
         moving = body in self.machine.bodies and not self.machine.is_frame(body)
         return body if moving and self.sim.ratios.get(body, 0.0) != 0.0 else str(self.sim.body)
@@ -134,19 +135,19 @@ class Missing:
         return self.abscissa("velocity", node)[0]
 
     def unnamed(self) -> GraphModel:
-        """The model beside which the force without a name was found."""
+        """Model beside which the unnamed force was fitted."""
         return self.d.decided.beside.model
 
     def _models(self, term: str, node: str) -> tuple[GraphModel, GraphModel]:
         if not term:
             model = self.unnamed()
             return model, model
-        known = self.best.known()  # those stay: their numbers go by their place
+        known = self.best.known()  # nominal terms stay: their paths hold their index
         terms = [t for i, t in enumerate(self.best.terms) if i < known or (t.term, t.node) != (term, node)]
         return self.best._replace(terms=tuple(terms)), self.best
 
     def _channel(self, known, node: str, out0: np.ndarray, out1: np.ndarray) -> str | None:
-        """Sensor whose reading shows an effect better than the correction does; None for the correction."""
+        """Sensor whose reading shows an effect better than the correction; None for the correction."""
         others = [name for name in self.sim.channels if name != self.sim.main]
         if known is None or not others:
             return None
@@ -163,7 +164,7 @@ class Missing:
 
 
 def subjects(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
-    """Term, node and axis of each panel: the effects that were found, else where the rest lives, else the main body."""
+    """Term, node and axis of each panel: the effects, else the unnamed force, else the main body."""
     there = {(t.term, t.node) for t in d.decided.best.model.terms}
     found = [(e.name, e.node, TERMS[e.name].axis) for e in d.effects if (e.name, e.node) in there]
     if not found and d.located is not None and d.decided.unlisted is not None:
@@ -173,14 +174,14 @@ def subjects(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
 
 
 def machine_words(machine: Description) -> str:
-    """The machine in a few words: "motor and carriage"."""
+    """Machine in a few words: "motor and carriage"."""
     names = [name.replace("_", " ") for name in machine.bodies if not machine.is_frame(name)]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def of_turn(x: np.ndarray) -> np.ndarray:
-    """Angles (n,) within one turn, degrees, from angles in rad: cut where the machine has not been, so that what it
-    sweeps stays in one piece."""
+    """Angles (n,) within one turn, degrees, from angles x (n,), rad, cut in the widest unvisited range: the visited
+    range stays in one piece."""
     angle = np.degrees(np.mod(x, 2 * np.pi))
     visited = np.sort(angle)
     gaps = np.diff(visited, append=visited[0] + TURN)

@@ -1,7 +1,7 @@
-"""The motions that an experiment can be made of, each as a table of knots within the limits of travel and speed.
+"""Menu of motions of an experiment, each a table of knots within the limits of travel and speed.
 
-Every motion begins where the recording began, at 0, and ends there or stays where it is. Corners are rounded to the
-machine's own acceleration, so that nothing is struck that the machine did not strike in the recording.
+Every motion begins at 0, the start of the recording, and ends at rest. Corners are rounded to the acceleration of the
+recording, so that the machine strikes nothing that it did not strike in the recording.
 
 Source: constant speeds of thesis 8.1 and 12.3; odd random-phase multisine of Pintelon & Schoukens, System
 Identification (2012), section 4.3; reversals within the presliding range of Armstrong-Helouvry (1991), chapter 3.
@@ -16,19 +16,19 @@ from rtctl.diagnose.answer.si_format import nice
 
 MARGIN = 0.02  # share of the travel that is kept free at each end
 CORNER = 4  # knots in a change of speed
-KNOTS = 900  # of one level of the multisine
-PERIOD = (1.0, 4.0)  # s, of the multisine, shortest and longest
-TICKS = 2000  # in a period between these
-LINES = 100  # periods of the highest frequency in that of the multisine
-DITHER = 40  # the same of the dither
-FASTEST = 0.05  # of the sample rate, highest frequency of either
-LEVELS = (0.3, 1.0)  # of the multisine
-SPEEDS = (0.08, 0.3, 0.9)  # of the highest
-WORK = 30.0  # s, of the warm-up
+KNOTS = 900  # knots of one level of the multisine, about
+PERIOD = (1.0, 4.0)  # s, shortest and longest period of the multisine
+TICKS = 2000  # ticks in a period within PERIOD
+LINES = 100  # highest frequency of the multisine times its period
+DITHER = 40  # frequency of the dither times the period of the multisine
+FASTEST = 0.05  # of the sample rate, highest frequency of multisine and dither
+LEVELS = (0.3, 1.0)  # amplitudes of the multisine over the largest
+SPEEDS = (0.08, 0.3, 0.9)  # constant speeds over the highest of the recording
+WORK = 30.0  # s, duration of the warm-up
 
 
 class Limits(NamedTuple):
-    """What the recording shows that the machine can do. Positions count from where the recording began."""
+    """Limits of travel, speed and command that the recording shows. Positions are relative to its start."""
 
     unit: str  # of the reference
     command_unit: str
@@ -38,7 +38,7 @@ class Limits(NamedTuple):
     speed: float
     acceleration: float
     resolution: float  # smallest step that the sensor shows, in `unit`
-    command: float  # largest, in `command_unit`
+    command: float  # largest command, in `command_unit`
 
     @property
     def period(self) -> float:
@@ -63,17 +63,17 @@ class Motion(NamedTuple):
     words: str
     knots: np.ndarray  # (k, 2): s, and rad or m
     repeat: float | None  # s
-    seconds: float  # for which it should run
+    seconds: float  # duration, s
 
     def reference(self, t: np.ndarray) -> np.ndarray:
-        """Reference at times `t` in s from its start."""
+        """Reference (n,) in the unit of the limits at times `t` (n,), s from the start of the motion."""
         if self.repeat is not None:
             t = np.mod(t, self.repeat)
         return np.interp(t, self.knots[:, 0], self.knots[:, 1])
 
 
 class Path:
-    """A table of knots under construction, from rest at 0."""
+    """Table of knots under construction, from rest at 0."""
 
     def __init__(self, limits: Limits):
         self.limits = limits
@@ -81,21 +81,21 @@ class Path:
 
     @property
     def at(self) -> float:
-        """Where it has come to."""
+        """Last position."""
         return self.knots[-1][1]
 
     @property
     def time(self) -> float:
-        """Seconds so far."""
+        """Last time, s."""
         return self.knots[-1][0]
 
     def rest(self, seconds: float) -> "Path":
-        """Stand still."""
+        """Append a rest of `seconds` s."""
         self.knots.append((self.time + seconds, self.at))
         return self
 
     def move(self, to: float, speed: float) -> "Path":
-        """Go to a place with a speed that rises and falls at the machine's acceleration."""
+        """Append a move to a position with a trapezoidal speed at the acceleration of the limits."""
         way, a = to - self.at, self.limits.acceleration
         if abs(way) < 1e-12:
             return self
@@ -109,20 +109,20 @@ class Path:
         return self
 
     def curve(self, t: np.ndarray, r: np.ndarray) -> "Path":
-        """Follow points that count from here."""
+        """Append points relative to the last knot."""
         start, origin = self.time, self.at
         self.knots += [(start + a, origin + b) for a, b in zip(t, r, strict=True)]
         return self
 
     def done(self, name: str, words: str, repeat: float | None = None, seconds: float | None = None) -> Motion:
-        """The motion; a knot that repeats the one before is left out."""
+        """Motion of the table, without repeated knots."""
         kept = [self.knots[0]]
         kept += [b for a, b in zip(self.knots, self.knots[1:], strict=False) if b[0] - a[0] > 1e-9]
         return Motion(name, words, np.array(kept), repeat, kept[-1][0] + 0.5 if seconds is None else seconds)
 
 
 def stretch(limits: Limits, way: float) -> tuple[float, float]:
-    """From and to of a way of at most this length, inside the travel, at the start or towards its middle."""
+    """Start and end of a move of at most length `way` inside the travel, from 0 towards the farther end if possible."""
     far, near = limits.far
     way = min(way, limits.span)
     side = np.sign(far - near) or 1.0
@@ -134,7 +134,7 @@ def stretch(limits: Limits, way: float) -> tuple[float, float]:
 
 
 def slow_ramp(limits: Limits, ease: float) -> Motion:
-    """Speed that goes slowly from one direction through zero into the other, three times."""
+    """Slow reversals through zero speed, three times in both directions."""
     v, half = 0.12 * ease * limits.speed, 3.0
     v = min(v, limits.span / (0.5 * half))
     a, b = stretch(limits, 0.5 * v * half)
@@ -168,7 +168,7 @@ def constant_speeds(limits: Limits, ease: float) -> Motion:
 
 
 def steps_with_rests(limits: Limits, ease: float) -> Motion:
-    """Quick moves of several lengths with a second of rest after each."""
+    """Quick moves of several lengths, each followed by a second of rest."""
     way = min(limits.span, ease * limits.speed)
     a, b = stretch(limits, way)
     path = Path(limits).rest(0.5).move(a, 0.3 * limits.speed).rest(1.0)
@@ -183,7 +183,7 @@ def steps_with_rests(limits: Limits, ease: float) -> Motion:
 
 
 def multisine(limits: Limits, ease: float) -> Motion:
-    """Odd random-phase lines, the amplitude falling with frequency, at two levels in turn."""
+    """Odd random-phase multisine, amplitude falling with frequency, at two levels in turn."""
     T, ticks = limits.period, round(limits.period / limits.dt)
     spacing = max(1, int(np.ceil(ticks / KNOTS)))
     n = max(ticks // spacing, 32)
@@ -193,7 +193,7 @@ def multisine(limits: Limits, ease: float) -> Motion:
     used = (lines % 2 == 1) & (lines / T <= max(highest, 3.5 / T))
     phases = np.random.default_rng(1).random(len(lines))
     x = np.fft.irfft(np.where(used, np.exp(2j * np.pi * phases) / np.maximum(lines, 1), 0.0), n)
-    x = np.roll(x, -int(np.argmax(x)))  # from its peak: at rest, and the levels join there
+    x = np.roll(x, -int(np.argmax(x)))  # starts at its peak, at rest: the levels join there
     x = (x[0] - np.append(x, x[0])) / np.ptp(x)
     steepest = np.abs(np.diff(x)).max() / (spacing * limits.dt)
     way = ease * min(0.5 * limits.span, 0.4 * limits.speed / steepest)
@@ -211,7 +211,7 @@ def multisine(limits: Limits, ease: float) -> Motion:
 
 
 def warm_up(limits: Limits, ease: float) -> Motion:
-    """The same slow test before and after half a minute of hard work."""
+    """Equal slow moves before and after half a minute of fast moves."""
     way = min(0.8 * limits.span, 0.8 * ease * limits.speed)
     a, b = stretch(limits, way)
     slow, fast = 0.25 * ease * limits.speed, 0.9 * ease * limits.speed
@@ -230,7 +230,7 @@ def warm_up(limits: Limits, ease: float) -> Motion:
 
 
 def small_reversals(limits: Limits, ease: float) -> Motion:
-    """Triangles from a few counts to some hundred, slowly."""
+    """Slow triangles with amplitudes of a few to some hundred counts."""
     top = ease * min(400 * limits.resolution, 0.05 * limits.span)
     sizes = np.geomspace(min(6 * limits.resolution, 0.1 * top), top, 5)
     a, _ = stretch(limits, 2 * top)
@@ -250,7 +250,7 @@ def small_reversals(limits: Limits, ease: float) -> Motion:
 
 
 def whole_travel(limits: Limits, ease: float) -> Motion:
-    """From one end of the travel to the other and back at an even, moderate speed."""
+    """Move over the whole travel and back at a constant, moderate speed."""
     far, near = limits.far
     v = min(max(0.25 * limits.speed, limits.span / 8.0), 0.9 * limits.speed) * ease
     path = Path(limits).rest(0.5).move(near, v).rest(0.5).move(far, v).rest(0.5).move(near, v).rest(0.5)
@@ -262,7 +262,7 @@ def whole_travel(limits: Limits, ease: float) -> Motion:
 
 
 def dither(limits: Limits, ease: float) -> Motion:
-    """The same slow move without and with a small fast oscillation on top."""
+    """Slow move without and with a small fast oscillation."""
     v, half = 0.06 * ease * limits.speed, 4.0
     a, b = stretch(limits, v * half)
     half = abs(b - a) / v if abs(b - a) < v * half else half

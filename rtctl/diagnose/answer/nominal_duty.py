@@ -1,4 +1,4 @@
-"""Sizes of effects by what a machine does in ordinary use."""
+"""Nominal duty of a machine: measures for the sizes of effects."""
 
 from math import pi
 from typing import Any
@@ -10,7 +10,7 @@ from rtctl.machines.profiles import profile_of
 
 
 def measure(what: str, node: str, config: Any) -> float:
-    """What a range is a multiple of, SI."""
+    """Measure of a node in nominal duty, SI: the unit of a range of sizes."""
     u, dt = use(node, config), 1.0 / config.loop.rate
     volts = rms_volts(config)
     stiffness = u.stiffness or u.force / u.travel
@@ -27,19 +27,19 @@ def measure(what: str, node: str, config: Any) -> float:
 
 
 def rms_volts(config: Any) -> float:
-    """Command that ordinary use takes."""
+    """Rms command in nominal duty, V or the unit of the drive."""
     return duty_of(config).volts(config)
 
 
 def use(node: str, config: Any) -> Use:
-    """How a node moves in ordinary use."""
+    """Motion of a node in nominal duty."""
     return duty_of(config).use(node, config)
 
 
 def duty_of(config: Any) -> Duty:
-    """Ordinary use of a config's machine, which declares one, or by its reference where its config describes it."""
+    """Nominal duty of the machine of a config: declared, or of a described machine by its reference."""
     if config.kind == DESCRIBED:
         return described_duty.duty(config)
     found = profile_of(config.kind).duty
-    assert found is not None  # that is asked before
+    assert found is not None  # callers check the duty first
     return found

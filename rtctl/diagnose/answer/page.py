@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one HTML file that needs nothing else, and a short table for the terminal."""
+"""Parts of the HTML report of a diagnosis: figures as inline SVG, and intervals in words."""
 
 import io
 import re
@@ -22,7 +22,7 @@ class Picture(NamedTuple):
 
 
 def svg(figure: Figure, prefix: str, alt: str) -> str:
-    """A figure as inline SVG: text stays text, ink is the page's colour, ids are its own, nothing points outside."""
+    """Inline SVG of a figure: text stays text, ink is the colour of the page, ids are unique, no external links."""
     out = io.StringIO()
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix, "font.family": "sans-serif"}):
         figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
@@ -39,7 +39,7 @@ def svg(figure: Figure, prefix: str, alt: str) -> str:
 
 
 def interval(v: Interval, unit: str) -> tuple[str, str]:
-    """A value and its 90 % interval in one unit."""
+    """Value with its unit, and its 90 % interval in this unit."""
     scale, shown = figures.prefixed(np.array([v.value]), unit)
     width = max(v.high - v.low, 1e-30)
     digits = int(np.clip(np.ceil(np.log10(max(abs(v.value), width) / width)) + 1, 2, 6)) if np.isfinite(width) else 2

@@ -1,8 +1,8 @@
-"""A diagnosis in words that a mechanic understands: what the machine does, where, and how large it is."""
+"""Phrases of a diagnosis for a mechanic: behaviour of the machine, place and size."""
 
 from typing import Protocol
 
-from rtctl.diagnose.answer.si_format import PREFIXES as PREFIXES  # for those who draw with words
+from rtctl.diagnose.answer.si_format import PREFIXES as PREFIXES  # for the figures
 from rtctl.diagnose.answer.si_format import figures as figures
 from rtctl.diagnose.answer.si_format import nice, percent
 from rtctl.diagnose.answer.si_format import prefix as prefix
@@ -11,7 +11,7 @@ from rtctl.plants.physics.search import Turn
 
 
 class Sized(Protocol):
-    """What a phrase asks of an effect: the node in words, and value, unit or words of a parameter by its name."""
+    """Effect in a phrase: the node in words, and value, unit or words of a parameter by its name."""
 
     here: str
 
@@ -23,7 +23,7 @@ class Sized(Protocol):
 
 
 class _Slot:
-    """One name in a phrase."""
+    """Parameter name in a phrase."""
 
     def __init__(self, sizes: Sized, name: str):
         self.sizes, self.name = sizes, name
@@ -45,7 +45,7 @@ class _Slot:
 
 
 class Slots(dict):
-    """The names of a phrase, filled in from an effect."""
+    """Names of a phrase with their values from an effect."""
 
     def __init__(self, sizes: Sized):
         super().__init__(here=sizes.here)
@@ -56,7 +56,7 @@ class Slots(dict):
 
 
 def harmonics(term: str, s: Sized) -> str:
-    """The harmonics of a ripple that were found: ", 2 mNm twice as often"."""
+    """Fitted harmonics of a ripple in words: ", 2 mNm twice as often"."""
     phrase = phrase_of(term)
     stem = next((part.amplitude for part in TERMS[term].search if isinstance(part, Turn)), "")
     again = [(f"{stem}{n}", w) for n, w in ((2, "twice"), (3, "three times")) if s.value(f"{stem}{n}") > 0]
@@ -65,17 +65,17 @@ def harmonics(term: str, s: Sized) -> str:
 
 
 def phrase_of(name: str) -> Phrase | None:
-    """How an effect is spoken of; None of one whose term does not say."""
+    """Phrase of an effect; None for a term without a phrase."""
     return TERMS[name].phrase if name in TERMS else None
 
 
 def noun(name: str) -> str:
-    """An effect in a few words: "sticking"."""
+    """Effect in a few words: "sticking"."""
     phrase = phrase_of(name)
     return phrase.noun if phrase else name
 
 
 def need(entry: str) -> str:
-    """What a record would have to hold to test "name:node"."""
+    """Motion that a record needs for a test of "name:node", in words."""
     phrase = phrase_of(entry.partition(":")[0])
     return phrase.need if phrase else "a richer motion"

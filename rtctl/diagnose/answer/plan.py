@@ -1,4 +1,4 @@
-"""Plan of a separating experiment: a motion, the rivals that it tells apart, and its form in diagnosis.json."""
+"""Plan of a separating experiment: a motion, the separated rivals, and the form in diagnosis.json."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Protocol, TypeVar
@@ -10,20 +10,20 @@ from rtctl.diagnose.answer.motions import MENU, Limits, Motion
 from rtctl.diagnose.answer.results import EXPERIMENT
 from rtctl.diagnose.answer.si_format import nice
 
-EASE = (1.0, 0.6, 0.35, 0.2)  # of speed and size, until the command stays within its limit
-FULL = 0.95  # of the drive's limit
-OVER = 0.1  # share of the travel by which a simulated machine may overshoot it
-SPEED_OVER = 0.02  # s, a speed is taken over this
-SMALLEST = 1e-5  # of the travel: resolution of a sensor whose steps nobody knows
-NEARLY = 0.9  # of the largest distance: of all that come this near, the shortest motion is taken
+EASE = (1.0, 0.6, 0.35, 0.2)  # factors of speed and size, tried until the command stays within its limit
+FULL = 0.95  # of the drive's limit: largest command of an experiment
+OVER = 0.1  # share of the travel by which a simulated machine may overshoot the travel
+SPEED_OVER = 0.02  # s, time over which a speed is taken
+SMALLEST = 1e-5  # of the travel: resolution of a sensor of unknown resolution
+NEARLY = 0.9  # of the largest distance: least distance of a motion that may be chosen for its short duration
 
 
 class Tried(Protocol):
-    """What a trial of a motion says at least."""
+    """Outcome of a trial of a motion."""
 
     @property
     def trouble(self) -> str:
-        """Why the motion cannot be run; "" where it can."""
+        """Reason why the motion cannot be run; "" where it can."""
         ...
 
 
@@ -31,16 +31,16 @@ Outcome = TypeVar("Outcome", bound=Tried)
 
 
 class Experiment(NamedTuple):
-    """A motion, and what it is expected to show."""
+    """Motion with the expected distances of the rivals."""
 
     motion: Motion
     limits: Limits
     rivals: tuple[str, ...]  # term:node, joined by " + "
     called: tuple[str, ...]  # the rivals in words
-    distance: dict[str, float]  # of each motion: how far the least distinct rivals are apart, over the noise
-    pairs: dict[str, dict[str, float]]  # of each motion: of each pair
-    refused: dict[str, str]  # motion -> why not
-    nats: dict[str, float] = {}  # noqa: RUF012  # of each motion: expected gain in log probability of the right rival
+    distance: dict[str, float]  # by motion: distance of the least distinct rivals, over the noise
+    pairs: dict[str, dict[str, float]]  # by motion: distance of each pair, over the noise
+    refused: dict[str, str]  # motion -> reason of the refusal
+    nats: dict[str, float] = {}  # noqa: RUF012  # by motion: expected gain in log probability of the right rival
 
     @property
     def name(self) -> str:
@@ -49,18 +49,18 @@ class Experiment(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What to do, in a sentence or two."""
+        """Instruction in one or two sentences."""
         return self.motion.words
 
     @property
     def why(self) -> str:
-        """What it is for, in a sentence."""
+        """Purpose in one sentence."""
         names = self.called
         told = " from ".join(names) if len(names) == 2 else f"{', '.join(names[:-1])} and {names[-1]} from each other"
         return f"It tells {told}: what they predict is {nice(self.distance[self.name])} times the noise apart."
 
     def as_dict(self) -> dict[str, Any]:
-        """As in diagnosis.json."""
+        """Experiment as in diagnosis.json."""
         limits = self.limits
         return {
             "name": self.name,
@@ -89,7 +89,7 @@ class Experiment(NamedTuple):
 def limits_in(
     x: np.ndarray, dt: float, unit: str, command_unit: str, grain: float, command: float, over: float
 ) -> Limits:
-    """Limits that a recorded motion x (n,) in `unit` shows; a speed is taken over `over` s."""
+    """Limits of a recorded motion x (n,) in `unit`; a speed is taken over `over` s."""
     x = x - x[0]
     step = min(max(1, round(over / dt)), len(x) // 8)
     v = (x[step:] - x[:-step]) / (step * dt)
@@ -110,7 +110,7 @@ def limits_in(
 
 
 def eased(limits: Limits, trial: Callable[[Motion], Outcome]) -> Iterator[tuple[Motion, Outcome]]:
-    """Each motion of the menu, made smaller until a trial of it has no trouble, and the last trial."""
+    """Motions of the menu, each reduced until its trial succeeds, with the last trial."""
     for make in MENU:
         for ease in EASE:
             motion = make(limits._replace(acceleration=ease * limits.acceleration), ease)
@@ -123,10 +123,10 @@ def eased(limits: Limits, trial: Callable[[Motion], Outcome]) -> Iterator[tuple[
 def chosen(
     motions: dict[str, Motion], pairs: dict[str, dict[str, float]], refused: dict[str, str], least: float
 ) -> tuple[str, dict[str, float]]:
-    """The motion that tells the least distinct pair best, and that pair's distance by motion.
+    """Motion that separates the least distinct pair best, and the distance of this pair by motion.
 
-    A pair that no motion tells apart by `least` does not count, unless there is no other. Raises NoAnswer where every
-    motion was refused.
+    A pair that no motion separates by `least` does not count, unless there is no other pair. Raises NoAnswer where
+    every motion was refused.
     """
     if not pairs:
         name, reason = next(iter(refused.items()))

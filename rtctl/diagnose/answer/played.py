@@ -1,4 +1,4 @@
-"""What a machine is made to do in an experiment, as a config that `rtctl run` takes as it is, and words around it."""
+"""Config of an experiment for `rtctl run`, and its instructions in words."""
 
 import math
 import re
@@ -15,16 +15,16 @@ from rtctl.diagnose.answer.si_format import span
 from rtctl.idiom import Settings
 from rtctl.own.files import OwnError
 
-WIDTH = 110
+WIDTH = 110  # characters of a comment line
 PAIR = re.compile(r"- - (\S+)\n +- (\S+)$(?!\n +- [^-])", re.M)  # a knot over two lines
-PLAYED = ("reference", "excitation")  # keys of a config that say what a machine is made to do
+PLAYED = ("reference", "excitation")  # keys of a config that prescribe the motion
 
 
 def text(data: dict[str, Any], experiment: dict[str, Any], names: Sequence[str], seconds: float, own: bool) -> str:
-    """The config `data` playing an experiment, as YAML under a head that says what for.
+    """Config `data` with the motion of an experiment, as YAML under a head with its purpose.
 
-    `names` are the effects that it tells apart, `seconds` the length where the experiment has none, `own` whether the
-    config is of the machine's own recording. Raises UserError where config and experiment do not go together.
+    `names` are the separated effects, `seconds` the duration where the experiment has none, `own` whether the config is
+    that of a recording by rtctl. Raises UserError where the config does not accept the experiment.
     """
     from rtctl import machines
     from rtctl.config.fields import Shape, fill
@@ -36,22 +36,22 @@ def text(data: dict[str, Any], experiment: dict[str, Any], names: Sequence[str],
         settings, seconds = playing(settings, experiment, seconds)
     except (OwnError, ValidationError) as error:
         raise UserError(f"the config of the machine does not play the experiment: {error}") from None
-    if not own:  # all of it is emulated, and needs no clock to be right
+    if not own:  # the whole machine is emulated: no real-time clock is needed
         settings = set_path(settings, "loop.mode", "fused")
     return _head(experiment, names, seconds, own) + PAIR.sub(r"- [\1, \2]", to_yaml(settings))
 
 
 def playing(config: Any, experiment: dict[str, Any], seconds: float) -> tuple[Any, float]:
-    """The config that plays an experiment, and how long that takes."""
+    """Config that plays an experiment, and its duration, s."""
     for key in PLAYED:
         if experiment.get(key) is not None:
-            given = {name: value for name, value in experiment[key].items() if name != "unit"}  # that of the machine
+            given = {name: value for name, value in experiment[key].items() if name != "unit"}  # the machine has one
             config = set_path(config, key, plain(given))
     return config, float(experiment.get("seconds") or seconds)
 
 
 def _head(experiment: dict[str, Any], names: Sequence[str], seconds: float, own: bool) -> str:
-    """Comment lines on top of an experiment's file: what it does, what for, and how to run it."""
+    """Comment lines at the top of the file of an experiment: motion, purpose and how to run it."""
     given = experiment.get("why")
     why: dict[str, Any] = given if isinstance(given, dict) else {"words": given}
     told = [
@@ -75,18 +75,18 @@ def _head(experiment: dict[str, Any], names: Sequence[str], seconds: float, own:
 
 
 def wrapped(text: str) -> list[str]:
-    """Lines of a comment; what stands in backticks is not broken, so that it can be copied."""
+    """Lines of a comment; text in backticks is not broken and can be copied."""
     kept = re.sub("`[^`]*`", lambda found: found[0].replace(" ", "\0"), text)
     return [line.replace("\0", " ") for line in textwrap.wrap(kept, WIDTH, break_on_hyphens=False)]
 
 
 def command(seconds: float) -> str:
-    """What runs an experiment of this length."""
+    """Command that runs an experiment of `seconds` s."""
     return f"rtctl run {EXPERIMENT} --for {math.ceil(seconds)}s"
 
 
 def room(experiment: dict[str, Any]) -> str:
-    """How much of it the machine needs, in words; "" where the experiment does not say."""
+    """Room that the machine needs, in words; "" where the experiment has no travel."""
     travel = experiment.get("limits", {}).get("travel")
     if travel is None:
         return ""
@@ -95,7 +95,7 @@ def room(experiment: dict[str, Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Numbers, words, lists and tables as YAML knows them."""
+    """Plain data for YAML."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -104,7 +104,7 @@ def plain(value: Any) -> Any:
 
 
 def terms(entries: Sequence[Settings], known: int) -> list[tuple[str, str, str]]:
-    """(key, "-", value) of each term of a `physics:` list after the first `known`."""
+    """Rows (key, "-", value) of the terms of a `physics:` list after the first `known`."""
     rows = []
     for number, term in enumerate(entries[known:], known):
         values = {k: v for k, v in term.model_dump().items() if k not in ("term", "node")}

@@ -1,4 +1,4 @@
-"""Law of a described machine as the `law` of a config: the one that its case says, else a stand-in."""
+"""Law of a described machine as the `law` of a config: the law of its case, else a stand-in."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ from rtctl.laws import sections
 
 
 def played_law(record: GraphRecord) -> dict[str, Any]:
-    """Law of a record as plain data of a config, SI; a stand-in where a config has no place for that of the case."""
+    """Law of a record as plain data of a config, SI; a stand-in where a config cannot hold the law of the case."""
     said = record.case.controller
     position = None if said is None else _position(record, said)
     if said is None or position is None:
@@ -23,7 +23,7 @@ def played_law(record: GraphRecord) -> dict[str, Any]:
 
 
 def _position(record: GraphRecord, said: GraphLaw) -> dict[str, Any] | None:
-    """Position law of a config, whose output moves the feedback forwards; None where it cannot be said there."""
+    """Position law of a config, whose output moves the feedback forwards; None where a config cannot hold it."""
     p = params(record, said)
     body = record.case.machine.sensors[str(said.sensor)].body
     sign = float(np.sign(levers(nominal(record.case), str(body))[str(said.drive)]))

@@ -1,4 +1,4 @@
-"""Posterior of a diagnosis as a list: combinations of effects, the description alone, and what has no name."""
+"""Posterior of a diagnosis as a list: combinations of effects, the nominal model alone, and unnamed effects."""
 
 from typing import NamedTuple
 
@@ -8,21 +8,21 @@ from rtctl.diagnose.evidence.evidence import Rival
 
 
 class Bar(NamedTuple):
-    """One rival."""
+    """Rival with its probability."""
 
     names: tuple[str, ...]  # term:node
-    free: str  # in words, of what has no name
+    free: str  # unnamed effect in words; "" for none
     probability: float
-    behind: float  # ln of its posterior over that of the likeliest, on the whole recording
+    behind: float  # ln of its posterior over that of the likeliest rival, on the whole recording
 
 
 def rivals(d: GraphDiagnosis) -> list[Bar]:
-    """All rivals, likeliest first; their probabilities sum to one. Numbers of hats along one axis are one rival."""
+    """Rivals, likeliest first; probabilities sum to one. Free functions along one axis are one rival."""
     return [bar for bar, _ in groups(d)]
 
 
 def groups(d: GraphDiagnosis) -> list[tuple[Bar, Rival]]:
-    """The same, each with the likeliest of what it stands for."""
+    """Rivals as by `rivals`, each with the likeliest of its models."""
     machine = d.record.case.machine
     found: dict[tuple[tuple[str, ...], str], list[Rival]] = {}
     for rival in d.decided.table:
@@ -41,6 +41,6 @@ def groups(d: GraphDiagnosis) -> list[tuple[Bar, Rival]]:
 
 
 def in_words(d: GraphDiagnosis, bar: Bar) -> str:
-    """A rival as a person would say it."""
+    """Rival in words."""
     machine = d.record.case.machine
     return bar.free or " + ".join(called(machine, n) for n in bar.names) or "the description alone"

@@ -1,7 +1,7 @@
-"""From a running machine to a better model of it: record, diagnose, where two answers are left run the experiment that
-separates them and diagnose again, write the model.
+"""Repair of a model: record the machine, diagnose, run a separating experiment where two answers are probable, diagnose
+again, write the model.
 
-What is recorded is an ordinary run (`rtctl run`), so the bundles are there to be looked at and diagnosed again.
+A recording is an ordinary run (`rtctl run`): its bundle can be viewed and diagnosed again.
 """
 
 from collections.abc import Callable
@@ -18,39 +18,39 @@ from rtctl.diagnose.model.by_symbol import Model
 from rtctl.machines.duty import Duty
 from rtctl.machines.profiles import profile_of
 
-LENGTH = 25.0  # s, of a recording of a machine that declares none
+LENGTH = 25.0  # s, recording of a machine without a declared duty
 RECORDING, SECOND = "recording", "experiment"  # bundles in the folder of a repair
-NEGLIGIBLE = 1e-4  # share of a value below which it has not changed
-LEGS = (  # (share of the travel, share of the speed): far and fast, and at a crawl where friction shows itself
+NEGLIGIBLE = 1e-4  # share of a value: least change that is reported
+LEGS = (  # (share of the travel, share of the speed): far and fast, and slow for friction
     (0.5, 1.0), (0.45, 0.05), (-0.3, 1.0), (-0.27, 0.1), (0.2, 0.5), (0.17, 0.05), (0.0, 0.7),
 )  # fmt: skip
-DWELL = 0.5  # s
+DWELL = 0.5  # s, rest after each leg
 
 Say = Callable[[str], None]
 
 
 class Repair(NamedTuple):
-    """What a machine taught: recordings and diagnoses in order; the last one counts."""
+    """Recordings and diagnoses of a repair in order; the last diagnosis counts."""
 
     bundles: tuple[Path, ...]
     diagnoses: tuple[GraphDiagnosis, ...]
-    trips: tuple[str, ...]  # of the recordings: "" for none
+    trips: tuple[str, ...]  # trip of each recording; "" for none
 
     @property
     def last(self) -> GraphDiagnosis:
-        """The diagnosis whose model is written."""
+        """Diagnosis whose model is written."""
         return self.diagnoses[-1]
 
     @property
     def bundle(self) -> Path:
-        """The recording that it is of."""
+        """Bundle of the last diagnosis."""
         return self.bundles[len(self.diagnoses) - 1]
 
 
 def ready(config: Any, mode: str | None = None) -> Any:
-    """The config as it is recorded: on virtual time where the machine is emulated here, with something to play.
+    """Config for a recording: on virtual time where the machine is emulated, and with a reference.
 
-    Raises UserError where a machine that is not ours has no reference: nobody knows how far it may go.
+    Raises UserError where a real machine has no reference: its safe travel is unknown.
     """
     if mode is None and config.link.spawns:
         config = set_path(config, "loop.mode", "fused")
@@ -70,7 +70,7 @@ def ready(config: Any, mode: str | None = None) -> Any:
 
 
 def ordinary_reference(duty: Duty) -> dict[str, Any]:
-    """To and fro at several speeds with rests in between, within what the machine is used to and the usual recording;
+    """Reference of moves at several speeds with rests in between, within nominal travel and the usual recording time;
     rad or m, and s."""
     speed, travel = duty.speed, duty.travel
     shares = [0.0, *(share for share, _ in LEGS)]
@@ -86,7 +86,7 @@ def ordinary_reference(duty: Duty) -> dict[str, Any]:
 
 
 def length_of(config: Any) -> float:
-    """Usual length of a recording, s."""
+    """Usual duration of a recording, s."""
     duty = profile_of(config.kind).duty
     return LENGTH if duty is None else duty.recording
 
@@ -99,11 +99,11 @@ def repair(
     record: Callable[[Any, Path, float], dict[str, Any]] | None = None,
     diagnose: Callable[..., Any] = diagnose,
 ) -> Repair:
-    """Record the machine of a config that is `ready` into bundles in `out`, and diagnose it.
+    """Repair of the machine of a config that is `ready`: bundles recorded in `out`, and their diagnoses.
 
-    `record` runs the machine (see `run`), `diagnose` is the judge; the recording of an experiment is diagnosed together
-    with the first. Raises UserError and NoAnswer as these do; what becomes of the experiment cannot undo the first
-    diagnosis.
+    `record` runs the machine (see `run`), `diagnose` diagnoses bundles; the recording of an experiment is diagnosed
+    together with the first. Raises UserError and NoAnswer of `record` and the first `diagnose`; a failed experiment
+    keeps the first diagnosis.
     """
     run_ = record or run
     seconds = length_of(config) if length is None else length
@@ -132,14 +132,14 @@ def repair(
 
 
 def run(config: Any, bundle: Path, seconds: float, say: Say = lambda text: None) -> dict[str, Any]:
-    """One recording as `rtctl run` makes it. Raises UserError where it cannot be run, RunFailed where it went wrong."""
+    """Summary of one recording as by `rtctl run`. Raises UserError where it cannot start, RunFailed where it fails."""
     from rtctl.daemon.session import Session, whole
 
     return whole(Session(config, bundle, seconds, arm=True, say=say).run())
 
 
 def between(owner: Model, after: Model) -> list[tuple[str, str, str]]:
-    """(key, owner's value, new value) of each key of the config that a model changes, the terms last."""
+    """Rows (key, nominal value, new value) of the keys of the config that a model changes, the terms last."""
     rows = []
     for name, value in after.base.items():
         was = owner.base.get(name)

@@ -1,4 +1,4 @@
-"""Report of a diagnosis of a described machine: one HTML file that needs nothing else, and a table for the terminal."""
+"""Report of a diagnosis of a described machine: one self-contained HTML file, and a table for the terminal."""
 
 import re
 from collections import defaultdict
@@ -20,8 +20,8 @@ from rtctl.diagnose.answer.phrases import need, noun, phrase_of
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Interval
 from rtctl.plants.physics import TERMS
 
-LEAST = 1e-3  # probability of a look-alike that is told where nothing is known to tell it apart
-ONE_LINE = 36  # characters of an effect with its name that fit on one line of a console of 80
+LEAST = 1e-3  # least probability of a reported look-alike without a known separating experiment
+ONE_LINE = 36  # characters of an effect with its name that fit on one line of a console of 80 characters
 MOST_RIVALS = 4  # look-alikes of one effect in the table
 PICTURES = {
     "missing": (figures.missing_force, {
@@ -59,7 +59,7 @@ MISSING = {
 
 
 class Row(NamedTuple):
-    """A number of the machine in the table."""
+    """Parameter of the machine in the table."""
 
     path: str
     nominal: str
@@ -70,7 +70,7 @@ class Row(NamedTuple):
 
 
 def html(d: GraphDiagnosis) -> str:
-    """The report as one text."""
+    """Text of the HTML report."""
     env = Environment(
         loader=PackageLoader("rtctl.diagnose.answer", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
@@ -99,7 +99,7 @@ def html(d: GraphDiagnosis) -> str:
 
 
 def together(d: GraphDiagnosis) -> str:
-    """What several recordings have been taken for, in a sentence; "" for one recording."""
+    """Sentence on several recordings of one machine; "" for one recording."""
     if len(d.records) == 1:
         return ""
     names = [r.name for r in d.records]
@@ -110,7 +110,7 @@ def together(d: GraphDiagnosis) -> str:
 
 
 def pictures(d: GraphDiagnosis) -> dict[str, Picture]:
-    """All figures that this diagnosis has."""
+    """Figures of the diagnosis with captions, by name."""
     found = {}
     for name, (draw, captions) in PICTURES.items():
         figure = draw(d)
@@ -121,7 +121,7 @@ def pictures(d: GraphDiagnosis) -> dict[str, Picture]:
 
 
 def summary(d: GraphDiagnosis) -> str:
-    """Held-out errors in one line, as shares of the recorded motion."""
+    """Held-out errors in one sentence, as shares of the recorded motion."""
     shown = [d.heldout.before, d.heldout.after, d.heldout.floor]
     floor = numbers.percent(shown[2])
     if not d.decided.best.names:
@@ -131,7 +131,7 @@ def summary(d: GraphDiagnosis) -> str:
 
 
 def effect_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
-    """Name, node, size, interval and confidence; one row for each parameter."""
+    """Rows (name, node, size, interval, confidence), one for each parameter of the effects."""
     rows: list[tuple[str, ...]] = []
     for e in d.effects:
         first = f"{noun(e.name)} ({e.name})", words.here(d.record.case.machine, e.node)
@@ -144,14 +144,14 @@ def effect_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
 
 
 def checks(d: GraphDiagnosis) -> list[str]:
-    """What a mechanic should look at, a sentence for each effect that was found."""
+    """Checks for a mechanic, one sentence for each effect."""
     machine = d.record.case.machine
     found = [(words.here(machine, e.node), TERMS[e.name].check) for e in d.effects if TERMS[e.name].check]
     return list(dict.fromkeys(f"{at[:1].upper()}{at[1:]}: {line}" for at, line in found))
 
 
 def reason(d: GraphDiagnosis) -> str:
-    """Why no name is given, where none is; else what is to be known beside the names."""
+    """Reason of a verdict without a name; else the remark on the names."""
     if not d.decided.why:
         return ""
     if d.verdict not in (UNNAMED, NOTHING):
@@ -161,7 +161,7 @@ def reason(d: GraphDiagnosis) -> str:
 
 
 def told_names(d: GraphDiagnosis, text: str) -> str:
-    """A sentence with each "term:node" in words, also of models that were turned down."""
+    """Sentence with each "term:node" in words, also of rejected models."""
     machine = d.record.case.machine
 
     def told(found: re.Match[str]) -> str:
@@ -171,7 +171,7 @@ def told_names(d: GraphDiagnosis, text: str) -> str:
 
 
 def rival_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
-    """Found, look-alike, probability and the experiment that separates the two."""
+    """Rows (effect, look-alike, probability, experiment that separates the two)."""
     machine = d.record.case.machine
     rows = []
     for e in d.effects:
@@ -186,14 +186,14 @@ def rival_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
 
 
 def instead(d: GraphDiagnosis) -> list[str]:
-    """What to record next where this recording leaves several answers, a sentence each."""
+    """Sentences on the next recording where several answers are probable."""
     if d.experiment is not None:
         return run_next(d.experiment)
     return [*([d.planned.untold] if d.planned.untold else []), *without_motion(d)]
 
 
 def run_next(experiment: dict[str, Any]) -> list[str]:
-    """What an experiment does, what it tells, how it is run, and how far each motion that was tried gets."""
+    """Sentences on an experiment: motion, purpose, how to run it, and the distance by each tried motion."""
     why, seconds = experiment["why"], float(experiment["seconds"])
     tried = sorted(why["distance"].items(), key=lambda item: -item[1])
     far = "; ".join(f"{name.replace('_', ' ')} {value:.2g}" for name, value in tried)
@@ -208,7 +208,7 @@ def run_next(experiment: dict[str, Any]) -> list[str]:
 
 
 def without_motion(d: GraphDiagnosis) -> list[str]:
-    """The same where no motion was planned."""
+    """Sentences on the next recording without a planned motion."""
     if d.verdict == AMBIGUOUS:
         names = list(dict.fromkeys(e.name for e in d.effects))
         pairs = [(a, b) for a in names for b in names if b in TERMS[a].look_alikes]
@@ -232,7 +232,7 @@ def without_motion(d: GraphDiagnosis) -> list[str]:
 
 
 def parameter_rows(d: GraphDiagnosis) -> list[Row]:
-    """The fitted numbers with their nominal values."""
+    """Rows of the fitted parameters with their nominal values."""
     rows = []
     for path, v in d.parameters.items():
         start = is_start(path)
@@ -251,7 +251,7 @@ def _scaled(value: float, unit: str) -> tuple[float, str]:
 
 
 def cannot_rows(d: GraphDiagnosis) -> list[tuple[str, str, str]]:
-    """Effect, nodes and what a recording would have to hold, of what cannot be told from this one."""
+    """Rows (effect, nodes, motion that a recording needs) of the untestable effects."""
     nodes: dict[str, list[str]] = defaultdict(list)
     for entry in d.cannot_test:
         name, _, node = entry.partition(":")
@@ -271,7 +271,7 @@ def terminal(d: GraphDiagnosis) -> RenderableType:
         for name in ("effect", "at", "size", "90 % interval", "confidence"):
             right = name in ("90 % interval", "confidence")
             table.add_column(name, justify="right" if right else "left", overflow="fold", no_wrap=name == "effect")
-        for first, *others in effect_rows(d):  # the name of an effect stays whole
+        for first, *others in effect_rows(d):  # the name of an effect is not broken
             table.add_row(*map(Text, (first.replace(" (", "\n(") if len(first) > ONE_LINE else first, *others)))
         parts += [Text(), table]
     alike = [f"{look} ({p})" for _, look, p, _ in rival_rows(d)[:MOST_RIVALS] if not p.startswith("<")]

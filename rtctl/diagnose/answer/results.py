@@ -9,13 +9,13 @@ from rtctl.config.files import made_in, replaced_path
 
 RESULT, MODEL, EXPERIMENT, REPORT = "diagnosis.json", "model.yaml", "experiment.yaml", "report.html"
 TURN = "torque_over_turn.csv"  # of an axis that turns
-FOLDER = "diagnosis"  # in the bundle, where nobody says otherwise
+FOLDER = "diagnosis"  # default folder of the files in a bundle
 
 
 def fresh(folder: Path, base: Path | None) -> None:
-    """Make the folder, without files of an earlier diagnosis. Where `base` is given, no link may lead out of it.
+    """Make the folder and remove files of an earlier diagnosis. Where `base` is given, no link may lead out of `base`.
 
-    Raises UserError where the disk does not take it.
+    Raises UserError where the disk does not take the folder.
     """
     try:
         if base is not None:
@@ -28,7 +28,7 @@ def fresh(folder: Path, base: Path | None) -> None:
 
 
 def put(path: Path, make: Callable[[Path], Any]) -> None:
-    """Write the file at `path`, whole or not at all. Raises UserError where the disk does not take it."""
+    """Write the file at `path`, whole or not at all. Raises UserError where the disk does not take the file."""
     try:
         with replaced_path(path) as part:
             make(part)
@@ -37,7 +37,7 @@ def put(path: Path, make: Callable[[Path], Any]) -> None:
 
 
 def finite(value: Any) -> Any:
-    """Plain data with None for a number that is not finite, and numpy's numbers as Python's, as JSON knows them."""
+    """Plain data for JSON: None for a number that is not finite, Python numbers for those of numpy."""
     if isinstance(value, dict):
         return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Why the next likeliest answer lost: what each part of a recording says for the answer and against it."""
+"""Next likeliest answer: gain of the answer over it in each part of a recording, nats."""
 
 from typing import NamedTuple
 
@@ -10,23 +10,23 @@ from rtctl.diagnose.answer.si_format import percent
 from rtctl.diagnose.evidence.diagnosis import NOTHING, UNNAMED
 from rtctl.diagnose.evidence.evidence import losses_of
 
-HALF = 0.5  # of what speaks for the answer: the parts that are named
-LEAST_SHARE = 0.001  # probability that is told
-CLOSE = 1.0  # nats: less is told as about even
+HALF = 0.5  # of the gain: share of the parts that are named
+LEAST_SHARE = 0.001  # least reported probability
+CLOSE = 1.0  # nats, gain below which the answers are reported as about equally probable
 
 
 class Lost(NamedTuple):
-    """The next likeliest answer beside the one that was given."""
+    """Next likeliest answer compared with the answer."""
 
     other: str  # in words
     share: float  # its probability over resampled segments
     behind: float  # nats: ln of the odds of the answer against it, on the whole recording
-    edges: np.ndarray  # (parts + 1,) of the parts, s; of several recordings shares of all their rows, 0 to 1
-    nats: np.ndarray  # (parts,) for the answer
+    edges: np.ndarray  # (parts + 1,) edges of the parts, s; for several recordings shares of all rows, 0 to 1
+    nats: np.ndarray  # (parts,) gain of the answer
 
 
 def lost_by(d: GraphDiagnosis) -> Lost | None:
-    """What the next likeliest answer lost by; None where there is no other."""
+    """Comparison of the next likeliest answer with the answer; None where there is no other."""
     found = groups(d)
     own = next((pair for pair in found if answers(d, pair[0])), found[0])
     others = [pair for pair in found if pair is not own]
@@ -42,14 +42,14 @@ def lost_by(d: GraphDiagnosis) -> Lost | None:
 
 
 def answers(d: GraphDiagnosis, bar: Bar) -> bool:
-    """Whether a rival is the answer that was given."""
+    """Whether a rival is the answer of the diagnosis."""
     if d.verdict == UNNAMED:
         return bool(bar.free)
     return not bar.free and bar.names == (() if d.verdict == NOTHING else d.decided.best.names)
 
 
 def sentence(d: GraphDiagnosis) -> str:
-    """The next likeliest answer, by how much it is behind, and when it lost that; "" where there is none."""
+    """Sentences on the next likeliest answer: its odds, and the time of its losses; "" where there is none."""
     lost = lost_by(d)
     if lost is None:
         return ""
@@ -64,7 +64,7 @@ def sentence(d: GraphDiagnosis) -> str:
 
 
 def when(lost: Lost, recordings: int) -> str:
-    """The parts of one recording in which the other answer lost most, or what it loses by if not there."""
+    """Sentence on the parts of one recording in which the other answer lost most, or on its lower prior."""
     total = float(lost.nats.sum())
     if total < CLOSE:
         return "The rows do not decide between them: it has more numbers, or less probable ones."
@@ -79,7 +79,7 @@ def when(lost: Lost, recordings: int) -> str:
 
 
 def runs(numbers: np.ndarray) -> list[tuple[int, int]]:
-    """First and last of each run of neighbours among numbers in rising order."""
+    """First and last of each run of consecutive numbers among rising ones."""
     cuts = np.flatnonzero(np.diff(numbers) > 1)
     firsts, lasts = numbers[np.r_[0, cuts + 1]], numbers[np.r_[cuts, len(numbers) - 1]]
     return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]

@@ -1,4 +1,4 @@
-"""Prediction of a second recording of the same machine by the models that were fitted to the first."""
+"""Held-out prediction of a second recording of a machine by the models fitted to the first."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from rtctl.diagnose.model.simulate import Simulator
 
 
 def predicted(d: GraphDiagnosis, other: Path | str) -> GraphDiagnosis:
-    """The diagnosis with the errors on the recording in the folder `other` as its held-out errors.
+    """Diagnosis with the errors on the recording in the folder `other` as held-out errors.
 
     Raises UserError where the folder cannot be read or is of another machine, NoAnswer where it supports no verdict.
     """

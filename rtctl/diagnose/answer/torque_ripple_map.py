@@ -1,13 +1,13 @@
-"""The torque that a turning axis meets over one turn, beyond what its model has: cogging, ripple, what else repeats.
+"""Torque ripple map: missing torque of a rotary axis over one turn, from cogging, ripple and other periodic causes.
 
-With what drives it known, the torque that is missing at each moment is
+For a known drive torque the missing torque is
 
     tau = M x'' - K u + F_v x' + F_c sign(x') + k x
 
-x smoothed without a lag up to the finest order that is asked for, at the speed at which the axis turns. Seen against
-the angle, what belongs to the turn stays and what does not averages out: each visit of a place counts as one, since
-neighbouring rows are not independent, and the band comes from how visits differ. Of a single turn nothing says what
-belongs to it; its band is what a series of the strongest orders leaves over.
+with x smoothed by a zero-phase filter up to the highest order at the speed of the axis. Averaged over the angle, torque
+that repeats with the turn remains and all other torque averages out. Each visit of a place counts once, since
+neighbouring rows are not independent; the band comes from the scatter of the visits. A single turn does not show which
+torque repeats; its band is the residual of a series of the strongest orders.
 
 Source: Fyfe & Munck, Analysis of computed order tracking, Mechanical Systems and Signal Processing 11 (1997); Piccoli &
 Yim, Anticogging: torque ripple suppression, modeling and parameter selection, Int. J. Robotics Research 35 (2016).
@@ -24,37 +24,37 @@ from rtctl.diagnose.model.by_symbol import Model
 from rtctl.diagnose.record.format1 import Record
 from rtctl.diagnose.search.disturbance_estimate import Along, peaks, spectrum
 
-PLACES = 360  # over the turn
-FINEST = 60.0  # orders
-SLOWEST, FASTEST = 2.0, 0.1  # Hz, and share of the sample rate, between which the smoothing stays
-SETTLE = 0.5  # s at either end that count for nothing: there the smoothing has one side only
-MOVES = 0.2  # of the median speed, below which a row shows friction and no turn
-VISITS = 3  # of a place, from which on their scatter says how certain it is
+PLACES = 360  # places over the turn
+FINEST = 60.0  # highest order, periods a turn
+SLOWEST, FASTEST = 2.0, 0.1  # Hz, and share of the sample rate: bounds of the cutoff of the smoothing
+SETTLE = 0.5  # s at either end that are excluded: the smoothing is one-sided there
+MOVES = 0.2  # of the median speed, least speed of a row that counts
+VISITS = 3  # visits of a place, at least, for a band by their scatter
 ORDERS = np.arange(1.0, FINEST + 1)
-TOLD = 8  # orders that are told
+TOLD = 8  # reported orders, at most
 
 
 class Order(NamedTuple):
-    """What repeats so many times a turn."""
+    """Component of the torque with `order` periods a turn."""
 
     order: float
     amplitude: float  # Nm
-    share: float  # of the torque's variance, each order taken alone
+    share: float  # of the variance of the torque, each order fitted alone
 
 
 class Turn(NamedTuple):
-    """Torque over the turn; nan where the axis never was."""
+    """Torque over the turn; nan at unvisited places."""
 
     angle: np.ndarray  # (PLACES,) rad, middles
-    torque: np.ndarray  # Nm, on the axis in the direction of its angle, without its mean
-    band: np.ndarray  # Nm, half width, 95 %
-    visits: np.ndarray  # (PLACES,) times that the place was passed
+    torque: np.ndarray  # (PLACES,) Nm, on the axis in the direction of its angle, without its mean
+    band: np.ndarray  # (PLACES,) Nm, half width, 95 %
+    visits: np.ndarray  # (PLACES,) number of visits
     orders: tuple["Order", ...]  # largest first
-    turns: float  # that the axis went through
+    turns: float  # range of the angle, turns
 
 
 def over_turn(record: Record, model: Model) -> Turn | None:
-    """The map by what `model` says of the axis; None where it does not turn, or hardly ever did."""
+    """Torque ripple map under `model`; None for an axis that is not rotary, or hardly moved."""
     if not turns(record) or "M" not in model.base or "K" not in model.base:
         return None
     rows = slice(round(SETTLE / record.dt), len(record.t) - round(SETTLE / record.dt))
@@ -65,7 +65,7 @@ def over_turn(record: Record, model: Model) -> Turn | None:
     if not usual or np.count_nonzero(moves) < PLACES:
         return None
     x, way, torque = x[moves], np.sign(v[moves]), torque[moves]
-    for side in (-1.0, 1.0):  # friction differs by direction, and is no part of the turn
+    for side in (-1.0, 1.0):  # friction depends on direction and not on the angle
         if (way == side).any():
             torque[way == side] -= torque[way == side].mean()
     place = np.floor(np.mod(x, 2 * np.pi) / (2 * np.pi) * PLACES).astype(int) % PLACES
@@ -82,7 +82,7 @@ def over_turn(record: Record, model: Model) -> Turn | None:
 
 
 def turns(record: Record) -> bool:
-    """Whether it is of an axis that turns and shows its angle."""
+    """Whether the record is of a rotary axis with a measured angle."""
     return of_case(record.case).rotary and "x" in record.y
 
 
@@ -92,7 +92,7 @@ def missing(record: Record, model: Model) -> tuple[np.ndarray, np.ndarray, np.nd
     pace = float(np.median(np.abs(np.gradient(x, record.dt)[np.gradient(x) != 0]))) if np.ptp(x) else 0.0
     rate = 1.0 / record.dt
     cut = float(np.clip(FINEST * pace / (2 * np.pi), SLOWEST, FASTEST * rate))
-    smooth = butter(2, cut, fs=rate, output="sos")  # twice, there and back: no lag
+    smooth = butter(2, cut, fs=rate, output="sos")  # applied forwards and backwards: zero phase
     x, u = sosfiltfilt(smooth, x), sosfiltfilt(smooth, record.u[:, 0])
     v = np.gradient(x, record.dt)
     own = b["M"] * np.gradient(v, record.dt) + b.get("F_v", 0.0) * v + b.get("k", 0.0) * x
@@ -100,7 +100,7 @@ def missing(record: Record, model: Model) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 def visited(place: np.ndarray, moves: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Place and mean torque of each visit: rows at one place in one go."""
+    """Place and mean torque of each visit, (visits,) each: consecutive rows at one place."""
     row = np.flatnonzero(moves)
     new = np.concatenate(([True], (np.diff(place) != 0) | (np.diff(row) > 1)))
     number = np.cumsum(new) - 1
@@ -108,14 +108,14 @@ def visited(place: np.ndarray, moves: np.ndarray, torque: np.ndarray) -> tuple[n
 
 
 def mean_of(visits: np.ndarray, sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean over the visits of each place, nan where there are none, and their number."""
+    """Mean torque over the visits of each place, nan without visits, and number of visits, (PLACES,) each."""
     counts = np.bincount(visits, minlength=PLACES)
     with np.errstate(invalid="ignore"):
         return np.bincount(visits, sums, PLACES) / np.where(counts, counts, np.nan), counts
 
 
 def amplitudes(x: np.ndarray, torque: np.ndarray) -> tuple[Order, ...]:
-    """The strongest orders of `torque` (n,) over the angle `x` (n,)."""
+    """Strongest orders of `torque` (n,), Nm, over the angle `x` (n,), rad; largest first."""
     thin = max(1, len(x) // 8000)
     height = spectrum(Along(x[::thin]), torque[::thin], ORDERS)
     found = peaks(ORDERS, height, TOLD)
@@ -124,12 +124,12 @@ def amplitudes(x: np.ndarray, torque: np.ndarray) -> tuple[Order, ...]:
 
 
 def wave(x: np.ndarray, torque: np.ndarray, order: float) -> np.ndarray:
-    """Cosine and sine part (2,) of one order."""
+    """Cosine and sine part (2,) of one order, Nm."""
     A = np.stack([np.cos(order * x), np.sin(order * x), np.ones_like(x)], axis=1)
     return np.linalg.lstsq(A, torque, rcond=None)[0][:2]
 
 
 def series(x: np.ndarray, torque: np.ndarray, orders: list[float]) -> np.ndarray:
-    """What all these orders together make of the torque (n,)."""
+    """Fit (n,) of the torque by a series of these orders, Nm."""
     A = np.column_stack([np.ones_like(x), *(f(order * x) for order in orders for f in (np.cos, np.sin))])
     return A @ np.linalg.lstsq(A, torque, rcond=None)[0]

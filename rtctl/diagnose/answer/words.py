@@ -1,4 +1,4 @@
-"""Words of a diagnosis: each effect as its term tells it, with the names, units and sizes of the described machine."""
+"""Words of a diagnosis: the phrase of each effect with names, units and sizes of the described machine."""
 
 import math
 import re
@@ -18,14 +18,14 @@ from rtctl.plants.physics.dimensions import DIMENSIONS
 
 
 def here(machine: Description, node: str) -> str:
-    """A node as part of a sentence: "the carriage", "motor 2"."""
+    """Node as part of a sentence: "the carriage", "motor 2"."""
     words = node.replace("_", " ").replace("-", " ")
     numbered = re.fullmatch(r"(.*[^\W\d]) ?(\d+)", words)
     return f"{numbered[1]} {numbered[2]}" if numbered else f"the {words}"
 
 
 def unit_in(record: GraphRecord, path: str) -> str:
-    """Unit of any unknown number: of the description, of an owner's term, or of a first position and speed."""
+    """Unit of any unknown: of the description, of a nominal term, or of a first position or speed."""
     machine, plain = record.case.machine, path.partition(RECORDING)[0]
     if plain.startswith(PHYSICS):
         _, number, key = plain.split(".")
@@ -38,7 +38,7 @@ def unit_in(record: GraphRecord, path: str) -> str:
 
 
 def channel_unit(machine: Description, channel: str) -> str:
-    """Unit of a sensor's reading, or of the force that drives were measured to make."""
+    """Unit of the reading of a sensor, or of the measured force of the drives."""
     sensor = machine.sensors.get(channel)
     if sensor is not None:
         return measured_unit(sensor.measures, turns_at(machine, sensor))
@@ -74,7 +74,7 @@ def value_unit(machine: Description, path: str) -> str:
 
 
 class Sizes:
-    """The numbers of an effect, by the names that its phrase uses."""
+    """Sizes of an effect, by the names in its phrase."""
 
     def __init__(self, machine: Description, effect: Effect, model: GraphModel):
         self.here = here(machine, effect.node)
@@ -83,7 +83,7 @@ class Sizes:
         self.term: Any = next((t for t in terms if (t.term, t.node) == (effect.name, effect.node)), None)
 
     def value(self, name: str) -> float:
-        """SI value; nan where nobody knows it."""
+        """Value of a parameter, SI; nan where it is unknown."""
         if name == "F_added":
             name = "F_C"
         if name in self.effect.parameters:
@@ -96,7 +96,7 @@ class Sizes:
         return unit_at(self.machine, self.effect.name, self.effect.node, "F_C" if name == "F_added" else name)
 
     def said(self, name: str) -> str:
-        """What a phrase leaves to words."""
+        """Words of a phrase for a name that is not a number."""
         phrase = phrase_of(self.effect.name)
         if name == "sticking":
             dry = self.model.base.get(f"bodies.{self.effect.node}.dry", 0.0)
@@ -113,7 +113,7 @@ class Sizes:
 
 
 def clause(machine: Description, effect: Effect, model: GraphModel) -> str:
-    """What an effect does and how much: "the carriage rubs: 3 N more dry friction than in the model, at any speed"."""
+    """Effect and its size in words: "the carriage rubs: 3 N more dry friction than in the model, at any speed"."""
     phrase = phrase_of(effect.name)
     if phrase is None:
         return f"{here(machine, effect.node)} shows {effect.name}"
@@ -122,7 +122,7 @@ def clause(machine: Description, effect: Effect, model: GraphModel) -> str:
 
 
 def wrong_number(record: GraphRecord, path: str, believed: float, value: float) -> str:
-    """A number of the description that is wrong by far: "the machine acts as if drives.motor.gain were 0.32 ..."."""
+    """Sentence on a nominal number out of its tolerance: "the machine acts as if drives.motor.gain were 0.32 ..."."""
     unit = unit_in(record, path)
     return (
         f"The machine acts as if {path} were {nice(value, unit)} instead of {nice(believed, unit)}, which is beyond "
@@ -131,6 +131,6 @@ def wrong_number(record: GraphRecord, path: str, believed: float, value: float) 
 
 
 def called(machine: Description, entry: str) -> str:
-    """A hypothesis "name:node" in a few words: "dry friction at the carriage"."""
+    """Hypothesis "name:node" in a few words: "dry friction at the carriage"."""
     name, _, node = entry.partition(":")
     return f"{noun(name)} at {here(machine, node)}" if node else noun(name)

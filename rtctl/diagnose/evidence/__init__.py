@@ -1,1 +1,1 @@
-"""Forces and errors of readings without a name, rivals, their probabilities, held-out rows, the verdict."""
+"""Evidence: unnamed forces and errors of readings, rivals, posterior probabilities, held-out rows, the verdict."""

@@ -1,4 +1,4 @@
-"""What a diagnosis says, and its form in diagnosis.json."""
+"""Records of a diagnosis: effect, rival, location and interval, as in diagnosis.json."""
 
 from typing import Any, NamedTuple
 
@@ -7,7 +7,7 @@ NAMED, AMBIGUOUS, UNNAMED, NOTHING = "named", "ambiguous", "unnamed", "nothing"
 
 class Interval(NamedTuple):
     value: float
-    low: float  # of the 90 % interval
+    low: float  # lower end of the 90 % interval
     high: float
     unit: str = ""
 
@@ -17,31 +17,31 @@ class Interval(NamedTuple):
 
 
 class Rival(NamedTuple):
-    """A look-alike of an effect that was fitted in its place."""
+    """Look-alike of an effect, fitted in the place of the effect."""
 
     name: str
     node: str
-    p_value: float  # of explaining the record as well
-    rms: float  # of its weighted error
+    p_value: float  # probability of the look-alike
+    rms: float  # rms of the weighted residual
 
 
 class Effect(NamedTuple):
-    """A term of physics that the record asks for."""
+    """Term of physics that the recording supports."""
 
     name: str
     node: str
     confidence: float
     parameters: dict[str, Interval]
     look_alikes: tuple[Rival, ...]
-    instead_of: str | None = None  # term:node of the effect before it whose place it would take; None: it stands itself
+    instead_of: str | None = None  # term:node of the effect that this one would replace; None: the effect is accepted
 
 
 class Located(NamedTuple):
-    """Where simulation and recording part."""
+    """Location of the difference between simulation and recording."""
 
     channel: str
     node: str
     axis: str
-    where: str  # in words
+    where: str  # location in words
     since_s: float
-    share: float  # of the error that lives there
+    share: float  # share of the residual that is located there

@@ -1,9 +1,9 @@
-"""Evidence: combinations of effects, the description alone and what has no name are rivals for one probability.
+"""Posterior probabilities of the rivals: combinations of effects, the nominal model alone, and unnamed effects.
 
 A probability is the mean of the posterior over resampled segments of the recording (a bagged posterior). Where two
-models are both wrong, the posterior of one recording is sure of either; the mean over what could have been recorded
-is not. The law of a name is exact to some per cent alone: a small free force beside it counts for the name, a large
-one against it.
+models are both wrong, the posterior of one recording is close to one for either of them; the bagged posterior is not.
+The law of a named effect has an error of some per cent: a small free force beside the effect counts for the name, a
+large free force counts against the name.
 
 Source: Huggins & Miller, Reproducible model selection using bagged posteriors, Bayesian Analysis 18 (2023);
 Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of model discrepancy, Inverse Problems 30
@@ -26,53 +26,53 @@ from rtctl.diagnose.model.node_scaling import Measures
 from rtctl.diagnose.search.search import Found
 from rtctl.plants.physics import TERMS
 
-SEGMENTS = 32
-DRAWS = 300
-BESIDE = 3  # combinations beside which free functions are asked for
-NEAR = 50.0  # nats: models with a wrong number that are further behind the best are not asked for free functions
-LEAST = 1e-4  # of the force that moves a node: a discrepancy that is smaller is none
+SEGMENTS = 32  # resampled segments of a recording
+DRAWS = 300  # bootstrap draws
+BESIDE = 3  # combinations beside which free functions are fitted
+NEAR = 50.0  # nats behind the best model, up to which free functions are fitted beside a model with a wrong number
+LEAST = 1e-4  # of the force that moves a node: smallest discrepancy that is fitted
 
 
 class Rival(NamedTuple):
-    """One explanation of a recording."""
+    """Explanation of a recording, with its posterior."""
 
     fit: Fitted
-    free: Free | None  # what has no name, or the error of a law, beside the fit
+    free: Free | None  # unnamed effect, or error of a law, beside the fit
     merit: float  # logarithm of the posterior on the whole recording, nats, up to a constant
     probability: float
 
     @property
     def doubted(self) -> str:
-        """The number of the description that is wrong by far in it; empty where none is."""
+        """Path of the nominal number that is far out of its tolerance; empty where there is none."""
         return self.fit.space.doubted
 
     @property
     def unlisted(self) -> bool:
-        """Whether it has no name: a number of the description that is wrong by far, or a free function that is more
-        than what the law of a name may be wrong by."""
+        """Whether the explanation has no name: a nominal number far out of its tolerance, or a free function larger
+        than the error of a law."""
         return bool(self.doubted) or (self.free is not None and self.free.large)
 
 
 def rivals(found: Found) -> tuple[Rival, ...]:
-    """All explanations that were fitted, with free functions beside the likeliest; the most probable first."""
+    """Rivals, the most probable first: all fitted models, and the likeliest of them with free functions."""
     base = found.base
     fits = list(found.fits) if any(not f.names for f in found.fits) else [*found.fits, base]
     sim = base.like.parts[0].sim
     unit = Measures(sim, base.model.base, {}).of("force", str(sim.body))
 
     def wrong(fit: Fitted) -> float:
-        """What the laws of a fit may be wrong by, in forces that move the machine: the correction at the followed body
-        has less of what the effects are, also of those in a sensor or a drive."""
+        """Standard deviation of the error of the laws of a fit, as a share of the force that moves the machine: by the
+        change of the tracking correction at the followed body, which includes effects in a sensor or a drive."""
         if not (fit.names or fit.space.doubted) or not len(fit.pushes[0]):
             return 0.0
         change = float(np.sqrt(np.mean((base.pushes[0] - fit.pushes[0])[:, 0] ** 2)))
         return LAW_ERROR_OF_FORCE * change / unit if np.isfinite(change) else 0.0
 
     def beside(fit: Fitted, off: float, axes: dict[str, float]) -> list[Free]:
-        """Free functions beside a fit; errors of its laws are along axes, each with its share of `off`."""
+        """Free functions beside a fit; the errors of its laws are along `axes`, each with its share of `off`."""
         return free_functions(fit, {axis: off * share for axis, share in axes.items() if off * share > LEAST})
 
-    best = set(found.best.names)  # and whether a small error of fewer laws does as well
+    best = set(found.best.names)  # subsets of the best names are tested with free functions as well
     entries: list[tuple[Fitted, Free | None, float]] = []
     for rank, fit in enumerate(fits):
         off, wander, merit = wrong(fit), wandering(fit), found.merit(fit)
@@ -99,34 +99,33 @@ def rivals(found: Found) -> tuple[Rival, ...]:
 
 
 def losses_of(power: float, fit: Fitted, free: Free | None) -> np.ndarray:
-    """Negative logarithm (segments,) of the likelihood of each part of the recording, nats, of which the share `power`
-    counts."""
+    """Negative log-likelihood (segments,) of each segment of the recording, nats, times the share `power`."""
     return power * fit.like.losses(fit.e if free is None else free.e, SEGMENTS)
 
 
 def arguments(shares: Sequence[tuple[str, float]]) -> dict[str, float]:
-    """Axes along which laws may be wrong, of terms and the share of what all effects do that each does: an error of a
-    law is a function of its own argument, and small beside its own effect.
+    """Share of the error of the laws by axis, from the share of each term in all effects: the error of a law is a
+    function of the argument of the law, and small against its effect.
 
-    A law that shows by frequency or tension has no axis here, and may be wrong along any but time.
+    A law whose argument is frequency or tension has no axis here: its error is along every axis but time.
     """
     out: dict[str, float] = {}
     for term, share in shares:
         axis = TERMS[term].axis
         along = {axis} if axis in AXES else set(AXES) - {TIME}
-        for name in along | ({"position"} if axis == "angle" else set()):  # of less than a turn
+        for name in along | ({"position"} if axis == "angle" else set()):  # motion of less than a turn
             out[name] = float(np.hypot(out.get(name, 0.0), share))
     return out
 
 
 def axes_of(number: str) -> set[str]:
-    """Axes along which the law that has a number of the description may be wrong."""
+    """Axes of the error of the law that a nominal number belongs to."""
     return {"command"} if number.startswith("drives.") else set(AXES) - {TIME, "command"}
 
 
 def shares(fit: Fitted) -> list[tuple[str, float]]:
-    """Term of each effect of a fit, and what it does to the correction of the observer over what all do; the squares of
-    several sum to one."""
+    """Term of each effect of a fit, and its share in the tracking correction; the squares of several shares sum to
+    one."""
     terms = [h.term for h in fit.space.hypotheses]
     if len(terms) < 2 or not len(fit.pushes[0]):
         return [(term, 1.0) for term in terms]
@@ -143,13 +142,13 @@ def shares(fit: Fitted) -> list[tuple[str, float]]:
 
 
 def exceeds(base: Fitted, fit: Fitted, free: Free) -> bool:
-    """Whether a force beside a fit takes off more than what the laws of the fit may be wrong by."""
+    """Whether a free force beside a fit reduces the residual by more than the error of the laws of the fit."""
     return share_of(base.e, fit.e, free.e) > LAW_ERROR_OF_FORCE
 
 
 def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
-    """Mean posterior (rivals,) over resampled segments, of merits (rivals,) on the whole and losses (rivals, segments)
-    that are part of them."""
+    """Bagged posterior (rivals,): mean over resampled segments, from merits (rivals,) on the whole recording and losses
+    (rivals, segments), nats."""
     count = losses.shape[1]
     weights = np.random.default_rng(0).multinomial(count, np.full(count, 1.0 / count), DRAWS)
     drawn = (merits + losses.sum(axis=1)) - weights @ losses.T
@@ -158,13 +157,13 @@ def bagged(merits: np.ndarray, losses: np.ndarray) -> np.ndarray:
 
 
 def _small(free: list[Free]) -> list[tuple[Free, float]]:
-    """Errors of the laws of a model among free forces, each with the logarithm of its prior."""
+    """Errors of the laws among free functions, each with its log prior, nats."""
     return _shared([f for f in free if not f.large])
 
 
 def _shared(free: list[Free]) -> list[tuple[Free, float]]:
-    """Free forces of one size, each with the logarithm of its prior: they share it. A large one leaves a force that
-    comes and goes as small as its law may be wrong by."""
+    """Free functions of one size, each with its log prior, nats: all share one prior probability. Beside a large
+    function the time-varying force is as small as the error of a law."""
     each = -float(np.log(max(len(free), 1)))
     return [
         (f, each + (log_density(0.0, float(np.hypot(UNEXPLAINED, LAW_ERROR_OF_FORCE * f.rms))) if f.large else 0.0))

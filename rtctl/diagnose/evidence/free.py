@@ -1,9 +1,8 @@
-"""Free functions: what any force at a body, or any error of a reading, over speed, position, angle, command or time,
-would explain.
+"""Free functions: any force at a body, or any error of a reading, over speed, position, angle, command or time.
 
-An effect without a name in the library is a function that nobody has written down. At each body and each sensor, along
-each axis, a function of a few hats is fitted beside a model. It competes with the names for the evidence, and what it
-still explains beside a name says that the law of that name is not the machine's.
+A free function stands for an effect that the library does not name. At each body and each sensor, along each axis, a
+piecewise linear function is fitted beside a model (semiparametric regression). The function competes with the named
+effects for the evidence; a gain of a function beside a name shows that the law of the name is not that of the machine.
 
 Source: Robinson, Root-N-consistent semiparametric regression, Econometrica 56 (1988).
 """
@@ -21,25 +20,25 @@ from rtctl.diagnose.likelihood.linear import DAMPING, Linear
 from rtctl.diagnose.likelihood.solver import bounded_step, parallel
 from rtctl.diagnose.model.model import GraphModel
 
-HATS = 10  # of a first look at each axis
-FINE = 30  # of the axes that explain most
-SECOND = 2  # axes of forces, and of errors of readings, that are looked at again
-SMOOTH = 0.25  # of the range: distance over which a free function is alike, by its prior
+HATS = 10  # hat functions of the first fit along each axis
+FINE = 30  # hat functions along the axes with the most evidence
+SECOND = 2  # axes of forces, and of errors of readings, that are fitted again with FINE hats
+SMOOTH = 0.25  # of the range: correlation length of a free function by its prior
 NONE: Mapping[str, float] = {}
-PARTS = (1.0, 0.5, 0.25)  # of the step of the linear model, at which it is simulated
+PARTS = (1.0, 0.5, 0.25)  # shares of the step of the linear model that are simulated
 
 
 class Free(NamedTuple):
-    """A free function beside a model."""
+    """Free function beside a model."""
 
     place: Place
-    large: bool  # whether its prior is that of an effect without a name, and not of the error of a law
-    gain: float  # nats, under the noise that it leaves
-    e: np.ndarray  # (blocks, sensors) residual that it leaves
-    evidence: float  # nats that it adds to the model
+    large: bool  # whether the prior is of an unnamed effect; False: of the error of a law
+    gain: float  # nats, under the noise of its residual
+    e: np.ndarray  # (blocks, sensors) residual beside it, SI
+    evidence: float  # nats that it adds to the evidence of the model
     knots: np.ndarray
-    value: np.ndarray  # (hats,) N or Nm; of an error rad, m, rad/s or m/s
-    rms: float  # over the recording, in forces that move the node, or in spreads of the reading
+    value: np.ndarray  # (hats,) N or Nm; an error of a reading in rad, m, rad/s or m/s
+    rms: float  # over the recording, by the force that moves the node or by the spread of the reading
 
     @property
     def node(self) -> str:
@@ -48,27 +47,27 @@ class Free(NamedTuple):
 
     @property
     def axis(self) -> str:
-        """Axis along which it is a function."""
+        """Argument of the function."""
         return self.place.axis
 
     def over(self, number: int) -> np.ndarray:
-        """The function (n,) over the rows of a recording, SI."""
+        """Values (n,) of the function over the rows of a recording, SI."""
         return self.place.along(self.knots, self.value, self.place.values[number])
 
     @property
     def kind(self) -> str:
-        """What it is, in words."""
+        """Kind of the function in words."""
         return "an error of the reading" if self.place.reads else "a force"
 
 
 def free_functions(base: Fitted, errors: Mapping[str, float] = NONE) -> list[Free]:
-    """Free functions at every body and every sensor along every axis; those with most evidence first.
+    """Free functions at every body and every sensor along every axis, the most evidence first.
 
-    Each is fitted as an effect without a name. A force along one of the axes of `errors` is fitted as an error of the
-    laws of the model as well, which has this standard deviation, in forces that move the body.
+    Each function is fitted as an unnamed effect. A force along an axis of `errors` is also fitted as an error of the
+    laws of the model; `errors` holds its standard deviation as a share of the force that moves the body.
     """
     own = Linear(base)
-    about = own, own.under(base.like.flat(base.e))  # the parameters are filtered once for all places
+    about = own, own.under(base.like.flat(base.e))  # derivatives are whitened once for all places
     out = [free for place in places(base) for free in _fitted(about, place, HATS, errors)]
     out.sort(key=lambda f: -f.evidence)
     for reads in (False, True):
@@ -84,10 +83,10 @@ def _fitted(abouts: tuple[Linear, Linear], place: Place, hats: int, errors: Mapp
     knots = np.unique(spaced(along, low, high, hats))
     unit = place.size * place.whole
     apart = np.abs(np.subtract.outer(*[np.arange(len(knots)) / max(len(knots) - 1, 1)] * 2))
-    root = np.linalg.cholesky(np.exp(-apart / SMOOTH))  # of the prior's covariance (Ornstein and Uhlenbeck, 1930)
+    root = np.linalg.cholesky(np.exp(-apart / SMOOTH))  # prior covariance (Ornstein and Uhlenbeck, 1930)
 
     def change(hat: np.ndarray, model: GraphModel) -> np.ndarray:
-        """What a function by hats does to the residuals (blocks, sensors) of coarse simulations."""
+        """Change (blocks, sensors) of the residual of coarse simulations by a free function, SI."""
         found = [
             place.run(part, model, unit * place.along(knots, hat, own), coarse)
             for part, own in zip(like.parts, place.values, strict=True)
@@ -118,14 +117,14 @@ class _Solved(NamedTuple):
     evidence: float
     e: np.ndarray
     z: np.ndarray  # (columns,) in standard deviations of the prior
-    dx: np.ndarray  # step of the base's parameters
-    volume: float  # of the posterior, nats
+    dx: np.ndarray  # step of the parameters of the base
+    volume: float  # log determinant of the posterior precision over the prior's, nats
 
 
 def _simulated(base: Fitted, solved: _Solved, change: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> _Solved:
-    """The same as a simulation has it, as far along the step as it gains most.
+    """Solution by simulation, at the share of the step with the most evidence.
 
-    What lets go of dry friction, or closes a gap, is no sum of what single hats did.
+    Slip of dry friction and contact in a gap are not linear in the hat functions.
     """
     tried = []
     for part in PARTS:
@@ -136,7 +135,7 @@ def _simulated(base: Fitted, solved: _Solved, change: Callable[[np.ndarray, np.n
 
 
 def _judged(base: Fitted, e: np.ndarray, dx: np.ndarray, z: np.ndarray, volume: float) -> _Solved:
-    """What a step of the parameters and a free function gain, that leave the residuals e (blocks, sensors)."""
+    """Gain and evidence of a step of the parameters and a free function, from the residuals e (blocks, sensors)."""
     weight = prior(base.space)
     odds = 0.5 * float(weight @ ((base.x + dx) ** 2 - base.x**2) + z @ z)
     gain = base.loss - base.like.loss(e)
@@ -144,8 +143,8 @@ def _judged(base: Fitted, e: np.ndarray, dx: np.ndarray, z: np.ndarray, volume: 
 
 
 def _solved(about: Linear, C: np.ndarray) -> _Solved:
-    """Parameters of the base and the columns C (blocks, sensors, k), each of variance one, that suit the residual under
-    the noise of `about`."""
+    """Least-squares solution of the parameters of the base and of the columns C (blocks, sensors, k), each of prior
+    variance one, under the noise of `about`."""
     base, noise = about.base, about.like
     r = noise.white(base.e)
     n, k = len(base.x), C.shape[2]

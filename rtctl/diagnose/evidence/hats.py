@@ -1,4 +1,4 @@
-"""What a model lacks, as a force or a reading, against the axis where it lives."""
+"""Binned means of a missing force or reading along an axis, and knots of hat functions."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,18 +6,18 @@ from typing import Any
 import numpy as np
 from scipy.stats import t
 
-LEAST = 12  # samples in a bin
-GAP = 0.25  # of the axis: no line is drawn across
+LEAST = 12  # samples in a bin, at least
+GAP = 0.25  # of the axis: smallest gap across which no line is drawn
 
 
 def binned(
     x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int, middle: Callable[..., Any] = np.median
 ) -> np.ndarray:
-    """Along x: middles, medians of y (or another `middle`), half widths of their 95 % bands, and medians of the law,
-    (4, bins).
+    """Binned curve (4, bins) along x: centres, medians of y (or another `middle`), half widths of the 95 % bands, and
+    medians of the law.
 
     Neighbouring samples are not independent: the band comes from the scatter of the means of `block` rows, visit by
-    visit. Each bin has the same sum of its shares of the way along x and of the samples; a gap in x leaves a column of
+    visit. The share of the range of x plus the share of the samples is equal for all bins; a gap in x gives a column of
     nan. No samples give no bins.
     """
     if not len(x):
@@ -40,7 +40,7 @@ def binned(
 
 
 def spaced(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
-    """Places (count,) among sorted values (n,): each step has the same sum of its shares of the way from low to high
-    and of the values."""
+    """Knots (count,) among sorted values (n,): the share of the range plus the share of the values is equal for all
+    steps."""
     share = 0.5 * ((values - low) / ((high - low) or 1.0) + np.linspace(0.0, 1.0, len(values)))
     return np.interp(np.linspace(0.0, 1.0, count), share, values)

@@ -1,7 +1,7 @@
-"""A name of which nothing shows but a force that is always there yields to one that is just that.
+"""Replacement of an effect of which only a constant force is identified by an effect that is a constant force.
 
-A spring whose stiffness may be zero, far from where it rests, is a constant push. Its free number is a licence: it fits
-a little better than a push that has none, and says something that nobody has seen.
+A spring whose stiffness may be zero, far from its place of rest, acts as a constant force. Its further free parameter
+improves the fit a little, and the recording does not identify it.
 """
 
 from rtctl.diagnose.calibration import VISIBLE
@@ -13,8 +13,8 @@ from rtctl.diagnose.likelihood.widths import hollow
 
 
 def filled(decided: Verdict, base: Fitted) -> Verdict:
-    """The verdict with another name in the place of each whose own size may be zero, where a fitted model takes off
-    nearly as much with it."""
+    """Verdict in which another effect replaces each effect whose own size may be zero, where a fitted model with the
+    other effect explains nearly as much."""
     while decided.verdict in (NAMED, AMBIGUOUS) and (best := decided.best).names:
         other = next((f for i in hollow(best) if (f := instead(decided, base, i)) is not None), None)
         if other is None:
@@ -27,8 +27,8 @@ def filled(decided: Verdict, base: Fitted) -> Verdict:
 
 
 def instead(decided: Verdict, base: Fitted, index: int) -> Fitted | None:
-    """The likeliest model with another effect than the one of this number, all of whose sizes are told; None where none
-    takes off nearly as much as the best."""
+    """Likeliest model with another effect in the place of effect `index`, with all sizes identified; None where no such
+    model explains nearly as much as the best."""
     best = decided.best
     rest = {name for i, name in enumerate(best.names) if i != index}
     enough = explained(base, best) - VISIBLE

@@ -1,8 +1,8 @@
 """Places of a free function: a force at a body, or an error of the reading of a sensor, along one axis.
 
-Position and speed are those of the model, as an observer of the usual bandwidth has them: the speed of a recording that
-counts knows of a step before it comes, and a force by it pushes ahead. That of a quick observer holds the noise of the
-reading before, and a function of it would be another observer.
+Position and speed are those of the model under an observer of the usual bandwidth. The differentiated reading of a
+counter is not causal: a force over it acts before the step. The speed of a quick observer contains the noise of the
+reading: a force over it would be another observer.
 """
 
 from typing import NamedTuple
@@ -17,28 +17,28 @@ from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.node_scaling import Measures
 from rtctl.diagnose.model.simulate import HELD
 
-TIME = "time"  # axis along which a force comes and goes
+TIME = "time"  # axis of a time-varying force
 AXES = ("velocity", "position", TIME, "angle", "command")
-TURNS = 1.5  # turns from which on an angle is another axis than the position
+TURNS = 1.5  # turns: least range of a rotary motion for which the angle is an axis beside the position
 
 
 class Place(NamedTuple):
-    """Where a free function may act."""
+    """Place of a free function."""
 
     node: str  # body or sensor
     axis: str
-    values: list[np.ndarray]  # (n,) of the axis, of each recording
+    values: list[np.ndarray]  # (n,) values of the axis in each recording
     whole: float  # force that moves the body, or spread of the reading, SI
-    reads: bool  # whether it is an error of a reading
+    reads: bool  # whether the function is an error of a reading
 
     @property
     def size(self) -> float:
-        """Standard deviation of the function by its prior, of the whole."""
+        """Prior standard deviation of the function, by `whole`."""
         return FREE_ERROR if self.reads else FREE_FORCE
 
     def along(self, knots: np.ndarray, hat: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """The function (n,) that is `hat` at the knots. An error of a reading is smooth: where it had corners, the
-        machine would have to jump in speed."""
+        """Values (n,) of the function that is `hat` at the knots. An error of a reading is a cubic spline: a corner
+        would be a jump of the speed."""
         if self.reads and len(knots) > 2:
             inside = np.clip(values, knots[0], knots[-1])
             return np.asarray(CubicSpline(knots, hat, bc_type="natural")(inside))
@@ -56,7 +56,7 @@ class Place(NamedTuple):
 
 
 def places(fit: Fitted) -> list[Place]:
-    """Places of forces at every body and of errors of every reading, along every axis that the recordings have."""
+    """Places of forces at every body and of errors of every reading, along every axis of the recordings."""
     sim, base = fit.like.sim, fit.model.base
     every = [Measures(part.sim, base, {}) for part in fit.like.parts]
     told = [Measures(part.sim.usual().seen_by(fit.model), base, {}) for part in fit.like.parts]
@@ -64,7 +64,7 @@ def places(fit: Fitted) -> list[Place]:
     taken: set[int] = set()
     for body, ratio in sim.ratios.items():
         at = sim.layout.coordinate(body)
-        if ratio == 0.0 or at in taken:  # bodies that move as one feel one force
+        if ratio == 0.0 or at in taken:  # rigidly joined bodies share one coordinate and one force
             continue
         taken.add(at)
         found += _of(told, body, body, max(m.of("force", body) for m in every), False)
@@ -78,8 +78,8 @@ def places(fit: Fitted) -> list[Place]:
 
 
 def told_otherwise(axis: str, measures: str) -> bool:
-    """Whether an error of a reading along an axis has another name: what comes and goes is noise, of whatever colour,
-    and a position that is off by the speed is late."""
+    """Whether an error of a reading along an axis has another name: an error over time is coloured noise, and an error
+    of a position over speed is a delay."""
     return axis == TIME or (axis == "velocity" and measures == "position")
 
 
@@ -97,9 +97,9 @@ def _read(fit: Fitted) -> list[str]:
 
 
 def _sampled(place: Place, fit: Fitted) -> Place:
-    """A place of an error of a reading: a command that leaks in is the one that acted until the sensor was read.
+    """Place of an error of a reading, whose command is the one in force before the sensor was read.
 
-    The command that is computed from the reading follows its noise, and would explain it.
+    The command that is computed from the reading follows the noise of the reading and would explain that noise.
     """
     if place.axis != "command":
         return place
@@ -109,7 +109,7 @@ def _sampled(place: Place, fit: Fitted) -> Place:
 
 
 def _of(told: list[Measures], node: str, body: str, whole: float, reads: bool) -> list[Place]:
-    """Places of one node that moves as a body does."""
+    """Places of one node that moves with a body."""
     found = [axes(measures, body) for measures in told]
     return [
         Place(node, axis, after(axis, [values[axis] for values in found]), whole, reads)
@@ -129,13 +129,13 @@ def axes(m: Measures, body: str) -> dict[str, np.ndarray]:
     }
     if m.turns(body) and np.ptp(x) > TURNS * 2 * np.pi:
         out["angle"] = np.mod(x, 2 * np.pi)
-    if sim.volts.shape[1] and sim.case.problem != "static":  # where the force is what the model predicts
+    if sim.volts.shape[1] and sim.case.problem != "static":  # a static problem predicts the force itself
         out["command"] = sim.volts[:, 0]
     return out
 
 
 def after(axis: str, values: list[np.ndarray]) -> list[np.ndarray]:
-    """Values of an axis in each recording; the time of each begins where that of the one before ends."""
+    """Values of an axis in each recording; the times of the recordings follow one another."""
     if axis != TIME:
         return values
     ends = np.cumsum([0.0, *(v[-1] for v in values)])

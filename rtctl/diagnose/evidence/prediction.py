@@ -1,4 +1,4 @@
-"""Prediction of rows that no fit saw: fitted to the first part of a record, judged on the rest under the observer."""
+"""Held-out prediction: models fitted to the first rows of a record, judged on the last rows under the observer."""
 
 from typing import NamedTuple
 
@@ -9,35 +9,35 @@ from rtctl.diagnose.likelihood.fits import Fitted, refit, without
 from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.model import GraphModel
 
-HELD = 0.25  # share of the record
-ROUNDS = 6  # steps of a fit to the rows before
+HELD = 0.25  # share of the rows that are held out
+ROUNDS = 6  # Gauss-Newton steps of a fit to the early rows
 
 
 class Heldout(NamedTuple):
-    """Errors on the held-out rows by the spread of the followed sensor, and the rows that were fitted."""
+    """Residual rms on the held-out rows by the spread of each sensor, and the fits to the early rows."""
 
     before: float
     after: float
     floor: float
-    gain: float  # nats by which the best predicts them better, each under the noise of the rows before
-    fits: tuple[Fitted, Fitted]  # base and best, as the rows before were fitted
-    early: Likelihood  # of the rows before
+    gain: float  # nats of the best model over the base on the held-out rows, each under its noise of the early rows
+    fits: tuple[Fitted, Fitted]  # base and best, fitted to the early rows
+    early: Likelihood  # of the early rows
     late: Likelihood  # of the held-out rows
 
     @property
     def rows(self) -> tuple[int, int]:
-        """First row that was fitted, and the first that was not."""
+        """First fitted row, and first held-out row."""
         return self.early.rows
 
     @property
     def models(self) -> tuple[GraphModel, GraphModel]:
-        """The models of both."""
+        """Models of the base and of the best."""
         return self.fits[0].model, self.fits[1].model
 
 
 def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, Fitted]:
-    """Held-out error of the base and of the best model, each fitted to the rows before, and the best model, without
-    the effects (`fewer`) without which the held-out rows are predicted better."""
+    """Held-out errors of the base and the best model, each fitted to the early rows, and the best model; with `fewer`,
+    without effects that worsen the held-out prediction."""
     first, late = base.like.split(HELD)
 
     own = fitted_to(first, best)
@@ -53,11 +53,12 @@ def predict(base: Fitted, best: Fitted, fewer: bool = False) -> tuple[Heldout, F
 
 
 def ahead(late: Likelihood, one: tuple[Fitted, np.ndarray], other: tuple[Fitted, np.ndarray]) -> float:
-    """Nats by which one model foretells the rows of `late` better than another, each under its noise of rows before;
-    each comes with its residuals (blocks, sensors) there.
+    """Gain in nats of model `one` over model `other` on the rows of `late`, each under its noise of the early rows.
 
-    A model that left little there, without memory, loses by its slow errors in later rows to one whose larger errors
-    are expected. So it is also asked which is nearer, both under the noise of the first, and a clear answer counts.
+    Each model comes with its residuals (blocks, sensors) on `late`.
+
+    A model with a small white residual on the early rows loses by slow errors on later rows to a model with a large
+    coloured residual. Both are therefore also compared under the noise of model `one`; a clear gain there counts.
     """
     (first, e), (second, f) = one, other
     told = late.foretold(e, first.like)
@@ -66,18 +67,18 @@ def ahead(late: Likelihood, one: tuple[Fitted, np.ndarray], other: tuple[Fitted,
 
 
 def predicted(heldout: Heldout, best: Fitted) -> Heldout:
-    """The same with another best model."""
+    """Held-out errors with another best model."""
     early, late = heldout.early, heldout.late
     return judged(best.like, early, late, (heldout.fits[0], fitted_to(early, best)))
 
 
 def fitted_to(rows: Likelihood, f: Fitted) -> Fitted:
-    """A model fitted to some rows, from where it is; as it is where nothing may move."""
+    """Model refitted to some rows from its present unknowns; unchanged where it has no unknowns."""
     return refit(rows, f.space, f.x, rounds=ROUNDS) if f.space.names or f.space.hypotheses else f
 
 
 def judged(whole: Likelihood, early: Likelihood, late: Likelihood, fits: tuple[Fitted, Fitted]) -> Heldout:
-    """Errors of the base and the best model on the rows of `late`, by the spread of each sensor on those of `whole`."""
+    """Held-out errors of the base and the best model on the rows of `late`, by the spread of each sensor on `whole`."""
     spread = whole.spread
     residuals = [late.raw(f.model) for f in fits]
     before, after = (float(np.sqrt(np.mean(np.mean(e**2, axis=0) / spread**2))) for e in residuals)

@@ -1,8 +1,8 @@
-"""Numbers of a model for prediction: those of the likelihood or those of least squares, by a free run of held-out rows.
+"""Parameters of a model for prediction: of maximum likelihood or of least squares, by a free run over held-out rows.
 
-The likelihood judges the next reading under a noise that knows what is slow: an error of a law at an event, as where a
-carriage turns, moves all parameters. Least squares under a usual observer weighs by power, and slow errors move them.
-Which of the two predicts a machine is asked of rows that no fit saw.
+Maximum likelihood weighs one-step predictions under coloured noise: an error of a law at an event, as a reversal, moves
+all parameters. Least squares under the usual observer weighs by power: slow errors move the parameters. Held-out rows
+decide which of the two predicts the machine.
 
 Source: Ljung, System Identification (1999), ch. 8.5 (the prefilter decides where a model that is not exact fits).
 """
@@ -19,18 +19,18 @@ from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import GraphModel
 
-SLOWER = (1.0, 0.3)  # times the usual observer
+SLOWER = (1.0, 0.3)  # bandwidths over that of the usual observer
 ROUNDS = 20  # steps of least squares
-WEIGHED = 2  # rounds, as the weights of several sensors are those of their residuals
+WEIGHED = 2  # rounds of reweighting the sensors by their residuals
 MOST = 2  # models with further effects that are tried
-ENOUGH = 1e-3  # of the cost, that a step must gain
+ENOUGH = 1e-3  # of the cost: least gain of a step
 
 
 def predictive(decided: Verdict, heldout: Heldout) -> Fitted:
-    """The model that predicts a free run over the held-out rows best: that of the verdict, or one with further effects
-    that are probable and not sure, each with the numbers of the likelihood or of least squares.
+    """Model with the best free run over the held-out rows: the model of the verdict, or a model with further probable
+    effects, each with the parameters of maximum likelihood or of least squares.
 
-    It is that of the verdict where nothing is named, and where no observer follows the machine.
+    The model of the verdict is returned where nothing is named, and where no observer follows the machine.
     """
     best = decided.best
     like = best.like
@@ -48,10 +48,11 @@ def predictive(decided: Verdict, heldout: Heldout) -> Fitted:
 
 
 def freest(f: Fitted) -> Fitted:
-    """The model with those of its numbers that run freely over the whole recording best: its own, or those of least
-    squares under observers that are slower and slower.
+    """Model with the parameters of the best free run over the whole recording: its own, or those of least squares under
+    the usual observer or a slower one.
 
-    All have as many numbers. The held-out rows alone are too few to choose by, where a machine adds up its errors.
+    The number of parameters is equal for all. Held-out rows are too few for this choice where a machine integrates its
+    errors.
     """
     like = f.like
     if not f.names or not followed(like):
@@ -68,18 +69,18 @@ def followed(like: Likelihood) -> bool:
 
 
 def usual(like: Likelihood) -> float:
-    """The usual observer's quickness over that of the likelihood's own."""
+    """Bandwidth of the usual observer over that of the observer of the likelihood, at most 1."""
     return min(1.0, like.sim.followed[0].bandwidth / like.sim.follow)
 
 
 def at(f: Fitted, x: np.ndarray) -> Fitted:
-    """The model with other numbers."""
+    """Model evaluated at other unknowns x (unknowns,)."""
     e = f.like.raw(f.space.model(x))
     return evaluated(f.like, f.space, Point(x, e, derivatives(f.like, f.space, x, range(len(x)))))
 
 
 def probable(decided: Verdict) -> list[Fitted]:
-    """Models with all effects of the verdict and others, likeliest first, that are not improbable."""
+    """Probable models with all effects of the verdict and further ones, likeliest first."""
     best, chances = decided.best, dict(decided.probabilities)
     found = {r.fit.names: r.fit for r in decided.table if set(r.fit.names) > set(best.names)}
     likely = sorted(found, key=lambda names: -chances.get(names, 0.0))
@@ -87,7 +88,7 @@ def probable(decided: Verdict) -> list[Fitted]:
 
 
 def least_squares(like: Likelihood, f: Fitted) -> np.ndarray:
-    """Unknowns of a model by least squares of its residuals under the observer of `like`, from where they are."""
+    """Unknowns (unknowns,) by least squares of the residuals under the observer of `like`, from the present ones."""
     like = like.slackened(None)
     e = like.raw(f.model)
     at = Point(f.x, e, derivatives(like, f.space, f.x, range(len(f.x))), ALL)
@@ -97,8 +98,8 @@ def least_squares(like: Likelihood, f: Fitted) -> np.ndarray:
 
 
 def free_error(like: Likelihood, model: GraphModel) -> float:
-    """Error of a free run over the rows of `like`, rms over its sensors, by the spread of each; inf where it runs
-    away."""
+    """Free-run error over the rows of `like`: rms over the sensors, by the spread of each; inf where the model
+    diverges."""
     found = []
     for part in like.parts:
         begin, end = part.rows
@@ -106,7 +107,7 @@ def free_error(like: Likelihood, model: GraphModel) -> float:
         told = [c for c, name in enumerate(part.sim.channels) if name not in part.sim.edges]
         e = (part.target[begin:end] - out)[:, told]
         beside = np.array([part.sim.channels[c] != part.sim.main for c in told])
-        e = e - np.where(beside, e.mean(axis=0), 0.0)  # where they began to count says nothing
+        e = e - np.where(beside, e.mean(axis=0), 0.0)  # the offset of a counter is arbitrary
         found.append(np.mean(e**2, axis=0) / like.spread[told] ** 2)
     total = float(np.sqrt(np.mean(found)))
     return total if np.isfinite(total) else np.inf

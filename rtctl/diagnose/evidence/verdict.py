@@ -1,4 +1,4 @@
-"""Verdict from the probabilities of all rivals: a name from 0.9, else what is certain of it, nothing, or no name."""
+"""Verdict from the posterior of all rivals: named from a probability of 0.9, else ambiguous, unnamed or nothing."""
 
 from typing import NamedTuple
 
@@ -15,22 +15,22 @@ ALIKE = 3  # names of an ambiguous answer
 
 
 class Verdict(NamedTuple):
-    """What the recording says."""
+    """Verdict on a recording."""
 
     verdict: str
-    best: Fitted  # the model that stands: the base where nothing is named
+    best: Fitted  # the accepted model: the base where nothing is named
     confidence: tuple[float, ...]  # of each effect of the best
     rivals: tuple[tuple[tuple[str, float], ...], ...]  # of each effect: term:node in its place, probability
     probabilities: tuple[tuple[tuple[str, ...], float], ...]  # of combinations, best first
-    unlisted: Free | None  # the likeliest force, or error of a reading, without a name
-    beside: Fitted  # the model beside which it stands
+    unlisted: Free | None  # the likeliest unnamed force or error of a reading
+    beside: Fitted  # the model beside which `unlisted` was fitted
     why: str  # one sentence
     table: tuple[Rival, ...]  # all rivals, the most probable first
-    ticks: Clock | None = None  # their times, where they are off
+    ticks: Clock | None = None  # jitter of the ticks, where it is significant
 
 
 def verdict(found: Found) -> Verdict:
-    """Verdict of a search, and of the times of the ticks: those show in the noise that the best model leaves."""
+    """Verdict of a search, and on the jitter of the ticks, which the residual of the best model shows."""
     decided = of_motion(found)
     ticks = clock(decided.best)
     if ticks.probability < SURE:
@@ -40,7 +40,7 @@ def verdict(found: Found) -> Verdict:
 
 
 def of_motion(found: Found) -> Verdict:
-    """Verdict on what moves the machine."""
+    """Verdict on the motion of the machine, without the jitter of the ticks."""
     table = rivals(found)
     ranked = combinations(table)
     nothing, unlisted = dict(ranked).get((), 0.0), 1.0 - sum(p for _, p in ranked)
@@ -54,7 +54,7 @@ def of_motion(found: Found) -> Verdict:
     left = poor(found.base)
 
     def answer(kind: str, model: Fitted, why: str) -> Verdict:
-        if kind == NOTHING and left > POOR:  # of all explanations it may be the best, and none is good
+        if kind == NOTHING and left > POOR:  # the most probable explanation may leave a large residual
             kind, why = UNNAMED, f"the description leaves {100 * left:.0f} % of what a sensor shows; {why}"
         return Verdict(kind, model, (), (), ranked, free, beside, why, table)
 
@@ -89,7 +89,7 @@ def of_motion(found: Found) -> Verdict:
 
 
 def combinations(table: tuple[Rival, ...]) -> tuple[tuple[tuple[str, ...], float], ...]:
-    """Probability of each combination of effects that has a name, likeliest first."""
+    """Probability of each combination of named effects, likeliest first."""
     named: dict[tuple[str, ...], float] = {}
     for rival in table:
         if not rival.unlisted:
@@ -98,8 +98,11 @@ def combinations(table: tuple[Rival, ...]) -> tuple[tuple[tuple[str, ...], float
 
 
 def nameless_best(table: tuple[Rival, ...]) -> Rival | None:
-    """The likeliest of what has no name: of the place and axis, or the wrong number, that has most of the probability
-    together, the rival that the whole recording favours most. None where there is none."""
+    """Likeliest unnamed rival; None where there is none.
+
+    Rivals are grouped by place and axis, or by wrong number. The group with the highest total probability is taken, and
+    in the group the rival with the highest posterior on the whole recording.
+    """
     found: dict[tuple[str, ...], list[Rival]] = {}
     for r in table:
         if r.doubted:
@@ -113,8 +116,7 @@ def nameless_best(table: tuple[Rival, ...]) -> Rival | None:
 
 
 def robust(table: tuple[Rival, ...], names: tuple[str, ...]) -> tuple[str, ...]:
-    """Those of the names that are sure whether or not a number of the description is wrong: both kinds of explanation
-    have a say, and each holds them."""
+    """Names that are sure both with and without a wrong nominal number: each kind of rival contains them."""
     listed = [r for r in table if not r.unlisted]
     both = [*listed, *(r for r in table if r.doubted)]
     share = sum(r.probability for r in listed)
@@ -128,7 +130,7 @@ def robust(table: tuple[Rival, ...], names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def of_names(decided: Verdict) -> Verdict:
-    """The verdict with the confidence in each effect of its best model, and its rivals."""
+    """Verdict with the confidence and the rivals of each effect of its best model."""
     ranked, best = decided.probabilities, decided.best
     sure = [(r.fit.names, r.probability) for r in decided.table if r.doubted or not r.unlisted]
     confidence = tuple(sum(p for names, p in sure if holds(names, term)) for term in terms(best))
@@ -138,7 +140,7 @@ def of_names(decided: Verdict) -> Verdict:
 
 
 def fewer(decided: Verdict, best: Fitted, why: str) -> Verdict:
-    """The verdict with a model that lacks some of the effects, for a reason that takes up the sentence after them."""
+    """Verdict with a model of fewer effects; `why` completes the sentence "without EFFECTS, ..."."""
     if best.names == decided.best.names or decided.verdict not in (NAMED, AMBIGUOUS):
         return decided
     gone = ", ".join(name for name in decided.best.names if name not in best.names)
@@ -146,7 +148,7 @@ def fewer(decided: Verdict, best: Fitted, why: str) -> Verdict:
 
 
 def certain(ranked: tuple[tuple[tuple[str, ...], float], ...]) -> tuple[str, ...]:
-    """The likeliest combination, without an effect that may as well be absent."""
+    """Likeliest combination, without an effect whose absence is not improbable."""
     best = next((names for names, _ in ranked if names), ())
     for name in best:
         rest = tuple(other for other in best if other != name)
@@ -171,7 +173,7 @@ def holds(names: tuple[str, ...], term: str) -> bool:
 def _rivals(
     ranked: tuple[tuple[tuple[str, ...], float], ...], best: tuple[str, ...], index: int
 ) -> tuple[tuple[str, float], ...]:
-    """Names in the place of one effect of the best, with their probability, highest first."""
+    """Names in the place of one effect of the best, each with its probability, highest first."""
     rest = set(best) - {best[index]}
     out: dict[str, float] = {}
     for names, p in ranked:

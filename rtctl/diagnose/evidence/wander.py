@@ -1,7 +1,7 @@
-"""Force that comes and goes: what the observer had to push with, more slowly than it follows (pushes.py).
+"""Time-varying unnamed force: the tracking correction, averaged over windows longer than the observer's response
+(pushes.py).
 
-It tells a machine that lacks a force, without a pattern of its own, from a sensor that is noisy, whatever the colour of
-that noise.
+The force separates a missing force without a pattern from sensor noise of any colour.
 """
 
 from typing import NamedTuple
@@ -17,20 +17,20 @@ from rtctl.diagnose.model.node_scaling import Measures
 
 
 class Wander(NamedTuple):
-    """Force that comes and goes, of the recording and the followed body where it is largest."""
+    """Time-varying force at the followed body, and in the recording, where it is largest."""
 
     share: float = 0.0  # rms, by the force that moves the machine
-    noise: float = 0.0  # what noise of the sensor makes of it, the same way
+    noise: float = 0.0  # rms from sensor noise alone, by the force that moves the machine
     free: Free | None = None  # the force itself; None where the model follows nothing
 
     def density(self, *usual: float) -> float:
-        """Logarithm of the probability density of the force where it is sensor noise and what is `usual`, standard
-        deviations by the same force."""
+        """Log density of `share` under sensor noise and the standard deviations `usual`, by the force that moves the
+        machine."""
         return log_density(self.share, float(np.linalg.norm([*usual, self.noise])))
 
 
 def wandering(fit: Fitted) -> Wander:
-    """The force that a fit leaves."""
+    """Time-varying force in the tracking correction of a fit."""
     worst = Wander()
     for part, slow in zip(fit.like.parts, fit.pushes, strict=True):
         sim = part.sim
@@ -49,8 +49,8 @@ def wandering(fit: Fitted) -> Wander:
 
 
 def heard(part: Likelihood, number: int, width: int, inertia: float) -> float:
-    """Standard deviation of the mean over windows `width` ticks apart of what the observer makes of the noise of a
-    followed sensor, N or Nm at its body, which feels an inertia of `inertia`."""
+    """Standard deviation, N or Nm, of the windowed tracking correction from the noise of a followed sensor alone;
+    windows are `width` ticks apart, `inertia` is that of the followed body, kg or kg m^2."""
     sim, one = part.sim, part.sim.followed[number]
     if one.shows_speed or sim.column(one.sensor) not in part.channels:
         return 0.0
@@ -59,5 +59,5 @@ def heard(part: Likelihood, number: int, width: int, inertia: float) -> float:
 
 
 def log_density(share: float, spread: float) -> float:
-    """Logarithm of the probability density of a share whose standard deviation is `spread`, up to a constant."""
+    """Log density of a normal share of standard deviation `spread`, nats, up to a constant."""
     return -0.5 * (share / spread) ** 2 - float(np.log(spread))

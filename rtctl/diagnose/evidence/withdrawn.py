@@ -1,4 +1,4 @@
-"""Names that are withdrawn: rows that no fit saw are predicted as well without them, or worse with them."""
+"""Withdrawal of names: held-out rows are predicted as well without the name, or worse with the name."""
 
 from rtctl.diagnose.calibration import FIRST, WORSE
 from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED
@@ -11,8 +11,10 @@ from rtctl.diagnose.search.search import Found
 
 
 def told(decided: Verdict, heldout: Heldout, found: Found) -> tuple[Verdict, Heldout, Fitted]:
-    """The verdict, without effects whose size in the model that predicts best may be zero, its held-out error, and that
-    model. What is left without them stands if it is worth its numbers on its own."""
+    """Verdict without effects whose size may be zero in the best predictor, its held-out errors, and the predictor.
+
+    The remaining effects are accepted if their gain over the base exceeds the threshold of a first effect.
+    """
     predictor = predictive(decided, heldout)
     while len(decided.best.names) > 1 and decided.verdict in (NAMED, AMBIGUOUS):
         idle = {predictor.names[index] for index in faint(predictor)}
@@ -30,7 +32,7 @@ def told(decided: Verdict, heldout: Heldout, found: Found) -> tuple[Verdict, Hel
 
 
 def borne_out(decided: Verdict, heldout: Heldout) -> Verdict:
-    """The verdict, without a name that predicts rows which no fit saw worse than the description alone does."""
+    """Verdict, unnamed where the names predict held-out rows worse than the nominal model alone."""
     if decided.verdict not in (NAMED, AMBIGUOUS) or not decided.best.names or heldout.gain > -WORSE:
         return decided
     names = ", ".join(decided.best.names)

@@ -1,1 +1,1 @@
-"""Noise, errors of laws, the likelihood of a recording, and the fit of a model by it."""
+"""Noise, errors of laws, likelihood of a recording, and fit of a model."""

@@ -1,10 +1,10 @@
-"""Ticks off their times: no motion shows them, but the noise of what moves, which then grows with its rate.
+"""Timing errors of the ticks: estimated from sensor noise that grows with the rate of the reading.
 
-A tick that comes late by d shows a reading that is d times its rate further on, and the d of all sensors are the same.
-They move the machine, too: a command acts until the next one is written, and a law with a derivative answers a late
-reading, which is ahead, with a command against the motion that is then cut short. On average that is a force along
-the motion, by the square of their standard deviation. `timed` reads each d back from the residual and holds each
-command for as long as it was.
+A tick that is late by d shows a reading that is d times its rate further on. All sensors share the d of a tick. Timing
+errors also move the machine: a command acts until the next one is written. A law with a derivative answers a late
+reading, which is ahead, with a command against the motion, and this command is cut short. The mean is a force along the
+motion, proportional to the variance of d. `timed` estimates each d from the residual and holds each command for its
+actual time.
 
 Source: Cervin et al., How does control timing affect performance, IEEE Control Systems 23(3) (2003).
 """
@@ -26,31 +26,32 @@ from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.plants.physics import TERMS
 
-MOST = 0.5  # of a tick
-GRID = 60  # standard deviations that are tried, alike in their logarithm
-SLOW, PUSH = 21, 41  # ticks: what changes more slowly is no late tick; over which a force is averaged
-TAIL = 0.05  # of probability, beyond each end of a 90 % interval
+MOST = 0.5  # share of a tick: largest standard deviation of the timing error
+GRID = 60  # standard deviations that are tried, equally spaced in logarithm
+SLOW, PUSH = 21, 41  # ticks: window of slow residuals, which are no timing error; window of an averaged force
+TAIL = 0.05  # probability beyond each end of a 90 % interval
 UNSTEADY = next((t.name, t.stands[0].element, *t.typical) for t in TERMS.values() if t.clock)  # term, node, size
 
 
 class Clock(NamedTuple):
-    """Times of the ticks, as the noise of a fit tells of them."""
+    """Timing error of the ticks, estimated from the noise of a fit."""
 
     sigma: float  # s, standard deviation
-    low: float  # 90 % interval
+    low: float  # s, 90 % interval
     high: float
-    gain: float  # nats of evidence that they are off by more than those of any clock
+    gain: float  # nats of evidence for a timing error above that of a usual clock
 
     @property
     def probability(self) -> float:
-        """That they are."""
+        """Probability of a timing error above that of a usual clock."""
         return float(expit(self.gain))
 
 
 def clock(fit: Fitted, chance: float = CHANCE) -> Clock:
-    """Times of the ticks by the residuals of a fit, of the sensors of which at least a share `chance` is chance.
+    """Timing error of the ticks by the residuals of a fit.
 
-    What speaks against them is a clock as any other, and a noise of each sensor that grows with its rate on its own.
+    A sensor counts where its innovations have at least a share `chance` of the power of its residual. The rivals are a
+    usual clock, and a noise of each sensor that grows with the rate of this sensor alone.
     """
     dt = fit.like.sim.record.dt
     least = max(CLOCK[0] * dt, CLOCK[1])
@@ -68,10 +69,10 @@ def clock(fit: Fitted, chance: float = CHANCE) -> Clock:
 
 
 def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray, chance: float) -> np.ndarray:
-    """Logarithm of the likelihood (positions, sizes) of residuals where ticks are off by each of `sizes`, s.
+    """Logarithm of the likelihood (positions, sizes) of residuals for timing errors of each of `sizes`, s.
 
-    Inertia keeps the rate of a position alike from tick to tick; that of a force or a current tells nothing of time. A
-    residual that its past foretells is motion that the model lacks, and what grows there is its own.
+    Inertia keeps the rate of a position steady from tick to tick; the rate of a force or a current does not show time.
+    A residual that its past predicts is motion that the model lacks, and its growth with the rate is no timing error.
     """
     sensors = part.sim.case.machine.sensors
     out = [np.zeros((0, len(sizes)))]
@@ -90,7 +91,7 @@ def _likely(part: Likelihood, e: np.ndarray, sizes: np.ndarray, chance: float) -
 
 
 def timed(fit: Fitted, found: Clock) -> Likelihood:
-    """The likelihood of a fit whose commands are held for as long as they were, on average over PUSH ticks."""
+    """Likelihood of a fit with each command held for its actual time, averaged over PUSH ticks."""
     parts = [copy(part) for part in fit.like.parts]
     for part in parts:
         part.sim = _timed(part, fit.model, found.sigma)
@@ -98,7 +99,7 @@ def timed(fit: Fitted, found: Clock) -> Likelihood:
 
 
 def _timed(part: Likelihood, model: GraphModel, sigma: float) -> Simulator:
-    """The simulator of one recording with the commands as long as they were held, where a position tells of it."""
+    """Simulator of one recording with each command held for its actual time; unchanged where a speed is followed."""
     sim = part.sim
     if sim.shows_speed:
         return sim

@@ -1,9 +1,8 @@
-"""Descent of a fit: Gauss-Newton steps inside bounds, with derivatives that are kept up to date at no cost.
+"""Descent of a fit: Gauss-Newton steps inside bounds, with quasi-Newton updates of the derivatives.
 
-Derivatives are those of the residuals themselves, (blocks, sensors, unknowns): whatever noise a fit goes on under, they
-stay what they are, so that a fit goes on from those of the model that it extends. Between difference quotients
-Broyden's formula keeps them up to date. Where a step keeps less than it promised, the columns of the effects are taken
-anew first, then all.
+Derivatives are those of the residuals (blocks, sensors, unknowns). They do not depend on the noise model: a fit starts
+with the derivatives of the model that it extends. Between difference quotients Broyden's formula updates them. Where a
+step gains less than predicted, the columns of the effects are recomputed first, then all columns.
 
 Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10; Broyden, Math. Comp. 19 (1965).
 """
@@ -17,22 +16,24 @@ from rtctl.diagnose.likelihood.likelihood import Likelihood
 from rtctl.diagnose.likelihood.solver import bounded_step, quotients, trust
 from rtctl.diagnose.model.space import WIDE, Space
 
-UNKNOWN = WIDE / 2  # standard deviation, in logarithm, of a parameter of which the owner says nothing
-HONEST = 0.3  # share of the promised gain that a step must keep
-SMALLEST = 1e-9  # step of an unknown
-STALE, EFFECTS, ALL = range(3)  # what of the derivatives was taken since the last step
-TRIES = {STALE: 3, EFFECTS: 3, ALL: 12}  # dampings
+UNKNOWN = WIDE / 2  # prior standard deviation, in logarithm, of a parameter without a tolerance
+HONEST = 0.3  # share of the predicted gain: least gain of a step that keeps the derivatives
+SMALLEST = 1e-9  # step of an unknown below which a fit has converged
+STALE, EFFECTS, ALL = range(3)  # derivatives recomputed since the last step: none, of the effects, all
+TRIES = {STALE: 3, EFFECTS: 3, ALL: 12}  # dampings of a step, at most
 
 
 def weights(space: Space) -> np.ndarray:
-    """Precision (unknowns,) of the prior in a fit: the owner's tolerances, and a weak one of what the owner does not
-    know, so that it does not stray where the recording does not tell it either; 0 of the effects."""
+    """Precision (unknowns,) of the prior in a fit: by the tolerance of a parameter, 0 of the effects.
+
+    A parameter without a tolerance has a weak prior: it stays in place where the recording does not determine it.
+    """
     known = space.prior()
     return np.asarray(np.where((known > 0.0) | (np.arange(len(known)) >= space.nb), known, 1.0 / UNKNOWN**2))
 
 
 class Point(NamedTuple):
-    """Where a fit is."""
+    """Point of a fit: unknowns, residuals and derivatives."""
 
     x: np.ndarray
     e: np.ndarray  # (blocks, sensors) residuals, SI
@@ -43,8 +44,10 @@ class Point(NamedTuple):
 def derivatives(
     like: Likelihood, space: Space, x: np.ndarray, columns: Sequence[int], into: np.ndarray | None = None
 ) -> np.ndarray:
-    """Difference quotients (blocks, sensors, unknowns) in some columns, away from the upper bound; the others are those
-    of `into`, or 0."""
+    """Difference quotients (blocks, sensors, unknowns) of the residuals in some columns.
+
+    Steps go away from the upper bound. The other columns are those of `into`, or 0.
+    """
     if into is not None and not columns:
         return into
     start, coarse = like.rough(space.model(x))
@@ -56,7 +59,7 @@ def derivatives(
 
 
 class Descent:
-    """Steps of one fit under one noise. It changes the derivatives of the point that it is given."""
+    """Steps of one fit under one noise; the derivatives of the given point are overwritten."""
 
     def __init__(self, like: Likelihood, space: Space, at: Point):
         self.like, self.space = like, space
@@ -69,7 +72,7 @@ class Descent:
         self._whiten(range(len(self.x)))
 
     def _whiten(self, columns: Sequence[int]) -> None:
-        """Innovations of the derivatives in some columns, and the products of all with them."""
+        """Update the innovations of the derivatives in some columns, and their inner products with all columns."""
         at = list(columns)
         self.W[:, at] = self.like.white(self.J[..., at])
         self.A[:, at] = self.W.T @ self.W[:, at]
@@ -79,7 +82,7 @@ class Descent:
         return 0.5 * float(r @ r) + 0.5 * float((self.prior * trust(r)) @ x**2)
 
     def renew(self, columns: Sequence[int]) -> None:
-        """Take the derivatives in some columns anew."""
+        """Recompute the derivatives in some columns."""
         derivatives(self.like, self.space, self.x, columns, self.J)
         self._whiten(columns)
 
@@ -88,8 +91,7 @@ class Descent:
         return list(range(self.space.nb, len(self.x)))
 
     def step(self, damping: float, tries: int) -> tuple[float, float, float]:
-        """Go to where the cost is lower; what was gained and what was promised, and the damping that it took; 0 and 0
-        where no step gains."""
+        """Gain of a step to a lower cost, its predicted gain, and its damping; no gains (0, 0) without such a step."""
         weight = self.prior * trust(self.r)
         H, g = self.A + np.diag(weight), self.W.T @ self.r + weight * self.x
         for _ in range(tries):
@@ -121,9 +123,10 @@ class Descent:
 
 
 def descend(like: Likelihood, space: Space, at: Point, rounds: int, enough: float, freshest: int = ALL) -> Point:
-    """The point of least squares under the noise of `like`, from a point whose derivatives are known.
+    """Point of least squares under the noise of `like`, from a point with known derivatives.
 
-    Stops where a step gains less than `enough` of the cost with derivatives as fresh as they may become.
+    The descent stops where a step gains less than a share `enough` of the cost, with derivatives as current as
+    `freshest`.
     """
     now, damping, fresh = Descent(like, space, at._replace(J=at.J.copy())), 1e-4, at.fresh
     for _ in range(rounds):

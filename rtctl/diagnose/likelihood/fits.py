@@ -1,8 +1,8 @@
-"""Fit of a model to a recording under a noise of its own, with its evidence.
+"""Fit of a model to a recording under the noise of its own residual, with its evidence.
 
-The noise is estimated from the residual of the fit, and the fit made again: a noise that was estimated without an
-effect holds the effect for noise. The evidence is Laplace's: the likelihood at its maximum, times the prior there,
-times the volume of the posterior.
+The noise is estimated from the residual of the fit, and the fit is repeated: a noise that is estimated without an
+effect includes the effect. The evidence is Laplace's approximation: the likelihood at its maximum, times the prior
+there, times the volume of the posterior.
 
 Source: MacKay, Information Theory, Inference, and Learning Algorithms (2003), ch. 28; Miller & Dunson, Robust Bayesian
 inference via coarsening, JASA 114 (2019) for the power of the likelihood.
@@ -21,11 +21,11 @@ from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.space import COSINE, INVERSE, REST, SINE, SIZE, Space
 from rtctl.plants.physics import TERMS
 
-ROUNDS = 3  # of noise and fit
-MOST = 10  # Gauss-Newton steps in each
-ENOUGH = 2.0  # nats, that a further round must gain
-LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior, below which a recording may say nothing
-MATTERS = 0.5  # nats of the prior that going back must gain
+ROUNDS = 3  # rounds of noise and fit, at most
+MOST = 10  # Gauss-Newton steps of a round, at most
+ENOUGH = 2.0  # nats: least gain of a round before a further round
+LOOSE = (300.0, 30.0, 3.0)  # times the curvature of the prior: directions of less curvature count as undetermined
+MATTERS = 0.5  # nats of the prior: least gain of a return to nominal values
 
 
 class Fitted(NamedTuple):
@@ -35,15 +35,15 @@ class Fitted(NamedTuple):
     x: np.ndarray
     e: np.ndarray  # (blocks, sensors) residual, SI
     J: np.ndarray  # (blocks, sensors, unknowns) of the residual, in single precision
-    A: np.ndarray  # (unknowns, unknowns) their inner products, as innovations
-    like: Likelihood  # with its own noise
+    A: np.ndarray  # (unknowns, unknowns) inner products of the innovations of J
+    like: Likelihood  # with the noise of its own residual
     loss: float  # negative logarithm of the likelihood, nats
     pushes: tuple[np.ndarray, ...]  # (windows, followed) corrections of the observer in each recording, N or Nm
-    fresh: int = ALL  # derivatives that are those at the solution: of the effects (a draft), or of all unknowns
+    fresh: int = ALL  # derivatives that are current at the solution: of the effects (a draft), or of all unknowns
 
     @property
     def model(self):
-        """The model itself."""
+        """Model with the fitted values."""
         model: GraphModel = self.space.model(self.x)
         return model
 
@@ -54,12 +54,12 @@ class Fitted(NamedTuple):
 
     @property
     def seldom(self) -> float:
-        """Prior odds against the names, nats, beside that each is one of many."""
+        """Prior odds, nats, against terms whose law usually has another name."""
         return sum(TERMS[h.term].seldom for h in self.space.hypotheses)
 
     @property
     def power(self) -> float:
-        """Share of the likelihood that counts."""
+        """Power of the likelihood: share of its innovations that counts."""
         return self.like.power
 
     @property
@@ -77,13 +77,12 @@ class Fitted(NamedTuple):
 
 
 def curvature(f: Fitted, power: float) -> np.ndarray:
-    """Second derivative (unknowns, unknowns) of the negative logarithm of a posterior, a share of whose likelihood
-    counts."""
+    """Second derivative (unknowns, unknowns) of the negative logarithm of a posterior, likelihood to a power."""
     return np.asarray(power * f.A + np.diag(prior(f.space)))
 
 
 def prior(space: Space) -> np.ndarray:
-    """Precision of the prior of each unknown: the owner's tolerance, and a typical size of each effect."""
+    """Precision (unknowns,) of the prior: by the tolerance of a parameter, by the typical size of an effect."""
     out = list(weights(space)[: space.nb])
     for h in space.hypotheses:
         for c in h.coordinates:
@@ -92,7 +91,7 @@ def prior(space: Space) -> np.ndarray:
     return np.array(out)
 
 
-SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0, REST: 3.0}  # standard deviation of a size, in typical sizes
+SPREAD = {SIZE: 3.0, COSINE: 3.0, SINE: 3.0, INVERSE: 2.0, REST: 3.0}  # prior deviation of a size, in typical sizes
 
 
 def refit(
@@ -105,11 +104,12 @@ def refit(
     relax: bool = True,
     draft: bool = False,
 ) -> Fitted:
-    """The model of `space` from x: by least squares and under the noise `floor`, then under the noise that it left.
+    """Fitted model of `space`, from x: by least squares and under the noise `floor`, then under its own noise.
 
-    Least squares finds large effects, a noise that knows them finds small ones. `known` (blocks, sensors, unknowns) are
-    the derivatives in the first columns, as a model with fewer effects has them. Parameters are fitted as if the laws
-    were exact: their errors weigh evidence, and would else stand for an effect that the fit left too small.
+    Least squares finds large effects; a noise estimated without these effects finds small ones. `known` (blocks,
+    sensors, unknowns) are the derivatives in the first columns, from a model with fewer effects. Parameters are fitted
+    with exact laws. Errors of the laws enter the evidence only: in a fit they would explain part of an effect of too
+    small a size.
 
     A `draft` recomputes the derivatives of the effects only. The derivatives of the parameters, most of the work of a
     fit, stay as `known`. The evidence of a draft is a few nats too low; `finished` fits the draft to convergence.
@@ -164,7 +164,7 @@ def _under_own_noise(like: Likelihood, space: Space, best: Judged, rounds: int, 
         gain = best.loss - found.loss
         if gain > 0.0:
             best = found
-        else:  # derivatives that were taken later
+        else:  # keep the later derivatives
             best = best._replace(at=best.at._replace(J=found.at.J))
         if gain < ENOUGH:
             break
@@ -172,16 +172,16 @@ def _under_own_noise(like: Likelihood, space: Space, best: Judged, rounds: int, 
 
 
 def relaxed(f: Fitted) -> Fitted:
-    """The model with what the recording does not tell back where the owner put it, as far as that costs nothing.
+    """Model with the undetermined directions of its parameters back at nominal values, where the evidence gains.
 
-    Difference quotients of a machine with dry friction are not exact: directions along which the recording says
-    nothing, as that of all forces and inertias together, look as if it said a little, and a fit that strayed along them
-    does not find back.
+    Difference quotients of a machine with dry friction are inexact. A direction that the recording does not determine,
+    as the common factor of all forces and inertias, seems weakly determined. A fit that has moved along this direction
+    does not return.
     """
     weight = prior(f.space)
     root = np.sqrt(weight)
     exact = f.like.slackened(None)
-    own = exact.told(f.e)  # along a curved valley the first step leaves much that is no noise
+    own = exact.told(f.e)  # noise of f: the residual of a first step along a curved valley is not noise
     values, vectors = np.linalg.eigh(f.power * f.A / np.outer(root, root))
     for loose in LOOSE:
         idle = vectors[:, values < loose]
@@ -203,7 +203,7 @@ def evaluated(like: Likelihood, space: Space, at: Point) -> Fitted:
     """Fitted model at a point of a fit, with the evidence under its own noise model and law errors.
 
     The noise level decides how much law errors explain. Every model takes the noise of its own residual: evidences of
-    models compare, whichever noise their fits began with. How exact the laws are is told by the recording as well.
+    models are comparable, whichever noise their fits began with. The recording also decides how exact the laws are.
     """
     own = like.slackened(None).told(at.e)
     laws, fixed = errors(own, space, at.x, at.e)
@@ -218,7 +218,7 @@ def evaluated(like: Likelihood, space: Space, at: Point) -> Fitted:
 
 
 def without(base: Fitted, *indices: int) -> tuple[Space, np.ndarray, np.ndarray]:
-    """Space, start and derivatives of a model without one of its hypotheses, or without several."""
+    """Space, start and derivatives of a model without one or several of its hypotheses."""
     space, x, J = base.space, base.x, base.J
     for index in sorted(indices, reverse=True):
         gone = space.columns(index)

@@ -1,7 +1,8 @@
-"""What a command did between its samples, where no controller held it: it was held, or sampled from a smooth one.
+"""Command between its samples in an open-loop recording: held, or a smooth command that was sampled.
 
-A generator in the laboratory has a filter behind it, a DAC in a loop holds. Of a recording in open loop nobody may have
-written down which. Held for smooth is half a tick of delay and a little of gain.
+A generator in the laboratory has a filter at its output; a DAC in a loop holds its value. An open-loop recording may
+not say which of both wrote the command. A held model of a smooth command is off by half a tick of delay and a small
+gain.
 """
 
 from copy import copy
@@ -16,11 +17,11 @@ from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.model.space import Space
 from rtctl.diagnose.record.hold import half_a_tick_on
 
-CLEARLY = 5.0  # nats
+CLEARLY = 5.0  # nats of evidence: least gain of the other kind of command
 
 
 def other_way(like: Likelihood) -> Likelihood | None:
-    """The likelihood with the commands taken the other way between their samples; None where a controller held them."""
+    """Likelihood with the other kind of command between samples; None where a controller held the command."""
     parts = []
     for part in like.parts:
         other = other_commands(part.sim)
@@ -32,7 +33,7 @@ def other_way(like: Likelihood) -> Likelihood | None:
 
 
 def other_commands(sim: Simulator) -> Simulator | None:
-    """The simulator with the commands taken the other way between their samples; None where a controller held them."""
+    """Simulator with the other kind of command between samples; None where a controller held the command."""
     if not sim.case.open_loop or sim.mode != TRACK or not sim.volts.size:
         return None
     out = copy(sim)
@@ -42,7 +43,7 @@ def other_commands(sim: Simulator) -> Simulator | None:
 
 
 def likelier(like: Likelihood, space: Space) -> Likelihood:
-    """The way that the description alone follows better."""
+    """Likelihood with the kind of command under which the description alone has the higher evidence."""
     other = other_way(like)
     if other is None or refit(other, space).log_evidence < refit(like, space).log_evidence:
         return like
@@ -50,7 +51,7 @@ def likelier(like: Likelihood, space: Space) -> Likelihood:
 
 
 def suits(best: Fitted) -> Likelihood | None:
-    """The other way, where a model that was found follows the recording clearly better by it."""
+    """Likelihood with the other kind of command, where the evidence of a model gains CLEARLY; else None."""
     other = other_way(best.like)
     if other is None:
         return None

@@ -1,4 +1,4 @@
-"""What the laws of a fitted model may be wrong by, as its residuals show it (slack.py)."""
+"""Errors of the laws of a fitted model, as columns of its residual (slack.py)."""
 
 import numpy as np
 
@@ -10,8 +10,10 @@ from rtctl.diagnose.model.space import Space
 
 
 def errors(like: Likelihood, space: Space, x: np.ndarray, e: np.ndarray) -> Inexact:
-    """Errors of the laws of a model with the residuals e (blocks, sensors): those of the description, of the effects
-    beside it, and of a number that is wrong by far."""
+    """Errors of the laws of a model with the residuals e (blocks, sensors).
+
+    The laws are those of the description, of the effects beside it, and of a number with a gross error.
+    """
     none = np.zeros((*e.shape, 0))
     given = Inexact(none, none) if like.own is None else like.own
     effects = [effect(like, space.model_without(i, x), e, h.node) for i, h in enumerate(space.hypotheses)]
@@ -21,8 +23,10 @@ def errors(like: Likelihood, space: Space, x: np.ndarray, e: np.ndarray) -> Inex
 
 
 def effect(like: Likelihood, without: GraphModel, e: np.ndarray, node: str) -> np.ndarray:
-    """Errors (blocks, sensors, columns) of what a node has in the model with the residuals e, and not in `without`;
-    none where that runs away."""
+    """Errors (blocks, sensors, columns) of an effect at a node; no columns where the model `without` it diverges.
+
+    The residuals e (blocks, sensors) are those of the model with the effect.
+    """
     lacking = like.raw(without)
     if like.ran_away(lacking) or not np.any(lacking - e):
         return np.zeros((*e.shape, 0))
@@ -30,7 +34,7 @@ def effect(like: Likelihood, without: GraphModel, e: np.ndarray, node: str) -> n
 
 
 def pace(like: Likelihood, model: GraphModel, node: str) -> np.ndarray:
-    """Speed (blocks,) of what a node belongs to, rad/s or m/s."""
+    """Speed (blocks,) of the body of a node, rad/s or m/s."""
     out = []
     for part in like.parts:
         measures = Measures(part.sim, model.base, {})

@@ -1,7 +1,7 @@
-"""Likelihood of several recordings of one machine: the sum over recordings that each have their own start and noise.
+"""Likelihood of several recordings of one machine: the sum over recordings, each with its own start and noise.
 
-Parameters and effects are shared; what a case declares under `per_recording`, and the state at the first row, each
-recording has for itself. Residuals are stacked, recording after recording, so that a fit sees one recording.
+Recordings share parameters and effects. Each recording has its own values of the paths under `per_recording`, and its
+own state at the first row. Residuals are stacked, recording after recording, so that a fit sees one recording.
 
 Source: Ljung, System Identification (1999), ch. 7 and 14.3 for estimates from several data records.
 """
@@ -21,11 +21,11 @@ from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.model.space import Space
 
-SAME = 1e-9  # relative, of two values
+SAME = 1e-9  # relative difference of two equal values, at most
 
 
 class Joint(Likelihood):
-    """Likelihoods of several recordings as one; the first of them has the longest way."""
+    """Likelihoods of several recordings as one; the first recording has the longest travel."""
 
     def __init__(self, parts: Sequence[Likelihood]):
         first = parts[0]
@@ -50,30 +50,30 @@ class Joint(Likelihood):
         return np.concatenate([part.raw(model, coarse) for part in self._parts])
 
     def plain(self, e: np.ndarray) -> np.ndarray:
-        """Innovations of residuals (blocks, sensors, ...), recording after recording, where the laws are exact."""
+        """Innovations of residuals (blocks, sensors, ...), recording after recording, with exact laws."""
         return np.concatenate([part.plain(own) for part, own in self.cut(e)])
 
     def noisy(self, e: np.ndarray) -> "Joint":
-        """The same with the noise of these residuals (blocks, sensors)."""
+        """Likelihood with the noise of the residuals e (blocks, sensors)."""
         return self._of([part.noisy(own) for part, own in self.cut(e)], self.errors)
 
     def flat(self, e: np.ndarray) -> "Joint":
-        """The same with white noise as loud as these residuals (blocks, sensors) in each recording."""
+        """Likelihood with white noise of the standard deviation of the residuals e (blocks, sensors), by recording."""
         return self._of([part.flat(own) for part, own in self.cut(e)], self.errors)
 
     def directed(self, model: GraphModel) -> "Joint":
-        """The same with the sensors that know no direction, as far as the model tells it in every recording."""
+        """Likelihood with the sensors that show no direction, where the model gives directions in every recording."""
         sims = [part.sim.directed(model) for part in self._parts]
         for sim in sims:
             sim.channels = [name for name in sim.channels if all(name in other.channels for other in sims)]
         return Joint([Likelihood(sim) for sim in sims])
 
     def following(self, times: float) -> "Joint":
-        """The same rows with observers that are so many `times` as quick, and laws that are exact."""
+        """Likelihood of these rows with observers of `times` the bandwidth, and with exact laws."""
         return self._of([part.following(times) for part in self._parts]).described(None)
 
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
-        """Losses where the laws are exact, by segment (count,), nats: each recording has a share of the segments."""
+        """Losses (count,) by segment, nats, with exact laws; each recording has a share of the segments."""
         cuts = self.cut(e)
         shares = np.cumsum([len(own) for _, own in cuts]) * count // sum(len(own) for _, own in cuts)
         sizes = np.maximum(np.diff([0, *shares]), 1)
@@ -93,13 +93,13 @@ class Joint(Likelihood):
         return np.asarray(np.sqrt(np.mean([part.spread**2 for part in self._parts], axis=0)))
 
     def split(self, share: float) -> tuple["Joint", "Joint"]:
-        """The same of the first rows of each recording, and of the last `share` of each."""
+        """Likelihoods of the first rows, and of the last `share` of the rows, of each recording."""
         halves = [part.split(share) for part in self._parts]
         early, late = (self._of(side).described(None) for side in zip(*halves, strict=True))
         return early, late
 
     def during(self, begin: int, end: int) -> "Joint":
-        """The same of rows `begin` to `end` of each recording."""
+        """Likelihood of rows `begin` to `end` of each recording."""
         return self._of([part.during(begin, min(end, part.rows[1])) for part in self._parts]).described(None)
 
     def _of(self, parts: Sequence[Likelihood], errors: np.ndarray | None = None) -> "Joint":
@@ -109,7 +109,7 @@ class Joint(Likelihood):
         return other
 
     def cut(self, e: np.ndarray) -> list[tuple[Likelihood, np.ndarray]]:
-        """The part of residuals (blocks, ...) that belongs to each recording."""
+        """Likelihood of each recording, with its part of the residuals e (blocks, ...)."""
         sizes = [(part.rows[1] - part.rows[0]) // part.mean for part in self._parts]
         return list(zip(self._parts, np.split(e, np.cumsum(sizes)[:-1]), strict=True))
 
@@ -117,7 +117,8 @@ class Joint(Likelihood):
 def together(records: Sequence[GraphRecord]) -> tuple[Likelihood, Space]:
     """Likelihood and unknowns of the recordings of one machine.
 
-    Raises UserError where they are not of one machine, or a value differs that none of them declares.
+    Raises UserError where the machines differ, or where a value differs that no recording declares under
+    `per_recording`.
     """
     if len(records) == 1:
         case = records[0].case
@@ -146,7 +147,7 @@ def together(records: Sequence[GraphRecord]) -> tuple[Likelihood, Space]:
 
 
 def named(records: Sequence[GraphRecord]) -> list[GraphRecord]:
-    """The recordings, each with a name of its own, that with the longest way first."""
+    """Recordings with unique names, the longest travel first."""
     out: list[GraphRecord] = []
     for record in sorted(records, key=lambda r: -float(np.ptp(r.y[r.main]))):
         name = record.case.file.parent.name
@@ -173,7 +174,7 @@ def check_same(first: GraphRecord, second: GraphRecord) -> None:
 
 
 def _check_values(first: GraphRecord, other: GraphRecord, differ: set[str]) -> None:
-    """Raise UserError where two cases believe different things of what they share."""
+    """Raise UserError where two cases differ in the problem, or in a value that they share."""
     if first.case.problem != other.case.problem:
         raise UserError(
             f"{other.case.file}: problem is {other.case.problem}, and {first.case.problem} in {first.case.file}; "

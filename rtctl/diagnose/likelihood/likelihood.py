@@ -1,8 +1,8 @@
-"""Likelihood of a recording under a model: innovations of the residuals that the tracking observer leaves.
+"""Likelihood of a recording under a model: innovations of the residuals under the tracking observer.
 
-The residual of each sensor is averaged over a few ticks, made white by an autoregression (noise.py) and weighed by its
-innovation. The negative logarithm of the likelihood is half the sum of squares plus n ln sigma for each sensor, so that
-models compare each under a noise of its own.
+The residual of each sensor is averaged over a few ticks, whitened by an autoregression (noise.py) and divided by the
+standard deviation of its innovations. The negative logarithm of the likelihood is half the sum of squares plus n ln
+sigma for each sensor: models with different noise are comparable.
 
 Source: Ljung, System Identification (1999), ch. 7 and 16.4.
 """
@@ -23,22 +23,22 @@ from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.simulate import Simulator
 from rtctl.diagnose.record.edges import Edges
 
-RATE = 500.0  # 1/s, of the averaged residuals
-ORDER = 20  # of the autoregression
-FORGET = 8.0  # over the bandwidth of the observer: until the start is forgotten
-QUANTISED = 0.29  # of a step: the least that counting leaves in a residual
-SMOOTH = 9  # blocks, over which the rate of a reading is taken
-EDGE = 0.03  # of a step: the least that an edge leaves, whose tick is known
-WILD = 1e6  # residual of a model that runs away, in steps of noise
+RATE = 500.0  # 1/s: rate of the averaged residuals
+ORDER = 20  # order of the autoregression
+FORGET = 8.0  # time constants of the observer, after which the initial state has decayed
+QUANTISED = 0.29  # share of a sensor step: least rms of a residual, by counting (1 / sqrt 12)
+SMOOTH = 9  # blocks: window of the rate of a reading
+EDGE = 0.03  # share of a sensor step: least rms of a residual at an edge with a known tick
+WILD = 1e6  # times the least noise: residual of a diverged model
 
 
 class Likelihood:
-    """A recording, its noise and the rows that count."""
+    """Likelihood of a recording: its noise and the rows that count."""
 
-    errors: np.ndarray | None = None  # (blocks, sensors, columns) what the laws of a model may be wrong by
-    odds: float = 0.0  # nats against laws that are as exact
-    own: Inexact | None = None  # what the description itself may be wrong by, beside any effect
-    _slack: Slack | None = None  # the same under this noise
+    errors: np.ndarray | None = None  # (blocks, sensors, columns) errors of the laws of a model
+    odds: float = 0.0  # nats of prior odds against laws of this exactness
+    own: Inexact | None = None  # errors of the description itself, beside any effect
+    _slack: Slack | None = None  # errors of the laws, under this noise
 
     def __init__(self, sim: Simulator, noise: Sequence[Noise] | None = None, rows: tuple[int, int] | None = None):
         self.sim = sim
@@ -52,7 +52,7 @@ class Likelihood:
         smooth = np.std(np.diff(self.target, 2, axis=0), axis=0) / 10.0
         self.least = np.where(grain > 0.0, QUANTISED * grain, np.maximum(smooth, 1e-12)) / np.sqrt(self.mean)
         self.least = np.where([name in sim.edges for name in sim.channels], EDGE * grain, self.least)
-        if sim.case.problem == "kinematic":  # the counts of the first position are in what follows it
+        if sim.case.problem == "kinematic":  # counting noise of the first position moves the others
             passed = np.array([sim.ratios.get(str(sensor_body(sim, name)), 0.0) for name in sim.channels])
             self.least = np.hypot(self.least, QUANTISED * record.grain[sim.main] * passed / np.sqrt(self.mean))
         self.noise: list[Noise] = list(noise) if noise is not None else [
@@ -63,20 +63,22 @@ class Likelihood:
     def raw(self, model: GraphModel, coarse: bool = False) -> np.ndarray:
         """Residuals (blocks, sensors), SI, averaged over `mean` ticks.
 
-        The constant of the followed sensor is that of a force. Where the others began to count says nothing: theirs is
-        left out.
+        The mean residual of the followed sensor shows a constant force. The mean residual of any other sensor depends
+        on the start of its count, and is removed.
         """
         out = self.sim.run(model, n=self.rows[1], coarse=coarse)
         return self.of_readings(out)
 
     def rough(self, model: GraphModel) -> tuple[np.ndarray, bool]:
-        """Residuals (blocks, sensors) of coarse simulations, from which differences are taken, and whether they are
-        coarse: where a model runs away in twice the step, they are fine."""
+        """Residuals (blocks, sensors) of a coarse simulation, for difference quotients, and whether it is coarse.
+
+        Where a model diverges at twice the step, the simulation is fine.
+        """
         e = self.raw(model, True)
         return (self.raw(model), False) if self.ran_away(e) else (e, True)
 
     def of_readings(self, out: np.ndarray) -> np.ndarray:
-        """The same of simulated readings (n, sensors of the machine)."""
+        """Residuals (blocks, sensors), SI, of simulated readings (n, sensors of the machine)."""
         begin, end = self.rows
         blocks = (end - begin) // self.mean
         end = begin + blocks * self.mean
@@ -87,18 +89,18 @@ class Likelihood:
             else:
                 e[:, c] = averaged(self.target[begin:end, c] - out[begin:end, channel], self.mean)
         wild = WILD * self.least
-        if not (np.abs(e) < wild).all():  # ran away: no noise explains it
+        if not (np.abs(e) < wild).all():  # diverged: no noise explains it
             gone = ~(np.abs(e) < wild).all(axis=1)
             e[gone] = wild * np.random.default_rng(0).choice((-1.0, 1.0), (int(gone.sum()), e.shape[1]))
         beside = np.array([self._floats(name) for name in self.sim.channels])
         return np.asarray(e - np.where(beside, e.mean(axis=0), 0.0))
 
     def ran_away(self, e: np.ndarray) -> bool:
-        """Whether residuals (blocks, sensors) are of a model that ran away."""
+        """Whether residuals (blocks, sensors) are of a diverged model."""
         return not bool((np.abs(e) < 0.5 * WILD * self.least).all())
 
     def _floats(self, name: str) -> bool:
-        """Whether the constant of a channel says nothing and is still in its residuals."""
+        """Whether the mean residual of a channel is arbitrary and still in its residuals."""
         if name in self.sim.edges:
             return False
         if self.sim.case.problem != "static":
@@ -106,7 +108,7 @@ class Likelihood:
         return self._is_position(name)
 
     def _by_edges(self, name: str, out: np.ndarray, blocks: int) -> np.ndarray:
-        """Residual (blocks,) of a sensor that shows edges: their mean in each block, 0 where there is none."""
+        """Residual (blocks,) of a sensor that shows edges: mean over the edges of a block, 0 without edges."""
         sensor = self.sim.case.machine.sensors[name]
         told, block = self.edges_in(name)
         way = sensor.scale * out
@@ -123,8 +125,11 @@ class Likelihood:
 
     @cached_property
     def present(self) -> list[np.ndarray]:
-        """Blocks in which each sensor shows something: all, those with an edge, or, of a force that a recorded motion
-        makes, those in which it does not turn: that time is known to a row, and dry friction jumps there."""
+        """Blocks in which each sensor has information: all blocks, or the blocks with an edge.
+
+        A force under a recorded motion has no information in blocks with a reversal: the time of a reversal is known to
+        a row only, and dry friction jumps there.
+        """
         every = np.arange((self.rows[1] - self.rows[0]) // self.mean)
         steady = every if self.sim.held is None else np.setdiff1d(every, self._turns(self.sim.held.v))
         return [
@@ -133,7 +138,7 @@ class Likelihood:
         ]
 
     def _turns(self, v: np.ndarray) -> np.ndarray:
-        """Blocks before and after each turn of a motion of the speed v (n,)."""
+        """Blocks before and after each reversal of a motion of the speed v (n,)."""
         last = np.flatnonzero(np.diff(np.sign(v)))
         return (np.concatenate([last, last + 1]) - self.rows[0]) // self.mean
 
@@ -144,12 +149,14 @@ class Likelihood:
 
     @cached_property
     def growth(self) -> list[np.ndarray]:
-        """What the variance of each sensor's residual may grow with (blocks present, columns): whether it moves, where
-        it counts, and of a position the square of its rate: by it an error of time shows."""
+        """Regressors (blocks present, columns) of the variance of each sensor's residual.
+
+        A sensor that counts has one for motion. A position has its squared rate, which shows timing errors.
+        """
         begin, end = self.rows
         blocks = (end - begin) // self.mean
         y = self.target[begin:end][: blocks * self.mean].reshape(blocks, self.mean, -1).mean(axis=1)
-        rate = np.gradient(uniform_filter1d(y, SMOOTH, axis=0), axis=0) ** 2  # by the block
+        rate = np.gradient(uniform_filter1d(y, SMOOTH, axis=0), axis=0) ** 2  # squared change per block
         out = []
         for c, (name, rows) in enumerate(zip(self.sim.channels, self.present, strict=True)):
             grain = self.sim.record.grain[name]
@@ -160,61 +167,63 @@ class Likelihood:
         return out
 
     def directed(self, model: GraphModel) -> "Likelihood":
-        """The same with the sensors that know no direction, as the model tells the directions of their edges."""
+        """Likelihood with the sensors that show no direction; the model gives the directions of their edges."""
         return Likelihood(self.sim.directed(model))
 
     def following(self, times: float) -> "Likelihood":
-        """The same rows with an observer that is so many `times` as quick, and laws that are exact."""
+        """Likelihood of these rows with an observer of `times` the bandwidth, and with exact laws."""
         other = self.slackened(None).described(None)
         other.sim = self.sim.following(times)
         other.slow = slow(other.sim, self.channels, self.mean)
         return other
 
     def white(self, e: np.ndarray) -> np.ndarray:
-        """Innovations of residuals (blocks, sensors, ...), sensor after sensor, and the errors of laws beneath."""
+        """Innovations of residuals (blocks, sensors, ...), sensor after sensor, then the errors of the laws."""
         return self.plain(e) if self.slack is None else self.slack.stacked(self.plain(e))
 
     def plain(self, e: np.ndarray) -> np.ndarray:
-        """The same where the laws are exact; after them the slow residuals by their standard deviation."""
+        """Innovations of residuals (blocks, sensors, ...) with exact laws, then normalised slow residuals."""
         return np.concatenate([*whitened(self.noise, e, self.present), *(one.of(e) / one.sigma for one in self.slow)])
 
     @property
     def slack(self) -> Slack | None:
-        """What the laws may be wrong by, under this noise."""
+        """Errors of the laws under this noise; None where the laws are exact."""
         if self._slack is None and self.errors is not None:
             self._slack = Slack(self.plain(self.errors), self.power)
         return self._slack
 
     def slackened(self, errors: np.ndarray | None, odds: float = 0.0) -> "Likelihood":
-        """The same where laws may be wrong by columns (blocks, sensors, columns) of standard deviation one; `odds`,
-        nats, are against laws that are as exact."""
+        """Likelihood with errors of the laws: columns (blocks, sensors, columns) of standard deviation one.
+
+        `odds`, nats, are against laws of this exactness.
+        """
         other = copy(self)
         other.errors, other.odds, other._slack = errors, odds, None
         return other
 
     def described(self, own: Inexact | None) -> Self:
-        """The same where the description itself may be wrong, whatever is fitted beside it."""
+        """Likelihood with errors of the description itself, beside any effect."""
         other = copy(self)
         other.own = own
         return other
 
     def left(self, e: np.ndarray) -> np.ndarray:
-        """What errors of the laws leave of residuals (blocks, sensors)."""
+        """Residuals (blocks, sensors) without the most probable errors of the laws."""
         if self.slack is None or self.errors is None:
             return e
         return np.asarray(e + self.errors @ self.slack.size(self.plain(e)))
 
     @property
     def power(self) -> float:
-        """Share of it that counts."""
+        """Power of the likelihood: share of its innovations that counts."""
         return coarsened(self.size)
 
     def told(self, e: np.ndarray) -> "Likelihood":
-        """The same with the noise of these residuals (blocks, sensors), less what errors of the laws explain."""
+        """Likelihood with the noise of the residuals e (blocks, sensors), without the errors of the laws."""
         return self.noisy(self.left(e))
 
     def noisy(self, e: np.ndarray) -> "Likelihood":
-        """The same with the noise of these residuals (blocks, sensors)."""
+        """Likelihood with the noise of the residuals e (blocks, sensors)."""
         other = copy(self)
         other._slack = None
         other.noise, _ = noises_of(e, self.present, ORDER, self.least, self.growth)
@@ -222,9 +231,9 @@ class Likelihood:
         return other
 
     def flat(self, e: np.ndarray) -> "Likelihood":
-        """The same with white noise as loud as these residuals (blocks, sensors): least squares.
+        """Likelihood with white noise of the standard deviation of the residuals e (blocks, sensors): least squares.
 
-        An autoregression holds a large effect for noise, so that a fit under it moves by events alone.
+        An autoregression takes a large effect for noise: a fit under it follows sudden events only.
         """
         other = copy(self)
         other._slack = None
@@ -240,7 +249,7 @@ class Likelihood:
         return float(self.losses(e, 1)[0])
 
     def losses(self, e: np.ndarray, count: int) -> np.ndarray:
-        """The same by segment of the rows (count,), nats: their sum is the loss."""
+        """Losses (count,) by segment of the rows, nats; their sum is the loss."""
         if self.slack is None or self.errors is None:
             return self.parted(e, count)
         a = self.slack.size(self.plain(e))
@@ -248,7 +257,7 @@ class Likelihood:
         return self.parted(e + self.errors @ a, count) + beneath / count
 
     def parted(self, e: np.ndarray, count: int) -> np.ndarray:
-        """The same where the laws are exact."""
+        """Losses (count,) by segment of the rows, nats, with exact laws."""
         out = np.zeros(count)
         for rows, own, r in zip(self.present, *noises_of(e, self.present, ORDER, self.least, self.growth), strict=True):
             segment = rows[own.order :] * count // len(e)
@@ -256,10 +265,10 @@ class Likelihood:
         return np.asarray(out + sum(one.losses(e, count) for one in self.slow))
 
     def foretold(self, e: np.ndarray, other: "Likelihood") -> float:
-        """Negative logarithm of the likelihood of residuals under the noise that `other` rows showed, nats.
+        """Negative logarithm of the likelihood of residuals under the noise of the rows of `other`, nats.
 
-        Its size is that of these rows where they are louder: a model that followed the other rows to the noise of the
-        sensor would else lose by each small error more than one that never came near.
+        The noise level is raised to that of these rows where it is larger. A model that fits the other rows down to
+        sensor noise would otherwise lose more by each small error than a model with a poor fit.
         """
         out = 0.0
         for (part, own), before in zip(self.cut(e), other.parts, strict=True):
@@ -280,7 +289,7 @@ class Likelihood:
         return (self,)
 
     def cut(self, e: np.ndarray) -> list[tuple["Likelihood", np.ndarray]]:
-        """The part of residuals (blocks, ...) that belongs to each recording."""
+        """This likelihood, with all residuals e (blocks, ...): there is one recording."""
         return [(self, e)]
 
     @property
@@ -290,13 +299,13 @@ class Likelihood:
         return np.asarray(np.where(found > 0.0, found, 1.0))
 
     def split(self, share: float) -> tuple["Likelihood", "Likelihood"]:
-        """The same of the first rows, and of the last `share` of them."""
+        """Likelihoods of the first rows, and of the last `share` of the rows."""
         begin, end = self.rows
         cut = end - round(share * (end - begin))
         return self.during(begin, cut), self.during(cut, end)
 
     def during(self, begin: int, end: int) -> "Likelihood":
-        """The same of rows `begin` to `end`."""
+        """Likelihood of rows `begin` to `end`."""
         other = self.slackened(None).described(None)
         other.rows = (max(begin, self.rows[0]), end)
         other.noise = [noise.averaged() for noise in self.noise]
@@ -308,7 +317,7 @@ class Likelihood:
 def averaged(x: np.ndarray, count: int) -> np.ndarray:
     """Means (n / count,) of each `count` neighbours among values (n,).
 
-    A sum of columns: a mean along so short an axis takes five times as long.
+    A sum of columns takes a fifth of the time of a mean along a short axis.
     """
     parts = x.reshape(-1, count)
     total = parts[:, 0].copy()
@@ -318,20 +327,20 @@ def averaged(x: np.ndarray, count: int) -> np.ndarray:
 
 
 def sensor_body(sim: Simulator, name: str) -> str | None:
-    """Body of a channel; None where it looks at none."""
+    """Body of a channel; None where the channel has no body."""
     found = sim.case.machine.sensors.get(name)
     return None if found is None else found.body
 
 
 def coarsened(size: int, most: float = INNOVATIONS) -> float:
-    """Share of the likelihood of `size` innovations that counts where they count for `most` at most."""
+    """Power of the likelihood of `size` innovations, whose effective number is `most` at most."""
     return most / (most + size)
 
 
 def settled(sim: Simulator) -> int:
-    """First row that counts: the machine has moved and forgotten how it stood before the recording began.
+    """First row that counts: the machine has moved, and its state before the recording has decayed.
 
-    Of a free response it is the first of all: the state there is fitted.
+    For a free response it is row 0: the fit includes the state there.
     """
     if sim.case.problem == "free":
         return 0

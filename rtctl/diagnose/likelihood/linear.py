@@ -1,6 +1,6 @@
-"""Linear model of a fit: the residual as a function of the fitted parameters about where they are, under a given noise.
+"""Linear model of a fit: the residual as a function of the parameters about their fitted values, under a given noise.
 
-Screening, starts of fits and free functions all solve for the parameters beside something new; they share this.
+Screening, starts of fits and free functions solve for the parameters beside a further function with it.
 """
 
 from copy import copy
@@ -40,7 +40,7 @@ class Linear:
         return self._starts[steps]
 
     def under(self, like: Likelihood) -> "Linear":
-        """The same under another noise."""
+        """Linear model under the noise of `like`."""
         other = copy(self)
         other.like = like
         for derived in ("white", "H"):
@@ -54,19 +54,19 @@ class Linear:
 
     @cached_property
     def H(self) -> np.ndarray:
-        """Half the second derivative of the cost, prior included."""
+        """Second derivative (unknowns, unknowns) of the cost by Gauss and Newton, prior included."""
         return np.asarray(self.white.T @ self.white + np.diag(self.weight))
 
     def slope(self, r: np.ndarray) -> np.ndarray:
-        """Derivative of the cost where the innovations are r (innovations,)."""
+        """Derivative (unknowns,) of the cost where the innovations are r (innovations,)."""
         return np.asarray(self.white.T @ r + self.weight * self.base.x)
 
     def step(self, e: np.ndarray) -> np.ndarray:
-        """Step of the parameters that suits the residuals e (blocks, sensors) best, within their bounds."""
+        """Step (unknowns,) of the parameters to the least cost of the residuals e (blocks, sensors), within bounds."""
         low, high = self.base.space.bounds()
         return bounded_step(self.H, self.slope(self.like.white(e)), self.base.x, low, high, DAMPING)
 
     def left(self, dx: np.ndarray, C: np.ndarray) -> np.ndarray:
-        """Residuals after a step of the parameters and of the directions C (blocks, sensors, k) beside them."""
+        """Residuals (blocks, sensors) after a step of the parameters and of the directions C (blocks, sensors, k)."""
         n = len(self.base.x)
         return np.asarray(self.base.e + np.tensordot(self.raw, dx[:n], axes=1) + np.tensordot(C, dx[n:], axes=1))

@@ -1,7 +1,6 @@
-"""Noise of the sensors' residuals: an autoregression of each, what the sensors tell of each other, and the variance of
-what neither predicts, which may grow with speed.
+"""Noise of the sensors' residuals: autoregression, prediction by other sensors, and variance that grows with speed.
 
-Counts are silent at rest, and a tick that comes late shows a reading that is off by the more the faster it moves.
+Counting makes no noise at rest. A late tick makes an error of the reading that is proportional to speed.
 
 Source: Ljung, System Identification (1999), ch. 4; Kay, Modern Spectral Estimation (1988), ch. 7 for the covariance
 method with both directions of time; Davidian & Carroll, Variance function estimation, JASA 82 (1987).
@@ -16,15 +15,15 @@ from numpy.lib.stride_tricks import as_strided, sliding_window_view
 from scipy.linalg import solve_toeplitz
 from scipy.optimize import nnls
 
-SPAN = 10  # innovations before and after, of each earlier sensor, that foretell one of a later sensor
-OWN = 10  # innovations of its own before, that foretell it beside those
-ROWS = 20  # innovations for each coefficient, without which nothing is foretold
+SPAN = 10  # innovations before and after, of each earlier sensor, that predict one of a later sensor
+OWN = 10  # past innovations of the sensor itself in this prediction
+ROWS = 20  # innovations for each coefficient of a prediction, at least
 VARIANCES = 5  # rounds of a variance function, at most, each weighed by the one before
-SETTLED = 1e-3  # of the least variance: a round that changes less is the last
+SETTLED = 1e-3  # share of the least variance: largest change in the last round
 
 
 class Noise(NamedTuple):
-    """Noise of one sensor's residual: an autoregression, and what the innovations of the sensors before it foretell."""
+    """Noise of one sensor's residual: an autoregression, and a prediction by the innovations of earlier sensors."""
 
     a: np.ndarray  # (p + 1,) whitening filter, a[0] = 1
     sigma: float | np.ndarray  # standard deviation of the innovations: of all, or of each (n - p,)
@@ -36,22 +35,22 @@ class Noise(NamedTuple):
         return len(self.a) - 1
 
     def averaged(self) -> "Noise":
-        """The same with one standard deviation for all rows, as other rows need it."""
+        """Noise with one standard deviation for all rows, for use on other rows."""
         return self._replace(sigma=float(np.sqrt(np.mean(np.square(self.sigma)))))
 
     def filtered(self, e: np.ndarray) -> np.ndarray:
-        """What the past does not foretell (n - p, ...) of residuals (n, ...), in their unit."""
+        """Innovations (n - p, ...) of residuals (n, ...) by their past, in the unit of the residuals."""
         return filtered(self.a, e)
 
     def scaled(self, rest: np.ndarray) -> np.ndarray:
-        """Innovations (n - p, ...) by their standard deviation."""
+        """Innovations (n - p, ...) over their standard deviation."""
         return np.asarray((rest.T / self.sigma).T)
 
 
 def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
-    """Autoregression of `order` of a residual (n,) about its mean, whose innovation is not below `least`.
+    """Autoregression of `order` of a residual (n,) about its mean; the innovation is not below `least`, rms.
 
-    A constant is no noise: it stays in the innovations as the force that makes it.
+    A constant is no noise: it stays in the innovations as the effect of a force.
     """
     n = len(e)
     e = e - e.mean()
@@ -64,15 +63,19 @@ def noise_of(e: np.ndarray, order: int, least: float) -> Noise:
 
 
 def surprise(white: np.ndarray, sigma: float | np.ndarray) -> np.ndarray:
-    """Negative logarithm of the density of each innovation (n,), by its standard deviation sigma, up to a constant."""
+    """Negative logarithm of the density (n,) of innovations with the standard deviation sigma, up to a constant.
+
+    `white` (n,) are the innovations over their standard deviation.
+    """
     return np.asarray(np.log(sigma) + 0.5 * white**2)
 
 
 def levels(rest: np.ndarray, growth: np.ndarray, least: float, known: np.ndarray | float = 0.0) -> np.ndarray:
-    """Standard deviation (n,) of each of the innovations (n,), whose variance is what is `known` of it (n,), a constant
-    and a share of each column of `growth` (n, columns), none of them negative; it is not below `least`.
+    """Standard deviation (n,) of innovations `rest` (n,), not below `least`.
 
-    The square of a normal variable scatters by its own mean, so that each is weighed by the round before.
+    The variance is the sum of its `known` part (n,), a constant, and a share of each column of `growth` (n, columns),
+    none of them negative. The square of a normal variable scatters in proportion to its mean: each square is weighed by
+    the variance of the round before.
     """
     power = rest**2
     B = np.column_stack([np.ones(len(rest)), growth])
@@ -93,12 +96,11 @@ def levels(rest: np.ndarray, growth: np.ndarray, least: float, known: np.ndarray
 def noises_of(
     e: np.ndarray, present: Sequence[np.ndarray], order: int, least: np.ndarray, growth: Sequence[np.ndarray] = ()
 ) -> tuple[list[Noise], list[np.ndarray]]:
-    """Noise of each sensor of residuals (n, sensors) that show in the rows `present` of each, and their innovations
-    by their standard deviation, as `whitened` gives them. `growth` (rows, columns) is what the variance of each sensor
-    may grow with.
+    """Noise of each sensor of residuals (n, sensors) in its rows `present`, and innovations as by `whitened`.
 
-    A force without a law moves all sensors at once: the innovations of the first sensors foretell those of the later.
-    The determinant of the covariance is the product of what is left.
+    `growth` (rows, columns) are the regressors of the variance of each sensor. A force without a law moves all sensors
+    at once: the innovations of earlier sensors predict those of later ones. The determinant of the covariance is the
+    product of the variances of the innovations.
     """
     out: list[Noise] = []
     white: list[np.ndarray] = []
@@ -121,10 +123,10 @@ def noises_of(
 def joined(
     own: Noise, rest: np.ndarray, at: np.ndarray, grids: Sequence[np.ndarray | None]
 ) -> tuple[Noise, np.ndarray]:
-    """Noise of a sensor by its past and by the innovations of the sensors before it, and what neither foretells; as it
-    is alone (`rest` in the rows `at`) where there are too few rows.
+    """Noise of a sensor with a prediction by its past and by the innovations of earlier sensors, and its innovations.
 
-    Both are fitted at once: of what others foretell, the past of a sensor foretells another part than of all of it.
+    With too few rows, `own` and its innovations `rest`, in the rows `at`, are unchanged. Both predictions are fitted
+    together: beside the innovations of other sensors, the past of a sensor has other coefficients.
     """
     past = min(OWN, own.order)
     columns = [neighbours(grid, at[past:]) for grid in grids if grid is not None]
@@ -148,7 +150,7 @@ def joined(
 
 
 def whitened(noises: Sequence[Noise], e: np.ndarray, present: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Innovations of residuals (n, sensors, ...), of each sensor, by their standard deviation."""
+    """Innovations of residuals (n, sensors, ...), by sensor, over their standard deviation."""
     out: list[np.ndarray] = []
     grids: list[np.ndarray | None] = []
     for c, (noise, rows) in enumerate(zip(noises, present, strict=True)):
@@ -194,6 +196,6 @@ def gridded(rest: np.ndarray, at: np.ndarray, n: int) -> np.ndarray:
 
 def neighbours(grid: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Innovations (rows, 2 SPAN + 1, ...) around each of some rows."""
-    if grid.ndim == 1 and len(at) and at[-1] - at[0] + 1 == len(at):  # all in a row
+    if grid.ndim == 1 and len(at) and at[-1] - at[0] + 1 == len(at):  # consecutive rows
         return np.ascontiguousarray(sliding_window_view(grid, 2 * SPAN + 1)[at[0] : at[-1] + 1])
     return np.stack([grid[at + lag] for lag in range(2 * SPAN + 1)], axis=1)

@@ -1,8 +1,8 @@
-"""Corrections of the tracking observer, averaged over windows: forces that the model lacks, without the sensor's noise.
+"""Corrections of the tracking observer, averaged over windows: forces that the model lacks, without sensor noise.
 
-Noise of a sensor is quick: the observer averages over it. A force that no law explains is slow enough to be followed,
-and so stands in what the observer pushes with. A quick observer pushes with noise mostly: a smooth window takes that
-off, where the mean over a box keeps the noise of its two ends.
+Sensor noise is fast, and the observer averages it. A force without a law is slow enough to be followed: the correction
+contains it. The correction of a fast observer is mostly noise. A smooth window removes this noise; the mean over a box
+keeps the noise of its two ends.
 
 Source: disturbance observer (Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mechatronics 1, 1996).
 """
@@ -17,12 +17,14 @@ from rtctl.diagnose.model.kernel import TRACK
 from rtctl.diagnose.model.model import GraphModel
 from rtctl.diagnose.model.observer import DAMPED, SMOOTHED, stiffness
 
-LONG = 100  # windows of noise, by which its part is measured
+LONG = 100  # windows of simulated noise, for the standard deviation of an average
 
 
 def pushes(like: Likelihood, model: GraphModel) -> tuple[np.ndarray, ...]:
-    """Corrections (windows, followed) of the observer in each recording, N or Nm at the followed bodies; no windows
-    where the machine is not followed."""
+    """Corrections (windows, followed) of the observer in each recording, N or Nm at the followed bodies.
+
+    There are no windows where no observer follows the machine.
+    """
     out = []
     for part in like.parts:
         if part.sim.mode == TRACK:
@@ -44,8 +46,11 @@ def averaged(push: np.ndarray, width: int) -> np.ndarray:
 
 @cache
 def answer(follow: float, dt: float, width: int) -> float:
-    """Standard deviation of the mean over windows, `width` ticks of dt s apart, of what an observer of bandwidth
-    `follow`, rad/s, makes of white noise of standard deviation one, for a unit of inertia."""
+    """Standard deviation of averaged corrections by white sensor noise of standard deviation one, for an inertia of
+    one.
+
+    Windows are `width` ticks of dt, s, apart. The bandwidth of the observer is `follow`, rad/s.
+    """
     w = follow * dt
     white = np.random.default_rng(0).standard_normal(LONG * width)
     e = lfilter([1.0, -2.0, 1.0], [1.0, DAMPED * w - 2.0, 1.0 - DAMPED * w + w**2], white)

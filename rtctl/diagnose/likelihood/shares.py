@@ -1,4 +1,4 @@
-"""What models take off: shares of a residual, and of the force that an observer needed, over what sensors leave."""
+"""Explained shares of the power of a residual, and of the observer's force, above sensor noise."""
 
 import numpy as np
 
@@ -7,29 +7,27 @@ from rtctl.diagnose.likelihood.fits import Fitted
 
 
 def floor(f: Fitted) -> np.ndarray:
-    """Rms (sensors,), SI, at which nothing is left to explain: by what counting leaves, and what differs from one block
-    to the next without a pattern."""
+    """Noise floor (sensors,), rms, SI: the larger of counting noise and noise from block to block, times QUIET."""
     restless = np.std(np.diff(f.e, axis=0), axis=0) / np.sqrt(2.0)
     return np.asarray(np.maximum(QUIET[0] * (f.like.least * np.sqrt(f.like.mean)), QUIET[1] * restless))
 
 
 def silent(f: Fitted) -> bool:
-    """Whether a model leaves no more than noise in any sensor."""
+    """Whether the residual of every sensor is at its noise floor."""
     return bool((np.sqrt(np.mean(f.e**2, axis=0)) <= floor(f)).all())
 
 
 def poor(f: Fitted) -> float:
-    """Share of the spread of a sensor that a model leaves in it, of the sensor in which it leaves most; 0 where that is
-    no more than noise."""
+    """Largest share of the spread of a sensor that its residual has, rms; 0 where residuals are at the noise floor."""
     left = np.sqrt(np.mean(f.e**2, axis=0))
     return float(np.max(np.where(left > floor(f), left / f.like.spread, 0.0)))
 
 
 def explained(base: Fitted, best: Fitted) -> float:
-    """Share of the power of the residual, above the noise of the sensor, that the best model takes off.
+    """Share of the power of the residual, above the noise floor, that the best model explains.
 
-    Noise is what counting leaves, and what differs from one block to the next without a pattern. The sensor in which
-    most is missing counts.
+    The sensor with the largest ratio of residual to noise floor counts. The share is 1 where the best model reaches the
+    floor.
     """
     least = floor(best)
     before = np.sqrt(np.mean(base.e**2, axis=0))
@@ -42,8 +40,10 @@ def explained(base: Fitted, best: Fitted) -> float:
 
 
 def explained_force(base: Fitted, best: Fitted) -> float:
-    """Share of the power of what the observer had to push with that the best model takes off, of the followed body
-    where most is missing; 0 where no observer follows the machine."""
+    """Share of the power of the observer's force that the best model explains, of one followed body.
+
+    The followed body with the largest force counts. The share is 0 where no observer follows the machine.
+    """
     before, after = (np.concatenate([np.mean(slow**2, axis=0) for slow in f.pushes if len(slow)] or [np.zeros(1)])
                      for f in (base, best))  # fmt: skip
     c = int(np.argmax(before))
@@ -51,10 +51,10 @@ def explained_force(base: Fitted, best: Fitted) -> float:
 
 
 def shown(base: Fitted, best: Fitted) -> float:
-    """Share of the power of the residual beyond sensor noise, or of the observer's force, that the best model takes
-    off, of the sensor in which most is missing: at most one, and what a reader sees of an effect.
+    """Share, at most 1, of the power of the residual above noise, or of the observer's force, that is explained.
 
-    Noise of a sensor that counts is what counting leaves; of any other, what differs from block to block.
+    The sensor with the largest ratio of residual to noise counts, and the larger of both shares. The noise is counting
+    noise for a sensor that counts, and noise from block to block for any other.
     """
     counts = np.array([base.like.sim.record.grain[name] > 0.0 for name in base.like.sim.channels])
     restless = np.std(np.diff(best.e, axis=0), axis=0) / np.sqrt(2.0)
@@ -67,8 +67,10 @@ def shown(base: Fitted, best: Fitted) -> float:
 
 
 def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
-    """What a further effect takes off over what all take off, rms, of the residual or of the observer's pushes, and of
-    the sensor that shows most of it."""
+    """Largest ratio, rms, of the change by a further effect to the change by all effects.
+
+    The ratio is over sensors of the residual and followed bodies of the observer's force.
+    """
     found = share_of(base.e, fewer.e, more.e)
     for slow in zip(base.pushes, fewer.pushes, more.pushes, strict=True):
         if len(slow[0]) and all(np.isfinite(part).all() for part in slow):
@@ -77,7 +79,7 @@ def amplitude(base: Fitted, fewer: Fitted, more: Fitted) -> float:
 
 
 def share_of(base: np.ndarray, fewer: np.ndarray, more: np.ndarray) -> float:
-    """The same of values (rows, k) under the three models."""
+    """Largest ratio, rms, of the change by a further effect to that by all, over columns of values (rows, k)."""
     further = np.sqrt(np.mean((fewer - more) ** 2, axis=0))
     whole = np.sqrt(np.mean((base - more) ** 2, axis=0))
     return float(np.max(further / np.maximum(whole, 1e-300)))

@@ -1,8 +1,9 @@
-"""Slack: what the laws of a model may be wrong by, integrated out of its likelihood.
+"""Slack: errors of the laws of a model, integrated out of its likelihood.
 
-No law is exact. What an effect does may be off by a share of it, smoothly along what it does and along the speed of the
-machine. The errors are columns beside the parameters, each with a normal prior, so that the covariance of a residual is
-that of the noise and of these columns. A further effect then counts only for what no small error of the laws explains.
+No law is exact. The change of the residual by an effect may be wrong by a share of it, smoothly along the change and
+along the speed of the machine. The errors are columns beside the parameters, each with a normal prior: the covariance
+of a residual is the sum of the covariances of the noise and of these columns. A further effect then counts only for the
+part that no small error of the laws explains.
 
 Source: Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of model discrepancy, Inverse
 Problems 30 (2014); Woodbury's identity for the covariance.
@@ -18,20 +19,23 @@ from scipy.ndimage import uniform_filter1d
 
 from rtctl.diagnose.calibration import LAW_ERROR
 
-ORDER = 3  # of the polynomials along what it does, and along the speed
-WIDTHS = (1, 4, 16, 64)  # blocks, of the averages between which bands of frequency lie
+ORDER = 3  # order of the polynomials in the effect, and in the speed
+WIDTHS = (1, 4, 16, 64)  # blocks: windows of the averages between which bands of frequency lie
 
 
 class Inexact(NamedTuple):
     """Errors (blocks, sensors, columns) of a description, of standard deviation one."""
 
-    laws: np.ndarray  # of its own laws, as far as laws are exact at all
-    unseen: np.ndarray  # of effects finer than a sensor shows
+    laws: np.ndarray  # of its own laws, before a factor for the exactness of all laws
+    unseen: np.ndarray  # of effects below the resolution of a sensor
 
 
 def columns(effect: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Errors (blocks, sensors, columns) of an effect (blocks, sensors) that is seen while the machine moves with
-    `speed` (blocks,): in size along what it does and along the speed, and in size and phase by bands of frequency."""
+    """Errors (blocks, sensors, columns) of an effect (blocks, sensors) of a machine with the `speed` (blocks,).
+
+    The columns are errors of size along the effect and along the speed, and errors of size and phase by bands of
+    frequency.
+    """
     done = effect / np.maximum(np.abs(effect).max(axis=0), 1e-300)
     fast = speed[:, None] / max(float(np.abs(speed).max(initial=0.0)), 1e-300)
     along = [legvander(done, ORDER), legvander(fast, ORDER)[..., 1:] + 0.0 * effect[..., None]]
@@ -50,7 +54,7 @@ def _rms(e: np.ndarray) -> np.ndarray:
 
 
 class Slack:
-    """Errors under one noise: `white` (innovations, columns) are their innovations, of which `power` counts."""
+    """Errors of the laws under one noise: `white` (innovations, columns), under a likelihood to the power `power`."""
 
     def __init__(self, white: np.ndarray, power: float):
         self.white, self.power = white, power
@@ -59,16 +63,16 @@ class Slack:
         self.factor = cho_factor(inner)
 
     def size(self, r: np.ndarray) -> np.ndarray:
-        """Errors (columns, ...) that suit the innovations r (innovations, ...) best."""
+        """Most probable errors (columns, ...) for the innovations r (innovations, ...)."""
         return np.asarray(-cho_solve(self.factor, self.white.T @ r))
 
     def stacked(self, r: np.ndarray) -> np.ndarray:
-        """Innovations that the errors leave, and the errors beneath: half the sum of squares is the cost."""
+        """Innovations without the most probable errors, then the errors: half the sum of squares is the cost."""
         a = self.size(r)
         return np.concatenate([r + self.white @ a, a / np.sqrt(self.power)])
 
     @property
     def volume(self) -> float:
-        """Half the logarithm of the determinant, nats, of which the share `power` counts."""
+        """Half the logarithm of the determinant of the covariance, nats, divided by `power`."""
         spread = 2.0 * float(np.sum(np.log(np.diag(self.factor[0])))) + len(self.white.T) * np.log(self.power)
         return 0.5 * spread / self.power

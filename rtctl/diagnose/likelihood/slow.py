@@ -1,7 +1,7 @@
-"""Slow residuals of the followed sensors: an autoregression foretells them, however large they are.
+"""Slow residuals of the followed sensors, which an autoregression predicts at any size.
 
-A likelihood of innovations alone holds a slow error of a model for noise that is coloured. So the residual, averaged
-over windows, counts beside its innovations, by the larger of its own size and of what an error of the laws makes: a
+A likelihood of innovations alone takes a slow error of a model for coloured noise. The residual, averaged over windows,
+therefore counts beside its innovations. Its variance is the sum of its mean square and that of an error of the laws: a
 small share of the force that moves the machine.
 
 Source: Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of model discrepancy, Inverse
@@ -22,11 +22,11 @@ from rtctl.diagnose.model.simulate import Simulator
 
 
 class Slow(NamedTuple):
-    """A followed sensor."""
+    """Slow residual of a followed sensor."""
 
-    column: int  # among the channels
+    column: int  # index among the channels
     width: int  # blocks of a window
-    least: float  # SI: residual that an error of the laws makes
+    least: float  # SI: standard deviation by an error of the laws
     sigma: float  # SI: standard deviation of the averaged residual
 
     def of(self, e: np.ndarray) -> np.ndarray:
@@ -36,11 +36,11 @@ class Slow(NamedTuple):
         return np.asarray(own.reshape(count, self.width, *e.shape[2:]).mean(axis=1))
 
     def told(self, e: np.ndarray) -> "Slow":
-        """The same with the standard deviation that residuals (blocks, sensors) show."""
+        """Slow residual with the standard deviation that residuals (blocks, sensors) show."""
         return self._replace(sigma=self._size(self.of(e)))
 
     def _size(self, own: np.ndarray) -> float:
-        """Standard deviation by averages (windows,)."""
+        """Standard deviation, SI, of averages (windows,)."""
         return float(np.hypot(self.least, np.sqrt(np.mean(own**2)))) if len(own) else self.sigma
 
     def losses(self, e: np.ndarray, count: int) -> np.ndarray:
@@ -53,7 +53,7 @@ class Slow(NamedTuple):
 
 
 def slow(sim: Simulator, channels: Sequence[int], mean: int) -> list[Slow]:
-    """The followed sensors among the `channels`, where blocks are `mean` ticks long."""
+    """Slow residuals of the followed sensors among the `channels`, for blocks of `mean` ticks."""
     if sim.mode != TRACK:
         return []
     measures, out = Measures(sim, nominal(sim.case).base, {}), []

@@ -1,4 +1,4 @@
-"""Steps of a fit by least squares: difference quotients, damped Gauss-Newton inside bounds, simulations side by side.
+"""Steps of a fit by least squares: difference quotients, damped Gauss-Newton inside bounds, parallel simulations.
 
 Source: Nocedal & Wright, Numerical Optimization (2006), ch. 10.
 """
@@ -13,15 +13,15 @@ import numpy as np
 
 from rtctl.diagnose.model.space import Space
 
-# Side by side in one process. Where whoever calls runs several processes already, it sets 1 for itself: a context
-# variable, so that nobody else in this process is slowed down by it.
+# Threads of one process. A caller with several processes sets 1: a context variable limits no other caller of this
+# process.
 THREADS: ContextVar[int] = ContextVar("threads", default=2)
 
 Result = TypeVar("Result")
 
 
 def parallel(jobs: Sequence[Callable[[], Result]]) -> list[Result]:
-    """Run simulations, or fits that consist of them, side by side: compiled code lets go of the interpreter."""
+    """Results of simulations, or of fits, that run in several threads: compiled code releases the interpreter lock."""
     threads = THREADS.get()
     if len(jobs) < 2 or threads < 2:
         return [job() for job in jobs]
@@ -37,11 +37,10 @@ def quotients(
     columns: Sequence[int],
     gone: Callable[[np.ndarray], bool],
 ) -> list[np.ndarray]:
-    """Difference quotients of a model's residual by the unknowns of some columns, each in the shape of the residual
-    `start` at x. A step goes up, or down where up would pass the upper bound.
+    """Difference quotients of a residual by the unknowns of some columns, each in the shape of `start`, its value at x.
 
-    A model may run away a step from where it does not, which `gone` tells by its residual: the step goes the other way
-    then, and where it runs away there too, nothing is known of the column: it is 0.
+    A step goes up, or down where up would pass the upper bound. Where the model diverges after a step, as `gone`
+    decides by its residual, the step is reversed. Where the model diverges after both steps, the column is 0.
     """
     high, steps = space.bounds()[1], space.steps()
 
@@ -59,10 +58,10 @@ def quotients(
 
 
 def trust(r: np.ndarray, together: float = 1.0) -> float:
-    """By how much the owner's values outweigh the errors' count, of which `together` count as one.
+    """Weight of the prior: the mean square of the residuals, at least 1, times `together` correlated residuals.
 
-    Errors of neighbouring ticks go together, and where the model lacks something they are no noise at all. Without this
-    weight, parameters that hardly matter run into their bounds to serve what is missing, and the way back is barred.
+    Residuals of neighbouring ticks are correlated, and residuals of an incomplete model are no noise. Without this
+    weight, parameters of little influence move to their bounds to fit missing effects, and do not return.
     """
     return together * max(1.0, float(np.mean(r**2)))
 

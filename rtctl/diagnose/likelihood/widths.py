@@ -1,4 +1,4 @@
-"""How well a fit knows its numbers: half widths of 90 % intervals, and effects whose size may be zero."""
+"""Intervals of a fit: half widths of 90 % intervals, and effects whose size may be zero."""
 
 import numpy as np
 
@@ -11,14 +11,16 @@ Z90 = 1.645  # standard deviations of a 90 % interval, each way
 
 
 def half_widths(f: Fitted) -> np.ndarray:
-    """Half width (unknowns,) of the 90 % interval of each unknown, as an answer tells it: by the second derivative of
-    a posterior in which few innovations count, since the error of a law moves its numbers more than noise."""
+    """Half width (unknowns,) of the 90 % interval of each unknown, as an answer reports it.
+
+    The posterior for an interval counts few innovations: the error of a law moves its parameters more than noise.
+    """
     information = curvature(f, coarsened(f.like.size, INNOVATIONS_OF_INTERVAL))
     return np.asarray(Z90 * np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0)))
 
 
 def faint(f: Fitted) -> list[int]:
-    """Numbers of the effects of a model whose sizes may all be zero, by their 90 % intervals."""
+    """Indices of the effects of a model whose sizes may all be zero, by their 90 % intervals."""
     half, out = half_widths(f), []
     for index, h in enumerate(f.space.hypotheses):
         columns = f.space.columns(index)
@@ -31,8 +33,10 @@ def faint(f: Fitted) -> list[int]:
 
 
 def hollow(f: Fitted) -> list[int]:
-    """Numbers of the effects of a model of which only the force at their place of rest is told: their own size may be
-    zero by its 90 % interval."""
+    """Indices of the effects of which only the force at their place of rest is determined.
+
+    The size of the effect itself may be zero by its 90 % interval.
+    """
     half, out = half_widths(f), []
     for index, h in enumerate(f.space.hypotheses):
         columns = f.space.columns(index)
@@ -44,6 +48,6 @@ def hollow(f: Fitted) -> list[int]:
 
 
 def along(pair: np.ndarray, half: np.ndarray) -> tuple[float, float]:
-    """Amplitude of cosine and sine parts (2,) with these half widths, and its own at the phase that was found."""
+    """Amplitude of cosine and sine parts (2,), and its half width at the fitted phase, by their half widths (2,)."""
     amplitude = float(np.hypot(*pair))
     return amplitude, float(np.hypot(*(pair * half)) / max(amplitude, 1e-12))

@@ -1,1 +1,1 @@
-"""A machine as somebody believes it, and its simulation under a recording: kernel, observer, closed loop, unknowns."""
+"""Nominal model of a machine, and its simulation under a recording: kernel, observer, closed loop, unknowns."""

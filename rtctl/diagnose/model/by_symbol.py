@@ -1,4 +1,4 @@
-"""A machine as somebody believes it: parameters of the plant's equations, and terms of physics on top of them."""
+"""Model of a machine of exchange format 1: parameters of the plant equations by symbol, and terms of physics."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,22 +25,22 @@ class Model(NamedTuple):
     units: Quantities = quantities(None)  # of an axis
 
     def change(self, **base: float) -> "Model":
-        """The same with other parameters."""
+        """Model with other parameters."""
         return self._replace(base={**self.base, **base})
 
     def tied(self, name: str) -> tuple[str, ...]:
-        """Parameters that move with one: itself."""
+        """Parameters that change together with `name`: `name` alone."""
         return (name,)
 
     def add(self, *terms: Settings) -> "Model":
-        """The same with more terms."""
+        """Model with more terms."""
         return self._replace(terms=(*self.terms, *terms))
 
 
 def owner_model(case: Case, record: "Record | None" = None) -> Model:
-    """The nominal model, without any term; what `case.estimated` names comes from the record.
+    """Nominal model without terms; the parameters in `case.estimated` are estimated from the record.
 
-    Raises UserError where the record is to give both M and K of an axis: it shows only their ratio.
+    Raises UserError where both M and K of an axis are unknown: a record shows only their ratio.
     """
     base = {k: v for k, v in believed(case).items() if v is not None}
     if profile_of(case.plant).has(FREE_UNITS) and record is not None and not {"M", "K"} & set(base):
@@ -58,9 +58,9 @@ def owner_model(case: Case, record: "Record | None" = None) -> Model:
 
 
 def guess(record: "Record", base: dict[str, float]) -> dict[str, float]:
-    """Values for an axis of which the owner says nothing: M, F_v and k by least squares on U = (k + j w F_v - w^2 M) X.
+    """Estimates of M, F_v and k of an axis without nominal values: least squares on U = (k + j w F_v - w^2 M) X.
 
-    The held input is half a tick late; frequencies count by their power. Source: Pintelon & Schoukens, System
+    The held input is half a tick late; frequencies are weighted by their power. Source: Pintelon & Schoukens, System
     Identification (2012), ch. 8.
     """
     window = np.hanning(len(record.t))

@@ -1,8 +1,7 @@
-"""Cases of exchange format 1 for the judge of described machines: parameters by symbol, sensors by fixed columns.
+"""Conversion of cases of exchange format 1 to described machines: parameters by symbol, sensors by fixed columns.
 
-The three machines of that format are descriptions that come with the program (plants/*.yaml). Their `symbols` say
-which numbers a parameter of the case stands for; what the case says of drives and sensors takes the place of what the
-description says.
+The three machines of exchange format 1 are descriptions that come with the program (plants/*.yaml). Their `symbols` map
+a parameter of the case to numbers of the description; drives and sensors of the case override those of the description.
 """
 
 import math
@@ -25,13 +24,13 @@ from rtctl.plants.graph.layout import layout
 from rtctl.plants.physics.place import PLANTS
 
 FORMAT = 1
-RATIOS = {"N": "R_t"}  # symbol of a ratio of two radii: one of them, which is as well known
-SAME = 1e-12  # relative, of two values that differ by rounding alone
+RATIOS = {"N": "R_t"}  # symbol of a ratio of two radii: the radius whose tolerance it has
+SAME = 1e-12  # relative difference of two values that differ by rounding alone
 
 
 def graph_record(record: Record, model: Model | None = None) -> GraphRecord:
-    """The record of a format 1 bundle as one of a described machine, whose nominal model is `model` where one is given,
-    else what the owner says."""
+    """Record of a format 1 bundle as a record of a described machine; its nominal model is `model`, or that of the case
+    for None."""
     case = graph_case(record, model)
     sensors = {sensor.column: name for name, sensor in case.machine.sensors.items()}
     y: dict[str, np.ndarray] = {}
@@ -50,7 +49,7 @@ def graph_record(record: Record, model: Model | None = None) -> GraphRecord:
 
 
 def known_model(model: GraphModel, record: GraphRecord) -> Model:
-    """A model of a machine of format 1 by the symbols of that format, as `rtctl simulate` and a config have it."""
+    """Model of a machine of format 1 with parameters by symbol, as `rtctl simulate` and a config have it."""
     source = record.source
     assert source is not None
     values = own(model.base, record.name)
@@ -62,7 +61,7 @@ def known_model(model: GraphModel, record: GraphRecord) -> Model:
 
 
 def graph_case(record: Record, model: Model | None = None) -> GraphCase:
-    """The case of a format 1 bundle as one of a described machine; `model` as for `graph_record`."""
+    """Case of a format 1 bundle as a case of a described machine; `model` as for `graph_record`."""
     case = record.case
     model = owner_model(case, record) if model is None else model
     machine = described(record, model.base)
@@ -93,7 +92,7 @@ def graph_case(record: Record, model: Model | None = None) -> GraphCase:
 
 
 def described(record: Record, base: dict[str, float]) -> Description:
-    """The machine as its owner believes it."""
+    """Description of the machine with the nominal parameters `base`."""
     case = record.case
     data = PLANTS[case.plant].described().layout.machine.model_dump(exclude_unset=True)
     for symbol, paths in list(data["symbols"].items()):
@@ -146,8 +145,8 @@ def _sensors(data: dict[str, Any], record: Record) -> None:
 
 
 def resolution(record: Record) -> float:
-    """Step of a main sensor that does not count, m or rad: one that the owner says, or the smallest step that occurs.
-    Of a sensor of speed its noise, per s."""
+    """Resolution of a main sensor that is no counter, m or rad: the step in the case, or the smallest recorded step.
+    For a speed sensor at least the standard deviation of its noise, per s."""
     sensors = record.case.sensors
     if sensors.x_counts_per_rev:
         return float(2 * np.pi / sensors.x_counts_per_rev)
@@ -160,7 +159,7 @@ def resolution(record: Record) -> float:
 
 
 def _turn(data: dict[str, Any]) -> None:
-    """Let the bodies turn: of a rotary axis M is a moment of inertia."""
+    """Change masses to inertias: M of a rotary axis is a moment of inertia."""
     for name, body in data["bodies"].items():
         if "mass" in body:
             body["inertia"] = body.pop("mass")

@@ -1,7 +1,7 @@
 """Compiled simulation of any described machine with any terms of physics, under a tracking observer.
 
-One compiled function serves all described machines and all hypotheses: the machine is arrays
-(plants/graph/params.py), and a slot says which term stands in it, where, with which params.
+One compiled function serves all described machines and all hypotheses: arrays hold the machine
+(plants/graph/params.py), and a slot holds number, place and params of a term.
 """
 
 from functools import cache
@@ -23,8 +23,8 @@ from rtctl.plants.physics.term import SITES, Term
 from rtctl.sources import hash_of
 
 OPEN, TRACK, HELD = range(3)
-LAWS = {"rtctl.diagnose.record.law", "rtctl.laws.shaper"}  # modules of what closes a loop
-KIND = "described"  # of the lines of a term that a described machine has
+LAWS = {"rtctl.diagnose.record.law", "rtctl.laws.shaper"}  # modules of a closed loop
+KIND = "described"  # kind of machine for which the lines of a term are taken
 
 HEADER = '''"""Described machines with every term of physics in slots, for fits.
 
@@ -235,64 +235,64 @@ def run(jobs, loops, laws, law_states, ps, ss, ts, ref, w, volts, forces, seen, 
     return n
 '''
 
-CLOSED = state(  # of a closed loop
+CLOSED = state(  # params of a closed loop
     shaper=shaper.SHAPER_STATE,
-    shaped=int,  # 1: the reference is as the law got it
-    sensor=int,  # whose reading the law gets
-    scale=float,  # that reading for one SI unit
+    shaped=int,  # 1: the reference is shaped already
+    sensor=int,  # number of the feedback sensor
+    scale=float,  # reading of the law for one SI unit of the sensor
     give=(float, (MOST_DRIVES, 2)),  # command of each drive for one unit of either output of the law
-    beside=(float, MOST_DRIVES),  # and what it is beside them
+    beside=(float, MOST_DRIVES),  # constant command of each drive beside the law
 )
 JOB = state(
     mode=int,
     substeps=int,
-    stride=int,  # ticks a substep, where it is longer than one
+    stride=int,  # ticks a substep, where a substep is longer than a tick
     lead=int,  # ticks
     release=int,  # row at which the correction ends
-    delay=int,  # substeps from a write until it acts
-    part=float,  # and a part of one
+    delay=int,  # whole substeps from a write until the command acts
+    part=float,  # fraction of a substep beside `delay`
     rate=float,  # Hz
     follows=int,
     main=(int, Q),  # numbers of the sensors that are followed
-    speed=(int, Q),  # 1: it shows a speed
+    speed=(int, Q),  # 1: the followed sensor shows a speed
     way=(float, (Q, Q)),  # motion of each coordinate for one unit of motion of each followed body
-    K=(float, Q),  # what of its error each followed body is moved by at a tick
-    L=(float, Q),  # and what its speed is raised by, for a unit of the error
-    P=(float, Q),  # force that would do the same, N or Nm at the followed body, for a unit of the error
-    D=(float, Q),  # and of its rate
-    a=(float, Q),
+    K=(float, Q),  # observer gain: correction of the position at a tick, for a unit of the error
+    L=(float, Q),  # observer gain: correction of the speed at a tick, for a unit of the error
+    P=(float, Q),  # equivalent force, N or Nm at the followed body, for a unit of the error
+    D=(float, Q),  # equivalent force for a unit of the rate of the error
+    a=(float, Q),  # filter coefficient of the rate of the error
     correction=(float, Q),
-    first_x=(float, Q),  # how far each coordinate is from rest at the first row, and its speed
-    first_v=(float, Q),
+    first_x=(float, Q),  # distance of each coordinate from rest at the first row
+    first_v=(float, Q),  # speed of each coordinate at the first row
     holds=int,  # 1: some coordinate is held
     held=(int, Q),  # 1: the coordinate moves as `path` says
-    shift=(float, Q),  # what the reading of a held coordinate is off by
-    need=(float, Q),  # force that holds it, N or Nm
-    share=(float, Q),  # what of it counts at the main sensor's body
-    e=(float, Q),
-    d=(float, Q),
-    before=(float, Y),  # readings of the substep before
+    shift=(float, Q),  # reading error of a held coordinate
+    need=(float, Q),  # force on a held coordinate, N or Nm
+    share=(float, Q),  # share of `need` that counts at the body of the main sensor
+    e=(float, Q),  # error of each followed sensor
+    d=(float, Q),  # filtered rate of the error
+    before=(float, Y),  # readings of the previous substep
 )
 
 
 class Kernel(NamedTuple):
-    """The compiled simulation and the records that it takes."""
+    """Compiled simulation and the types of its records."""
 
     module: ModuleType
-    names: tuple[str, ...]  # of terms, by their number in a slot less one
+    names: tuple[str, ...]  # of the terms; a slot holds the index plus one
     slot: np.dtype
     slots: np.dtype
 
 
 def terms() -> tuple[Term, ...]:
-    """The library's terms that can stand in a described machine."""
+    """Terms of the library that can act in a described machine."""
     return tuple(term for term in TERMS.values() if any(term.act_at(site, KIND) for site in SITES))
 
 
 def source(code: Mechanics | None = None, closed: bool = False) -> str:
-    """The module's text; of machines with mechanics from a file it imports their integration by the file's hash.
+    """Text of the generated module; for mechanics from a file it imports their integration by the hash of the file.
 
-    `closed`: with the loop closed by a law, else as fits simulate.
+    `closed`: with the loop closed by a law, else under the observer.
     """
     known = terms()
     modules = {t.build.__module__ for t in known}
@@ -307,7 +307,7 @@ def source(code: Mechanics | None = None, closed: bool = False) -> str:
 
 
 def sources_hash(closed: bool = False) -> str:
-    """Hash over the sources that the kernel is compiled from."""
+    """Hash of the sources of the kernel."""
     import rtctl
     import rtctl.plants
 
@@ -319,7 +319,7 @@ def sources_hash(closed: bool = False) -> str:
 
 @cache
 def kernel(code: Mechanics | None = None) -> Kernel:
-    """The kernel of all machines, or of those with the mechanics of a file; compiled, or taken from the cache."""
+    """Kernel of all machines, or of machines with the mechanics of a file; compiled, or taken from the cache."""
     known = terms()
     params = [(field(t.name), record_dtype(sample(t))) for t in known]
     states = [(field(t.name), t.state) for t in known if t.state is not None]
@@ -332,7 +332,7 @@ def kernel(code: Mechanics | None = None) -> Kernel:
 
 @cache
 def closed_loop(code: Mechanics | None = None) -> ModuleType:
-    """The compiled simulation of the same with the loop closed by a law."""
+    """Compiled simulation of the machines of `kernel` with the loop closed by a law."""
     return _module("loop", code, True)
 
 

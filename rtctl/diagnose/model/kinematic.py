@@ -1,10 +1,10 @@
-"""Machine of a kinematic problem: positions that follow the first one through the joints, where no force was measured.
+"""Machine of a kinematic problem: positions that follow the first position through the joints, without measured forces.
 
-Nobody knows forces there, and none is asked for. A joint that is rigid in the description is a spring too stiff to be
-seen, at which lost motion and an uneven ratio can act. A body that nothing brakes would fly on through lost motion; it
-rubs as little as no reading shows.
+Forces are neither known nor fitted. A rigid joint of the description becomes a spring, too stiff for its deflection to
+show in a reading, at which backlash and an uneven ratio can act. A body without friction would coast through backlash:
+it gets dry friction whose effect no reading shows.
 
-Source: Lurie & Enright, Classical feedback control (2000), for the play operator: what follows stays until it is moved.
+Source: Lurie & Enright, Classical feedback control (2000), for the play operator: the follower rests until it is moved.
 """
 
 import numpy as np
@@ -14,18 +14,18 @@ from rtctl.case.graph_case import GraphCase
 from rtctl.diagnose.model.model import rigid
 from rtctl.plants.graph.layout import layout
 
-QUICK = (1000.0, 3000.0)  # rad/s, at which a stiff joint rings with what it moves: least and most
-QUICK_OF_ROW = 30.0  # rad a row: a joint that rings more quickly is stiff as far as a slow recording shows
-DAMPED = 1.4  # damping of the same, twice its ratio
-SLIGHT = 0.05  # steps of the reading by which friction may stretch a stiff joint
-BRAKES = 2.0  # times the force that the given motion takes: what follows must not fly on
-OVER = 7  # rows, over which an acceleration is taken
+QUICK = (1000.0, 3000.0)  # rad/s, natural frequency of a stiff joint: least and most
+QUICK_OF_ROW = 30.0  # rad a row, highest natural frequency that a slow recording needs
+DAMPED = 1.4  # twice the damping ratio of a stiff joint
+SLIGHT = 0.05  # steps of the reading: largest deflection of a stiff joint by friction
+BRAKES = 2.0  # dry friction over the inertial force of the given motion, so that no follower coasts
+OVER = 7  # rows of the window of an acceleration
 
 
 def followed(case: GraphCase, main: str, fine: dict[str, float], x: np.ndarray, dt: float) -> GraphCase:
-    """The case with a spring for each rigid joint and friction for each body that has none.
+    """Case with a spring for each rigid joint and dry friction for each body without friction.
 
-    `main` is the sensor of the motion x (n,) that is given; `fine` is the step or noise of each reading, SI.
+    `main` is the sensor of the given motion x (n,), rad or m; `fine` is the step or noise of each reading, SI.
     """
     machine, values, given = case.machine, dict(case.values), set(case.values)
     own = str(machine.sensors[main].body)
@@ -57,7 +57,7 @@ def followed(case: GraphCase, main: str, fine: dict[str, float], x: np.ndarray, 
 
 
 def _felt(case: GraphCase, name: str, far: str) -> float:
-    """Inertia or mass of one end of a joint, as its far end feels it."""
+    """Inertia or mass of one end of a joint, reflected to the far end, kg m^2 or kg."""
     body = case.machine.bodies[name]
     mass = case.values[f"bodies.{name}.{'inertia' if body.turns else 'mass'}"]
     ends = [case.layout.ratio(end, case.values) for end in (name, far)]

@@ -1,4 +1,4 @@
-"""Closed loop around a described machine: a law, how it is wired, and the simulation with it."""
+"""Closed loop around a described machine: a law, its connections, and the simulation with it."""
 
 import math
 from typing import NamedTuple
@@ -19,17 +19,17 @@ from rtctl.plants.graph.units import measured_unit
 
 
 class Loop(NamedTuple):
-    """A law, and how it is wired."""
+    """Control law and its connections."""
 
     law: LawParams
-    state: np.ndarray  # (1,) at the first row
+    state: np.ndarray  # (1,) state of the law at the first row
     sensor: str
     scale: float  # the law's reading for one SI unit of the sensor
     give: np.ndarray  # (drives, 2) command of each drive for one unit of either output
-    beside: np.ndarray  # (drives,) and what it is beside them
+    beside: np.ndarray  # (drives,) constant command of each drive beside the law
     unit: str  # of the reference
-    limit: float  # largest command of any drive; inf where nobody says
-    known: bool  # whether it is the machine's own
+    limit: float  # largest command of any drive; inf where it is unknown
+    known: bool  # whether the law is that of the machine; False: a stand-in
 
     @property
     def per_unit(self) -> float:
@@ -42,8 +42,8 @@ def run(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Readings (n, sensors), SI, and commands (n, drives) of a model in closed loop, from the first row of `sim` on.
 
-    `ref` and `w` (n,) are the reference, before shaping or as recordings have it (`shaped`), and the excitation.
-    Readings are nan from the tick on at which the model ran away. The law's sensor begins where the record shows it.
+    `ref` (n,) is the reference, before shaping or after it (`shaped`), `w` (n,) the excitation. Readings are nan from
+    the tick on at which the model diverged. The feedback sensor begins at its first recorded reading.
     """
     start = ready(sim, model, TRACK)
     n, drives = len(ref), sim.volts.shape[1]
@@ -70,7 +70,7 @@ def run(
 
 
 def _off(sim: Simulator, loop: Loop, start: Ready) -> float:
-    """Simulated reading of the law's sensor less what its column shows, SI, at the first row."""
+    """Simulated less recorded reading of the feedback sensor at the first row, SI."""
     for number, one in enumerate(sim.followed):
         if one.sensor == loop.sensor:
             return float(start.offsets[number])
@@ -83,11 +83,11 @@ def _off(sim: Simulator, loop: Loop, start: Ready) -> float:
 
 
 def most_of(machine: Description) -> float:
-    """Largest command that every drive of a machine takes, in its unit; inf where it has no drive."""
+    """Largest command that every drive of a machine takes, in its unit; inf without a drive."""
     return float(min((d.limit or d.dac_range for d in machine.drives.values()), default=math.inf))
 
 
 def unit_of(record: GraphRecord, sensor: str) -> str:
-    """SI unit of what a sensor shows."""
+    """SI unit of the reading of a sensor."""
     machine = record.case.machine
     return measured_unit(machine.sensors[sensor].measures, turns_at(machine, machine.sensors[sensor]))

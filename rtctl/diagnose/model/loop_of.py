@@ -1,7 +1,7 @@
-"""Loop of a recorded machine: by its own law where that is known, else by a stand-in.
+"""Loop of a recorded machine: with its own law where the law is known, else with a stand-in.
 
-The law is known where the recording is of our own daemon, with a law of the program's, or where a case says it. A law
-in an own file that came with a recording is never run.
+The law is known where rtctl made the recording with a law of the program, or where the case declares a law. A law in a
+user file that came with a recording is never run.
 """
 
 import math
@@ -19,17 +19,17 @@ from rtctl.diagnose.record.law_params import began, law_params, law_state
 from rtctl.diagnose.record.law_parts import neutral, of_settings
 from rtctl.own.files import OwnError
 
-METRES = "m"  # unit of a law that does not count in its sensor's
+METRES = "m"  # unit of a law whose unit is not that of its sensor
 
 
 def loop_of(record: GraphRecord) -> Loop:
-    """The loop of a recorded machine."""
+    """Loop of a recorded machine."""
     own = _known(record) if record.source is not None else _of_config(record) or _of_case(record)
     return own if own is not None else stand_in(record)
 
 
 def _known(record: GraphRecord) -> Loop | None:
-    """The law of a machine of exchange format 1; None where it is not known."""
+    """Loop of a machine of exchange format 1; None where its law is not known."""
     source = record.source
     assert source is not None
     if not source.closed_loop:
@@ -44,13 +44,13 @@ def _known(record: GraphRecord) -> Loop | None:
 
 
 def _of_config(record: GraphRecord) -> Loop | None:
-    """The law of a described machine by the config in its case; None where there is none, or one of an own file."""
+    """Loop of a described machine by the config in its case; None without a config, or with a law of a user file."""
     settings = settings_of(record.case.config)
     return None if settings is None else of_machine(settings, record)
 
 
 def _of_case(record: GraphRecord) -> Loop | None:
-    """The law that a case of exchange format 2 says; None where it says none. Other drives keep their command."""
+    """Loop with the law of a case of exchange format 2; None without a law. Other drives keep their command."""
     said, machine = record.case.controller, record.case.machine
     if said is None:
         return None
@@ -65,7 +65,7 @@ def _of_case(record: GraphRecord) -> Loop | None:
 
 
 def settings_of(config: dict[str, Any] | None) -> Any:
-    """Checked settings of a described machine's config, without code that came with it; None where they do not load."""
+    """Checked settings of the config of a described machine, without code of the recording; None where invalid."""
     from rtctl import machines
     from rtctl.own.model import without_code
 
@@ -80,7 +80,7 @@ def settings_of(config: dict[str, Any] | None) -> Any:
 
 
 def of_machine(settings: Any, record: GraphRecord) -> Loop:
-    """The loop of a config of a described machine, around a recording of it."""
+    """Loop of a described machine with the law of its config, around a recording."""
     from rtctl.machines.described import parts_of, shares_of
     from rtctl.machines.described_plant import converter, is_counter
 

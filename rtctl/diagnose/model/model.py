@@ -12,8 +12,8 @@ from rtctl.plants.graph.layout import Layout, layout
 from rtctl.plants.graph.params import GraphParams
 from rtctl.plants.physics import TERMS
 
-PHYSICS = "physics."  # head of the paths of the owner's terms
-RECORDING = "@"  # between the path of a number and the recording that it belongs to
+PHYSICS = "physics."  # head of the paths of the nominal terms
+RECORDING = "@"  # separator between the path of a number and the name of its recording
 
 
 class GraphModel(NamedTuple):
@@ -24,11 +24,11 @@ class GraphModel(NamedTuple):
     terms: tuple[Settings, ...] = ()
 
     def known(self) -> int:
-        """Number of the terms that the owner knows, which come first."""
+        """Number of the nominal terms, which come first."""
         return len({path.split(".")[1] for path in self.base if path.startswith(PHYSICS)})
 
     def without_known(self, index: int) -> "GraphModel":
-        """The same without one of the terms that the owner knows."""
+        """Model without one of the nominal terms."""
         base: dict[str, float] = {}
         for path, value in self.base.items():
             head, *rest = path.split(".", 2)
@@ -41,7 +41,7 @@ class GraphModel(NamedTuple):
         return self._replace(base=base, terms=(*self.terms[:index], *self.terms[index + 1 :]))
 
     def resolved(self) -> "GraphModel":
-        """The same with the numbers of the owner's terms as `base` has them."""
+        """Model whose nominal terms have the numbers of `base`."""
         found: dict[int, dict[str, float]] = {}
         for path, value in self.base.items():
             if path.startswith(PHYSICS) and RECORDING not in path:
@@ -51,18 +51,18 @@ class GraphModel(NamedTuple):
         return self._replace(terms=tuple(terms))
 
     def add(self, *terms: Settings) -> "GraphModel":
-        """The same with more terms."""
+        """Model with more terms."""
         return self._replace(terms=(*self.terms, *terms))
 
     def tied(self, path: str) -> tuple[str, ...]:
-        """Paths of the numbers that move with that of a path: those of the same symbol."""
+        """Paths of the numbers that share the symbol of a path, and change together."""
         for paths in self.layout.machine.symbols.values():
             if path in paths:
                 return tuple(paths)
         return (path,)
 
     def built(self) -> "GraphModel":
-        """The same with the joints that its terms make springs as springs of the description."""
+        """Model in which joints with a compliance term are springs of the description."""
         machine, numbers = sprung(self.layout.machine, self.terms)
         if not numbers:
             return self
@@ -77,12 +77,12 @@ class GraphModel(NamedTuple):
 
 
 def nominal(case: GraphCase) -> GraphModel:
-    """The owner's model: the description and the terms that the owner knows."""
+    """Nominal model: the description and the nominal terms."""
     return GraphModel(case.layout, dict(case.values), tuple(settings_of(entry) for entry in case.physics))
 
 
 def own(values: dict[str, float], name: str) -> dict[str, float]:
-    """Numbers as one recording has them: those of its own in the place of the shared ones."""
+    """Numbers of one recording: its own numbers replace the shared ones."""
     if not any(RECORDING in path for path in values):
         return values
     out = {path: value for path, value in values.items() if RECORDING not in path}
@@ -96,7 +96,7 @@ def settings_of(entry: dict[str, Any]) -> Settings:
 
 
 def rigid(layout: Layout, values: dict[str, float], main: str) -> dict[str, float]:
-    """Motion of each body for one unit of the body `main`, joints taken as rigid; 0 where nothing connects the two."""
+    """Motion of each body for one unit of the body `main`, joints taken as rigid; 0 where no joint connects the two."""
     machine = layout.machine
     out = {main: 1.0}
     todo = [main]
@@ -112,18 +112,19 @@ def rigid(layout: Layout, values: dict[str, float], main: str) -> dict[str, floa
 
 
 def carried(layout: Layout, values: dict[str, float], ratios: dict[str, float]) -> dict[int, float]:
-    """Motion of each coordinate that moves, rad or m, where the bodies move by `ratios`."""
+    """Motion of each moving coordinate, rad or m, for a motion of the bodies by `ratios`."""
     moving = {name: ratio for name, ratio in ratios.items() if ratio != 0.0}
     return {layout.coordinate(name): ratio / layout.ratio(name, values) for name, ratio in moving.items()}
 
 
 def moved_inertia(inertia: np.ndarray, moved: dict[int, float]) -> float:
-    """Inertia, kg or kg m^2, at the body for whose unit the coordinates move by `moved`; `inertia` is that of each."""
+    """Reflected inertia, kg or kg m^2, at the body for whose unit motion the coordinates move by `moved`; `inertia` is
+    that of each coordinate."""
     return float(sum(ratio**2 * inertia[at] for at, ratio in moved.items()))
 
 
 def ratio_of(joint: Any, name: str, values: dict[str, float]) -> float:
-    """What the far end of a joint moves for one unit of its near end when it is not stretched; a span by the radii."""
+    """Transmission ratio of a joint: motion of its far end for one unit of its near end; of a span by the radii."""
     if joint.span is None:
         return values[f"joints.{name}.ratio"]
     near, far = (values[f"bodies.{body}.radius"] for body in (getattr(joint, "from"), joint.to))

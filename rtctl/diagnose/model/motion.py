@@ -1,7 +1,7 @@
-"""Recorded motion of bodies that are held to it: that of the main sensor in a static or kinematic problem, and inputs.
+"""Recorded motion of held bodies: of the main sensor in a static or kinematic problem, and of measured inputs.
 
-Force follows from acceleration, and single counts have a large one: the motion of a static problem is smoothed over a
-time in which a force law hardly changes. A kinematic problem asks for positions, and takes them as they are.
+Force follows from acceleration, and quantisation makes a large acceleration: the motion of a static problem is smoothed
+over a time in which a force law hardly changes. A kinematic problem predicts positions: its motion is not smoothed.
 """
 
 from typing import NamedTuple
@@ -11,8 +11,8 @@ from scipy.signal import savgol_filter
 
 from rtctl.diagnose.model.recording import GraphRecord
 
-OVER = 0.15  # s, over which the motion of a static problem is a cubic
-LEAST = 7  # rows, of the same
+OVER = 0.15  # s, window of the cubic smoothing of a static problem
+LEAST = 7  # rows of the window, at least
 
 
 class Path(NamedTuple):
@@ -20,7 +20,7 @@ class Path(NamedTuple):
 
     body: str
     x: np.ndarray  # rad or m
-    v: np.ndarray  # of its rate
+    v: np.ndarray  # rad/s or m/s
 
 
 def main_path(record: GraphRecord) -> Path:
@@ -33,12 +33,12 @@ def main_path(record: GraphRecord) -> Path:
 
 
 def paths(record: GraphRecord) -> list[Path]:
-    """Motion of each body whose position is a measured input."""
+    """Motions of the bodies whose position is a measured input."""
     return [moved(body, x, record.dt, True) for body, x in record.positions.items()]
 
 
 def moved(body: str, x: np.ndarray, dt: float, smooth: bool) -> Path:
-    """Position and its rate; both `smooth` where the force counts that it takes."""
+    """Motion of a body from positions x (n,), rad or m; `smooth` where the force of the motion counts."""
     if not smooth:
         return Path(body, np.asarray(x, float), np.gradient(x, dt))
     window = min(max(LEAST, round(OVER / dt)) | 1, (len(x) - 1) | 1)

@@ -1,4 +1,4 @@
-"""Measures of a recording at each node: what is large and what is small there."""
+"""Node scaling: characteristic speed, span, force, inertia and stiffness of a recording at each node."""
 
 from typing import NamedTuple
 
@@ -15,28 +15,28 @@ from rtctl.plants.graph.params import drive_gain
 from rtctl.plants.graph.term_units import body_of
 from rtctl.plants.physics import TERMS
 
-SMOOTH = 5e-3  # s, over which a speed is taken
-USUAL_RATE = 500.0  # 1/s, of a machine whose parts ring at 3 to 225 Hz
-ONE_WAY = 0.02  # of the way in one direction: least way in the other, for a motion in both
-LITTLE = 1e-12
+SMOOTH = 5e-3  # s, half window of a speed
+USUAL_RATE = 500.0  # 1/s, sample rate of a machine with natural frequencies of 3 to 225 Hz
+ONE_WAY = 0.02  # of the travel in one direction: least travel in the other, for a motion in both
+LITTLE = 1e-12  # lower bound of a measure, SI
 
 
 class Scales(NamedTuple):
-    """Of one node, in its own unit."""
+    """Scales of one node, in its own unit."""
 
-    speed: float  # rms while it moves
+    speed: float  # rms speed while the node moves
     span: float
-    force: float  # rms of what the drives make of it there
+    force: float  # rms force of the drives at the node
     low: float  # lowest position
-    sign: float  # of its motion for one of the main sensor's body
+    sign: float  # of its motion for a positive motion of the body of the main sensor
 
     def at(self, share: float) -> float:
-        """Position of the node where the main sensor has gone that share of its span."""
+        """Position of the node where the main sensor is at a share of its span."""
         return self.low + self.span * (1.0 - share if self.sign < 0.0 else share)
 
 
 class Seen(NamedTuple):
-    """What the starts of a search ask of a recording (search/grid_starts.py)."""
+    """Elements and tick of a recording, for the grid of starts (search/grid_starts.py)."""
 
     plant: tuple[Element, ...]
     dt: float  # s
@@ -65,7 +65,7 @@ class Measures:
         self.record = Seen(sim.elements, dt)
 
     def _effort(self, number: int, a: float) -> float:
-        """Rms of what all drives make at a followed body with the acceleration `a` (rms), N or Nm."""
+        """Rms force of all drives at a followed body, N or Nm; at least a share of inertia times acceleration `a`."""
         total = np.zeros(len(self.u))
         for name, channel in self.layout.drives.items():
             drive = self.machine.drives[name]
@@ -73,11 +73,11 @@ class Measures:
             if self.leaders.get(body, 0) == number:
                 total += drive_gain(self.values, name) * self.ratios.get(body, 0.0) * self.u[:, channel]
         found = float(np.sqrt(np.mean(total**2)))
-        share = 0.1 if found > 0.0 or not number else 1.0  # what no drive moves, another body moves
+        share = 0.1 if found > 0.0 or not number else 1.0  # another body moves a body without a drive
         return max(found, share * self.inertia(self.sim.followed[number].body) * a, LITTLE)
 
     def body_of(self, node: str) -> str:
-        """The body that moves at a node; that of the followed sensor where the node has none."""
+        """Body of a node; that of the followed sensor where the node has none."""
         return body_of(self.machine, node) or str(self.sim.body)
 
     def scale(self, node: str) -> Scales:
@@ -95,13 +95,13 @@ class Measures:
         )
 
     def lever(self, node: str) -> tuple[str, float]:
-        """Body by which a node moves, and what it moves for one unit of it: tape, and what a contact drives, in its
-        own."""
+        """Body by which a node moves, and the motion of the node for one unit of the body: a span of tape and a driven
+        contact have a lever arm."""
         at = lever(self.layout, self.values, node, bool(self.term) and TERMS[self.term].contact)
         return at if at is not None else (self.body_of(node), 1.0)
 
     def way(self, body: str) -> np.ndarray:
-        """Position (n,) of a body as the followed sensor that joints connect it with saw it."""
+        """Position (n,) of a body, rad or m, by the followed sensor that joints connect it with."""
         return np.asarray(self.ways[self.leaders.get(body, 0)] * self.ratios.get(body, 0.0))
 
     def both_ways(self, node: str) -> bool:
@@ -111,11 +111,11 @@ class Measures:
         return bool(min(parts) > ONE_WAY * max(*parts, LITTLE))
 
     def turns(self, node: str) -> bool:
-        """Whether what a node belongs to turns."""
+        """Whether the body of a node turns."""
         return self.machine.turns(self.body_of(node))
 
     def of(self, measure: str, node: str) -> float:
-        """The measure in SI at a node."""
+        """Value of a measure at a node, SI."""
         s = self.scale(node)
         volts = max(self.volts(""), LITTLE)
         stiffness = self.stiffness(node)
@@ -135,7 +135,7 @@ class Measures:
         return table[measure]
 
     def pace(self, node: str) -> float:
-        """Fastest rate of the command of a drive, in its unit a second."""
+        """Highest rate of the command of a drive, in its unit a second."""
         u = self.sim.volts
         u = u[:, [self.layout.drives[node]]] if node in self.layout.drives else u
         if not u.size:
@@ -143,13 +143,13 @@ class Measures:
         return max(float(np.abs(np.diff(u, axis=0)).max()) / self.sim.record.dt, LITTLE)
 
     def volts(self, node: str) -> float:
-        """Rms command of the drive that the node names, or of all."""
+        """Rms command of the drive that the node names, or of all drives."""
         u = self.sim.volts
         u = u[:, self.layout.drives[node]] if node in self.layout.drives else u
         return float(np.sqrt(np.mean(u**2))) if u.size else LITTLE
 
     def grain(self, node: str) -> float:
-        """Step of the main sensor as the node moves, or of the sensor that the node is, SI."""
+        """Resolution of the followed sensor at a node, or of the sensor at `node` itself, SI."""
         record = self.sim.record
         if node in record.grain:
             return record.grain[node] or LITTLE
@@ -158,11 +158,11 @@ class Measures:
         return (record.grain[sensor] or LITTLE) * abs(self.ratios.get(body, 1.0) or 1.0)
 
     def dry(self, node: str) -> float:
-        """Dry friction of the model at a body, with that of all bodies that move with it."""
+        """Dry friction of the model at a body, N or Nm, with that of all rigidly joined bodies."""
         return self._friction(node, "dry", 1)
 
     def thick(self, node: str) -> float:
-        """Viscous friction of the model at a body."""
+        """Viscous friction of the model at a body, Ns/m or Nms/rad, with that of all rigidly joined bodies."""
         return self._friction(node, "viscous", 2)
 
     def _friction(self, node: str, key: str, power: int) -> float:
@@ -178,7 +178,7 @@ class Measures:
         return float(total / own**power)
 
     def inertia(self, node: str) -> float:
-        """Inertia or mass of all that joints make move with a node, as the node feels it."""
+        """Inertia or mass of all bodies that move with a node, reflected to the node, kg m^2 or kg."""
         body = self.body_of(node)
         number = self.leaders.get(body, 0)
         ratios = {name: ratio for name, ratio in self.ratios.items() if self.leaders[name] == number}
@@ -186,12 +186,12 @@ class Measures:
         return total / (self.ratios.get(body, 1.0) or 1.0) ** 2
 
     def stiffness(self, node: str) -> float:
-        """Of a joint; elsewhere of a spring that the drives stretch over the span."""
+        """Stiffness of a joint; elsewhere of a spring that the drives stretch over the span, N/m or Nm/rad."""
         s = self.scale(node)
         return self.values.get(f"joints.{node}.stiffness", 0.0) or s.force / s.span
 
     def twist(self, node: str, usual: float) -> float:
-        """Deflection of a joint: `usual` by its force, in a kinematic problem as the positions differ."""
+        """Deflection of a joint, rad or m: `usual`, in a kinematic problem at least the difference of the positions."""
         sim, sensors = self.sim, self.machine.sensors
         if sim.case.problem != "kinematic":
             return usual
@@ -204,7 +204,7 @@ class Measures:
         return max([usual, *apart])
 
     def firm(self, node: str) -> float:
-        """Stiffness of a joint with which the lighter of its two sides rings at a tenth of the sample rate."""
+        """Stiffness of a joint whose lighter side has a natural frequency of 0.02 of the sample rate, N/m or Nm/rad."""
         if node not in self.machine.joints:
             return self.stiffness(node)
         far = self.machine.joints[node].to
@@ -214,17 +214,17 @@ class Measures:
         return (2 * np.pi * 0.02 / self.sim.record.dt) ** 2 * min(sides)
 
     def _own(self, name: str) -> float:
-        """Inertia or mass of one body."""
+        """Inertia or mass of one body, kg m^2 or kg."""
         return self.values[f"bodies.{name}.{'inertia' if self.machine.bodies[name].turns else 'mass'}"]
 
     def most(self, parameter: str) -> float:
-        """The highest value that the term's settings allow."""
+        """Highest value that the settings of the term allow."""
         bounds = TERMS[self.term].settings.model_fields[parameter].metadata
         return float(min((b.le for b in bounds if hasattr(b, "le")), default=np.inf))
 
 
 def lever(layout: Layout, values: dict[str, float], node: str, contact: bool) -> tuple[str, float] | None:
-    """Body and arm of what a span of tape, or where `contact` says so a contact, passes on; None of any other node."""
+    """Body and lever arm of a span of tape, or of a contact where `contact`; None of any other node."""
     machine = layout.machine
     touching = contacts(machine).get(node) if contact else None
     if touching is not None and touching.joint:
@@ -238,12 +238,12 @@ def lever(layout: Layout, values: dict[str, float], node: str, contact: bool) ->
 
 
 def speed(x: np.ndarray, dt: float) -> np.ndarray:
-    """Rate (n,) of a position, over a few ticks."""
+    """Rate (n,) of a position x (n,), smoothed over a few ticks, per s."""
     return np.asarray(np.gradient(uniform_filter1d(x, 2 * max(1, round(SMOOTH / dt)) + 1), dt))
 
 
 def way(sim: Simulator, number: int = 0) -> np.ndarray:
-    """Position of a followed body as its sensor saw it, (n,) rad or m; of a speed the way since row 0."""
+    """Position (n,) of a followed body by its sensor, rad or m; of a speed the integral from row 0."""
     if sim.followed[number].shows_speed:
         return np.asarray(np.cumsum(sim.watched[:, number]) * sim.record.dt)
     return np.asarray(sim.watched[:, number])

@@ -1,18 +1,18 @@
-"""Sensors that a tracking observer follows."""
+"""Tracking observer: its followed sensors, bandwidths and equivalent forces."""
 
 from typing import NamedTuple
 
 from rtctl.diagnose.model.model import rigid
 from rtctl.diagnose.model.recording import GraphRecord
 
-FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position
+FOLLOW = 30.0  # rad/s, bandwidth of the observer of a position sensor
 DAMPED = 1.4  # twice its damping ratio
-SMOOTHED = 10.0  # bandwidths of the observer: that of the rate of its error
-FOLLOW_SPEED = 5.0  # rad/s, of a speed: it does not drift, and has more noise to average
+SMOOTHED = 10.0  # bandwidth of the filtered rate of the error over that of the observer
+FOLLOW_SPEED = 5.0  # rad/s, bandwidth of the observer of a speed sensor, which has more noise and no drift
 
 
 class Followed(NamedTuple):
-    """A sensor that the model is made to follow."""
+    """Sensor that the observer follows."""
 
     sensor: str
     body: str
@@ -25,15 +25,15 @@ class Followed(NamedTuple):
 
 
 def stiffness(follow: float, inertia: float) -> tuple[float, float]:
-    """Force of an observer for a unit of its error in position, and for a unit in speed, N or Nm each.
+    """Equivalent stiffness and damping of an observer: force, N or Nm, for a unit of its error and of the error rate.
 
-    `follow` is the bandwidth, rad/s, `inertia` that of the followed body with all that moves with it.
+    `follow` is the bandwidth, rad/s, `inertia` the reflected inertia at the followed body, kg or kg m^2.
     """
     return follow**2 * inertia, DAMPED * follow * inertia
 
 
 def followed(record: GraphRecord) -> tuple[Followed, ...]:
-    """Sensors that the observer follows: the main one, and of each body that joints do not connect with one of them."""
+    """Followed sensors: the main one, and one for each group of bodies that no joint connects with a followed body."""
     case = record.case
     sensors = case.machine.sensors
     order = [record.main, *(n for wanted in ("position", "speed") for n, s in sensors.items() if s.measures == wanted)]

@@ -1,8 +1,9 @@
-"""The law that a case of exchange format 2 says: its params, and whether it gives the recorded command.
+"""Law of a case of exchange format 2: its params, and whether it gives the recorded command.
 
-The law reads the recorded column of its sensor: whole counts of a counter without wraps, the number of any other.
-`units` SI divide it by the column units for one SI unit; gains and reference are SI. `units` column leaves all as
-recorded. The command is that of the drive's column, after the drive's limit and converter.
+The law reads the recorded column of its sensor: whole counts of a counter without wraps, the number of any other
+sensor. With `units` SI the reading is divided by the column units for one SI unit; gains and reference are SI. With
+`units` column reading, gains and reference are as recorded. The command is that of the drive's column, after the
+drive's limit and converter.
 """
 
 from typing import TYPE_CHECKING
@@ -27,7 +28,7 @@ def reference_scale(said: GraphLaw | None, sensors: dict[str, Sensor]) -> float:
 
 
 def params(record: "GraphRecord", said: GraphLaw) -> LawParams:
-    """The law for the compiled step: of a reading in column units and a reference in SI."""
+    """Params of the law for the compiled step, with a reading in column units and a reference in SI."""
     machine = record.case.machine
     sensor, drive = machine.sensors[str(said.sensor)], machine.drives[str(said.drive)]
     p = limited(neutral(1.0 / sensor.scale, record.dt), most(drive), drive.step, drive.dac_range)
@@ -46,18 +47,18 @@ def params(record: "GraphRecord", said: GraphLaw) -> LawParams:
 
 
 def most(drive: Drive) -> float | None:
-    """Largest command of a drive, in its unit; None where nobody says."""
+    """Largest command of a drive, in its unit; None where it is unknown."""
     return drive.limit or (drive.dac_range if drive.dac_bits else None)
 
 
 def stepped(p: LawParams, sensor: Sensor) -> LawParams:
-    """The law for a simulation, whose sensor has to show the steps of the recorded one."""
+    """Params of the law for a simulation, with the quantisation of the recorded sensor."""
     counter = sensor.counts_per_unit is not None
     return p._replace(resolution=1.0 if counter else abs(sensor.grain), shift=0.0 if counter else 0.5)
 
 
 def recomputed(record: "GraphRecord", said: GraphLaw) -> np.ndarray | None:
-    """Commands (n,) that the law gives for the recorded columns; None where the recording has no reference."""
+    """Recomputed commands (n,) of the law from the recorded columns; None where the recording has no reference."""
     if said.sensor not in record.y or not np.isfinite(record.ref).all():
         return None
     sensor = record.case.machine.sensors[said.sensor]
@@ -69,7 +70,7 @@ def recomputed(record: "GraphRecord", said: GraphLaw) -> np.ndarray | None:
 
 
 def law_agreement(record: "GraphRecord", said: GraphLaw) -> Agreement | None:
-    """The recomputed law against the recorded command of its drive; None where it cannot be recomputed."""
+    """Agreement of the recomputed law with the recorded command of its drive; None where it cannot be recomputed."""
     again = recomputed(record, said)
     if again is None:
         return None
@@ -78,7 +79,7 @@ def law_agreement(record: "GraphRecord", said: GraphLaw) -> Agreement | None:
 
 
 def checked(record: "GraphRecord") -> "GraphRecord":
-    """The record with its law, where that can close the loop; else without it, with a warning that says why."""
+    """Record with its law where the law can close the loop; else without the law, with a warning that says why."""
     case, said = record.case, record.case.controller
     if said is None:
         return record

@@ -1,4 +1,4 @@
-"""Preparation of a run: the records that the compiled simulation takes of a model, at the first row of a recording."""
+"""Preparation of a run: records of a model for the compiled simulation, at the first row of a recording."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,13 +21,13 @@ from rtctl.plants.physics import TERMS, ordered
 if TYPE_CHECKING:
     from rtctl.diagnose.model.simulate import Simulator
 
-COARSEST = 0.25e-3  # s, of substeps that are longer than a tick, at most
+COARSEST = 0.25e-3  # s, longest substep where a substep is longer than a tick
 RUBS = "dry"  # trait of a body with dry friction
 ABSENT = np.zeros((1, 1))
 
 
 class Ready(NamedTuple):
-    """A model at the first row of a recording."""
+    """Model at the first row of a recording."""
 
     model: GraphModel  # with the numbers of the recording
     params: Any
@@ -39,13 +39,13 @@ class Ready(NamedTuple):
 
 
 def ready(sim: "Simulator", model: GraphModel, mode: int | None = None, coarse: bool = False) -> Ready:
-    """The records that one run of a model takes, at the first row. Raises UserError for too many terms."""
+    """Records for one run of a model, at the first row. Raises UserError for too many terms."""
     record, k = sim.record, sim.kernel
     mode = sim.mode if mode is None else mode
     model = sim.own(model).resolved().built()
     stiff = any(TERMS[str(getattr(t, "term", ""))].stiff for t in model.terms)
     substeps = sim.substeps * (2 if stiff else 1)
-    coarse = coarse and not any(TERMS[str(getattr(t, "term", ""))].slips for t in model.terms)  # a matter of ticks
+    coarse = coarse and not any(TERMS[str(getattr(t, "term", ""))].slips for t in model.terms)  # slip needs fine steps
     whole = sim.mode == HELD or bool(sim.inputs) or sim.case.machine.mechanics is not None  # needs every tick
     stride = max(1, int(COARSEST / record.dt)) if coarse and sim.substeps == 1 and not whole else 1
     substeps = 1 if stride > 1 else (substeps + 1) // 2 if coarse else substeps
@@ -70,12 +70,12 @@ def ready(sim: "Simulator", model: GraphModel, mode: int | None = None, coarse: 
 
 
 def places(layout: Layout) -> tuple[Element, ...]:
-    """Elements of a machine. A body of which the description gives no dry friction may be found to have it."""
+    """Elements of a machine. Every body may have dry friction, whether or not the description declares it."""
     return tuple(e._replace(traits=e.traits | {RUBS}) if e.kind == "body" else e for e in elements(layout))
 
 
 def path_of(sim: "Simulator", job: np.ndarray, model: GraphModel, start: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and speeds (n, coordinates) of what moves as recorded; the job is told which."""
+    """Positions and speeds (n, coordinates) of the held coordinates, which are marked in the job."""
     moved = list(sim.inputs)
     if job["mode"][0] == HELD:
         assert sim.held is not None
@@ -93,7 +93,7 @@ def path_of(sim: "Simulator", job: np.ndarray, model: GraphModel, start: float) 
 
 
 def pushing(sim: "Simulator", model: GraphModel) -> np.ndarray:
-    """Forces by the coordinates of a model that may have more of them than the description."""
+    """Forces (n, coordinates) of a model that may have more coordinates than the description, N or Nm."""
     if len(sim.forces) < 2 or model.layout is sim.layout:
         return sim.forces
     out = np.zeros((len(sim.forces), model.layout.nq))
@@ -117,7 +117,7 @@ def start_of(sim: "Simulator", one: Followed, base: dict[str, float]) -> float:
 
 
 def _begin(sim: "Simulator", states: np.ndarray, model: GraphModel, first: np.ndarray) -> None:
-    """Put every coordinate where the first row of the followed sensors has it, the joints unstretched."""
+    """Set every coordinate to the first row of the followed sensors, with unstretched joints."""
     x = states["m"]["x"][0]
     mechanics = sim.case.machine.mechanics
     for name, place in (mechanics.at if mechanics is not None else {}).items():
@@ -144,7 +144,7 @@ def _begin(sim: "Simulator", states: np.ndarray, model: GraphModel, first: np.nd
 
 
 def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: int, stride: int) -> np.ndarray:
-    """What a run is told beside the model: timing, observer, and how far own starts are from rest, (1,) JOB."""
+    """Job of a run, (1,) JOB: timing, observer, and the distances of fitted starts from rest."""
     job = np.zeros(1, kernel.JOB)
     j = job[0]
     dt = sim.record.dt * stride
@@ -174,7 +174,7 @@ def _job(sim: "Simulator", model: GraphModel, params: Any, mode: int, substeps: 
 
 
 def _own_scales(sim: "Simulator", params: Any, at: int) -> tuple[float, float]:
-    """Scales of the first position and speed of a coordinate: those of a ring as quick as the machine moves."""
+    """Scales of the first position and speed of a coordinate: of a free oscillation with the speed of the machine."""
     ratio = next((r / sim.layout.ratio(name, sim.case.values) for name, r in sim.ratios.items()
                   if r and sim.layout.coordinate(name) == at), 1.0)  # fmt: skip
     stiffness = sum(c for end, c in stiff_ends(params) if end == at)
@@ -183,7 +183,7 @@ def _own_scales(sim: "Simulator", params: Any, at: int) -> tuple[float, float]:
 
 
 def stiff_ends(params: Any) -> list[tuple[int, float]]:
-    """Coordinate and stiffness at it, N/m or Nm/rad, of each end of each spring."""
+    """Coordinate and stiffness, N/m or Nm/rad, of each end of each spring."""
     return [
         (int(at), float(params.link_c[k] * lever**2))
         for k in range(params.nl)

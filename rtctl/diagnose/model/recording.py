@@ -16,9 +16,9 @@ from rtctl.diagnose.record.format1 import Record
 from rtctl.plants.graph.params import drive_gain
 from rtctl.trace.clock import even_rows, increasing
 
-MIDDLE = 0.5  # counts from what a counter shows to where it is on average
-SPARE = 10  # rows that a recording has to have beside one for each unknown: its noise is estimated as well
-EARLY = 10  # rows, from which the speed at the first is guessed
+MIDDLE = 0.5  # counts, mean distance of the position from the reading of a counter
+SPARE = 10  # rows beside one for each unknown that a recording needs for the estimate of its noise
+EARLY = 10  # rows of the guess of the first speed
 
 
 class GraphRecord(NamedTuple):
@@ -27,23 +27,23 @@ class GraphRecord(NamedTuple):
     case: GraphCase
     t: np.ndarray  # (n,) s
     dt: float  # s
-    ref: np.ndarray  # (n,) SI, nan where there is none
+    ref: np.ndarray  # (n,) SI, nan without a reference
     w: np.ndarray  # (n,) excitation
     u: np.ndarray  # (n, drives) command, in each drive's unit
-    y: dict[str, np.ndarray]  # sensor -> (n,) SI; a counter's value is the middle of its count
-    grain: dict[str, float]  # sensor -> step of its numbers, SI; 0 where nobody knows it
+    y: dict[str, np.ndarray]  # sensor -> (n,) SI; of a counter the middle of the count
+    grain: dict[str, float]  # sensor -> resolution, SI; 0 where it is unknown
     forces: np.ndarray | None  # (n, bodies in order) measured inputs, N or Nm
-    edges: dict[str, np.ndarray] = {}  # noqa: RUF012  # sensor without direction -> (n,) its counts
+    edges: dict[str, np.ndarray] = {}  # noqa: RUF012  # sensor without direction -> (n,) counts
     positions: dict[str, np.ndarray] = {}  # body -> (n,) measured inputs, rad or m  # noqa: RUF012
     name: str = ""  # of the recording, where there are several of one machine
-    scales: tuple[float, float, float] = (1.0, 1.0, 0.0)  # of a first position, a first speed, and a guess of the speed
-    source: Record | None = None  # the record of exchange format 1 that it was made of
+    scales: tuple[float, float, float] = (1.0, 1.0, 0.0)  # scales of first position and speed; guess of the speed
+    source: Record | None = None  # the record of exchange format 1 that was converted
 
     @property
     def main(self) -> str:
-        """The sensor that the observer follows: the first of a position, else of a speed, else the first.
+        """Sensor that the observer follows first: the first of a position, else of a speed, else the first.
 
-        One that looks through a tape shows more than the motion of its body, and is the last of its kind.
+        A sensor that looks through a tape shows more than the motion of its body, and is taken last of its kind.
         """
         sensors = sorted(self.case.machine.sensors.items(), key=lambda item: item[1].through is not None)
         for wanted in ("position", "speed"):
@@ -54,10 +54,10 @@ class GraphRecord(NamedTuple):
 
 
 def record_of(columns: dict[str, np.ndarray], case: GraphCase, path: Path) -> GraphRecord:
-    """The record of these columns, checked; `path` is told in messages.
+    """Checked record of these columns; messages name `path`.
 
-    Raises UserError that names file, column and row and says what would be right, NoAnswer where the recording
-    supports no verdict.
+    Raises UserError that names file, column, row and the correct value, NoAnswer where the recording supports no
+    verdict.
     """
     t = _column(path, columns, "t", "s, clock at the tick")
     unknowns = len(case.fitted)
@@ -136,7 +136,7 @@ def _on(path: Path, columns: dict[str, np.ndarray], drive: Any) -> np.ndarray | 
 
 
 def _made(case: GraphCase, u: np.ndarray, main: str) -> dict[str, np.ndarray]:
-    """Force (n,) that the drives were measured to make, N or Nm at the main body's, under the first drive's name."""
+    """Measured force (n,) of the drives at the main body, N or Nm, under the name of the first drive."""
     at = levers(GraphModel(case.layout, case.values), main)
     return {next(iter(at)): u @ np.array(list(at.values()))} if at else {}
 
@@ -152,7 +152,7 @@ def levers(model: GraphModel, main: str) -> dict[str, float]:
 
 
 def _check_problem(path: Path, record: GraphRecord) -> None:
-    """Raise NoAnswer where the recording lacks what its problem is about, UserError where an input is what it tells."""
+    """Raise NoAnswer where the recording lacks a column of its problem, UserError where an input is the main motion."""
     problem, machine, bodies = record.case.problem, record.case.machine, record.case.layout.bodies
     for name, entry in record.case.inputs.items():
         own = machine.sensors[record.main].body if entry.measures == "position" else None
@@ -175,7 +175,7 @@ def _check_problem(path: Path, record: GraphRecord) -> None:
 
 
 def _scales(record: GraphRecord) -> tuple[float, float, float]:
-    """Scales of the first position and the first speed of the main sensor, and a guess of that speed."""
+    """Scales of the first position and the first speed of the main sensor, and a guess of the first speed, SI."""
     x = record.y[record.main]
     if record.case.machine.sensors[record.main].measures == "speed":
         return float(np.std(x)) or 1.0, 1.0, 0.0
@@ -188,7 +188,7 @@ def _scales(record: GraphRecord) -> tuple[float, float, float]:
 def _forces(
     path: Path, columns: dict[str, np.ndarray], case: GraphCase
 ) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
-    """Measured forces (n, bodies), None where there are none, and measured positions (n,) by body."""
+    """Measured forces (n, bodies), N or Nm, or None, and measured positions (n,) by body, rad or m."""
     names = list(case.machine.bodies)
     forces, positions = None, {}
     for name, entry in case.inputs.items():
@@ -202,7 +202,7 @@ def _forces(
 
 
 def _clock(path: Path, t: np.ndarray, case: GraphCase):
-    """Even times, tick, and what lays a column onto them."""
+    """Even times (n,) in s, tick in s, and the function that resamples a column onto the even times."""
 
     def row(k: int) -> str:
         return f"{path}: column 't', row {k}"

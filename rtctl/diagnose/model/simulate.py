@@ -1,10 +1,10 @@
 """Simulator of a recording: any model of its machine, under the recorded commands and a tracking observer.
 
-track   the recorded command, and a correction that makes the model follow the main sensor. It moves positions and
-        speeds of all bodies along their rigid motion, so that it stretches no joint and breaks no held body loose.
+track   the recorded command, and a correction that makes the model follow the main sensor. The correction moves
+        positions and speeds of all bodies along their rigid motion: it stretches no joint and starts no slip.
 open    the recorded command alone: a free run
-held    the main sensor's coordinate moves as it was recorded, and the force that it takes is what the model predicts:
-        of a static problem, where forces were measured, and of a kinematic one, where other positions follow
+held    the coordinate of the main sensor moves as recorded. A static problem predicts the force of this motion, a
+        kinematic problem the other positions.
 """
 
 from copy import copy
@@ -26,18 +26,18 @@ from rtctl.plants.graph.linearised import ringing
 from rtctl.plants.graph.mechanics import code_of
 from rtctl.plants.graph.params import build, drive_gain
 
-QUICKEST = 0.25  # rad a tick: a correction that comes a tick late may not be quicker
-SUBSTEP = 0.5e-3  # s, at most: the linear part is exact at any
-SUBSTEPS = 20  # of a slow row: more show nothing further
-LEAD = 1.0  # s at the first row, at most, in which springs come to rest
-FORGOTTEN = 5.0  # time constants of what swings longest, after which it does so no more
-SLOW = 3.0  # time constants of a usual observer: window over which what is slow is averaged
-STEADY = 0.4  # rad a substep, of the quickest ring in which lost motion is crossed
-NEVER = np.iinfo(np.int64).max  # row
+QUICKEST = 0.25  # rad a tick, largest bandwidth of a correction with a tick of delay
+SUBSTEP = 0.5e-3  # s, longest substep; the linear part is exact for any length
+SUBSTEPS = 20  # substeps of a slow row, at most
+LEAD = 1.0  # s, longest time before the first row for the decay of oscillations
+FORGOTTEN = 5.0  # time constants of the slowest decay before the first row
+SLOW = 3.0  # time constants of the usual observer: window of the mean of a slow residual
+STEADY = 0.4  # rad a substep, of the highest natural frequency where backlash is crossed
+NEVER = np.iinfo(np.int64).max  # row of a release that never comes
 
 
 class Simulator:
-    """A recording, ready to be simulated by models; one call is one run, and calls may go on in several threads."""
+    """Recording under which models are simulated; one call is one run, and several threads may call."""
 
     def __init__(self, record: GraphRecord, follow: float | None = None):
         self.record, self.case = record, record.case
@@ -70,21 +70,21 @@ class Simulator:
         self.begins: tuple[float, float] | None = None  # first position and speed of the main body in a free run
         self.ratios = self.moves(record.case.values)
         self.wrong: dict[str, np.ndarray] = {}  # errors (n,) of readings, SI
-        self.edges: dict[str, Edges] = {}  # of sensors without direction, by the direction that a model gives them
+        self.edges: dict[str, Edges] = {}  # of sensors without direction, decoded by a model
 
     @property
     def window(self) -> int:
-        """Ticks over which what is slow is averaged."""
+        """Ticks of the window of slow means."""
         return max(1, round(SLOW / min(self.followed[0].bandwidth, self.follow) / self.record.dt))
 
     def bandwidth(self, one: Followed) -> float:
-        """Bandwidth, rad/s, with which a sensor is followed."""
+        """Bandwidth of the observer of a sensor, rad/s."""
         return self.follow * one.bandwidth / self.followed[0].bandwidth
 
     def _rest(self) -> float:
-        """Time in s at the first row in which what swings comes to rest."""
+        """Time for the decay of oscillations before the first row, s."""
         machine = self.case.machine
-        if machine.mechanics is not None or self.case.problem == "free":  # it swings on while its sensors are held
+        if machine.mechanics is not None or self.case.problem == "free":  # it swings on with held sensors
             return 0.0
         weighs = any(body.weights for body in machine.bodies.values())
         if weighs or not self.layout.links:
@@ -93,8 +93,8 @@ class Simulator:
         return min(LEAD, FORGOTTEN / max(float(-swings.real.max()), 1e-9)) if len(swings) else LEAD
 
     def directed(self, model: GraphModel) -> "Simulator":
-        """The same with the sensors that know no direction as the model tells the directions of their edges, where it
-        does: between two edges they are on a line."""
+        """Simulator with the sensors without direction decoded by a model, where its motion decides the directions of
+        the edges; the position between two edges is interpolated linearly."""
         found: dict[str, Edges] = {}
         y, grain = dict(self.record.y), dict(self.record.grain)
         out = self.run(model) if self.record.edges else np.empty((0, 0))
@@ -125,7 +125,7 @@ class Simulator:
         self.watched = np.column_stack([values, self.watched[:, 1:]])
 
     def moves(self, values: dict[str, float]) -> dict[str, float]:
-        """Motion of each body for one unit of the followed body that joints connect it with; 0 where there is none."""
+        """Motion of each body for one unit of the connected followed body; 0 where there is none."""
         out: dict[str, float] = {}
         for one in self.followed:
             for name, ratio in rigid(self.layout, values, one.body).items():
@@ -133,14 +133,14 @@ class Simulator:
         return out
 
     def leader(self, body: str) -> int:
-        """Number of the followed sensor with which joints connect a body; 0 where there is none."""
+        """Number of the followed sensor that joints connect with a body; 0 where there is none."""
         for number, one in enumerate(self.followed):
             if rigid(self.layout, self.case.values, one.body).get(body, 0.0) != 0.0:
                 return number
         return 0
 
     def _ring(self) -> float:
-        """Highest frequency, rad/s, at which a body beside the held one rings with a joint."""
+        """Highest natural frequency of a body on a joint, rad/s, without the held body."""
         p = GraphModel(self.layout, self.case.values).params(SUBSTEP)
         held, out = self.layout.coordinate(str(self.body)), 0.0
         for at, stiffness in stiff_ends(p):
@@ -150,16 +150,16 @@ class Simulator:
 
     @cached_property
     def pace(self) -> float:
-        """Rms speed of the followed body, rad/s or m/s; of a speed its spread."""
+        """Rms speed of the followed body, rad/s or m/s; of a speed sensor its standard deviation."""
         x = self.seen
         return float(np.std(x) if self.shows_speed else np.sqrt(np.mean(np.gradient(x, self.record.dt) ** 2)))
 
     def column(self, channel: str) -> int:
-        """Column of a channel in what a run returns: that of its sensor, the last one for the force of the drives."""
+        """Column of a channel in the readings of a run; the last column is the force of the drives."""
         return self.layout.sensors.get(channel, len(self.layout.sensors))
 
     def own(self, model: GraphModel) -> GraphModel:
-        """The model with the numbers of this recording."""
+        """Model with the numbers of this recording."""
         gauged = model.layout.sensors.keys() != self.layout.sensors.keys()
         layout = model.layout if gauged else self.layout
         return model._replace(base=own(model.base, self.record.name), layout=layout)
@@ -175,36 +175,35 @@ class Simulator:
         return out
 
     def following(self, times: float) -> "Simulator":
-        """The same with an observer that is so many `times` as quick, as far as ticks allow."""
+        """Simulator with `times` the bandwidth of the observer, up to the limit of the tick."""
         other = copy(self)
         other.follow = min(times * self.follow, self.quickest)
         return other
 
     def usual(self) -> "Simulator":
-        """The same with an observer of the usual bandwidth."""
+        """Simulator with an observer of the usual bandwidth."""
         return self.following(self.followed[0].bandwidth / self.follow)
 
     def released(self, row: int) -> "Simulator":
-        """The same whose correction ends at `row`: a free run from there, from the state that the observer reached."""
+        """Simulator whose correction ends at `row`: a free run from `row` on, from the state of the observer."""
         other = copy(self)
         other.release = row
         return other
 
     def beginning(self, position: float, speed: float) -> "Simulator":
-        """The same whose main body begins at a position, as its column shows it, and at a speed, SI."""
+        """Simulator whose main body begins at a position, as its column shows it, and at a speed, SI."""
         other = copy(self)
         other.begins = (position, speed)
         return other
 
     def pushed(self, forces: np.ndarray) -> "Simulator":
-        """The same with forces (n, coordinates) on top of the measured ones."""
+        """Simulator with forces (n, coordinates), N or Nm, added to the measured forces."""
         other = copy(self)
         other.forces = np.ascontiguousarray(forces if len(self.forces) < 2 else self.forces + forces)
         return other
 
     def misread(self, sensor: str, error: np.ndarray) -> "Simulator":
-        """The same whose sensor reads an error (n,) beside what is there, SI. An observer that follows it follows what
-        is there."""
+        """Simulator whose sensor has a reading error (n,), SI. Its observer follows the reading without the error."""
         other = copy(self)
         other.wrong = {sensor: error}
         shown = [one.sensor == sensor for one in self.followed]
@@ -212,7 +211,7 @@ class Simulator:
         return other
 
     def seen_by(self, model: GraphModel) -> "Simulator":
-        """The same whose followed sensors show what a model reads that follows them."""
+        """Simulator whose followed sensors show the readings of a model under the observer."""
         other = copy(self)
         if self.mode == TRACK:
             out = self.run(self.own(model))[:, [self.layout.sensors[one.sensor] for one in self.followed]]
@@ -220,30 +219,31 @@ class Simulator:
         return other
 
     def finer(self, times: int) -> "Simulator":
-        """The same with steps that are so many `times` shorter."""
+        """Simulator with `times` as many substeps."""
         other = copy(self)
         other.substeps *= times
         return other
 
     def run(self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False) -> np.ndarray:
-        """Readings (n, sensors of the machine) in SI, with the force of the drives after them where it was measured;
-        nan from the tick on at which the model ran away. The mode is that of the problem where none is given.
+        """Readings (n, sensors of the machine), SI, and in a last column the force of the drives of a static problem.
 
-        `coarse` takes steps of twice the length: good for differences, not for verdicts.
+        Readings are nan from the tick on at which the model diverged. For None the mode is that of the problem.
+
+        `coarse` takes longer substeps: accurate enough for differences, not for verdicts.
         """
         return self.everything(model, mode, n, coarse)[0]
 
     def everything(
         self, model: GraphModel, mode: int | None = None, n: int | None = None, coarse: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Readings, and the corrections (n, followed), in N or Nm at the body of each followed sensor."""
+        """Readings (n, sensors), SI, and corrections (n, followed), N or Nm at the body of each followed sensor."""
         record, start = self.record, ready(self, model, mode, coarse)
         model, job, offsets = start.model, start.job, start.offsets
         n = len(self.seen) if n is None else n
         seen = np.ascontiguousarray(self.watched[:n] + offsets)
         path, pace = path_of(self, job, model, float(offsets[0]))
         out, push = np.full((n, start.params.ny), np.nan), np.zeros((n, len(self.followed)))
-        static = self.case.problem == "static"  # forces were measured: the commands that made them do not count
+        static = self.case.problem == "static"  # measured forces replace the commands
         done = self.kernel.module.run(
             job, start.p, start.states, start.slots, (np.zeros_like if static else np.asarray)(self.volts[:n]),
             pushing(self, model)[:n], seen, path[:n], pace[:n], out, push,
@@ -252,7 +252,7 @@ class Simulator:
         self.counted(out, offsets)
         for name, error in self.wrong.items():
             out[:, self.layout.sensors[name]] += error[:n]
-        if static:  # what the drives would have to make, as their nominal gain tells it
+        if static:  # required force of the drives, by their nominal gain
             name = next((c for c in self.channels if c not in self.layout.sensors), "")
             made, share = (record.y[name][:n], self._told(name, model)) if name else (np.zeros(n), 1.0)
             out = np.column_stack([out, push[:, 0] * share])
@@ -260,11 +260,11 @@ class Simulator:
         return out, push
 
     def counted(self, out: np.ndarray, offsets: np.ndarray) -> None:
-        """Let the readings (n, sensors) of followed sensors count from where their columns show 0."""
+        """Shift the readings (n, sensors) of followed sensors to the zero of their columns."""
         for one, offset in zip(self.followed, offsets, strict=True):
             if offset:
                 out[:, self.layout.sensors[one.sensor]] -= offset
 
     def _told(self, drive: str, model: GraphModel) -> float:
-        """Force of a drive by its nominal gain over that by the model's."""
+        """Nominal gain of a drive over its gain in the model."""
         return drive_gain(self.case.values, drive) / drive_gain(model.base, drive)

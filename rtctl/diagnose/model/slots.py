@@ -1,7 +1,6 @@
-"""Slots of the compiled simulation: which term acts, where, with which params.
+"""Slots of the compiled simulation: number, place and params of each acting term.
 
-A slot holds a term by its number, the numbers of its place, and its params. So a guess at another effect is another
-record and not another compilation.
+A hypothesis of another effect is another record, and needs no compilation.
 """
 
 import re
@@ -10,7 +9,7 @@ from typing import Any
 from rtctl.plants.physics import anywhere
 from rtctl.plants.physics.term import Term
 
-SLOTS = 32  # terms at once
+SLOTS = 32  # terms of a model, at most
 
 
 def field(name: str) -> str:
@@ -19,7 +18,7 @@ def field(name: str) -> str:
 
 
 def sample(term: Term) -> Any:
-    """Params of a term with any values, for their layout."""
+    """Params of a term with arbitrary values, for their record type."""
     values: dict[str, Any] = {"node": next(iter(anywhere(term).values()))[0]}
     for name, info in term.settings.model_fields.items():
         if info.is_required() and name != "node":
@@ -33,14 +32,14 @@ def _defaults(term: Term) -> dict[str, Any]:
 
 
 def _inside(info: Any) -> float:
-    """A number within a field's bounds."""
+    """Number within the bounds of a field."""
     low = max((getattr(m, k) for m in info.metadata for k in ("ge", "gt") if hasattr(m, k)), default=0.0)
     high = min((getattr(m, k) for m in info.metadata for k in ("le", "lt") if hasattr(m, k)), default=low + 2.0)
     return 0.5 * (low + min(high, low + 2.0))
 
 
 def at_site(site: str, kind: str, terms: tuple[Term, ...]) -> str:
-    """Text of the compiled function of a site: every term that acts there on a machine of a kind, slot by slot."""
+    """Text of the compiled function of a site: every term that acts at the site on a kind of machine, slot by slot."""
     lines = ["@compiled", f"def {site}(t, m):", f'    """Every term that acts at the {site}."""']
     lines += [
         "    for k in range(t.q.shape[0]):",

@@ -1,10 +1,9 @@
-"""What a fit may move: the owner's parameters within their tolerance, and the numbers of the terms on trial.
+"""Parameter space of a fit: nominal parameters within their tolerance, and the coordinates of the hypotheses.
 
-x holds, in order, ln(value / owner's value) of each plant parameter, then the coordinates of each hypothesis. A
-coordinate is a size in units of its scale, or the logarithm of a shape (a speed, a time, a frequency) over its scale,
-or one of a pair that makes amplitude and phase: the cosine and sine parts are well-behaved where an angle is not. The
-place at which a spring rests is fitted as the push that it makes of it: where the stiffness is small a place is not
-well-behaved, a push is.
+x holds, in order, ln(value / nominal value) of each plant parameter, then the coordinates of each hypothesis. A
+coordinate is a size in units of its scale, the logarithm of a shape (a speed, a time, a frequency) over its scale, or
+the cosine or sine part of an amplitude and phase: the phase is ill-conditioned at a small amplitude. The place of rest
+of a spring is fitted as the force at that place: the place is ill-conditioned at a small stiffness.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,15 +15,15 @@ from rtctl.diagnose.calibration import BEYOND, FACTOR, TOLERANCE
 from rtctl.idiom import Settings
 from rtctl.plants.physics import TERMS
 
-WIDE = 7.0  # in logarithm, of a parameter of which the owner knows nothing
+WIDE = 7.0  # logarithm, bound of a parameter without a tolerance
 SIZE, INVERSE, SHAPE, COSINE, SINE, PLACE = "size", "inverse", "shape", "cosine", "sine", "place"
 REST = "rest"
-SOFTEST = 1e-6  # of its typical size: least stiffness by which a place of rest is told
+SOFTEST = 1e-6  # of the typical stiffness: least stiffness in the conversion to a place of rest
 
 
 class Coordinate(NamedTuple):
-    """One number of a hypothesis. COSINE is followed by SINE; their name is amplitude and phase, split by a bar. REST
-    follows the SIZE of its stiffness; its scale is of the force with which the spring pulls at `offset`."""
+    """Coordinate of a hypothesis. SINE follows COSINE; their name is amplitude and phase, split by a bar. REST follows
+    the SIZE of its stiffness; its scale is that of the spring force at `offset`."""
 
     name: str
     kind: str
@@ -32,13 +31,13 @@ class Coordinate(NamedTuple):
     low: float = -np.inf  # of x
     high: float = np.inf
     start: float = 0.0
-    offset: float = 0.0  # SI, of a place, or of a size that is not 0 where the effect is none
+    offset: float = 0.0  # SI, of a place, or of a size that is not 0 without the effect
     step: float = 1e-2  # of the difference quotient
-    slight: float = 0.0  # size below which it is missed by nobody
+    slight: float = 0.0  # size below which the effect is negligible
 
 
 class Hypothesis(NamedTuple):
-    """One term at one node, with the choices that are not fitted."""
+    """Term at a node, with the settings that are not fitted."""
 
     term: str
     node: str
@@ -47,16 +46,16 @@ class Hypothesis(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As in `cannot_test`: term:node."""
+        """term:node, as in `cannot_test`."""
         return f"{self.term}:{self.node}"
 
     @property
     def sizes(self) -> list[int]:
-        """Indices of the coordinates that are zero where the effect is."""
+        """Indices of the coordinates that are zero without the effect."""
         return [i for i, c in enumerate(self.coordinates) if c.kind in (SIZE, INVERSE, COSINE, SINE, REST)]
 
     def values(self, x: Sequence[float] | np.ndarray) -> dict[str, float]:
-        """SI values of the term's parameters at x."""
+        """Values of the parameters of the term at x, SI."""
         out: dict[str, float] = {}
         for i, c in enumerate(self.coordinates):
             if c.kind == SHAPE:
@@ -79,14 +78,14 @@ class Hypothesis(NamedTuple):
         return out
 
     def settings(self, x: Sequence[float] | np.ndarray) -> Settings:
-        """The entry of a `physics:` list."""
+        """Entry of a `physics:` list at x."""
         values = {**self.fixed, **self.values(x)}
         return TERMS[self.term].settings.model_construct(
             **{**_defaults(self.term), "term": self.term, "node": self.node, **values}
         )
 
     def start(self) -> np.ndarray:
-        """x where its shapes are as first guessed and its size is zero."""
+        """Start x (coordinates,): shapes at their first guess, sizes zero."""
         return np.array([c.start for c in self.coordinates])
 
 
@@ -101,13 +100,13 @@ def _defaults(term: str) -> dict[str, Any]:
 
 
 class Space(NamedTuple):
-    """A model with all that may move in it."""
+    """Model with its unknowns."""
 
-    owner: Any  # the nominal model (graph/model.py)
+    owner: Any  # the nominal model (model/model.py)
     names: tuple[str, ...]  # plant parameters
     tolerance: Callable[[str], float]
     hypotheses: tuple[Hypothesis, ...] = ()
-    doubted: str = ""  # the parameter that may be wrong by a factor, if one
+    doubted: str = ""  # path of the parameter with a wide prior; empty for none
 
     @property
     def nb(self) -> int:
@@ -115,7 +114,7 @@ class Space(NamedTuple):
         return len(self.names)
 
     def model(self, x: np.ndarray) -> Any:
-        """The model at x."""
+        """Model at x."""
         base = dict(self.owner.base)
         for name, value in zip(self.names, x[: self.nb], strict=True):
             for each in self.owner.tied(name):
@@ -126,7 +125,7 @@ class Space(NamedTuple):
         return self.owner._replace(base=base, terms=tuple(terms))
 
     def parts(self, x: np.ndarray) -> list[np.ndarray]:
-        """The coordinates of each hypothesis."""
+        """Coordinates of each hypothesis, parts of x."""
         out, at = [], self.nb
         for hypothesis in self.hypotheses:
             out.append(x[at : at + len(hypothesis.coordinates)])
@@ -134,16 +133,16 @@ class Space(NamedTuple):
         return out
 
     def columns(self, index: int) -> np.ndarray:
-        """Where in x the coordinates of one hypothesis stand."""
+        """Indices in x of the coordinates of one hypothesis."""
         at = self.nb + sum(len(h.coordinates) for h in self.hypotheses[:index])
         return np.arange(at, at + len(self.hypotheses[index].coordinates))
 
     def start(self) -> np.ndarray:
-        """The owner's values, and nothing of any effect."""
+        """Start x (unknowns,): nominal values, effects of size zero."""
         return np.concatenate([np.zeros(self.nb), *(h.start() for h in self.hypotheses)])
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest x."""
+        """Bounds of x, (unknowns,) each."""
         low, high = [], []
         for name in self.names:
             tol = np.inf if name == self.doubted else BEYOND * self.tolerance(name)
@@ -155,7 +154,7 @@ class Space(NamedTuple):
         return np.array(low, float), np.array(high, float)
 
     def prior(self) -> np.ndarray:
-        """Weight of x^2 in the cost: the owner's values count for what they are worth, an effect is free."""
+        """Prior precision (unknowns,): nominal values by their tolerance, 0 for coordinates of effects."""
         weights = []
         for name in self.names:
             spread = np.log(FACTOR) if name == self.doubted else TOLERANCE * self.tolerance(name)
@@ -163,23 +162,23 @@ class Space(NamedTuple):
         return np.array(weights + [0.0] * (len(self.start()) - self.nb))
 
     def steps(self) -> np.ndarray:
-        """Steps of the difference quotients."""
+        """Steps of the difference quotients (unknowns,)."""
         return np.array([2e-3] * self.nb + [c.step for h in self.hypotheses for c in h.coordinates])
 
     def add(self, *hypotheses: Hypothesis) -> "Space":
-        """With more hypotheses."""
+        """Space with further hypotheses."""
         return self._replace(hypotheses=(*self.hypotheses, *hypotheses))
 
     def model_without(self, index: int, x: np.ndarray) -> Any:
-        """The model at x, without one of the hypotheses."""
+        """Model at x without one of the hypotheses."""
         return self.without(index).model(np.delete(x, self.columns(index)))
 
     def model_believed(self, x: np.ndarray) -> Any:
-        """The model at x, with the owner's value of the doubted parameter."""
+        """Model at x with the nominal value of the doubted parameter."""
         x = x.copy()
         x[self.names.index(self.doubted)] = 0.0
         return self._replace(doubted="").model(x)
 
     def without(self, index: int) -> "Space":
-        """With one hypothesis less."""
+        """Space without one of the hypotheses."""
         return self._replace(hypotheses=(*self.hypotheses[:index], *self.hypotheses[index + 1 :]))

@@ -1,6 +1,6 @@
-"""Law that stands in for one that nobody knows: a PD on the main sensor, which keeps a machine on a motion.
+"""Stand-in for an unknown law: a PD on the main sensor.
 
-It is as quick as the tracking correction, and its command is added to the median of the recorded ones.
+Its bandwidth is at most that of the tracking correction; its command is added to the median of the recorded commands.
 """
 
 import math
@@ -21,14 +21,14 @@ from rtctl.plants.graph.linearised import ringing
 from rtctl.plants.graph.params import GraphParams
 
 SLOWER = 0.2  # of the lowest natural frequency: bandwidth of a stand-in, at most
-DAMPED = 1.4  # times the bandwidth, rate of the stand-in's damping
-FILTER = 10.0  # times the bandwidth, that of its derivative
-SLOWEST = 1e-3  # Hz, below which it is a free motion
-COARSE = 1e-3  # s, substep of params that are only asked for poles and inertias
+DAMPED = 1.4  # derivative time of the stand-in times its bandwidth
+FILTER = 10.0  # corner of the derivative filter over the bandwidth
+SLOWEST = 1e-3  # Hz, frequency below which a mode is a free motion
+COARSE = 1e-3  # s, substep of params that give poles and inertias only
 
 
 def stand_in(record: GraphRecord) -> Loop:
-    """A PD on the main sensor by the nominal model, beside the median of the recorded commands."""
+    """Loop with a PD on the main sensor by the nominal model, added to the median of the recorded commands."""
     case, model = record.case, nominal(record.case)
     sensor = case.machine.sensors[record.main]
     shares, gain, rate = _pd(record, model)
@@ -48,7 +48,7 @@ def stand_in(record: GraphRecord) -> Loop:
 
 
 def stand_in_law(record: GraphRecord) -> dict[str, Any]:
-    """The stand-in as the `law` of a config, plain data in SI units."""
+    """Stand-in as the `law` of a config, plain data in SI units."""
     shares, gain, rate = _pd(record, nominal(record.case))
     machine = record.case.machine
     drive = int(np.argmax(shares != 0.0))
@@ -66,8 +66,8 @@ def stand_in_law(record: GraphRecord) -> dict[str, Any]:
 
 
 def _pd(record: GraphRecord, model: GraphModel) -> tuple[np.ndarray, float, float]:
-    """Shares (drives,) of a stand-in's output, its gain in command by rad or m (or by their rate), and its bandwidth in
-    rad/s."""
+    """Shares (drives,) of the output of a stand-in, its gain in command by rad or m (or by their rate), and its
+    bandwidth in rad/s."""
     machine = record.case.machine
     sensor = machine.sensors[record.main]
     at = np.array(list(levers(model, str(sensor.body)).values()))
@@ -82,7 +82,7 @@ def _pd(record: GraphRecord, model: GraphModel) -> tuple[np.ndarray, float, floa
 
 
 def lowest_mode(machine: Description, p: GraphParams) -> float:
-    """Lowest frequency, Hz, at which a machine rings with its joints; inf where it does not."""
+    """Lowest natural frequency of a machine on its joints, Hz; inf without an oscillation."""
     if machine.mechanics is not None or not p.nl:
         return math.inf
     rings = np.abs(ringing(p)) / (2 * np.pi)

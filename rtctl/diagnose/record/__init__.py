@@ -1,1 +1,1 @@
-"""Recordings as files hold them: columns, edges, sensors, laws of exchange format 1."""
+"""Recordings: columns, edges, sensors, laws of exchange format 1."""

@@ -4,18 +4,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-AGREES_RMS = 0.02  # of the command's spread: what a law may differ by and still be taken as the law in force
-AGREES_MEDIAN = 2e-3
-SAME = 1e-9  # in units of the command: equal but for rounding of numbers
+AGREES_RMS = 0.02  # of the command's spread: rms difference up to which the law is accepted
+AGREES_MEDIAN = 2e-3  # of the command's spread: median difference up to which the law is accepted
+SAME = 1e-9  # in units of the command: difference by rounding
 
 
 class Agreement(NamedTuple):
-    """How a recomputed law compares with the recorded command."""
+    """Difference of a recomputed law from the recorded command."""
 
     share: float  # of rows that are equal to within SAME
-    nrmse: float  # of the command's spread
-    median: float  # of the difference, by the command's spread
-    worst: float  # in units of the command
+    nrmse: float  # rms difference by the command's spread
+    median: float  # median difference by the command's spread
+    worst: float  # largest difference, in units of the command
     worst_row: int
 
     @property
@@ -28,7 +28,7 @@ class Agreement(NamedTuple):
 
 
 def agreement(again: np.ndarray, recorded: np.ndarray) -> Agreement:
-    """Commands (n, drives) that a law gives against the recorded ones (n, drives); what is not finite is off by inf."""
+    """Agreement of recomputed with recorded commands, (n, drives) each; a non-finite command is off by inf."""
     off = np.abs(again - recorded)
     off[~np.isfinite(off)] = np.inf
     spread = float(np.sqrt(np.sum(np.var(recorded, axis=0)))) or 1.0
@@ -41,8 +41,8 @@ def agreement(again: np.ndarray, recorded: np.ndarray) -> Agreement:
 
 
 def disagrees(kind: str, found: Agreement | None, unit: str) -> str:
-    """Sentence, without its full stop, on a law of this kind that does not give the recorded command; None of
-    `found`: it cannot be recomputed."""
+    """Sentence, without its full stop, on a law that does not give the recorded command; None for `found`: the law
+    cannot be recomputed."""
     if found is None:
         return f"the law '{kind}' cannot be recomputed from this recording"
     return (

@@ -1,4 +1,4 @@
-"""Columns as they stand in a file, made ready: running rows, an even clock, counters without wraps."""
+"""Preparation of recorded columns: running rows, an even clock, counters without wraps."""
 
 import math
 
@@ -7,11 +7,11 @@ import numpy as np
 from rtctl.drivers import ldu_amplifier
 
 WRAPS = (16, 24, 32)  # bits of the counters in use
-ARMED, RUNNING = 1, 2  # in the column `state` of our own recordings
+ARMED, RUNNING = 1, 2  # in the column `state` of recordings by rtctl
 
 
 def running(state: np.ndarray) -> slice:
-    """The longest stretch of rows in which our own loop ran: neither on its way there nor stopped by a trip."""
+    """Longest run of rows in which the loop of rtctl ran: neither armed nor stopped by a trip."""
     edges = np.diff(np.concatenate(([0], state == RUNNING, [0])).astype(np.int8))
     first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     if not len(first):
@@ -21,15 +21,15 @@ def running(state: np.ndarray) -> slice:
 
 
 def armed(state: np.ndarray, start: int) -> slice:
-    """The rows before row `start` in which the law ran, on the way to running."""
+    """Rows before row `start` in which the law ran while the loop was armed."""
     others = np.flatnonzero(state[:start] != ARMED)
     return slice(int(others[-1]) + 1 if len(others) else 0, start)
 
 
 def through_amplifier(u: np.ndarray) -> np.ndarray:
-    """Volts (n,) that give a current of 0.1 A/V what the measured amplifier gives at `u`, below where it runs away.
+    """Volts (n,) at which a gain of 0.1 A/V gives the current of the measured amplifier at `u`, below its runaway.
 
-    At 0 V it still has a current, whose direction is in the sign of that zero (12.3).
+    At 0 V the amplifier still gives a current, whose direction is the sign of the zero (12.3).
     """
     offset, knee = ldu_amplifier.OFFSET_VOLTS, ldu_amplifier.KNEE_VOLTS
     return np.copysign(offset + np.maximum(np.abs(u) - knee, 0.0), u)
@@ -57,14 +57,14 @@ def unwrap(counts: np.ndarray) -> tuple[np.ndarray, int | None, int]:
         if not wrapped.any():
             continue
         left = d - np.sign(d) * 2.0**bits
-        if np.abs(left[wrapped]).max() < 2.0 ** (bits - 4):  # what is left is a step as others are
+        if np.abs(left[wrapped]).max() < 2.0 ** (bits - 4):  # the corrected step is of ordinary size
             d = np.where(wrapped, left, d)
             return counts[0] + np.concatenate(([0.0], np.cumsum(d))), bits, int(wrapped.sum())
     return counts.copy(), None, 0
 
 
 def unwrap_turns(angle: np.ndarray) -> np.ndarray:
-    """An angle (n,) in rad without its jumps of a turn; it is left alone where it has none."""
+    """Angle (n,) in rad without jumps of a turn; unchanged where it has none."""
     return np.unwrap(angle) if (np.abs(np.diff(angle)) > math.pi).any() else angle
 
 

@@ -1,48 +1,47 @@
-"""What the reels' counters tell edge by edge: they cannot tell direction, and yet each count says where the reel stood.
+"""Decoding of counters without direction: direction and position of every counted edge of a reel.
 
-A count is an edge of a slotted disc that went past, one way or the other: the next one if it went on, the same one if
-it came back. The two lie a whole count apart, and a model that follows the capstan knows the way of the reel since the
-last edge to a few hundredths of one. So the direction of every count is known, nothing is lost at reversals, and the
-reel's angle is known at every edge but for one constant: where the disc stood at first. A sensor that counts only where
-dark turns to light has other edges on the way back, half a count off and known but for a constant of their own.
+A count is an edge of a slotted disc: the next edge if the motion continued, the last edge if it reversed. The two
+candidates lie a whole count apart. A model that follows the capstan predicts the motion of the reel since the last
+edge to a few hundredths of a count, and so decides the direction of every count. The angle of the reel is then known
+at every edge up to one constant: the initial angle of the disc. A sensor of rising edges has other edges in the
+backward direction: half a count off, with a constant of their own.
 
-Source: thesis 7.1.3 and 7.4 for the sensors; two-phase decoding, in which the direction comes with the pulse, does the
-same.
+Source: thesis 7.1.3 and 7.4 for the sensors; two-phase decoding gets the direction with the pulse.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-FEWEST = 20  # counts of a reel, below which it says little
-SURE = 0.12  # counts between neighbouring edges, rms, beside the tick that they came in: else directions are guesses
-OWN = 0.02  # counts: what a disc and a model that is right leave
-EVERY: tuple[float, ...] = (0.0,)  # counts from the last edge forward to the first one back, of a sensor of all edges
-RISING: tuple[float, ...] = (0.5, -0.5)  # and of rising ones
+FEWEST = 20  # counts of a reel, at least
+SURE = 0.12  # counts, rms error of the model between neighbouring edges up to which directions are accepted
+OWN = 0.02  # counts, standard deviation of the edges of a disc under a correct model
+EVERY: tuple[float, ...] = (0.0,)  # counts from the last forward edge to the first backward one, sensor of all edges
+RISING: tuple[float, ...] = (0.5, -0.5)  # counts from the last edge before a reversal to the next, rising edges
 
 
 class Edges(NamedTuple):
-    """The counts of one reel, in the order of their rows."""
+    """Edges of one reel, in the order of their rows."""
 
     channel: int  # of the simulator's sensors
-    rows: np.ndarray  # (n,) first row that holds the count: it came in the tick before
-    at: np.ndarray  # (n,) position of the edge, counts from where it stood at first
+    rows: np.ndarray  # (n,) first row that holds the count: the edge passed in the tick before
+    at: np.ndarray  # (n,) position of the edge, counts from the initial position
     sigma: np.ndarray  # (n,) noise, counts
-    group: np.ndarray  # (n,) of edges whose constant is the same
-    share: np.ndarray  # (n,) of the tick's way that was gone when it came: the middle, where it came alone
+    group: np.ndarray  # (n,) number of the constant of the edge
+    share: np.ndarray  # (n,) share of the motion in the tick at which the edge passed: one half for a single edge
 
     def between(self, start: int, stop: int) -> "Edges":
-        """Those of these rows."""
+        """Edges in the rows from `start` to `stop`."""
         keep = (self.rows >= start) & (self.rows < stop)
         return Edges(self.channel, *(x[keep] for x in self[1:]))
 
     def way(self, out: np.ndarray) -> np.ndarray:
-        """Simulated position (n,) at the edges, counts, of readings out (rows, sensors) that keep their direction."""
+        """Simulated position (n,) at the edges, counts, from readings out (rows, sensors) with direction."""
         y = out[:, self.channel]
         return y[self.rows - 1] + self.share * (y[self.rows] - y[self.rows - 1])
 
     def error(self, out: np.ndarray) -> np.ndarray:
-        """Edges less simulation, by their noise, (n,); the constants are those that fit best."""
+        """Residual (n,) of the edges by their noise; the constants are the weighted least-squares ones."""
         e, weight = self.at - self.way(out), 1.0 / (self.sigma * self.sigma)
         mean = np.bincount(self.group, weight * e) / np.maximum(np.bincount(self.group, weight), 1e-12)
         found: np.ndarray = (e - mean[self.group]) / self.sigma
@@ -50,15 +49,15 @@ class Edges(NamedTuple):
 
 
 def edges(counts: np.ndarray, way: np.ndarray, channel: int) -> Edges | None:
-    """Of a counter's readings (n,), seen by the way (n,) that a model gives the reel, in counts with their direction.
+    """Decoded edges of the readings (n,) of a counter, by the signed position (n,) of the reel in a model, counts.
 
-    None where there are too few, or where the model is so far off that it does not know the directions.
+    None where the counts are too few, or the error of the model is too large to decide the directions.
     """
     steps = np.diff(np.rint(counts).astype(np.int64))
     if not np.isfinite(way).all() or steps.sum() < FEWEST or (steps < 0).any():
         return None
     rows = np.repeat(np.arange(1, len(counts)), steps)
-    count = steps[rows - 1]  # that came in its tick, and share the way
+    count = steps[rows - 1]  # edges in the tick, which share its motion
     share = (np.arange(len(rows)) - np.searchsorted(rows, rows) + 0.5) / count
     predicted = way[rows - 1] + share * (way[rows] - way[rows - 1])
     moved = np.abs(np.diff(way))[rows - 1] / count
@@ -76,8 +75,8 @@ def edges(counts: np.ndarray, way: np.ndarray, channel: int) -> Edges | None:
 
 
 def one_a_tick(found: Edges) -> Edges:
-    """The same with one edge in the middle of all that came in a tick, as where a reel spins freely: they are one
-    reading, of which both ends are known to a count."""
+    """Edges merged to one in each tick, at the middle of the edges in the tick, as for a freely spinning reel: they are
+    one reading, whose ends are known to a count."""
     first = np.flatnonzero(np.diff(found.rows, prepend=-1))
     last = np.append(first[1:], len(found.rows)) - 1
     at, middle = 0.5 * (found.at[first] + found.at[last]), np.full(len(first), 0.5)
@@ -85,11 +84,11 @@ def one_a_tick(found: Edges) -> Edges:
 
 
 def followed(predicted: np.ndarray, turns: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which way each edge (n,) went, where it lies, and by how much the model differs from one to the next (n - 1,).
+    """Direction (n,) and position (n,) of each edge, and the error (n - 1,) of the model between neighbours, counts.
 
-    `predicted` (n,) is the way that the model gives it, in counts.
+    `predicted` (n,) is the position of the reel in the model at the edges, counts.
     """
-    for _ in range(2):  # radii that are a little off stretch the whole way
+    for _ in range(2):  # an error of the radii scales the whole motion
         forward, steps = directions(np.diff(predicted), turns)
         at = np.concatenate([[0.0], np.cumsum(steps)])
         predicted = predicted * float(np.polyfit(predicted, at, 1)[0])
@@ -97,12 +96,11 @@ def followed(predicted: np.ndarray, turns: tuple[float, ...]) -> tuple[np.ndarra
 
 
 def directions(moved: np.ndarray, turns: tuple[float, ...] = EVERY) -> tuple[np.ndarray, np.ndarray]:
-    """Whether each edge (n + 1,) went past forward, and the counts (n,) from one to the next, from the way (n,) that a
-    model goes between them.
+    """Whether each edge (n + 1,) passed forward, and the counts (n,) between neighbours, from the motion (n,) of a
+    model between neighbours: the least-squares sequence of directions.
 
-    Two edges the same way lie a count apart, or are the same edge where a sensor of rising ones did not see that it
-    turned twice between them; after one turn `turns` say how far: of all sequences that with the least squares of what
-    the model's way has too much. Source: Viterbi, IEEE Trans. Information Theory 13 (1967).
+    Two edges in one direction lie a count apart, or are one edge where a sensor of rising edges missed two reversals
+    between them. After one reversal `turns` is the distance. Source: Viterbi, IEEE Trans. Information Theory 13 (1967).
     """
     ahead = nearest(moved, (1.0,) if turns == EVERY else (1.0, 0.0))
     behind = nearest(moved, (-1.0,) if turns == EVERY else (-1.0, 0.0))
@@ -122,7 +120,7 @@ def directions(moved: np.ndarray, turns: tuple[float, ...] = EVERY) -> tuple[np.
 
 
 def nearest(values: np.ndarray, among: tuple[float, ...]) -> np.ndarray:
-    """The nearest of `among` to each value, (n,)."""
+    """Nearest of `among` to each value, (n,)."""
     choice = np.array(among)
     found: np.ndarray = choice[np.argmin(np.abs(values[:, None] - choice), axis=1)]
     return found

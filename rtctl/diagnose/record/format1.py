@@ -1,7 +1,7 @@
-"""A recording with its case, checked: what every stage of the diagnosis works on.
+"""Checked recording of exchange format 1 with its case.
 
-Row k holds what the loop read at the start of tick k and what it wrote at its end. Where the law is known, recomputing
-it from the recorded columns must give the recorded voltages; where it does not, the recorded command is the input.
+Row k holds the readings at the start of tick k and the commands written at its end. A known law, recomputed from the
+recorded columns, must give the recorded voltages; otherwise the recorded command is the input.
 """
 
 from pathlib import Path
@@ -35,7 +35,7 @@ from rtctl.machines.profiles import profile_of
 from rtctl.trace.bundle import PARQUET, Bundle, load_bundle
 from rtctl.trace.clock import even_rows, increasing
 
-COUNTED = "x_counts"  # column of our own axis: its position is that of a count's lower edge
+COUNTED = "x_counts"  # column of the axis of rtctl: its position is the lower edge of a count
 LEAST_SECONDS, LEAST_ROWS = 2.0, 500
 
 
@@ -44,22 +44,22 @@ class Record(NamedTuple):
     case: Case
     t: np.ndarray  # (n,) s, controller clock
     dt: float  # s, nominal
-    ref: np.ndarray  # (n,) rad (ivu) or m; nan where nobody knows it
+    ref: np.ndarray  # (n,) rad (ivu) or m; nan where it is unknown
     w: np.ndarray  # (n,) V
-    u: np.ndarray  # (n, nu) V, or what `case.drive.unit` says
-    y: dict[str, np.ndarray]  # name -> (n,) in the sensor's own unit; counters without their wraps
-    columns: dict[str, np.ndarray]  # as they stand in the file, `t` at its own uneven times
-    replay: LawReplay | None = None  # of our own recordings whose law LawParams do not hold
-    armed: dict[str, np.ndarray] | None = None  # columns of the rows before, in which the law ran already
+    u: np.ndarray  # (n, nu) V, or the unit `case.drive.unit`
+    y: dict[str, np.ndarray]  # name -> (n,) in the unit of the sensor; counters without wraps
+    columns: dict[str, np.ndarray]  # as in the file, `t` at its uneven times
+    replay: LawReplay | None = None  # of recordings by rtctl whose law LawParams do not hold
+    armed: dict[str, np.ndarray] | None = None  # columns of the rows before the first, in which the law ran already
 
     @property
     def closed_loop(self) -> bool:
-        """Whether the law is known, so that the reference is the input; otherwise the recorded command is."""
+        """Whether the law is known: the reference is the input; otherwise the recorded command is the input."""
         return self.case.controller_known and isinstance(self.case.controller, KNOWN_LAWS)
 
     @property
     def shows_speed(self) -> bool:
-        """Whether an axis is seen by its speed and not by its position."""
+        """Whether the main sensor of an axis measures speed and not position."""
         return "speed" in self.y
 
     @property
@@ -74,17 +74,17 @@ def commands_of(plant: str) -> tuple[str, ...]:
 
 
 def load_record(folder: Path | str) -> Record:
-    """Read and check a bundle.
+    """Checked record of a bundle.
 
-    Raises UserError (exit 2) that names file, column and row and says what would be right, NoAnswer (exit 3) where
-    the recording supports no verdict.
+    Raises UserError (exit 2) that names file, column, row and the correct value, NoAnswer (exit 3) where the recording
+    supports no verdict.
     """
     bundle = load_bundle(folder)
     return record_of(bundle, read_case(bundle.case, bundle.folder))
 
 
 def record_of(bundle: Bundle, case: Case) -> Record:
-    """Check a bundle that is read already, as `load_record` does."""
+    """Checked record of a bundle in memory, as by `load_record`."""
     columns, earlier = bundle.columns, None
     if isinstance(bundle.case.get("config"), dict) and "state" in columns:
         rows = running(columns["state"])
@@ -106,11 +106,11 @@ def check(
     whole: Bundle | None = None,
     earlier: dict[str, np.ndarray] | None = None,
 ) -> Record:
-    """The Record of these columns, by the same rules as `load_record`; `whole` is the bundle that they are from,
-    `earlier` the rows before, in which the law ran already."""
+    """Checked record of these columns, by the rules of `load_record`; `whole` is the bundle of the columns, `earlier`
+    the rows before them in which the law ran already."""
     path = Path(folder) / PARQUET
     warnings = list(case.warnings)
-    if case.estimated and case.reaches.parameter_tolerance is not None:  # null: the owner says that nothing is known
+    if case.estimated and case.reaches.parameter_tolerance is not None:  # null: the owner declares no knowledge
         names = ", ".join(case.estimated)
         warnings.append(
             f"{path.parent / 'case.json'}: parameters does not say {case.estimated[0]}; {names} estimated from the "
@@ -154,7 +154,7 @@ def check(
 
 
 def law_agreement(record: Record) -> Agreement | None:
-    """The recomputed law against the recorded command; None where there is no law to recompute."""
+    """Agreement of the recomputed law with the recorded command; None without a law to recompute."""
     again = recompute_law(record)
     if again is None:
         return None
@@ -162,7 +162,7 @@ def law_agreement(record: Record) -> Agreement | None:
 
 
 def recompute_law(record: Record) -> np.ndarray | None:
-    """The voltages (n, nu) that the law writes for the recorded columns; None where the law or its input is unknown."""
+    """Voltages (n, nu) of the law for the recorded columns; None where the law or its input is unknown."""
     p = law_params(record)
     reading = _reading(record)
     if p.kind == law.NONE or reading is None or np.isnan(record.ref).any():
@@ -171,7 +171,7 @@ def recompute_law(record: Record) -> np.ndarray | None:
 
 
 def _reading(record: Record) -> np.ndarray | None:
-    """Main sensor (n,) in its own unit, as the loop compares it with `ref`; None where that shows a speed."""
+    """Reading (n,) of the main sensor in its unit, as the loop compares it with `ref`; None for a speed sensor."""
     if record.shows_speed:
         return None
     name, values = next(iter(record.y.items()))
@@ -180,7 +180,7 @@ def _reading(record: Record) -> np.ndarray | None:
 
 
 def _column(path: Path, columns: dict, name: str, meaning: str, missing: bool = False) -> np.ndarray:
-    """The column as (n,) floats; `missing`: it may be nan all over, or not be there."""
+    """Column as (n,) floats; `missing`: it may be all nan, or absent."""
     if name not in columns:
         if missing:
             return np.full(len(columns["t"]), np.nan)
@@ -205,8 +205,8 @@ def _command(path: Path, columns: dict, case: Case, name: str) -> np.ndarray:
 
 
 def _readings(path: Path, columns: dict, case: Case, warnings: list[str]) -> dict[str, np.ndarray]:
-    """Columns (n,) of the sensors: counters that the case scales, or the one position or speed of a machine that has
-    none."""
+    """Columns (n,) of the sensors: counters scaled by the case, or the position or speed of a machine without
+    counters."""
     if profile_of(case.plant).has(FREE_UNITS):
         return _measured(path, columns, case)
     raw = {}
@@ -226,14 +226,14 @@ def _readings(path: Path, columns: dict, case: Case, warnings: list[str]) -> dic
 
 
 def _measured(path: Path, columns: dict, case: Case) -> dict[str, np.ndarray]:
-    """The position, of a counter the middle of a count, or the speed."""
+    """Column of the position, for a counter at the middle of a count, or of the speed."""
     names = [name for name in (case.sensors.column, "x", "speed") if name is not None and name in columns]
     if not names:
         raise UserError(f"{path} has no column 'x' (m, measured position) and no column 'speed'")
     key = "speed" if names[0] == "speed" else "x"
     values = _column(path, columns, names[0], "measured position")
     if key == "x" and COUNTED in columns and case.sensors.x_resolution_m:
-        values = values + 0.5 * case.sensors.x_resolution_m  # a count stands for all that lies up to the next
+        values = values + 0.5 * case.sensors.x_resolution_m  # a count covers the interval up to the next count
     return {key: values}
 
 

@@ -1,14 +1,14 @@
-"""Commands between their samples: held, or smooth."""
+"""Commands between samples: held, or smooth."""
 
 import numpy as np
 
-SLOWEST = 0.2  # cos(pi f) below which a command is too near half the sample rate to be smooth
+SLOWEST = 0.2  # lower bound of cos(pi f): a command near half the sample rate is not smooth
 
 
 def half_a_tick_on(volts: np.ndarray) -> np.ndarray:
-    """The command (n, drives) that, held over each tick, moves a mass at the ticks as the smooth one does.
+    """Command (n, drives) that, held over each tick, moves a mass at the ticks like the smooth command.
 
-    A command that was sampled, and not written by a DAC that holds it, goes on changing in between. With f in cycles
+    A sampled command that no DAC holds changes between its samples. With f in cycles
     a tick, 1 / (j w)^2 over the double integrator with a hold is sinc(f)^2 / cos(pi f) and half a tick of lead. Source:
     Astrom, Hagander & Sternby, Zeros of sampled systems, Automatica 20 (1984).
     """

@@ -1,15 +1,15 @@
-"""The recorded machine's own law, so that a simulation can close the loop as the machine did.
+"""Law of the recorded machine, for a simulation in closed loop.
 
-The steps are those of rtctl/laws, in the order of the loop's tick; here stands only which of them a law has:
+The steps are those of rtctl/laws, in the order of the loop's tick; this module only selects the steps of a law:
 
     e = ref - x,  u = position law(e, v)
     one motor     u + friction + computed torque + w
     a tape        gain factor u + w + friction, shared out between two motors that pull at the tape
 
-Each is limited, rounded to the steps of the DAC where there is one, and told to the position law if it asks. One
-record serves all laws, so that no kernel is compiled for another law.
+Each command is limited, rounded to the steps of a DAC, and fed back to a position law with anti-windup. One record type
+serves all laws: another law needs no compilation.
 
-Source: the `notes` of the exchange format's case.json; rtctl/machines for the laws of our own machines.
+Source: the `notes` of the exchange format's case.json; rtctl/machines for the laws of the machines of rtctl.
 """
 
 from typing import NamedTuple
@@ -51,27 +51,27 @@ from rtctl.laws.tension import TensionParams
 from rtctl.laws.velocity import VelocityParams
 
 NONE, PD, SECTIONS, PI_VELOCITY = range(4)  # position laws
-NO_TAPE, CONSTANT, TAPE = range(3)  # one motor; two with a constant pull; two with all of the laws for a tape
-EXACT, HALVES_UP, BOARD, AMPLIFIER = range(4)  # what an output makes of a voltage
+NO_TAPE, CONSTANT, TAPE = range(3)  # one motor; two motors with a constant pull; two motors with all laws for a tape
+EXACT, HALVES_UP, BOARD, AMPLIFIER = range(4)  # quantisation of an output
 SECTION = record_dtype(biquad.IDENTITY)
 
 
 class LawParams(NamedTuple):
-    kind: int  # of the position law
-    tape: int  # of NO_TAPE to TAPE: how the command is shared out between two motors
+    kind: int  # of the position law, NONE to PI_VELOCITY
+    tape: int  # NO_TAPE to TAPE: distribution of the command to two motors
     to_unit: float  # from the main sensor's count (or metre) to the reference's unit
-    resolution: float  # one count of the main sensor, in counts or metres; 0 where the law sees no steps
-    shift: float  # share of a count that is added before
-    origin: float  # counts at which the main sensor began
-    two_tap: int  # 1: the speed is that of the mean of two samples
+    resolution: float  # step of the main sensor, in counts or metres; 0 without quantisation
+    shift: float  # share of a count that is added before rounding down
+    origin: float  # counts of the main sensor at the start
+    two_tap: int  # 1: the speed is the rate of the mean of two samples
     velocity: VelocityParams
     pd: PdParams
     pi_velocity: PiVelocityParams
     n_sections: int
     sections: np.ndarray  # (8,) of SECTION
-    shaper: ShaperParams  # that made the reference
+    shaper: ShaperParams  # of the reference
     computed_torque: float  # V per m/s^2 of the reference
-    friction1: FrictionFeedforwardParams  # of CONSTANT: of both motors
+    friction1: FrictionFeedforwardParams  # with CONSTANT for both motors
     friction2: FrictionFeedforwardParams
     reference_speed: VelocityParams
     hand_over: HandOverParams
@@ -79,7 +79,7 @@ class LawParams(NamedTuple):
     R1: float  # m, at the first tick
     R2: float
     reels: ReelGrowthParams
-    pull1: float  # V, of CONSTANT: pull of each motor
+    pull1: float  # V, with CONSTANT: constant pull of each motor
     pull2: float
     tension: TensionParams
     inertia: InertiaFeedforwardParams
@@ -115,7 +115,7 @@ LAW_STATE = state(
 
 
 @tick
-def step(p, s, ref, w, reading):  # no array is passed on: counting its references would take as long as the law
+def step(p, s, ref, w, reading):  # no array argument: its reference count would cost as much as the law
     """Write the voltages of one tick, V, into s.u1 and s.u2; `reading` is the main sensor's, in counts or metres."""
     if p.resolution > 0.0:
         reading = (np.floor(reading / p.resolution + p.shift) + p.origin) * p.resolution
@@ -130,7 +130,7 @@ def step(p, s, ref, w, reading):  # no array is passed on: counting its referenc
         shaper.follow(p.shaper, s.shaper, ref)
     u = _position(p, s, ref - x, x)
     u_f1 = 0.0
-    if p.friction1.volts != 0.0 or p.tape == TAPE:  # which takes its direction from this one
+    if p.friction1.volts != 0.0 or p.tape == TAPE:  # the hand-over of TAPE uses its direction
         u_f1 = friction_feedforward.step(p.friction1, s.friction1, ref)
     if p.tape == TAPE:
         _tape(p, s, ref, w, x, u, u_f1)
@@ -179,8 +179,8 @@ def _tape(p, s, ref, w, x, u, u_f1):
 
 @tick
 def _written(p, u):
-    """The voltage in V that an output holds where `u` V is wanted."""
-    if p.rounds == HALVES_UP:  # as the exchange format has it; the board rounds halves to even
+    """Voltage of an output for a command of `u` V, V."""
+    if p.rounds == HALVES_UP:  # as in the exchange format; the board rounds halves to even
         code = np.floor(u / p.output.volts_per_code + 0.5)
         return min(max(code, float(p.output.code_min)), float(p.output.code_max)) * p.output.volts_per_code
     if p.rounds == BOARD:

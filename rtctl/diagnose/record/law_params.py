@@ -1,4 +1,4 @@
-"""Params of the recorded machine's law, from `controller` of case.json or from the config of our own recordings."""
+"""Params of the law of a recorded machine, from `controller` of case.json or the config of a recording by rtctl."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -34,20 +34,20 @@ TURN = 2 * np.pi  # rad
 
 
 def per_unit(case: Case) -> list[float]:
-    """Counts of each counter a rad or m, those of the description where the case does not say them; 1 for a machine
-    without a counter."""
+    """Counts of each counter for one rad or m, from the case, else from the description; 1 for a machine without a
+    counter."""
     out = []
     sensors = {sensor.column: sensor for sensor in machine_of(case.plant).sensors.values()}
     for column, scale in exchange_of(case.plant).scales.items():
         said = getattr(case.sensors, scale.key)
         per_unit = sensors[column].counts_per_unit if said is None else said / TURN if scale.per_turn else 1.0 / said
-        assert per_unit is not None  # what counts has a scale in its description
+        assert per_unit is not None  # every counter has a scale in its description
         out.append(float(per_unit))
     return out or [1.0]
 
 
 def law_params(record: "Record") -> LawParams:
-    """The law for the compiled step; kind NONE where it is not known."""
+    """Params of the law for the compiled step; kind NONE where the law is not known."""
     controller = record.case.controller
     if isinstance(controller, ConfigLaw):
         return _of_config(controller.config, record)
@@ -55,14 +55,14 @@ def law_params(record: "Record") -> LawParams:
 
 
 def began(p: LawParams, record: "Record") -> LawParams:
-    """The law for a simulation, whose main sensor begins at 0 where that of the record did not."""
+    """Params of the law for a simulation, whose main sensor begins at 0: the first recorded count is the origin."""
     if p.resolution == 0.0:
         return p
     return p._replace(origin=float(np.floor(next(iter(record.y.values()))[0] / p.resolution + p.shift)))
 
 
 def law_state(p: LawParams, record: "Record") -> np.ndarray:
-    """What the law remembers at the first row (1,), after the rows before it in which it ran already."""
+    """State (1,) of the law at the first row, after the earlier rows in which the law ran already."""
     s, earlier = np.zeros(1, law.LAW_STATE), record.armed
     name, values = next(iter(record.y.items()))
     if p.resolution == 0.0 or not earlier or not len(earlier["t"]) or name not in earlier:
@@ -75,12 +75,12 @@ def law_state(p: LawParams, record: "Record") -> np.ndarray:
 
 
 def plain(case: Case, dt: float) -> LawParams:
-    """A law that writes nothing, with the units of a case."""
+    """Params of a law without output, with the units of a case."""
     return neutral(1 / per_unit(case)[0], dt)
 
 
 def _of_format(c: Any, case: Case, dt: float) -> LawParams:
-    """A law in the words of the exchange format."""
+    """Params of a law of the exchange format."""
     drive = case.drive
     p = of_case(limited(plain(case, dt), drive.limit_volt, drive.step_volt, drive.dac_range_volt), c, dt)
     if isinstance(c, TapeLaw):
@@ -99,7 +99,7 @@ def _of_format(c: Any, case: Case, dt: float) -> LawParams:
 
 
 def _of_config(config: Any, record: "Record") -> LawParams:
-    """The law of one of our own machines."""
+    """Params of the law of a machine of rtctl."""
     case, dt = record.case, record.dt
     p = of_settings(plain(case, dt), config.law, dt)._replace(rounds=law.BOARD)
     profile = profile_of(config.kind)
@@ -109,12 +109,12 @@ def _of_config(config: Any, record: "Record") -> LawParams:
 
 
 def _plain(p: LawParams, config: Any, dt: float) -> LawParams:
-    """Of one drive that takes volts."""
+    """Params with the output of one drive with a voltage input."""
     return p._replace(resolution=config.encoder.pitch, output=at_mio_16de.build_output(config.output, dt))
 
 
 def _amplified(p: LawParams, config: Any, dt: float) -> LawParams:
-    """Of one drive behind an amplifier with a direction bit."""
+    """Params with the output of one drive behind an amplifier with a direction bit."""
     output, friction = at_mio_16de.build_output(config.board.output, dt), config.law.friction
     return p._replace(
         to_unit=p.to_unit * config.sensors.R_c,
@@ -129,7 +129,7 @@ def _amplified(p: LawParams, config: Any, dt: float) -> LawParams:
 
 
 def _with_tape(p: LawParams, config: Any, record: "Record") -> LawParams:
-    """Of two motors that pull at a tape."""
+    """Params with the laws of two motors that pull at a tape."""
     settings, dt, radius = config.law, record.dt, config.radius
     R1, R2 = (float(record.columns[n][0]) if n in record.columns else getattr(radius, n) for n in ("R1", "R2"))
     return p._replace(
@@ -144,7 +144,7 @@ def _with_tape(p: LawParams, config: Any, record: "Record") -> LawParams:
         R1=R1,
         R2=R2,
         reels=ReelGrowthParams(radius.d_tape * config.R_c / np.pi, radius.measure.R_min),
-        tension=tension.build(settings.tension, dt)._replace(ramp=1.0),  # full long before the loop runs
+        tension=tension.build(settings.tension, dt)._replace(ramp=1.0),  # the ramp ends before the loop runs
         inertia=inertia_feedforward.build(settings.inertia, dt),
         allocation=allocation.build(settings.allocation, dt),
         output=at_mio_16de.build_output(config.board.output1, dt),

@@ -1,4 +1,4 @@
-"""Params of a law by its parts: what a case or a config says, for the compiled step of rtctl/diagnose/record/law.py."""
+"""Params of a law by its parts, from a case or a config, for the compiled step of rtctl/diagnose/record/law.py."""
 
 import math
 from typing import Any
@@ -25,11 +25,11 @@ from rtctl.laws.shaper import ShaperParams
 from rtctl.laws.tension import TensionParams
 from rtctl.laws.velocity import VelocityParams
 
-LARGE = 1e9  # V, limit of a drive of which the owner says none
+LARGE = 1e9  # V, limit of a drive without a declared limit
 
 
 def neutral(to_unit: float, dt: float) -> LawParams:
-    """A law that writes nothing, each part in its neutral place; `to_unit` is the reference for one unit of reading."""
+    """Params of a law without output, each part neutral; `to_unit` is the reference for one unit of reading."""
     return LawParams(
         kind=law.NONE,
         tape=law.NO_TAPE,
@@ -66,7 +66,7 @@ def neutral(to_unit: float, dt: float) -> LawParams:
 
 
 def limited(p: LawParams, most: float | None, step: float | None, full: float) -> LawParams:
-    """The same with commands of at most `most`, in steps of `step` between minus and plus `full`, each where given."""
+    """Params with commands of at most `most`, in steps of `step` between minus and plus `full`; None for neither."""
     high = most or LARGE
     p = p._replace(limit=LimitParams(-high, high, math.inf))
     if not step:
@@ -77,7 +77,7 @@ def limited(p: LawParams, most: float | None, step: float | None, full: float) -
 
 
 def of_case(p: LawParams, said: Any, dt: float) -> LawParams:
-    """The same with the position law that a case says (rtctl.case.laws); as it is for a law that is not known."""
+    """Params with the position law of a case (rtctl.case.laws); unchanged for an unknown law."""
     if isinstance(said, PdLaw):
         return p._replace(kind=law.PD, pd=pd.of_gains(said.P, said.D, said.derivative_filter_hz, dt))
     if isinstance(said, SectionsLaw):
@@ -89,7 +89,7 @@ def of_case(p: LawParams, said: Any, dt: float) -> LawParams:
 
 
 def of_settings(p: LawParams, settings: Any, dt: float) -> LawParams:
-    """The same with position law, speed filter, limit and shaper of a config's `law`."""
+    """Params with position law, speed filter, limit and shaper of the `law` of a config."""
     return _position(p, settings, dt)._replace(
         velocity=velocity.build(settings.velocity, dt),
         limit=limit.build(settings.limit, dt),
@@ -107,7 +107,7 @@ def _position(p: LawParams, settings: Any, dt: float) -> LawParams:
 
 
 def _with_sections(p: LawParams, coefficients: Any) -> LawParams:
-    """The same with biquads (b0, b1, b2, a1, a2) in their order."""
+    """Params with biquads (b0, b1, b2, a1, a2) in their order."""
     for i, section in enumerate(coefficients):
         p.sections[i] = tuple(section)
     return p._replace(kind=law.SECTIONS, n_sections=len(coefficients))
@@ -116,9 +116,9 @@ def _with_sections(p: LawParams, coefficients: Any) -> LawParams:
 def written(
     p: LawParams, s: np.ndarray, ref: np.ndarray, w: np.ndarray, reading: np.ndarray, drives: int
 ) -> np.ndarray:
-    """The voltages (n, drives) that the law writes from state `s` (1,) on, which it alters, for columns (n,)."""
+    """Voltages (n, drives) of the law for columns (n,), from state `s` (1,) on, which is updated."""
     params, volts = np.zeros(1, record_dtype(p)), np.zeros((len(ref), drives))
     fill_record(params[0], p)
-    columns = (np.array(c, float) for c in (ref, w, reading))  # those of a file cannot be written to: another type
+    columns = (np.array(c, float) for c in (ref, w, reading))  # read-only columns of a file are of another type
     law.play(params, s, *columns, volts)
     return volts

@@ -1,7 +1,7 @@
-"""The law of a recording by our own daemon, replayed: whether the config in case.json gives the recorded command.
+"""Replay of the law of a recording by rtctl: whether the config in case.json gives the recorded command.
 
-What the simulation of a diagnosis cannot compute (see `unsaid`), or what changed while the recording ran, is checked by
-the tick of the config, as `rtctl replay` recomputes it to the bit. Code that came with the recording is never run.
+A law that the simulation of a diagnosis cannot compute (see `unsaid`), or that changed during the recording, is checked
+by the tick of the config, as `rtctl replay` recomputes it to the bit. Code that came with the recording is never run.
 """
 
 from typing import NamedTuple
@@ -10,19 +10,19 @@ from rtctl.config.errors import NoAnswer, UserError
 from rtctl.trace.bundle import Bundle
 from rtctl.trace.replay import replay_bundle
 
-NEEDED = ("tick", "order", "link_age")  # columns of every recording of our own
+NEEDED = ("tick", "order", "link_age")  # columns of every recording by rtctl
 
 
 class LawReplay(NamedTuple):
-    rows: int  # that were replayed; 0 where none could be
-    identical: bool  # to the bit, in all voltages written
+    rows: int  # number of replayed rows; 0 where the replay failed
+    identical: bool  # to the bit, in all written voltages
     words: str  # sentence without its full stop
 
 
 def replayed_law(bundle: Bundle) -> LawReplay | None:
-    """The recorded voltages against those that the law of the config writes for the recorded readings.
+    """Comparison of the recorded voltages with those of the law of the config for the recorded readings.
 
-    None where the recording is not one of our own.
+    None where rtctl did not make the recording.
     """
     if not isinstance(bundle.case.get("config"), dict) or any(name not in bundle.columns for name in NEEDED):
         return None

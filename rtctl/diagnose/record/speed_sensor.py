@@ -1,10 +1,8 @@
-"""What is peculiar to a sensor of speed: its noise, which nobody states as the step of a position is stated, and that
-it may not know direction.
+"""Speed sensor: noise estimate, and sign of a rectified speed.
 
-A speed is measured by a generator or by the rate of pulses, filtered, and shows noise much larger than its last digit.
-What a long linear regression on the speed's own past and the command cannot predict is that noise, whatever the
-machine is; where friction reverses or a sensor folds the speed over, a few rows are not linear, and robust weights
-leave them out.
+A speed is measured by a generator or by the rate of pulses, filtered, and shows noise much larger than its resolution.
+The residual of a long linear regression on the past of the speed and the command is the noise, for any machine. Dry
+friction at reversals and rectification make a few rows nonlinear; robust weights leave these rows out.
 
 Source: Ljung, System Identification (1999), 10.3 for high-order ARX models; Holland & Welsch, Robust regression using
 iteratively reweighted least-squares, Communications in Statistics A6 (1977), for the weights.
@@ -13,18 +11,18 @@ iteratively reweighted least-squares, Communications in Statistics A6 (1977), fo
 import numpy as np
 from scipy.signal import lfilter
 
-ORDER = 8  # rows of the past
-ROUNDS = 15
-TUNE = 4.685  # of Tukey's weights: 95 % efficient where all is normal
-NORMAL = 1.4826  # standard deviation by the median of sizes
-FEWEST = 5 * ORDER  # rows
-BACK = 0.05  # share of the highest speed, and of the time
-LAGS, LONGEST = 25, 0.2  # lags tried, in ticks, up to that share of the record
+ORDER = 8  # rows, order of the regression
+ROUNDS = 15  # rounds of reweighting
+TUNE = 4.685  # constant of Tukey's weights: 95 % efficient for normal noise
+NORMAL = 1.4826  # standard deviation over the median absolute deviation of normal noise
+FEWEST = 5 * ORDER  # rows, at least
+BACK = 0.05  # share of the highest speed, and of the time, for a rectified speed
+LAGS, LONGEST = 25, 0.2  # number of lags that are tried; longest lag as a share of the record
 
 
 def noise(y: np.ndarray, u: np.ndarray) -> float:
     """Standard deviation of the noise in a speed (n,) under commands (n, drives), in the speed's unit; 0 where the rows
-    are too few to tell."""
+    are too few."""
     if len(y) < FEWEST:
         return 0.0
     past = [y[ORDER - k : len(y) - k] for k in range(1, ORDER + 1)]
@@ -41,12 +39,12 @@ def noise(y: np.ndarray, u: np.ndarray) -> float:
 
 
 def folded(speed: np.ndarray, u: np.ndarray) -> bool:
-    """Whether a speed (n,) never goes below zero although the command (n,) pushes both ways."""
+    """Whether a speed (n,) is rectified: never negative although the command (n,) has both signs."""
     return bool(speed.min() > -BACK * speed.max() and min(np.mean(u > 0), np.mean(u < 0)) > BACK)
 
 
 def signed(speed: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """A speed (n,), where it is folded with the sign of the command (n,) through the lag that makes them most alike."""
+    """Speed (n,); a rectified speed gets the sign of the command (n,) through the lag of highest correlation."""
     if not folded(speed, u):
         return speed
     lagged = [lfilter([1.0], [1.0 + lag, -lag], u) for lag in np.geomspace(1.0, LONGEST * len(u), LAGS)]

@@ -1,1 +1,1 @@
-"""Hypotheses, and combinations of them by evidence."""
+"""Search over hypotheses and their combinations by evidence."""

@@ -1,6 +1,6 @@
 """Start of a search: the fitted base, the times of the ticks, and models with one effect.
 
-A fit with one effect may lead to a higher maximum of the base: the base is refitted from its parameters.
+A fit with one effect may lead to a higher maximum of the base: the base is refitted from the parameters of that fit.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,18 +22,18 @@ from rtctl.diagnose.search.screen import Screened
 from rtctl.diagnose.search.standing import merit_of
 
 NAMES = 8  # terms that are fitted as the first effect
-REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is fitted again
-MORE = 1.0  # nats that this must bring
+REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is refitted
+MORE = 1.0  # nats: least gain of evidence of a refitted base
 
 Progress = Callable[[str], None]
 
 
 class Begun(NamedTuple):
-    """The models with which a search begins."""
+    """Start of a search: base, models with one effect, screening scores and prior odds."""
 
     base: Fitted
-    grown: list[Fitted]  # of one effect
-    looked: Screened  # beside the base
+    grown: list[Fitted]  # models with one effect
+    looked: Screened  # screening scores beside the base
     odds: float  # ln of the prior odds of one effect at one place
 
     @property
@@ -69,9 +69,9 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
 
 
 def rebased(base: Fitted, grown: Sequence[Fitted]) -> Fitted:
-    """The base from where the best models with one effect have its parameters, if that is better by what counts.
+    """Base with the highest evidence, also refitted from the parameters of the best models with one effect.
 
-    Where the likelihood has many maxima, an effect may only have shown the way to a better one of the base.
+    The likelihood may have several maxima: an effect may lead the fit to a higher maximum of the base.
     """
     for f in sorted(grown, key=lambda f: f.loss)[:REBASED]:
         if f.loss < base.loss - FIRST:

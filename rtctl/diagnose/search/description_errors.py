@@ -1,8 +1,7 @@
-"""What the laws of the description itself may be wrong by: its friction, the effects that its owner knows, and effects
-that are too small for a name.
+"""Errors of the laws of the description: of its friction, its known effects, and effects too small for a name.
 
-No dry friction lets go at once, and none is the same at all speeds. What a machine with a right description leaves of
-that is no missing physics: it is integrated out of every model, as the errors of the effects on trial are (slack.py).
+Dry friction breaks away gradually, and depends on speed. Under a right description the residual of these errors is no
+missing effect: they are integrated out of every model, as the errors of the effects on trial are (slack.py).
 
 Source: Brynjarsdottir & O'Hagan, Learning about physical parameters: the importance of model discrepancy, Inverse
 Problems 30 (2014).
@@ -20,12 +19,12 @@ from rtctl.diagnose.likelihood.slack import Inexact
 from rtctl.diagnose.model.space import SIZE, Coordinate, Hypothesis
 from rtctl.diagnose.search.hypotheses import hypotheses
 
-FRICTION = (".dry", ".viscous")  # of a body, in the paths of a description
-LESS = 0.1  # of the friction of the description: step of the difference quotient
+FRICTION = (".dry", ".viscous")  # ends of the paths of a body's friction in a description
+LESS = 0.1  # share of the friction of the description: step of the difference quotient
 
 
 def inexact(base: Fitted) -> Fitted:
-    """The fitted description, whose own laws may be wrong."""
+    """Fitted description whose likelihood includes the errors of its own laws."""
     model, like = base.model, base.like
     known = [effect(like, model.without_known(i), base.e, str(model.terms[i].node)) for i in range(model.known())]
     laws = np.concatenate([rubbing(base), *known], axis=2)
@@ -36,7 +35,7 @@ def inexact(base: Fitted) -> Fitted:
 def rubbing(base: Fitted) -> np.ndarray:
     """Errors (blocks, sensors, columns) of the friction of the description, of standard deviation one.
 
-    A small share is taken off: without friction a machine may not come to rest where it was recorded to stand.
+    The difference quotient removes a small share: a model without friction may move where the machine stood at rest.
     """
     model = base.model
     less = {path: value * (1.0 - LESS * path.endswith(FRICTION)) for path, value in model.base.items()}
@@ -44,8 +43,10 @@ def rubbing(base: Fitted) -> np.ndarray:
 
 
 def unseen(base: Fitted, candidates: Sequence[Hypothesis]) -> np.ndarray:
-    """Errors (blocks, sensors, columns), of standard deviation one, that effects make which are finer than the sensor
-    could show: of each candidate that has a least size."""
+    """Errors (blocks, sensors, columns), of standard deviation one, by effects below the resolution of a sensor.
+
+    Each candidate with a least size gives one column for each share in UNSEEN.
+    """
     fine: dict[str, Hypothesis] = {}
     for h in candidates:  # the first form of a term is its plainest
         if any(has_least(c) for c in h.coordinates):
@@ -61,5 +62,5 @@ def unseen(base: Fitted, candidates: Sequence[Hypothesis]) -> np.ndarray:
 
 
 def has_least(c: Coordinate) -> bool:
-    """Whether a size begins where a sensor could show it."""
+    """Whether a coordinate is a size whose lower bound is the resolution of a sensor."""
     return c.kind == SIZE and c.low > 0.0

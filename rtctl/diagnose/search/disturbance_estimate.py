@@ -1,8 +1,8 @@
-"""What the record itself suggests: at which order, wavelength, place or time something is missing.
+"""Disturbance estimate of the record: orders, wavelengths, places and times of a missing force.
 
-The correction that keeps a fitted model on the recorded track is, up to its bandwidth, what the model lacks, in units
-of its input: a disturbance observer. Seen against the angle of a shaft it shows orders, against position spots and
-wavelengths. Sudden jumps of the error between two ticks show lost counts.
+The correction that keeps a fitted model on the recorded track is a disturbance observer: up to its bandwidth it
+estimates the missing force, in units of the input of the model. As a function of the angle of a shaft it shows orders,
+as a function of position it shows spots and wavelengths. Sudden jumps of the error between two ticks show lost counts.
 
 Source: Ohnishi, Shibata & Murakami, IEEE/ASME Trans. Mechatronics 1 (1996) for the observer; order tracking by least
 squares on cosine and sine of the angle, since angles are not evenly sampled.
@@ -12,32 +12,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-MOST = 4  # hints of a kind
-JUMPS = 47
-AROUND = 8  # ticks that a jump is compared with
-SURE, UNSURE = 6.0, 4.0  # times the noise from tick to tick: a jump, and one if there are others like it
-TWIN = 1.4  # times another jump nearby, which is as large
-ALIKE = 2.5  # times the same: jumps that differ by less may be of one size
-ORDERS = np.arange(1.0, 61.0)  # whole: what a disc or a shaft adds is the same after each turn
-SMOOTH, FEWEST = 51, 200  # rows over which a speed is taken, and without which an order is not looked for
+MOST = 4  # hints of a kind, at most
+JUMPS = 47  # jumps of a sensor, at most
+AROUND = 8  # ticks on each side with which a jump is compared
+SURE, UNSURE = 6.0, 4.0  # times the noise from tick to tick: a lone jump, and a jump beside others of its size
+TWIN = 1.4  # ratio of the sizes of two neighbouring jumps, at most
+ALIKE = 2.5  # times the noise from tick to tick: size difference of equal jumps, at most
+ORDERS = np.arange(1.0, 61.0)  # per turn, whole: the force of a disc or a shaft repeats after each turn
+SMOOTH, FEWEST = 51, 200  # rows: window of a speed, and least number for a spectrum
 
 
 class Along(NamedTuple):
-    """An angle, or a way, in which orders are looked for, rows (n,) each."""
+    """Angle (n,), rad, or position (n,), m, along which orders are searched."""
 
     angle: np.ndarray
-    by: np.ndarray | float = 1.0  # what the amplitude of a force is proportional to
-    motion: tuple[np.ndarray, np.ndarray] | None = None  # speed and acceleration, for an error of the angle itself
+    by: np.ndarray | float = 1.0  # (n,) quantity to which the amplitude of a force is proportional
+    motion: tuple[np.ndarray, np.ndarray] | None = None  # speed and acceleration (n,), for a reading error of the angle
 
     def at(self, rows: np.ndarray) -> "Along":
-        """The same of some rows."""
+        """Angle, amplitude and motion in some rows."""
         by = self.by[rows] if isinstance(self.by, np.ndarray) else self.by
         motion = None if self.motion is None else (self.motion[0][rows], self.motion[1][rows])
         return Along(self.angle[rows], by, motion)
 
     def waves(self, order: float) -> np.ndarray:
-        """Cosine and sine (n, 2) of an order, as the signal shows them. What follows an angle that is read wrongly is
-        pushed by the second derivative of the error."""
+        """Cosine and sine (n, 2) of an order, as the signal shows them.
+
+        A reading error of a followed angle acts as a force: its shape is the second derivative of the error.
+        """
         c, s = np.cos(order * self.angle), np.sin(order * self.angle)
         if self.motion is None:
             return np.stack([self.by * c, self.by * s], axis=1)
@@ -46,8 +48,10 @@ class Along(NamedTuple):
 
 
 def spectrum(along: Along, signal: np.ndarray, orders: np.ndarray, root: np.ndarray | float = 1.0) -> np.ndarray:
-    """Share of the variance of `signal` that each order explains, slow drift taken out. `root` is the root of the
-    weights of rows."""
+    """Share (orders,) of the variance of `signal` that each order explains, without slow drift.
+
+    `root` is the root of the weights of the rows.
+    """
     angle = along.angle
     if len(signal) < FEWEST:
         return np.zeros(len(orders))
@@ -70,15 +74,16 @@ def spectrum(along: Along, signal: np.ndarray, orders: np.ndarray, root: np.ndar
 
 
 def seen(along: Along, signal: np.ndarray, rate: np.ndarray, orders: np.ndarray, quick: float) -> np.ndarray:
-    """As `spectrum`, each order where it passes slower than `quick` rad/s, so that the signal can show it; `rate` is
-    that of the angle. By the number of rows that are left.
+    """Share (orders,) of the variance that each order explains, times the effective number of its rows.
 
-    Rows count the more the faster they pass: time alone would count a stop, at which friction holds whatever the force,
-    as many rows, and the angle alone a slow turn, which averages more noise, as no more than a fast one.
+    An order counts in the rows where it passes slower than `quick`, rad/s: the signal shows no faster ripple. `rate`
+    (n,) is the speed of the angle, rad/s. The weight of a row is the root of this speed. Equal weights would overrate a
+    stop, at which friction holds against any force. Weights by speed would underrate a slow turn, which averages more
+    noise.
     """
     out = np.zeros(len(orders))
     rows = np.array([np.count_nonzero(rate * order < quick) for order in orders])
-    for count in np.unique(rows):  # the rows of a higher order are among those of a lower one: as many are the same
+    for count in np.unique(rows):  # rows of a higher order are a subset of those of a lower: equal counts, equal rows
         same = np.flatnonzero(rows == count)
         slow = rate * orders[same[0]] < quick
         weight = np.sqrt(np.maximum(rate[slow], 0.0))  # a moving average may round below zero
@@ -95,8 +100,10 @@ def peaks(grid: np.ndarray, height: np.ndarray, most: int) -> list[float]:
 
 
 def orders_of(span: float, height: np.ndarray, most: int) -> list[float]:
-    """Orders by `height` (ORDERS). A way of `span` rad that is no whole turn does not tell neighbours apart: those of
-    the highest are among them."""
+    """Orders (of ORDERS) with the highest peaks of `height` (orders,).
+
+    A travel of `span` rad below one turn does not separate neighbouring orders: those of the highest peak are added.
+    """
     tops = peaks(ORDERS, height, most)
     if not tops or span >= 2 * np.pi:
         return tops
@@ -105,7 +112,7 @@ def orders_of(span: float, height: np.ndarray, most: int) -> list[float]:
 
 
 def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 80) -> list[float]:
-    """Places, as shares of the way, where the signal's mean stands out from that of the places around."""
+    """Places, as shares of the travel, where the mean of the signal deviates most from its surroundings."""
     edges = np.linspace(way.min(), way.max() + 1e-12, bins + 1)
     index = np.clip(np.digitize(way, edges) - 1, 0, bins - 1)
     count = np.bincount(index, minlength=bins)
@@ -116,11 +123,12 @@ def spots(way: np.ndarray, signal: np.ndarray, most: int, bins: int = 80) -> lis
 
 
 def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:
-    """Rows and sizes of sudden steps of the error (n,) that do not come back at once, the largest first.
+    """Rows and sizes of sudden lasting steps of the error (n,), the largest first.
 
-    `count` is the sensor's step in the error's unit. A jump takes one tick: it stands out of the ticks around it, but
-    for one more jump at most, which a vibration or a reversal that the model misses does not. Where one is sure, others
-    as large may be less so; and where noise makes what they differ by, they are alike.
+    `count` is the step of the sensor in the unit of the error. A jump takes one tick and exceeds the ticks around it,
+    with one further jump among them at most. A vibration or a reversal that the model lacks does not exceed its
+    neighbours so. Beside a sure jump, jumps of about its size count from a lower threshold. Jumps whose sizes differ
+    only by noise get one size.
     """
     step = np.diff(error)
     quiet = 1.4826 * float(np.median(np.abs(step - np.median(step)))) + 0.3 * count
@@ -130,7 +138,7 @@ def jumps(error: np.ndarray, count: float) -> list[tuple[int, float]]:
         if not AROUND < k < len(step) - AROUND:
             continue
         near = np.sort(np.abs(np.delete(step[k - AROUND : k + AROUND + 1], AROUND)))
-        if near[-1] < TWIN * abs(step[k]) < TWIN**2 * near[-1]:  # another as large, which stands out as well
+        if near[-1] < TWIN * abs(step[k]) < TWIN**2 * near[-1]:  # one further jump of about this size
             near = near[:-1]
         size = float(np.median(error[k + 1 : k + 4]) - np.median(error[k - 2 : k + 1]))
         if abs(step[k]) > 4 * np.median(near) and abs(step[k]) > 2 * near.max() and abs(size) > 0.6 * abs(step[k]):

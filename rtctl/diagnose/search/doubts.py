@@ -1,8 +1,8 @@
-"""Models in which one number of the description is wrong by a factor: rivals of effects that do the same.
+"""Models with a gross error in one number of the description: rivals of effects with the same signature.
 
-An owner's number is wrong within its tolerance, or by far: another unit, another gear, a command that the drive does
-not follow. A name stands only where it is likelier than such an error. Dry and viscous friction and the effects that
-the owner knows have names of their own for what they lack.
+A nominal value is wrong within its tolerance, or has a gross error: another unit, another gear, a command that the
+drive does not follow. An effect is named only where it is likelier than a gross error. Errors of dry and viscous
+friction and of the known effects are effects of the library.
 
 Source: O'Hagan, On outlier rejection phenomena in Bayes inference, JRSS B 41 (1979), for a prior with heavy tails.
 """
@@ -17,9 +17,11 @@ from rtctl.diagnose.search.search import Found
 
 
 def doubted(found: Found) -> tuple[Fitted, ...]:
-    """Fits (at most one a model and number) with one number free of its tolerance in the place of an effect: beside the
-    description alone, and beside the best model without each of its effects. A number is asked where the fit took it
-    beyond its tolerance."""
+    """Fits with a gross error of one number in the place of an effect, at most one for each model and number.
+
+    The models are the description alone, and the best model without each of its effects. The numbers are those that the
+    fit of the model took beyond their tolerance.
+    """
     best = found.best
     fewer = [refit(best.like, *without(best, index)) for index in range(len(best.names))] if best.names[1:] else []
     return tuple(
@@ -28,7 +30,7 @@ def doubted(found: Found) -> tuple[Fitted, ...]:
 
 
 def outside(f: Fitted) -> list[str]:
-    """Numbers that a fit took out of their tolerance, but for those whose error is an effect of the library."""
+    """Names of the numbers that a fit took beyond their tolerance, unless their error is an effect of the library."""
     values = zip(f.space.names, f.x, strict=False)
     return [name for name, x in values if no_effect(name) and out_of_tolerance(f.space, name, x)]
 
@@ -39,6 +41,6 @@ def no_effect(name: str) -> bool:
 
 
 def out_of_tolerance(space: Space, name: str, x: float) -> bool:
-    """Whether a number, ln of its ratio to the owner's value, is outside its tolerance."""
+    """Whether a number x, ln of its ratio to the nominal value, is outside its tolerance."""
     tol = space.tolerance(name)
     return bool(np.isfinite(tol)) and not np.log1p(-min(tol, 0.95)) <= x <= np.log1p(tol)

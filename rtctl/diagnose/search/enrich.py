@@ -1,4 +1,4 @@
-"""Richer and other forms of the effects that were found: harmonics, a second branch, another shape of the same law."""
+"""Other forms of the effects of a model: harmonics, a second branch, another shape of the law."""
 
 from itertools import product
 
@@ -12,16 +12,16 @@ from rtctl.diagnose.search.grid_starts import starts_of
 from rtctl.diagnose.search.term_variants import forms, is_rich
 from rtctl.plants.physics import TERMS, standing
 
-ORDER = "order"  # of a wave, per turn
-ROUNDS = 2  # of other forms: a further parameter may ask for another setting beside it
-WORTH = 2.0  # nats of evidence that another form must bring
-QUIET = 3.0  # times the least noise, below which one maximum is enough
-SHARES = (0.4, 2.5, 7.0)  # of a size, at other starts
-DRAWS = 2  # starts with other nominal values
+ORDER = "order"  # setting of a wave: order, per turn
+ROUNDS = 2  # rounds of other forms: a further parameter may need another setting
+WORTH = 2.0  # nats of evidence: least gain of another form
+QUIET = 3.0  # times the least noise: rms of a residual below which one maximum is enough
+SHARES = (0.4, 2.5, 7.0)  # factors of a size, at other starts
+DRAWS = 2  # starts with random nominal values
 
 
 def enriched(best: Fitted) -> Fitted:
-    """The model with each effect in the form that the record asks for."""
+    """Model with each effect in the form with the highest evidence."""
     for index in range(len(best.space.hypotheses)):
         for _ in range(ROUNDS):
             before = best
@@ -33,7 +33,7 @@ def enriched(best: Fitted) -> Fitted:
 
 
 def _better(best: Fitted, index: int, other: Hypothesis) -> Fitted:
-    """The model with one effect in another form where that is worth it, else as it is."""
+    """Model with one effect in another form where the evidence gains WORTH, else the unchanged model."""
     space, x = exchanged(best, index, other)
     trial = refit(best.like, space, x, best.J[..., : space.nb], draft=True)
     if trial.log_evidence > best.log_evidence - NEAR:
@@ -42,8 +42,10 @@ def _better(best: Fitted, index: int, other: Hypothesis) -> Fitted:
 
 
 def restarted(best: Fitted) -> Fitted:
-    """The model from other starts, where it leaves more than the noise of counting: where dry friction lets go, and
-    where a gap closes, the likelihood has many maxima."""
+    """Model with the highest evidence of several starts, where its residual exceeds counting noise.
+
+    The likelihood has many maxima where dry friction breaks away, and where a gap closes.
+    """
     if loudness(best) < QUIET:
         return best
     rng = np.random.default_rng(0)
@@ -67,7 +69,7 @@ def restarted(best: Fitted) -> Fitted:
 
 
 def loudness(f: Fitted) -> float:
-    """Rms of the residual by the least noise of its sensor, of the loudest sensor."""
+    """Largest ratio of the rms of a residual to the least noise of its sensor."""
     least = f.like.least * np.sqrt(f.like.mean)
     return float(np.max(np.sqrt(np.mean(f.e**2, axis=0)) / least))
 
@@ -79,9 +81,9 @@ def others(f: Fitted, index: int) -> list[Hypothesis]:
 
 
 def richer(f: Fitted, h: Hypothesis) -> list[Hypothesis]:
-    """The effect with the further parameters of its richer form; none where it has none.
+    """Hypotheses of an effect with the further parameters of its richer form; none where it has no richer form.
 
-    What comes several times a turn may be a harmonic of what comes once.
+    An effect that repeats several times a turn may be a harmonic of an effect of order one.
     """
     term, sim = TERMS[h.term], f.like.sim
     found = standing(term, sim.elements, h.node)
@@ -100,7 +102,7 @@ def richer(f: Fitted, h: Hypothesis) -> list[Hypothesis]:
 
 
 def exchanged(f: Fitted, index: int, other: Hypothesis) -> tuple[Space, np.ndarray]:
-    """Space and start with one effect in another form, which begins where its coordinates were."""
+    """Space and start (unknowns,) with one effect in another form, from the fitted values of its coordinates."""
     old, parts = f.space.hypotheses[index], f.space.parts(f.x)
     start = other.start()
     start[: len(old.coordinates)] = parts[index]

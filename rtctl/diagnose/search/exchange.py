@@ -1,7 +1,7 @@
-"""Exchange of the effects of a model for what the recording may take them for.
+"""Exchange of the effects of a model for others that may explain the recording as well.
 
-Each effect gives way to others, and all effects of one node give way at once: two laws that are not those of the
-machine may together stand for one that is.
+Each effect is replaced by others, and so are all effects of one node together: two wrong laws may together stand for
+the right one.
 """
 
 from collections.abc import Sequence
@@ -13,15 +13,15 @@ from rtctl.diagnose.search.extend import Known, Merit, extended, key
 from rtctl.diagnose.search.screen import Screened
 from rtctl.plants.physics import TERMS
 
-OTHERS = 3  # terms that are refitted beside what is left
+OTHERS = 3  # terms that are refitted beside the reduced model
 
 
 def exchanged(like: Likelihood, base: Fitted, best: Fitted, known: Known, looked: Screened, merit: Merit) -> None:
-    """Fit others in the place of each effect of the best model, and of all effects of a node; `known` gets them.
+    """Fit other effects in the place of each effect of the best model, and of all effects of a node, into `known`.
 
-    `looked` is what screening said of the base.
+    `looked` holds the screening scores beside the base.
     """
-    alone = len(best.names) == 1  # beside the base all others have been asked for
+    alone = len(best.names) == 1  # beside the base, all other effects are fitted already
     gone = [
         (rest, [h])
         for rest, h in zip([base] if alone else smaller(like, best, known), best.space.hypotheses, strict=True)
@@ -30,17 +30,17 @@ def exchanged(like: Likelihood, base: Fitted, best: Fitted, known: Known, looked
         known[key(rest.names)] = rest
         most, told = (0, looked) if alone else (OTHERS, None)
         for f in extended(like, [rest], known, most, merit, told, look_alikes(these)):
-            if merit(f) > merit(best):  # whether it needs all of its effects is asked before it stands
+            if merit(f) > merit(best):  # a model is accepted only if it needs all of its effects
                 known |= {key(g.names): g for g in smaller(like, f, known)}
 
 
 def look_alikes(effects: Sequence[Hypothesis]) -> set[str]:
-    """Names (term:node) that effects are taken for, at their nodes."""
+    """Names (term:node) of the look-alikes of effects, at their nodes."""
     return {f"{other}:{h.node}" for h in effects for other in TERMS[h.term].look_alikes}
 
 
 def emptied(like: Likelihood, f: Fitted, known: Known) -> list[tuple[Fitted, list[Hypothesis]]]:
-    """The model without all effects of a node, for each node that has several, and these effects."""
+    """Models without the effects of one node, for each node with several effects, and the effects left out."""
     out = []
     for node in dict.fromkeys(h.node for h in f.space.hypotheses):
         these = [index for index, h in enumerate(f.space.hypotheses) if h.node == node]
@@ -50,7 +50,7 @@ def emptied(like: Likelihood, f: Fitted, known: Known) -> list[tuple[Fitted, lis
 
 
 def smaller(like: Likelihood, f: Fitted, known: Known, which: Sequence[int] | None = None) -> list[Fitted]:
-    """The model without each of its effects, or without some of them, of several."""
+    """Models without one effect each, for all effects of a model with several, or for those in `which`."""
     every = range(len(f.names)) if len(f.names) > 1 else ()
     return [lacking(like, f, known, index) for index in every if which is None or index in which]
 

@@ -1,7 +1,6 @@
-"""Extension of models by one more effect each: those that promise most, of all models together, are fitted.
+"""Extension of models by one further effect: the most promising extensions of all models together are fitted.
 
-Which effect comes first does not matter then: a model that is behind on its own is extended where the two together
-promise more.
+The order of the effects does not matter: a model with a lower posterior is extended where the pair promises more.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -18,12 +17,12 @@ from rtctl.diagnose.search.hypotheses import hypotheses
 from rtctl.diagnose.search.screen import Score, Screened, screen
 from rtctl.diagnose.search.suggestions import combined
 
-STARTS = 2  # of the first few fits
-ALSO = 4  # starts of names that are tried whatever they promise: screening says little of their size
-FIRST = 3
-OTHERS = 3  # nodes of the best terms beside the first
+STARTS = 2  # starts of a fit, for each of the FIRST terms
+ALSO = 4  # starts of a fit, for the names `also`: screening estimates their sizes poorly
+FIRST = 3  # rank: terms that have several starts, and drafts that are always fitted to convergence
+OTHERS = 3  # further nodes of each of the best terms
 BEST = 2  # terms that are tried at their other nodes
-LEAST = 6.0  # nats that screening must promise for a refit
+LEAST = 6.0  # nats: least gain by screening for a refit
 NEAR = 10.0  # nats behind the best model; 3 of 4 drafts gain less by convergence in 2 cases of 3 (seed 26457513)
 
 Known = dict[tuple[str, ...], Fitted]  # by the names of the effects in alphabetical order
@@ -31,22 +30,22 @@ Merit = Callable[[Fitted], float]  # logarithm of the posterior of a model
 
 
 class Promise(NamedTuple):
-    """An effect beside a model."""
+    """Extension of a model by one effect, with its screening score."""
 
     parent: Fitted
     looked: Screened
     score: Score
-    gain: float  # logarithm of the posterior as screening sees it
-    power: float  # the same by least squares
+    gain: float  # logarithm of the posterior of the extended model, nats, by screening
+    power: float  # logarithm of the likelihood of the extended model, nats, by least squares
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Those of the model that it would be."""
+        """Names of the effects of the extended model, in alphabetical order."""
         return key((*self.parent.names, self.score.hypothesis.name))
 
     @property
     def term(self) -> tuple[int, str]:
-        """The model that is extended, and the term, wherever it stands."""
+        """Identity of the model that is extended, and the term at any node."""
         return id(self.parent), self.score.hypothesis.term
 
 
@@ -60,11 +59,12 @@ def extended(
     also: Collection[str] = (),
     passed: Collection[tuple[str, ...]] = (),
 ) -> list[Fitted]:
-    """Refits of models with the most promising hypotheses beside them; `looked` is what screening said of one model.
+    """Models with one further effect, refitted for the most promising hypotheses.
 
-    Each term is tried at its most promising node, then the best terms at their other nodes. `known` gets all of them.
-    The names `also` (term:node) are tried whatever they promise, and their terms at the most promising node. Of models
-    that were `passed`, those with other terms are asked for, as far as they promise to stand.
+    Each term is tried at its most promising node, then the best terms at their other nodes. `known` receives all fits.
+    `looked` holds the screening scores beside one model. The names `also` (term:node) are tried at any score, and their
+    terms at the most promising node. With `passed` models, only other combinations of terms are tried, and only those
+    that promise a gain of FURTHER.
     """
     gone = {terms_of(names) for names in passed}
     told = {name.partition(":")[0] for name in also}
@@ -79,7 +79,7 @@ def extended(
             top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
 
     def refitted(wanted: Sequence[tuple[list[Promise], int]]) -> list[tuple[str, ...]]:
-        """Names of drafts, after those that are not known have been fitted, each from a number of starts."""
+        """Names of the requested drafts; unknown drafts are fitted first, each from a number of starts."""
         jobs: dict[tuple[str, ...], Callable[[], Fitted]] = {}
         for these, starts in wanted:
             if these[0].names not in known:
@@ -129,7 +129,7 @@ def settle(known: Known, which: Iterable[tuple[str, ...]], merit: Merit) -> None
 
 
 def promises(parent: Fitted, looked: Screened, merit: Merit) -> list[Promise]:
-    """All effects beside a model."""
+    """Extensions of a model by each screened effect."""
     own, size = merit(parent), parent.like.size
     plain = -size * float(np.mean([np.log(noise.sigma) for noise in parent.like.flat(parent.e).noise]))
     return [
@@ -140,13 +140,13 @@ def promises(parent: Fitted, looked: Screened, merit: Merit) -> list[Promise]:
 
 
 def in_turns(found: Sequence[Promise]) -> list[Promise]:
-    """Promises in the order in which they deserve a fit: by what they gain, and by what least squares takes off."""
+    """Promises in the order of their fits: in turns by gain and by least squares."""
     orders = [sorted(found, key=lambda one: -one.gain), sorted(found, key=lambda one: -one.power)]
     return list({id(one): one for pair in zip(*orders, strict=True) for one in pair}.values())
 
 
 def screened(parent: Fitted) -> Screened:
-    """Scores beside a model."""
+    """Screening scores of all hypotheses beside a model."""
     sim, model = parent.like.sim, parent.model
     candidates = [
         h for h in hypotheses(sim, model, combined(parent.like, model), model.terms) if h.name not in parent.names
@@ -160,5 +160,5 @@ def terms_of(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def key(names: Iterable[str]) -> tuple[str, ...]:
-    """The names of a combination, in alphabetical order."""
+    """Names of a combination, in alphabetical order."""
     return tuple(sorted(names))

@@ -1,16 +1,18 @@
-"""What the fit of the description alone says, seconds after a diagnosis has begun: whether something is missing."""
+"""First look: whether the fit of the description alone lacks something, seconds after a diagnosis has begun."""
 
 import numpy as np
 
 from rtctl.diagnose.likelihood.fits import Fitted
 from rtctl.diagnose.likelihood.shares import floor
 
-WORD = "first look"  # that the sentence begins with, for those who show it
+WORD = "first look"  # first words of the sentence, by which a display recognises it
 
 
 def first_look(base: Fitted) -> str:
-    """One sentence on the sensor that the fitted description follows worst. Where none is off by more than its noise, a
-    force that the observer needed may still tell something."""
+    """Sentence on the sensor with the largest ratio of residual to noise floor.
+
+    Where no residual exceeds its floor, the correction of the observer may still show a missing force.
+    """
     over = np.sqrt(np.mean(base.e**2, axis=0)) / floor(base)
     worst = int(np.argmax(over))
     if over[worst] <= 1.0:

@@ -1,7 +1,7 @@
-"""Starts of a hypothesis: where a search begins to walk through the parameters of a term at a node.
+"""Starts of a hypothesis: grid of initial parameters of a term at a node.
 
-How a search walks through a term's parameters is told by the term itself (plants/physics/search.py). Starts are shares
-of what the recording shows of the node: its rms speed, its span, the rms force of its drive.
+Each term declares the search of its parameters (plants/physics/search.py). Starts are shares of measures of the node in
+the recording: its rms speed, its span, the rms force of its drive.
 """
 
 from collections.abc import Iterable
@@ -15,22 +15,24 @@ from rtctl.own.term import sizes
 from rtctl.plants.physics import TERMS, Element, Term, having
 from rtctl.plants.physics.search import At, Hint, Jumps, Limit, Part, Rest, Shape, Size, Turn, Where
 
-TURN = 0.1  # rad, by which a ripple's far end may move in a difference quotient
+TURN = 0.1  # rad: largest phase shift at the far end of a ripple in a difference quotient
 
 
 def searched(name: str) -> bool:
-    """Whether a term is among the hypotheses that every record is asked about."""
+    """Whether a term is among the hypotheses of every record."""
     return bool(sizes(name) or TERMS[name].search)
 
 
 def shows_alone(term: Term, element: Element, slides: bool, unsigned: bool) -> bool:
-    """Whether a lone sensor shows a term that elsewhere takes another sensor to compare with: the only one of the only
-    body, or one of a speed that is never negative."""
+    """Whether a lone sensor shows a term that usually needs a second sensor for comparison.
+
+    A lone sensor shows it as the only sensor of the only body, or as a sensor of a speed that is never negative.
+    """
     return {"slides": slides and "lone" in element.traits, "unsigned": unsigned}.get(term.needs.alone, False)
 
 
 def parts_of(name: str) -> tuple[Part, ...]:
-    """What is fitted of a term; of one that does not say, what it calls typical, the first being its size."""
+    """Fitted parts of a term; without a declared search, its typical values, of which the first is the size."""
     if TERMS[name].search:
         return TERMS[name].search
     (first, (low, high)), *others = TERMS[name].typical.items()
@@ -86,16 +88,16 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
             low, high = part.lengths
             found = [value for value in found if low < value < high]
         if part.kind == "order" and node in having(m.record.plant, "body", "rotor"):
-            found = [value for value in found if value > 1.0]  # once a turn a rotor is out of balance; teeth are more
+            found = [value for value in found if value > 1.0]  # order one of a rotor is unbalance; teeth are higher
         for value in found:
             if part.place:
                 yield (Coordinate(part.name, PLACE, part.reach * s.span, -3.0, 3.0, offset=s.at(value)),), {}
             elif part.kind != "wavelength":  # an order is a whole number
                 yield (), {part.name: value}
             else:
-                turns = s.span * 2 * np.pi / value  # rad, along the whole way
+                turns = s.span * 2 * np.pi / value  # rad, along the whole travel
                 step = min(1e-2, TURN / turns)
-                longest = min(part.reach, float(np.log(turns / (2 * np.pi))))  # less than one is any curve
+                longest = min(part.reach, float(np.log(turns / (2 * np.pi))))  # less than one wave fits any curve
                 if longest > 0.0:
                     yield (Coordinate(part.name, SHAPE, value, -part.reach, longest, step=step),), {}
     elif isinstance(part, Where):
@@ -106,7 +108,7 @@ def _options(part: Part, node: str, m: Measures) -> Iterable[tuple[tuple[Coordin
     elif isinstance(part, Jumps):
         jumps = m.hints.get(f"jump:{node}", [])
         if jumps:
-            tick, (_, first) = m.record.dt, jumps[0]  # counts are lost between two ticks: the later one reads all of it
+            tick, (_, first) = m.record.dt, jumps[0]  # counts are lost between two ticks: the later reads all of them
             (at, _), *more = [(max(when - tick, 0.0), size / first) for when, size in jumps]
             yield (Coordinate(part.name, SIZE, abs(first)),), {"at": at, "more": tuple(more), "over": tick}
     elif isinstance(part, At):

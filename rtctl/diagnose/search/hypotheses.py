@@ -1,4 +1,4 @@
-"""Hypotheses of a recording: each term of the library at each element of the machine where it can stand."""
+"""Hypotheses of a recording: each term of the library at each element of the machine to which it applies."""
 
 from collections.abc import Sequence
 
@@ -14,10 +14,10 @@ from rtctl.plants.element import Element
 from rtctl.plants.physics import TERMS, Term, nodes, standing
 from rtctl.plants.physics.search import Hint
 
-SLIGHT = 0.01  # of the force that moves a node: friction that nothing else could be told by
-ONE_SIGN = 0.02  # of the largest reading: the least that counts as the other sign
-BY_TURN = ("order", "order_from", "order_to")  # hints that hold half a period of what they suggest
-ABOUT = {  # kinds of element that a problem tells of: positions of no force, a measured force of no command
+SLIGHT = 0.01  # share of the force that moves a node: least friction for a term that needs friction
+ONE_SIGN = 0.02  # share of the largest reading: least negative reading that counts as the other sign
+BY_TURN = ("order", "order_from", "order_to")  # kinds of hints that need half a period of an order, not whole turns
+ABOUT = {  # kinds of element by problem: positions show no force, a measured force shows no command
     "kinematic": ("joint", "sensor"),
     "static": ("body", "joint", "sensor"),
 }
@@ -26,7 +26,7 @@ ABOUT = {  # kinds of element that a problem tells of: positions of no force, a 
 def hypotheses(
     sim: Simulator, model: GraphModel, hints: dict[str, list] | None = None, beside: Sequence[Settings] = ()
 ) -> list[Hypothesis]:
-    """All of them for this machine, one for each start."""
+    """Hypotheses of a machine, one for each start."""
     there = sim.elements
     measures = Measures(sim, model.base, hints or {})
     known = set(sim.kernel.names)
@@ -66,8 +66,10 @@ def hypotheses(
 
 
 def called_otherwise(sim: Simulator, term: Term, element: Element, span: float) -> bool:
-    """Whether the law of a term has another name at an element that moves over `span`: where it turns, one for whole
-    turns and one for less."""
+    """Whether the law of a term has another name at an element that moves over `span`.
+
+    The law of an element that turns has one name for whole turns and another for less than a turn.
+    """
     if "turns" not in element.traits:
         return False
     if span >= 2 * np.pi:
@@ -77,6 +79,6 @@ def called_otherwise(sim: Simulator, term: Term, element: Element, span: float) 
 
 
 def never_negative(sim: Simulator, sensor: str) -> bool:
-    """Whether a sensor shows one sign, but for what it is off by at rest."""
+    """Whether a sensor shows one sign, except for its offset at rest."""
     y = sim.record.y.get(sensor, np.zeros(0))
     return bool(y.size and y.min() >= -ONE_SIGN * y.max())

@@ -1,7 +1,7 @@
-"""Screening: what each hypothesis would gain beside a fitted model, from one simulation for each of its sizes.
+"""Screening: gain of each hypothesis beside a fitted model, from one simulation for each of its sizes.
 
-The residual is linear in the fitted parameters and, by a secant of typical size, in the size of an effect. Each
-hypothesis is solved for under the noise of the model, then judged under the noise that it leaves itself.
+The residual is linearised in the fitted parameters and, by a secant of typical size, in the size of an effect. Each
+hypothesis is solved under the noise of the model, then scored under the noise of its own residual.
 
 Source: score test (Rao 1948) with nuisance parameters projected out; secants for effects that have no derivative.
 """
@@ -17,40 +17,41 @@ from rtctl.diagnose.likelihood.linear import DAMPING, Linear
 from rtctl.diagnose.likelihood.solver import bounded_step, parallel
 from rtctl.diagnose.model.space import INVERSE, SIZE, Hypothesis
 
-TRIES = 3
-TOO_FAR = 3.0  # times the residual: a step that changes more says little about what is missing
-RIDGE = 1e-6
-ASKED = 40  # hypotheses that take off most, of which the gain under a noise of their own is asked
-FACTORS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of the size that a secant promises
-IDLE = 0.01  # of the least noise: largest change of a residual at which the gradient of a fit is zero
+TRIES = 3  # lengths of a secant, at most
+TOO_FAR = 3.0  # times the norm of the residual: largest change by a secant
+RIDGE = 1e-6  # ridge of the normal equations, for columns of norm one
+ASKED = 40  # hypotheses of highest power, whose gain under the noise of their own residual is computed
+FACTORS = (0.1, 0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # times the size by a secant: starts of a size
+IDLE = 0.01  # share of the least noise: largest change of a residual at which the gradient of a fit is zero
 SAME = 0.2  # relative difference of two estimated sizes that give one start
 
 
 class Score(NamedTuple):
-    """What a hypothesis promises."""
+    """Screening score of a hypothesis."""
 
     hypothesis: Hypothesis
-    gain: float  # nats, under the noise that it leaves; -inf where it takes off too little for that to be asked
-    power: float  # half the sum of squares that least squares takes off, in variances of the residual
-    x: tuple[np.ndarray, ...]  # of the hypothesis, by the noise under which it was solved for
-    norm: float  # of a typical size beside the base, in standard deviations: below 3 or so nothing is seen
+    gain: float  # nats, under the noise of its own residual; -inf where it is not computed
+    power: float  # half the fall of the sum of squares by least squares, in variances of the residual
+    x: tuple[np.ndarray, ...]  # of the hypothesis, one solution for each noise
+    norm: float  # change by a typical size beside the base, in standard deviations: visible from about 3
 
 
 class Screened(NamedTuple):
-    """Scores, best first, and the linear models about which they hold: under the noise of what no hypothesis explains,
-    and by least squares."""
+    """Scores, best first, and the linear models of the base under the noise floor and by least squares."""
 
     scores: list[Score]
     about: tuple[Linear, ...]
 
     @property
     def floor(self) -> Likelihood:
-        """Noise of what no hypothesis explains."""
+        """Likelihood under the noise that no hypothesis explains."""
         return self.about[0].like
 
     def starts(self, score: Score, most: int) -> list[np.ndarray]:
-        """Places (unknowns of the base and the hypothesis) to fit from: sizes far from what a secant says as well, the
-        base moved along with each; the best first."""
+        """Starts (unknowns of the base and the hypothesis) of a fit, the lowest loss first.
+
+        Sizes include multiples of the size by the secant. The parameters of the base are adapted to each start.
+        """
         h, base = score.hypothesis, self.about[0].base
         space = base.space.add(h)
         sizes = np.array([c.kind in (SIZE, INVERSE) for c in h.coordinates], bool)
@@ -78,9 +79,9 @@ class Screened(NamedTuple):
 
 
 def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
-    """Scores of all candidates."""
+    """Screening scores of all candidates beside a fitted model."""
     own = Linear(base)
-    for h in candidates:  # simulated once, before threads ask for the same
+    for h in candidates:  # simulated once, before several threads need it
         own.start_of(h)
     changes = parallel([partial(_change, own, h) for h in candidates])
     about = own.under(floor_noise(own, [change for found in changes for change, _ in found]))
@@ -106,7 +107,7 @@ def screen(base: Fitted, candidates: list[Hypothesis]) -> Screened:
 
 
 def _first(candidates: list[Hypothesis], powers: list[float]) -> list[int]:
-    """Numbers of the candidates that take off most, and of the best of each term."""
+    """Indices of the candidates with the highest power, and of the best candidate of each term."""
     order = sorted(range(len(candidates)), key=lambda k: -powers[k])
     best: dict[str, int] = {}
     for k in order:
@@ -115,9 +116,9 @@ def _first(candidates: list[Hypothesis], powers: list[float]) -> list[int]:
 
 
 def floor_noise(about: Linear, changes: list[np.ndarray]) -> Likelihood:
-    """The likelihood with the noise of what neither a parameter nor any hypothesis explains.
+    """Likelihood under the noise that neither a parameter nor any hypothesis explains.
 
-    A noise that is estimated under the base alone holds a large effect for noise.
+    A noise that is estimated under the base alone includes any large effect.
     """
     base = about.base
     least = base.like.least
@@ -136,7 +137,7 @@ def floor_noise(about: Linear, changes: list[np.ndarray]) -> Likelihood:
 
 
 def _change(about: Linear, h: Hypothesis) -> list[tuple[np.ndarray, float]]:
-    """Change of the residual for a step of each size, about as large as the residual itself, and that step."""
+    """Changes (blocks, sensors) of the residual, about as large as the residual, and their steps, by size."""
     base = about.base
     like, space = base.like, base.space.add(h)
     own = float(np.linalg.norm(like.white(about.start)))
@@ -158,8 +159,11 @@ def _change(about: Linear, h: Hypothesis) -> list[tuple[np.ndarray, float]]:
 
 
 def _solved(about: Linear, h: Hypothesis, C: np.ndarray, r: np.ndarray, slope: np.ndarray) -> tuple[Score, np.ndarray]:
-    """Score of a hypothesis, solved for beside the parameters, and the step of both; C (blocks, sensors, sizes) is what
-    its sizes do, r are the innovations of the base, `slope` is theirs."""
+    """Score of a hypothesis, solved together with the parameters, and the step (unknowns,) of both.
+
+    Secants of its sizes are C (blocks, sensors, sizes), innovations of the base r (innovations,), and the derivative of
+    the cost at r is `slope` (unknowns,).
+    """
     base, like = about.base, about.like
     n, k = len(base.x), C.shape[2]
     white = like.white(C)
@@ -175,7 +179,7 @@ def _solved(about: Linear, h: Hypothesis, C: np.ndarray, r: np.ndarray, slope: n
         lows, highs = np.zeros(k), np.ones(k)
     whole = np.concatenate([slope, white.T @ r])
     dx = bounded_step(full, whole, x, np.concatenate([low, lows]), np.concatenate([high, highs]), DAMPING)
-    if not h.sizes:  # it is there or not
+    if not h.sizes:  # a hypothesis without sizes is present or absent
         dx[n:] = 1.0
     power = -(whole @ dx + 0.5 * dx @ full @ dx)
     at = h.start()

@@ -23,26 +23,26 @@ from rtctl.diagnose.search.extend import NEAR, Known, Merit, extended, key
 from rtctl.diagnose.search.screen import Score
 from rtctl.diagnose.search.standing import adds, merit_of, standing
 
-MOST = 4  # effects
-NAMES = (8, 4, 4)  # terms that are refitted as a second, a third and a fourth effect, beside one model or another
+MOST = 4  # effects of a model, at most
+NAMES = (8, 4, 4)  # terms that are refitted as a second, a third and a fourth effect, beside any of the models
 BEAM = (4, 3, 2)  # models that are extended by a second, a third and a fourth effect
-ALIKE = 0.995  # cosine from which two models do the same
-EXCHANGES = 2
-RIVALS, CLOSE = 3, 5.0  # models that are asked for other forms, and nats by which the best may be ahead of them
+ALIKE = 0.995  # cosine from which two models make the same change of the residual
+EXCHANGES = 2  # rounds of exchange, at most
+RIVALS, CLOSE = 3, 5.0  # models whose other forms are fitted, at most, and nats behind the best model, at most
 
 
 class Found(NamedTuple):
-    """All that was fitted."""
+    """Result of a search: the fitted models."""
 
     like: Likelihood
     base: Fitted
     scores: tuple[Score, ...]  # beside the base
     fits: tuple[Fitted, ...]  # best first, the base among them
     odds: float  # ln of the prior odds of one effect at one place
-    doubts: tuple[Fitted, ...] = ()  # models in which one number of the description is wrong by far
+    doubts: tuple[Fitted, ...] = ()  # models with a gross error in one number of the description
 
     def merit(self, f: Fitted) -> float:
-        """Logarithm of the posterior, up to a constant."""
+        """Logarithm of the posterior of a model, nats, up to a constant."""
         return merit_of(f, self.odds)
 
     @property
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 
 def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) -> Found:
-    """Fit the base, then what is missing beside it, under the observer that suits the best model.
+    """Fitted models of a recording: base and combinations of effects, under the bandwidth of the best model.
 
     The best model with one effect at most decides the bandwidth of the observer. Where the best of all models decides
     for another bandwidth, the search is repeated.
@@ -72,7 +72,7 @@ def search(like: Likelihood, space: Space, progress: Progress = lambda _: None) 
 
 
 def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Found:
-    """The same under one observer; the best models under the one `before` are rivals here as well."""
+    """Fitted models of a recording under one bandwidth; the models `before`, of another bandwidth, are rivals too."""
     base, grown, looked, odds = begin
     like = base.like  # with the times of the ticks
     merit = partial(merit_of, odds=odds)
@@ -88,7 +88,7 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
             known[key(rest.names)] = rest
         if level == MOST:
             break
-        most = 1 if silent(better[0]) else BEAM[level - 1]  # of noise alone no rival explains more
+        most = 1 if silent(better[0]) else BEAM[level - 1]  # no rival explains more than noise
         parents = [finished_in(known, f) for f in apart(base, better, most)]
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
         grown = extended(like, parents, known, NAMES[level - 1], merit)
@@ -110,7 +110,7 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
 
 
 def leading(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
-    """Models that stand, by posterior; drafts within NEAR of the best are fitted to convergence first."""
+    """Accepted models, by posterior; drafts within NEAR of the best are fitted to convergence first."""
     while True:
         order = standing(base, known, merit)
         drafts = [f for f in order if f.fresh != ALL and merit(f) > merit(order[0]) - NEAR]
@@ -121,14 +121,16 @@ def leading(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
 
 
 def finished_in(known: Known, f: Fitted) -> Fitted:
-    """Known model, fitted to convergence."""
+    """Known model, fitted to convergence and stored in `known`."""
     known[key(f.names)] = f = finished(f)
     return f
 
 
 def enriched_near(fits: Sequence[Fitted], known: Known, merit: Merit, asked: set[tuple[str, ...]]) -> list[Fitted]:
-    """Models, best first, of which the best and those near it are in the forms that the recording asks for: a rival in
-    its plain form is no rival."""
+    """Models, best first; the best and those near it have the forms with the highest evidence.
+
+    A rival in its plain form is no fair comparison.
+    """
     order = sorted(fits, key=merit, reverse=True)
     for f in order[:RIVALS]:
         if merit(f) > merit(order[0]) - CLOSE and key(f.names) not in asked:
@@ -150,7 +152,7 @@ def apart(base: Fitted, fits: Sequence[Fitted], most: int) -> list[Fitted]:
 
 
 def likeness(base: Fitted, one: Fitted, other: Fitted) -> float:
-    """Cosine of the angle between what two models take off the residual, each sensor by its least noise."""
+    """Cosine of the angle between the changes of the residual by two models, each sensor over its least noise."""
     a, b = ((base.e - f.e) / base.like.least for f in (one, other))
     return float(np.sum(a * b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
 

@@ -1,4 +1,4 @@
-"""What stands in a search: models of which every effect has a size, and brings more than the errors of the others."""
+"""Acceptance of models: every effect has a significant size, and gains more than the law errors of the others."""
 
 import numpy as np
 
@@ -11,16 +11,19 @@ from rtctl.plants.physics import TERMS
 
 
 def merit_of(f: Fitted, odds: float) -> float:
-    """Logarithm of the posterior of a combination, up to a constant; `odds` are those of one effect at one place."""
+    """Logarithm of the posterior of a combination, nats, up to a constant.
+
+    `odds` is ln of the prior odds of one effect at one place.
+    """
     return f.log_evidence - odds * len(f.space.hypotheses) - f.seldom
 
 
 def adds(base: Fitted, fewer: Fitted, more: Fitted, merit: Merit) -> bool:
-    """Whether a further effect is worth its numbers, and takes off more than what the laws of the others may be wrong
-    by, in size or in evidence, and a part of the power that the others leave, of the residual or of the force.
+    """Whether a further effect gains enough evidence, exceeds the law errors of the other effects, and explains power.
 
-    Evidence counts for an effect of another argument alone: the error of a law is a function of its own, and in a clean
-    recording the evidence of a small one is large.
+    The effect exceeds the law errors in amplitude or in evidence. It explains a share of the power of the residual, or
+    of the observer's force, under the other effects. Evidence counts only for an effect of another argument: the error
+    of a law is a function of the law's own argument, and in a clean recording the evidence of a small error is large.
     """
     gained = merit(more) - merit(fewer)
     if gained < FURTHER or not fewer.names:
@@ -39,13 +42,15 @@ def argument(term: str) -> str:
 
 
 def standing(base: Fitted, known: Known, merit: Merit) -> list[Fitted]:
-    """The models that stand, best first."""
+    """Accepted models, best first."""
     return sorted((f for f in known.values() if stands(base, f, known, merit)), key=merit, reverse=True)
 
 
 def stands(base: Fitted, f: Fitted, known: Known, merit: Merit) -> bool:
-    """Whether every effect of a combination has a size, and adds to the combination without it, as far as that was
-    fitted."""
+    """Whether a combination is accepted: each effect has a significant size and adds to the model without it.
+
+    A model without one effect is compared only where it was fitted.
+    """
     if not np.isfinite(f.log_evidence):
         return False
     if not f.names:

@@ -1,4 +1,4 @@
-"""What a recording suggests to start from: orders, wavelengths, places, limits and jumps, by node.
+"""Hints of a recording for starts: orders, wavelengths, places, limits and jumps, by node.
 
 Source: order tracking by least squares on cosine and sine of the angle; the correction of the observer as the missing
 force (Ohnishi, Shibata & Murakami 1996).
@@ -31,21 +31,21 @@ from rtctl.plants.graph.elements import contacts, undriven
 from rtctl.plants.graph.layout import layout
 from rtctl.plants.linear import MOST_SENSORS
 
-QUICK = 2.0  # times the observer's bandwidth: a faster ripple is not in what it shows
-WAVES = 24  # wavelengths tried between a tenth of the travel and twice the travel
-ROWS = 8000  # of a spectrum
-CALM = 5e-3  # s, over which an acceleration is taken
+QUICK = 2.0  # times the observer's bandwidth: fastest ripple that its correction shows
+WAVES = 24  # wavelengths a decade, from a fiftieth of the travel to twice the travel
+ROWS = 8000  # rows of a spectrum, about: longer recordings are thinned
+CALM = 5e-3  # s: step of the difference quotients of a speed and an acceleration
 SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 HOLDING = (0.995, 0.97, 0.9)  # shares of the time that a joint may hold
-GAUGE = "gauge of "  # before the name of a joint
+GAUGE = "gauge of "  # prefix of the name of a joint
 
 
 def combined(like: Likelihood, model: GraphModel) -> dict[str, list]:
-    """Hints of all recordings, in turns: those of the first first, no suggestion twice."""
+    """Hints of all recordings by kind, in turns from the first recording on, without repetition."""
     found = [hints(part.sim, model, part.rows[0]) for part in like.parts]
     out = found[0]
     for kind in out if len(found) > 1 else ():
-        if kind.startswith("jump"):  # at a time of one recording
+        if kind.startswith("jump"):  # the time of a jump belongs to one recording
             continue
         merged: list[Any] = []
         for rank in range(MOST):
@@ -55,9 +55,9 @@ def combined(like: Likelihood, model: GraphModel) -> dict[str, list]:
 
 
 def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
-    """Suggestions by kind (and node): order, wavelength, spot, grip of a joint, and jump (time, size) of a sensor.
+    """Hints by kind (and node): order, wavelength, spot, grip of a joint, and jump (time, size) of a sensor.
 
-    A sensor that the model does not follow shows orders and wavelengths in its own error.
+    The residual of a sensor that the observer does not follow shows orders and wavelengths.
     """
     record = sim.record
     gauges = gauged(model)
@@ -78,7 +78,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         return listed(along, True, lambda grid: seen(along, push[:, number], rate, grid, quick))
 
     def misread(name: str) -> list[float]:
-        """Orders or wavelengths of an error of a reading that the observer follows, as the model moves."""
+        """Orders or wavelengths of the reading error of a followed sensor, along the motion of the model."""
         sensor = sim.case.machine.sensors[name]
         body = str(sensor.body)
         number, ratio, v = sim.leader(body), sim.ratios[body], read[begin:, sim.column(name)]
@@ -100,7 +100,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
         body = str(sim.case.machine.drives[name].body)
         if sim.ratios.get(body, 0.0) != 0.0 and sim.case.machine.turns(body):
             found[f"order:{name}"] = orders_at(body, sim.volts[begin:, column][::thin])
-    errors: dict[str, np.ndarray] = {}  # of the sensors that the model does not follow
+    errors: dict[str, np.ndarray] = {}  # of the sensors that the observer does not follow
     tracked = {one.sensor for one in sim.followed}
     for name, sensor in sim.case.machine.sensors.items():
         body = str(sensor.body)
@@ -141,9 +141,9 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
 
 
 def grips(sim: Simulator, model: GraphModel, shares: tuple[float, ...] = SLIPPING) -> dict[str, list]:
-    """Limits that would hold each contact for these `shares` of the time, by what lies behind it on the rigid machine.
+    """Limits at which each contact holds for these `shares` of the time, by the rigid bodies behind the contact.
 
-    The bodies behind a contact are those that no drive moves but through it.
+    The bodies behind a contact are those that a drive moves only through the contact.
     """
     record, machine, values = sim.record, sim.case.machine, model.base
     w = max(1, round(CALM / record.dt))
@@ -169,7 +169,10 @@ def grips(sim: Simulator, model: GraphModel, shares: tuple[float, ...] = SLIPPIN
 
 
 def listed(along: Along, turns: bool, height: Callable[[np.ndarray], np.ndarray]) -> list[float]:
-    """Orders, or wavelengths in m of what slides, by their height (n,) as a function of the orders, rad^-1 or m^-1."""
+    """Orders, or wavelengths, m, of a body that slides, with the highest peaks of `height`.
+
+    `height` maps orders (n,), rad^-1 or m^-1, to heights (n,).
+    """
     if turns:
         return orders_of(float(np.ptp(along.angle)), height(ORDERS), MOST)
     waves = waves_of(along.angle)
@@ -177,12 +180,12 @@ def listed(along: Along, turns: bool, height: Callable[[np.ndarray], np.ndarray]
 
 
 def waves_of(x: np.ndarray) -> np.ndarray:
-    """Wavelengths that are tried along a way x (n,), m."""
+    """Wavelengths (2 WAVES,), m, that are tried along positions x (n,), m."""
     return (float(np.ptp(x)) or 1.0) * np.geomspace(0.02, 2.0, 2 * WAVES)
 
 
 def gauged(model: GraphModel) -> GraphModel:
-    """The model with a gauge of the force in each of its springs, as far as a machine may have so many sensors."""
+    """Model with a force sensor in each spring, up to the largest number of sensors of a machine."""
     machine = model.layout.machine
     room = MOST_SENSORS - len(machine.sensors)
     more = {
@@ -193,5 +196,5 @@ def gauged(model: GraphModel) -> GraphModel:
 
 
 def faster(sim: Simulator) -> Simulator:
-    """The observer that shows missing forces over a wider band."""
+    """Simulator with a faster observer, which shows missing forces over a wider band."""
     return sim.following(3.0)

@@ -1,7 +1,7 @@
-"""Other forms of a hypothesis: richer ones, those that differ by a setting, and the same law by another name.
+"""Other forms of a hypothesis: with more parameters, or with another setting.
 
-A search begins with the plain form. Once that stands, the record is asked for harmonics, for a second branch, for
-another shape of the same physics; and where two names of the library are one law, for the other name.
+A search begins with the plain form. Once the plain form is accepted, the search tries harmonics, a second branch, and
+another shape of the same physics.
 """
 
 from rtctl.diagnose.model.space import Hypothesis
@@ -10,13 +10,13 @@ from rtctl.plants.physics.search import Choice
 
 
 def is_rich(h: Hypothesis) -> bool:
-    """Whether it has its richer form already."""
+    """Whether a hypothesis has its richer form already."""
     more = {part[0] for part in TERMS[h.term].richer if not isinstance(part, Choice)}
     return any(c.name.partition("|")[0] in more for c in h.coordinates)
 
 
 def forms(h: Hypothesis) -> list[Hypothesis]:
-    """The same hypothesis in each of its other forms."""
+    """Hypotheses with each other value of the variant setting of the term."""
     term = TERMS[h.term]
     if term.variants is None:
         return []
