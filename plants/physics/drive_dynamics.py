@@ -191,7 +191,6 @@ LAG = Term(
     check="Look for a filter on the command input and at the gains of the current loop.",
     search=(Size("tau", "tick", 0.5, blur="driver"), Choice("order", (1, 2))),
     richer=(Shape("zeta", "one", (1.0,), 5.0), Choice("order", (2,))),
-    late="bends",
     chosen={"order": (1, 2)},
 )
 THERMAL = Term(

@@ -99,7 +99,6 @@ class Term:
     joint: Callable[[Any], dict[str, float]] | None = None  # numbers of the joint at its node
     seldom: float = 0.0  # nats of prior odds against it, where an equivalent law has a more usual name
     round: str = ""  # name of the equivalent law at a body that makes whole turns
-    late: str = ""  # "delay": a delay of the command; "bends": a law that is nearly a delay
     stiff: bool = False  # alters a spring: simulated in shorter steps
     slips: bool = False  # a contact that slips: the bodies behind it move freely
     unsigned: bool = False  # a reading without direction

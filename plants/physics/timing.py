@@ -171,7 +171,6 @@ DELAY = Term(
         "ticks that each of them holds."
     ),
     search=(Size("extra", "tick", 0.5, blur="driver"),),
-    late="delay",
     draws={"extra": Draw(0.3, 1.5, "tick")},
 )
 JITTER = Term(

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from rtctl.case.quantities import quantities
-from rtctl.diagnose.evidence.diagnosis import Effect, Interval, Rival
+from rtctl.diagnose.evidence.diagnosis import Effect, Interval, LookAlike
 from rtctl.plants.physics import TERMS, nodes
 
 PLACES = [(name, node) for name, term in TERMS.items() for node in nodes(term, "axis")]
@@ -35,7 +35,7 @@ def effect(name: str, node: str, value: float) -> Effect:
     """A term with a value for each of its numbers and all that it can be taken for on an axis."""
     fields = TERMS[name].settings.model_fields
     numbers = [n for n, f in fields.items() if f.annotation in (float, float | None)]
-    alike = [Rival(other, n, 0.1, 1.0) for other in TERMS[name].look_alikes for n in nodes(TERMS[other], "axis")]
+    alike = [LookAlike(other, n, 0.1) for other in TERMS[name].look_alikes for n in nodes(TERMS[other], "axis")]
     numbers += ["F_added"] * (name == "friction.coulomb")
     return Effect(name, node, 0.9, {n: Interval(value, 0.9 * value, 1.1 * value) for n in numbers}, tuple(alike))
 

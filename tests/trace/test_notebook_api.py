@@ -12,7 +12,7 @@ import pytest
 import rtctl
 from rtctl import api_diagnosis, api_progress
 from rtctl.diagnose.evidence.diagnosis import Effect as Found
-from rtctl.diagnose.evidence.diagnosis import Interval, Rival
+from rtctl.diagnose.evidence.diagnosis import Interval, LookAlike
 
 
 class Answer:
@@ -21,7 +21,7 @@ class Answer:
     verdict, headline, seconds = "named", "The drive pushes <b>when</b> nothing is asked for.", 1.5
     located, experiment, heldout, cannot_test, parameters = None, None, None, ("tape.slack",), {}
     effects = (Found("drive.offset", "drive", 0.97, {"offset": Interval(0.8, 0.7, 0.9, "V")},
-                     (Rival("friction.coulomb", "carriage", 0.02, float("nan")),)),)  # fmt: skip
+                     (LookAlike("friction.coulomb", "carriage", 0.02),)),)  # fmt: skip
 
     def as_json(self):
         return {"verdict": self.verdict, "nan": float("nan")}

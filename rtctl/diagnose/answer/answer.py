@@ -12,7 +12,7 @@ from rtctl.diagnose.answer.experiment import Planned, left, planned
 from rtctl.diagnose.answer.intervals import parameters, sizes
 from rtctl.diagnose.answer.load import load
 from rtctl.diagnose.calibration import SURE
-from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, Rival
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Located, LookAlike
 from rtctl.diagnose.evidence.hollow import filled
 from rtctl.diagnose.evidence.prediction import Heldout, predict
 from rtctl.diagnose.evidence.predictive import freest
@@ -95,10 +95,10 @@ class GraphDiagnosis(NamedTuple):
         said = f"{names}{' together' if len(open_) > 1 else ''} ({100 * odds:.0f} %)"
         for e in open_:
             for other in e.look_alikes[:1]:
-                if other.p_value >= TOLD:
+                if other.probability >= TOLD:
                     at = words.called(machine, f"{other.name}:{other.node}")
                     instead = f"instead of {words.called(machine, f'{e.name}:{e.node}')} " if len(open_) > 1 else ""
-                    said += f"; {instead}it may be {at} ({100 * other.p_value:.0f} %)"
+                    said += f"; {instead}it may be {at} ({100 * other.probability:.0f} %)"
         nameless = 1.0 - sum(p for _, p in self.decided.probabilities)
         number = self.decided.beside.space.doubted
         what = f"a wrong {number}" if number else "an effect without a name"
@@ -115,7 +115,7 @@ class GraphDiagnosis(NamedTuple):
                     "node": e.node,
                     "confidence": round(e.confidence, 4),
                     "parameters": {k: v.as_json() for k, v in e.parameters.items()},
-                    "look_alikes": [{"name": r.name, "node": r.node, "probability": r.p_value} for r in e.look_alikes],
+                    "look_alikes": [r._asdict() for r in e.look_alikes],
                     "check": TERMS[e.name].check,
                 }
                 for e in self.effects
@@ -197,7 +197,7 @@ def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
     out = []
     for i, h in enumerate(best.space.hypotheses):
         looks = tuple(
-            Rival(name.partition(":")[0], name.partition(":")[2], round(p, 4), float("nan"))
+            LookAlike(name.partition(":")[0], name.partition(":")[2], round(p, 4))
             for name, p in decided.rivals[i]
             if not name.startswith(f"{h.term}:")
         )
@@ -218,8 +218,8 @@ def _effects(decided: Verdict, numbers: Fitted) -> tuple[Effect, ...]:
         )
         out.append(Effect(name, node, min(ticks.probability, 0.99), {parameter: size}, ()))
     if decided.verdict == AMBIGUOUS and len(best.names) == 1:
-        others = [r for r in out[0].look_alikes if r.p_value > (1.0 - SURE) / 2][:2]
-        out += [Effect(r.name, r.node, r.p_value, {}, (), f"{out[0].name}:{out[0].node}") for r in others]
+        others = [r for r in out[0].look_alikes if r.probability > (1.0 - SURE) / 2][:2]
+        out += [Effect(r.name, r.node, r.probability, {}, (), f"{out[0].name}:{out[0].node}") for r in others]
     return tuple(out)
 
 

@@ -177,8 +177,8 @@ def rival_rows(d: GraphDiagnosis) -> list[tuple[str, ...]]:
     for e in d.effects:
         for r in e.look_alikes:
             tell = TERMS[e.name].look_alikes.get(r.name, "") or TERMS[r.name].look_alikes.get(e.name, "")
-            p = f"{100 * r.p_value:.1f} %" if r.p_value >= LEAST else "< 0.1 %"
-            if r.p_value < LEAST and not tell:
+            p = f"{100 * r.probability:.1f} %" if r.probability >= LEAST else "< 0.1 %"
+            if r.probability < LEAST and not tell:
                 continue
             names = (words.called(machine, f"{x.name}:{x.node}") for x in (e, r))
             rows.append((*names, p, tell))

@@ -16,13 +16,12 @@ class Interval(NamedTuple):
         return {"value": self.value, "ci90": [self.low, self.high], "unit": self.unit}
 
 
-class Rival(NamedTuple):
+class LookAlike(NamedTuple):
     """Look-alike of an effect, fitted in the place of the effect."""
 
     name: str
     node: str
-    p_value: float  # probability of the look-alike
-    rms: float  # rms of the weighted residual
+    probability: float
 
 
 class Effect(NamedTuple):
@@ -32,7 +31,7 @@ class Effect(NamedTuple):
     node: str
     confidence: float
     parameters: dict[str, Interval]
-    look_alikes: tuple[Rival, ...]
+    look_alikes: tuple[LookAlike, ...]
     instead_of: str | None = None  # term:node of the effect that this one would replace; None: the effect is accepted
 
 

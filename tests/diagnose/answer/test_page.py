@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rtctl.diagnose.answer import page as report
-from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, Rival
+from rtctl.diagnose.evidence.diagnosis import AMBIGUOUS, NAMED, NOTHING, UNNAMED, Effect, Interval, LookAlike
 
 VOID = {"meta", "br", "img", "hr", "link", "input"}
 CASE = {
@@ -14,7 +14,7 @@ CASE = {
 }  # fmt: skip
 STICKS = Effect(
     "friction.stribeck", "carriage", 0.9, {"F_s": Interval(2.0, 1.93, 2.07, "N"), "v_s": Interval(0.3, 0.28, 0.32)},
-    (Rival("friction.load", "carriage", 0.012, 2.5),),
+    (LookAlike("friction.load", "carriage", 0.012),),
 )  # fmt: skip
 DRAGS = Effect("friction.asymmetry", "carriage", 0.5, {"a": Interval(0.2, 0.1, 0.3)}, ())
 
