@@ -39,7 +39,7 @@ DAY = 8 * 3600.0  # s
 PIECE = 300.0  # s of a day at a time: what is held in memory
 HEALTHY = 20.0  # s before an effect begins
 WITHIN = 30.0  # s of motion
-COUNTING = 0.29  # counts: rms error of a counter
+SHOWN = 1.0  # counts rms: least change of a sensor by an effect that the motion shows
 WATCHED = 90.0  # s that a trial lasts at most
 TURN = 0.25  # s of rows at a time, as the live watch takes them
 SEED = 20250614  # of learning and days; trials add their number
@@ -188,7 +188,7 @@ def main() -> None:
         tried.append(trial(config, moves, band, seed))
         say(json.dumps(tried[-1]))
     delays = [t["delay_s"] for t in tried if t["noticed"]]
-    seen = [t for t in tried if t["shown_counts"] >= COUNTING]
+    seen = [t for t in tried if t["shown_counts"] >= SHOWN]
     slow = api.load_config("ivu", {"loop.rate": 500.0})
     fast = api.load_config("ldu")
     out = {
