@@ -259,7 +259,7 @@ def behind(s, m, c):
 
 SLIP = Term(
     name="transmission.slip",
-    remedies=("limits",),
+    remedies=("tension", "limits"),
     words="slip: pushed too hard, the contact slides and what was gained is lost for good",
     equation="|F| <= F_max; beyond it the contact slides, at (|F| - F_max) / eta",
     source="thesis 11.2 and 12.5",
@@ -306,7 +306,7 @@ SLIP = Term(
 )
 CREEP = Term(
     name="transmission.creep",
-    remedies=("limits",),
+    remedies=("tension", "limits"),
     words="creep: under load the contact loses a little on every turn",
     equation="d' = kappa F |v|",
     source="Kalker 1990; thesis 11.2",

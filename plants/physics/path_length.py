@@ -77,6 +77,7 @@ def shown(p, m, c, j, i):
 
 PATH_LENGTH = Term(
     name="tape.path_length",
+    remedies=("tension",),
     words="the path of the tape is longer where it is pulled less: the tape is stiff and stands off its guides",
     equation="y = x - excess ((F_t / T)^power - 1)",
     source="thesis chapter 3; Love 1944, ch. 19",

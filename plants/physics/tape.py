@@ -145,7 +145,7 @@ VISCOELASTIC = Term(
 )
 SLACK = Term(
     name="tape.slack",
-    remedies=("limits",),
+    remedies=("tension", "limits"),
     words="slack: the tape pulls and cannot push",
     equation="T = max(0, c e + k e')",
     source="Shelton 1986",

@@ -47,6 +47,7 @@ REMEDIES = {  # kind of remedy -> what it is; rtctl/improve/ makes each
     "delay": "gains for the true delay",
     "behind": "reference of the time that the sensor shows",
     "limits": "slower reference, so that it does not happen",
+    "tension": "another tension of the tape",
     "observer": "disturbance observer",
     "sensor": "none in a law: the sensor is to be repaired",
 }

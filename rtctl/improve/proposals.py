@@ -20,6 +20,7 @@ from rtctl.machines.profiles import profile_of
 BELOW = 0.9  # share of dry friction that is compensated: above it the machine may creep without a command
 SHARES = (0.9, 1.0, 0.75, 0.5)  # of any other effect
 SLOWER = (0.8, 0.6)  # bandwidth of the reference
+TIGHTER = (2.0, 1.5, 3.0, 0.7)  # tension of the tape
 FILTERED = 3.0  # crossovers at which the speed of a predictor is filtered
 LESS = (1.0, 0.8, 0.6, 0.45, 0.3)  # factors of the gains, tried where the margins are too small
 GAINS = ("gain", "velocity_gain")  # of a position law: the loop gain is in proportion to them
@@ -174,6 +175,15 @@ def limits(g: Ground, effect: Effect) -> Remedy | None:
     return Remedy("limits", "slower reference", effect.words, effect.interval, ways)
 
 
+def tension(g: Ground, effect: Effect) -> Remedy | None:
+    """Another tension of the tape, for a machine that sets one."""
+    own = getattr(g.found.config.law, "tension", None)
+    if own is None or own.F_t <= 0.0:
+        return None
+    ways = tuple({"law.tension.F_t": float(f"{share * own.F_t:.3g}")} for share in TIGHTER)
+    return Remedy("tension", "another tension of the tape", effect.words, effect.interval, ways)
+
+
 def notch(g: Ground, effect: Effect) -> Remedy | None:
     """Notch where the effect's motion rings."""
     hertz = getattr(effect.entry, "f_Hz", None)
@@ -199,6 +209,7 @@ MAKERS: dict[str, Callable[[Ground, Effect], Remedy | None]] = {
     "delay": predicted,
     "table": table,
     "notch": notch,
+    "tension": tension,
     "limits": limits,
 }
 PLACE = "counts from where the counter is 0: start from the same place, or from an index mark"
