@@ -60,8 +60,11 @@ class Daemon:
         self.context.destroy(linger=100)
         self.doors.close()
 
-    def ask(self, endpoint: str, op: str = "disarm", within: float = 20.0) -> dict[str, Any]:
-        """Send one request as a new client, and turn until it is answered."""
+    def ask(self, endpoint: str, op: str = "disarm", within: float = 70.0) -> dict[str, Any]:
+        """Send one request as a new client, and turn until it is answered.
+
+        A full queue of connections drops the first packets of a new one; they are sent again after 1, 3, 7, 15, 31 s.
+        """
         context = zmq.Context()
         peer = context.socket(zmq.DEALER)
         peer.connect(endpoint)
