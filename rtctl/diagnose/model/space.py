@@ -7,7 +7,6 @@ of a spring is fitted as the force at that place: the place is ill-conditioned a
 """
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,41 +84,12 @@ class Hypothesis(NamedTuple):
             **{**_defaults(self.term), "term": self.term, "node": self.node, **values}
         )
 
-    def bounds(self) -> list[tuple[float, float]]:
-        """Bounds of x, of each coordinate: those of the search, within those of the settings."""
-        out = []
-        for c in self.coordinates:
-            least, most = _limits(self.term).get(c.name, (-np.inf, np.inf))
-            if c.kind in (SIZE, PLACE):
-                least, most = (least - c.offset) / c.scale, (most - c.offset) / c.scale
-            elif c.kind == SHAPE:
-                least, most = (float(np.log(max(v, 1e-300) / c.scale)) for v in (least, most))
-            elif c.kind == INVERSE:
-                least, most = c.scale / most, np.inf
-            else:
-                least, most = -np.inf, np.inf
-            out.append((max(c.low, least), min(c.high, most)))
-        return out
-
     def start(self) -> np.ndarray:
         """Start x (coordinates,): shapes at their first guess, sizes zero."""
         return np.array([c.start for c in self.coordinates])
 
 
 _known: dict[str, dict[str, Any]] = {}
-
-
-@cache
-def _limits(term: str) -> dict[str, tuple[float, float]]:
-    """Least and largest value of each setting of a term, SI."""
-    out = {}
-    for name, field in TERMS[term].settings.model_fields.items():
-        found = {
-            key: float(getattr(m, key)) for m in field.metadata for key in ("ge", "gt", "le", "lt") if hasattr(m, key)
-        }
-        least = max(found.get("ge", -np.inf), found.get("gt", -np.inf))
-        out[name] = least, min(found.get("le", np.inf), found.get("lt", np.inf))
-    return out
 
 
 def _defaults(term: str) -> dict[str, Any]:
@@ -178,9 +148,9 @@ class Space(NamedTuple):
             tol = np.inf if name == self.doubted else BEYOND * self.tolerance(name)
             low.append(-WIDE if not np.isfinite(tol) else np.log1p(-min(tol, 0.95)))
             high.append(WIDE if not np.isfinite(tol) else np.log1p(tol))
-        for least, most in (pair for h in self.hypotheses for pair in h.bounds()):
-            low.append(least)
-            high.append(most)
+        for h in self.hypotheses:
+            low += [c.low for c in h.coordinates]
+            high += [c.high for c in h.coordinates]
         return np.array(low, float), np.array(high, float)
 
     def prior(self) -> np.ndarray:

@@ -127,8 +127,8 @@ def test_a_value_ends_somewhat_beyond_its_tolerance_either_way(tolerance):
     low, high = s.bounds()
     ends = [s.model(x).base["M"] for x in (np.where(np.isfinite(low), low, 0), np.where(np.isfinite(high), high, 0))]
     np.testing.assert_allclose(ends, [95.0 * (1 - BEYOND * tolerance), 95.0 * (1 + BEYOND * tolerance)])
-    assert (low[3:] == [-2.0, -3.0]).all()  # F_s = 0
-    assert high[3] > 1e2 and high[4] == 3.0
+    assert (low[3:] == [-np.inf, -3.0]).all()
+    assert (high[3:] == [np.inf, 3.0]).all()
 
 
 def test_an_owner_who_knows_nothing_gives_room_and_no_weight():
@@ -171,10 +171,3 @@ def test_a_spring_pulls_as_its_rest_says_however_soft_it_is(soft):
     assert -values["k"] * (0.3 - values["x0"]) == pytest.approx(3.0)
     assert -values["k"] * (0.8 - values["x0"]) == pytest.approx(3.0 - 40.0 * soft * 0.5, abs=1e-4)
     assert spring.sizes == [0, 1]
-
-
-def test_a_size_stays_within_its_setting():
-    size = Coordinate("a", SIZE, 0.1)
-    shape = Coordinate("v_s", SHAPE, 0.1, np.log(0.1), np.log(10.0))
-    assert Hypothesis("drive.gain_asymmetry", "drive", (size,)).bounds() == [(pytest.approx(-9.5), pytest.approx(9.5))]
-    assert Hypothesis("friction.stribeck", "motor", (shape,)).bounds() == [(np.log(0.1), np.log(10.0))]
