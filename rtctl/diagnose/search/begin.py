@@ -61,7 +61,7 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
         looked = screened(base)
         odds = float(np.log(max(len({score.hypothesis.name for score in looked.scores}), 1)))
         progress("fitting effect 1")
-        grown = extended(like, [base], {(): base}, NAMES, partial(merit_of, odds=odds), looked)
+        grown = extended(like, [base], {(): base}, NAMES, partial(merit_of, odds=odds), [looked])
         before, base = base, rebased(base, grown)
         if base.log_evidence < before.log_evidence + FIRST:
             break

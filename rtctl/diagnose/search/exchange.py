@@ -28,7 +28,7 @@ def exchanged(like: Likelihood, base: Fitted, best: Fitted, known: Known, looked
     ]
     for rest, these in (*gone, *emptied(like, best, known)):
         known[key(rest.names)] = rest
-        most, told = (0, looked) if alone else (OTHERS, None)
+        most, told = (0, [looked]) if alone else (OTHERS, None)
         for f in extended(like, [rest], known, most, merit, told, look_alikes(these)):
             if merit(f) > merit(best):  # a model is accepted only if it needs all of its effects
                 known |= {key(g.names): g for g in smaller(like, f, known)}

@@ -55,26 +55,26 @@ def extended(
     known: Known,
     most: int,
     merit: Merit,
-    looked: Screened | None = None,
+    looks: Sequence[Screened] | None = None,
     also: Collection[str] = (),
     passed: Collection[tuple[str, ...]] = (),
 ) -> list[Fitted]:
     """Models with one further effect, refitted for the most promising hypotheses.
 
     Each term is tried at its most promising node, then the best terms at their other nodes. `known` receives all fits.
-    `looked` holds the screening scores beside one model. The names `also` (term:node) are tried at any score, and their
+    `looks` holds the screening scores beside each model. The names `also` (term:node) are tried at any score, and their
     terms at the most promising node. With `passed` models, only other combinations of terms are tried, and only those
     that promise a gain of FURTHER.
     """
     gone = {terms_of(names) for names in passed}
     told = {name.partition(":")[0] for name in also}
-    looks = [looked if looked is not None else screened(parent) for parent in parents]
+    looks = [screened(parent) for parent in parents] if looks is None else looks
     found = [promise for pair in zip(parents, looks, strict=True) for promise in promises(*pair, merit)]
     top: dict[tuple[int, str], dict[tuple[str, ...], list[Promise]]] = {}
     for promise in in_turns(found):
-        worth = max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top)
         if gone and (terms_of(promise.names) in gone or promise.gain < merit(promise.parent) + FURTHER):
             continue
+        worth = max(promise.score.gain, promise.score.power) > LEAST and (len(top) < most or promise.term in top)
         if worth or promise.term[1] in told:
             top.setdefault(promise.term, {}).setdefault(promise.names, []).append(promise)
 

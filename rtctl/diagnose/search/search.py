@@ -19,7 +19,7 @@ from rtctl.diagnose.model.space import Space
 from rtctl.diagnose.search.begin import Begun, Progress, begun
 from rtctl.diagnose.search.enrich import enriched, restarted
 from rtctl.diagnose.search.exchange import exchanged, smaller
-from rtctl.diagnose.search.extend import NEAR, Known, Merit, extended, key
+from rtctl.diagnose.search.extend import NEAR, Known, Merit, extended, key, screened
 from rtctl.diagnose.search.screen import Score
 from rtctl.diagnose.search.standing import adds, merit_of, standing
 
@@ -91,10 +91,11 @@ def under(begin: Begun, progress: Progress, before: Sequence[Fitted] = ()) -> Fo
         most = 1 if silent(better[0]) else BEAM[level - 1]  # no rival explains more than noise
         parents = [finished_in(known, f) for f in apart(base, better, most)]
         progress(f"fitting effect {level + 1} beside {'; '.join(', '.join(f.names) for f in parents)}")
-        grown = extended(like, parents, known, NAMES[level - 1], merit)
+        looks = [screened(parent) for parent in parents]
+        grown = extended(like, parents, known, NAMES[level - 1], merit, looks)
         if not any(adds(base, _parent(f, parents), f, merit) for f in grown):
             progress(f"asking for other names of effect {level + 1}")
-            grown += extended(like, parents, known, NAMES[level - 1], merit, passed=[f.names for f in grown])
+            grown += extended(like, parents, known, NAMES[level - 1], merit, looks, passed=[f.names for f in grown])
     for f in (f for f in before if key(f.names) not in known):
         known[key(f.names)] = again = refit(like, f.space, f.x)
         known |= {key(g.names): g for g in smaller(like, again, known)}
