@@ -23,13 +23,14 @@ from typing import cast
 PIECE = 1 << 16  # bytes that are read at once, and that may wait for a slow reader
 AT_ONCE = 16  # connections that are taken before those that are there have their turn again
 LAST = 1.0  # s for what is under way when the daemon ends
+ANSWER = 5.0  # s in which nobody takes the place of who has said something: an answer to it may be under way
 
 
 class Pair:
-    """A connection and its twin. `heard` is when its owner last said something."""
+    """A connection and its twin. `keeps` is the time until which its place is its own."""
 
     def __init__(self, door: "Door", outer: socket.socket, inner: socket.socket):
-        self.door, self.heard, self.ends = door, time.monotonic(), False
+        self.door, self.keeps, self.ends = door, time.monotonic(), False
         self.other = {outer: inner, inner: outer}
         self.outer = outer
         self.waiting = {outer: bytearray(), inner: bytearray()}  # what goes out there
@@ -43,7 +44,7 @@ class Pair:
         if not data:
             self.ends = True  # what waits for the other side still goes there
         if source is self.outer:
-            self.heard = time.monotonic()
+            self.keeps = time.monotonic() + ANSWER
         self.waiting[self.other[source]] += data
 
     def flush(self, target: socket.socket) -> None:
@@ -66,7 +67,8 @@ class Pair:
 
 class Door:
     """A listening socket with `places`. Where all are taken, a new connection has the place of the one that has been
-    silent for longest if the door `replaces`, and none otherwise."""
+    silent for longest if the door `replaces`, and none otherwise. Who never said anything counts as ANSWER more silent,
+    so that a crowd of such connections takes no place from which a question was just asked."""
 
     def __init__(self, fd: int, inner: str, places: int, replaces: bool):
         self.listener = socket.socket(fileno=fd)
@@ -85,7 +87,7 @@ class Door:
                 if not self.replaces:
                     outer.close()
                     continue
-                closed(min(self.pairs, key=lambda pair: pair.heard))
+                closed(min(self.pairs, key=lambda pair: pair.keeps))
             pair = self._connected(outer)
             if pair is not None:
                 self.pairs.append(pair)

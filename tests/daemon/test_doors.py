@@ -133,6 +133,43 @@ def test_control_answers_under_a_flood_of_viewers_and_of_its_own(daemon: Daemon)
         assert daemon.ask(daemon.server.endpoint, "ping")["pid"] == os.getpid()
 
 
+def test_a_question_under_way_is_answered_whoever_comes_after_it(daemon: Daemon) -> None:
+    daemon.ask(daemon.server.endpoint)  # the door is served
+    context = zmq.Context()
+    peer = context.socket(zmq.DEALER)
+    peer.connect(daemon.server.endpoint)
+    peer.send(encode_request(1, "ping", {}))
+    assert daemon.server.socket.poll(20_000)  # it is with the daemon, which is busy, while others come
+    held: list[socket.socket] = []
+    deadline = time.monotonic() + 60
+    try:
+        while sum(was_closed(each) for each in held) < 10:  # the places are taken, and taken again
+            assert time.monotonic() < deadline
+            made = connect(daemon.server.endpoint)
+            held += [made] if made is not None else []
+            time.sleep(0.002)
+        while not peer.poll(0):
+            assert time.monotonic() < deadline, "not answered"
+            daemon.turn()
+        assert decode_reply(peer.recv()).id == 1
+    finally:
+        context.destroy(linger=0)
+        for each in held:
+            each.close()
+
+
+def was_closed(end: socket.socket) -> bool:
+    """Whether the other side has closed a connection. It reads the greeting that came first."""
+    try:
+        while end.recv(4096):
+            pass
+        return True
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
 def test_who_is_active_keeps_the_place(daemon: Daemon) -> None:
     context = zmq.Context()
     peer = context.socket(zmq.DEALER)
