@@ -20,6 +20,7 @@ from rtctl.diagnose.model.format1 import known_model
 from rtctl.diagnose.model.model import nominal
 from rtctl.diagnose.model.recording import GraphRecord
 from rtctl.diagnose.record.columns import through_amplifier
+from rtctl.diagnose.record.replayed import by_rtctl
 from rtctl.loop import fused, generate
 from rtctl.loop.loop import Loop
 from rtctl.machines import Machine
@@ -27,15 +28,12 @@ from rtctl.own.files import OwnError
 from rtctl.trace.bundle import Bundle
 from rtctl.trace.orders import Order, orders, restore
 
-NEEDED = ("tick", "order", "link_age")  # columns of every recording by rtctl
-
 
 def can_emulate(bundle: Bundle) -> bool:
     """Whether a bundle is a recording by rtctl, complete from its first tick on."""
-    columns = bundle.columns
-    if not isinstance(bundle.case.get("config"), dict) or any(name not in columns for name in NEEDED):
+    if not by_rtctl(bundle):
         return False
-    ticks = columns["tick"]
+    ticks = bundle.columns["tick"]
     return bool(ticks[0] == 0 and (np.diff(ticks) == 1).all())
 
 

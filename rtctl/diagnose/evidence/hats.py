@@ -13,8 +13,8 @@ GAP = 0.25  # of the axis: smallest gap across which no line is drawn
 def binned(
     x: np.ndarray, y: np.ndarray, law: np.ndarray, count: int, block: int, middle: Callable[..., Any] = np.median
 ) -> np.ndarray:
-    """Binned curve (4, bins) along x: centres, medians of y (or another `middle`), half widths of the 95 % bands, and
-    medians of the law.
+    """Binned curve (4, bins) along x: centres, `middle` (the median) of y, half widths of the 95 % bands, and
+    `middle` of the law.
 
     Neighbouring samples are not independent: the band comes from the scatter of the means of `block` rows, visit by
     visit. The share of the range of x plus the share of the samples is equal for all bins; a gap in x gives a column of

@@ -13,6 +13,11 @@ from rtctl.trace.replay import replay_bundle
 NEEDED = ("tick", "order", "link_age")  # columns of every recording by rtctl
 
 
+def by_rtctl(bundle: Bundle) -> bool:
+    """Whether rtctl made a recording: the case has a config, the table the columns of a tick."""
+    return isinstance(bundle.case.get("config"), dict) and all(name in bundle.columns for name in NEEDED)
+
+
 class LawReplay(NamedTuple):
     rows: int  # number of replayed rows; 0 where the replay failed
     identical: bool  # to the bit, in all written voltages
@@ -24,7 +29,7 @@ def replayed_law(bundle: Bundle) -> LawReplay | None:
 
     None where rtctl did not make the recording.
     """
-    if not isinstance(bundle.case.get("config"), dict) or any(name not in bundle.columns for name in NEEDED):
+    if not by_rtctl(bundle):
         return None
     try:
         found = replay_bundle(bundle)

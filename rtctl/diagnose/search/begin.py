@@ -22,7 +22,8 @@ from rtctl.diagnose.search.screen import Screened
 from rtctl.diagnose.search.standing import merit_of
 
 NAMES = 8  # terms that are fitted as the first effect
-REBASED = 3  # rounds of the base and of the first effect; models with one effect from which the base is refitted
+ROUNDS = 3  # of the base and of the first effect
+LEADS = 3  # best models with one effect, from whose parameters the base is refitted
 MORE = 1.0  # nats: least gain of evidence of a refitted base
 
 Progress = Callable[[str], None]
@@ -56,7 +57,7 @@ def begun(like: Likelihood, space: Space, progress: Progress) -> Begun:
             like, base = held.like, held
     base = inexact(base)
     like = base.like
-    for _ in range(REBASED):
+    for _ in range(ROUNDS):
         progress("screening every hypothesis")
         looked = screened(base)
         odds = float(np.log(max(len({score.hypothesis.name for score in looked.scores}), 1)))
@@ -73,7 +74,7 @@ def rebased(base: Fitted, grown: Sequence[Fitted]) -> Fitted:
 
     The likelihood may have several maxima: an effect may lead the fit to a higher maximum of the base.
     """
-    for f in sorted(grown, key=lambda f: f.loss)[:REBASED]:
+    for f in sorted(grown, key=lambda f: f.loss)[:LEADS]:
         if f.loss < base.loss - FIRST:
             again = refit(base.like, *without(f, 0))
             if again.log_evidence > base.log_evidence + MORE:

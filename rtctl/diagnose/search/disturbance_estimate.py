@@ -19,7 +19,7 @@ SURE, UNSURE = 6.0, 4.0  # times the noise from tick to tick: a lone jump, and a
 TWIN = 1.4  # ratio of the sizes of two neighbouring jumps, at most
 ALIKE = 2.5  # times the noise from tick to tick: size difference of equal jumps, at most
 ORDERS = np.arange(1.0, 61.0)  # per turn, whole: the force of a disc or a shaft repeats after each turn
-SMOOTH, FEWEST = 51, 200  # rows: window of a speed, and least number for a spectrum
+FEWEST = 200  # rows: least number for a spectrum
 
 
 class Along(NamedTuple):

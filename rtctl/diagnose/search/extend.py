@@ -17,9 +17,10 @@ from rtctl.diagnose.search.hypotheses import hypotheses
 from rtctl.diagnose.search.screen import Score, Screened, screen
 from rtctl.diagnose.search.suggestions import combined
 
-STARTS = 2  # starts of a fit, for each of the FIRST terms
+STARTS = 2  # starts of a fit, for each of the LEADING terms
 ALSO = 4  # starts of a fit, for the names `also`: screening estimates their sizes poorly
-FIRST = 3  # rank: terms that have several starts, and drafts that are always fitted to convergence
+LEADING = 3  # rank by screening: terms that have several starts
+SETTLED = 3  # rank by posterior: drafts that are always fitted to convergence
 OTHERS = 3  # further nodes of each of the best terms
 BEST = 2  # terms that are tried at their other nodes
 LEAST = 6.0  # nats: least gain by screening for a refit
@@ -91,7 +92,7 @@ def extended(
         (these, ALSO) for nodes in top.values() for these in nodes.values() if these[0].score.hypothesis.name in also
     ]
     first = refitted(
-        [(next(iter(nodes.values())), STARTS if rank < FIRST else 1) for rank, nodes in enumerate(top.values())]
+        [(next(iter(nodes.values())), STARTS if rank < LEADING else 1) for rank, nodes in enumerate(top.values())]
     )
     settle(known, first, merit)
     ranked = sorted(zip(top, first, strict=True), key=lambda pair: -merit(known[pair[1]]))[:BEST]
@@ -122,7 +123,7 @@ def settle(known: Known, which: Iterable[tuple[str, ...]], merit: Merit) -> None
     best, most = -np.inf, 0.0
     for rank, names in enumerate(sorted(which, key=lambda names: -merit(known[names]))):
         draft = known[names]
-        if rank >= FIRST and merit(draft) < best - most - NEAR:
+        if rank >= SETTLED and merit(draft) < best - most - NEAR:
             break
         known[names] = f = finished(draft)
         best, most = max(best, merit(f)), max(most, merit(f) - merit(draft))

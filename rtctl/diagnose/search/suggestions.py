@@ -34,6 +34,7 @@ from rtctl.plants.linear import MOST_SENSORS
 QUICK = 2.0  # times the observer's bandwidth: fastest ripple that its correction shows
 WAVES = 24  # wavelengths a decade, from a fiftieth of the travel to twice the travel
 ROWS = 8000  # rows of a spectrum, about: longer recordings are thinned
+SMOOTH = 51  # rows: window of a rate
 CALM = 5e-3  # s: step of the difference quotients of a speed and an acceleration
 SLIPPING = (0.8, 0.92, 0.97, 0.99, 0.997)  # shares of the time that a contact may hold
 HOLDING = (0.995, 0.97, 0.9)  # shares of the time that a joint may hold
@@ -66,7 +67,7 @@ def hints(sim: Simulator, model: GraphModel, begin: int) -> dict[str, list]:
     push = push[begin:] if np.isfinite(push[begin:]).all() else np.zeros_like(push[begin:])
     thin = max(1, len(push) // ROWS)
     ways = [way(sim, number)[begin:] for number in range(len(sim.followed))]
-    rates = [uniform_filter1d(np.abs(np.gradient(x)) / record.dt, 51)[::thin] for x in ways]
+    rates = [uniform_filter1d(np.abs(np.gradient(x)) / record.dt, SMOOTH)[::thin] for x in ways]
     ways, push = [x[::thin] for x in ways], push[::thin]
     quick = QUICK * faster(sim).follow
     found: dict[str, list] = {}
