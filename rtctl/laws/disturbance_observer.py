@@ -2,12 +2,14 @@
 
     r  = y - x^                                        innovation
     x^ += (1 - z^3) r,   v^ += 3/2 (1 - z)^2 (1 + z) r / dt,   d^ += (1 - z)^3 r / dt^2          z = exp(-w dt)
-    a  = K u - B v^ + d^,   x^ += dt v^ + dt^2 a / 2,   v^ += dt a                              to the next tick
+    a  = K u - K u_known + K u_beside - B v^ + d^
+    x^ += dt v^ + dt^2 a / 2,   v^ += dt a                                                      to the next tick
     u  -= share d^ / K
 
 y is the measured position, K the acceleration for one unit of command, B the viscous friction over the inertia. The
-command that has acted since the last sample is the one written `delay` ticks before. The part of the command with
-which a feedforward compensates known forces (`u_known`) is subtracted first, so that no force is compensated twice.
+command that has acted since the last sample is the one written `delay` ticks before. `u_known` is the part of it with
+which a feedforward compensates known forces; no force is compensated twice. `u_beside` is what accelerates the machine
+beside the command, in volts of a positive command: a feedforward of inertia that goes to both motors of a tape.
 
 Source: Ohnishi, Shibata & Murakami, Motion control for advanced mechatronics, IEEE/ASME Trans. Mechatronics 1 (1996);
 gains of a critically damped filter by Brookner, Tracking and Kalman Filtering Made Easy (1998), 1.3 and 2.4.
@@ -53,8 +55,8 @@ class DisturbanceObserverParams(NamedTuple):
 
 
 DISTURBANCE_OBSERVER_STATE = state(
-    x=float, v=float, d=float, u=(float, MOST_DELAY + 1), primed=int
-)  # estimates; commands of the last ticks, V, newest first
+    x=float, v=float, d=float, a=(float, MOST_DELAY + 1), primed=int
+)  # estimates; accelerations by the commands of the last ticks, newest first
 
 
 def build(settings: DisturbanceObserverSettings, dt: float) -> DisturbanceObserverParams:
@@ -80,13 +82,17 @@ def step(p, s, y):
 
 
 @tick
-def track(p, s, u_written, u_known):
-    """Predict the next sample from the command written, V, less its part against known forces."""
+def track(p, s, u_written, u_known, u_beside):
+    """Predict the next sample from the command written, its part against known forces, and what acts beside it, V.
+
+    The drive that a command pulls with is told by the sign of the command, not by that of what it leaves over.
+    """
     for i in range(p.delay, 0, -1):
-        s.u[i] = s.u[i - 1]
-    s.u[0] = u_written - u_known
-    u = s.u[p.delay]
-    a = (p.K if u > 0.0 else p.K_back) * u - p.B * s.v + s.d
+        s.a[i] = s.a[i - 1]
+    written = (p.K if u_written > 0.0 else p.K_back) * u_written
+    known = (p.K if u_known > 0.0 else p.K_back) * u_known
+    s.a[0] = written - known + p.K * u_beside
+    a = s.a[p.delay] - p.B * s.v + s.d
     s.x += p.dt * (s.v + 0.5 * p.dt * a)
     s.v += p.dt * a
 
@@ -97,8 +103,8 @@ def reset(p, s):
     s.v = 0.0
     s.d = 0.0
     s.primed = 0
-    for i in range(len(s.u)):
-        s.u[i] = 0.0
+    for i in range(len(s.a)):
+        s.a[i] = 0.0
 
 
 def systems(p: DisturbanceObserverParams, back: bool = False) -> tuple[System, System]:

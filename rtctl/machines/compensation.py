@@ -149,6 +149,7 @@ class Signals(NamedTuple):
     written: str  # what it lets through
     known: str  # V of the command that the machine's own feedforward puts against friction
     channel: dict[int, float]  # of each drive: share of the command; none where drives are shared out otherwise
+    beside: str = "0.0"  # V of a positive command that accelerate alike, and are no part of the command
 
 
 def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: Any, dt: float) -> Lines:
@@ -197,7 +198,7 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         reset.append("disturbance_observer.reset(p.observer, s.observer)")
         law.append(f"u_observer = disturbance_observer.step(p.observer, s.observer, {names.feedback})")
         acting = names.written if settings.inverse is None else f"{names.wanted} + ({names.written} - {names.asked})"
-        track.append(f"disturbance_observer.track(p.observer, s.observer, {acting}, {known})")
+        track.append(f"disturbance_observer.track(p.observer, s.observer, {acting}, {known}, {names.beside})")
         extra.append("u_observer")
     if settings.map is not None:
         uses.append("rtctl.laws.map_feedforward")

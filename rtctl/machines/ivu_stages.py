@@ -13,7 +13,16 @@ LAW_SIGNALS = {
 }  # fmt: skip
 WRITTEN = "min(max(y.u_c, p.limit.low), p.limit.high)"
 NAMES = compensation.Signals(
-    "u_pd", "y.capstan_error", "y.capstan", "y.capstan_speed", "y.u_c", "y.u_c", WRITTEN, "s.hand_over.u", {}
+    "u_pd",
+    "y.capstan_error",
+    "y.capstan",
+    "y.capstan_speed",
+    "y.u_c",
+    "y.u_c",
+    WRITTEN,
+    "s.hand_over.u",
+    {},
+    "s.inertia.u1 - s.inertia.u2 * y.R1 / y.R2",
 )
 STAGES = (
     (

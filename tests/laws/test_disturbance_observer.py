@@ -17,7 +17,7 @@ def held(push, ticks, share=1.0, known=0.0, delay=1):
     for _ in range(ticks):
         against = observer.step(p, s, x)
         u = -20.0 * x - 1.5 * v + against + known
-        observer.track(p, s, u, known)
+        observer.track(p, s, u, known, 0.0)
         acting, commands = (commands[0], [*commands[1:], u]) if delay else (u, [])
         a = K * (acting + push)
         x, v = x + DT * v + 0.5 * DT * DT * a, v + DT * a
@@ -53,7 +53,7 @@ def test_response_is_that_of_the_ticks():
         out = []
         for value in part:
             out.append(observer.step(P, s, value))
-            observer.track(P, s, 0.0, 0.0)
+            observer.track(P, s, 0.0, 0.0, 0.0)
         outs.append(np.array(out))
     seen = (outs[0] + 1j * outs[1])[-1] / y[-1]
     to_y, _ = observer.response(P, np.array([f]))
@@ -70,7 +70,7 @@ def test_response_to_the_command_is_that_of_the_ticks():
         out = []
         for value in part:
             out.append(observer.step(P, s, 0.0))
-            observer.track(P, s, value, 0.0)
+            observer.track(P, s, value, 0.0, 0.0)
         outs.append(np.array(out))
     seen = (outs[0] + 1j * outs[1])[-1] / u[-1]
     assert observer.response(P, np.array([f]))[1][0] == pytest.approx(seen, rel=1e-3)
@@ -82,15 +82,41 @@ def test_two_drives_may_pull_with_different_strength():
     x = v = 0.0
     for _ in range(4000):
         u = -20.0 * x - 1.5 * v + observer.step(p, s, x)
-        observer.track(p, s, u, 0.0)
+        observer.track(p, s, u, 0.0, 0.0)
         a = (K if u > 0 else 0.5 * K) * u + 8.0
         x, v = x + DT * v + 0.5 * DT * DT * a, v + DT * a
     assert s["d"] == pytest.approx(8.0, rel=1e-6)
     assert abs(x) < 1e-8
 
 
+def test_the_drive_that_pulls_is_that_of_the_command_however_much_of_it_friction_takes():
+    settings = SETTINGS.model_copy(update={"acceleration_back": 0.5 * K, "delay": 0})
+    p, s = observer.build(settings, DT), np.zeros(1, observer.DISTURBANCE_OBSERVER_STATE)[0]
+    x, v = 0.0, 1.0
+    for _ in range(400):  # it slows down under a command that is smaller than its friction of 0.4 V
+        observer.step(p, s, x)
+        observer.track(p, s, 0.1, 0.4, 0.0)
+        a = K * (0.1 - 0.4)
+        x, v = x + DT * v + 0.5 * DT * DT * a, v + DT * a
+    assert s["d"] == pytest.approx(0.0, abs=1e-2 * K)
+
+
+def test_what_accelerates_beside_the_command_is_no_disturbance():
+    p, s = (
+        observer.build(SETTINGS.model_copy(update={"delay": 0}), DT),
+        np.zeros(1, observer.DISTURBANCE_OBSERVER_STATE)[0],
+    )
+    x = v = 0.0
+    for _ in range(400):
+        observer.step(p, s, x)
+        observer.track(p, s, 0.2, 0.0, 0.3)
+        a = K * (0.2 + 0.3)
+        x, v = x + DT * v + 0.5 * DT * DT * a, v + DT * a
+    assert s["d"] == pytest.approx(0.0, abs=1e-6 * K)
+
+
 def test_reset_forgets(zero):
     _, s = held(0.4, 300)
     observer.reset(P, s)
-    assert s["d"] == 0.0 and not s["u"].any()
+    assert s["d"] == 0.0 and not s["a"].any()
     assert observer.step(P, s, 3.0) == 0.0  # it starts from where the machine stands
