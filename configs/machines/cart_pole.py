@@ -48,6 +48,6 @@ def M(p, J, q, out):
 
 @tick
 def h(p, J, q, v, out):
-    """Centrifugal force on the cart, N, and gravity torque on the pole, Nm: M q'' + h = force of drives and friction."""
+    """Centrifugal force on the cart, N, and gravity torque on the pole, Nm: M q'' + h = drives and friction."""
     out[0] = -p.m * p.d * math.sin(q[1]) * v[1] ** 2
     out[1] = p.m * G_N * p.d * math.sin(q[1])

@@ -53,7 +53,7 @@ def M(p, J, q, out):
 
 @tick
 def h(p, J, q, v, out):
-    """Coriolis, centrifugal and gravity torques, Nm: M q'' + h = torques of drives and friction."""
+    """Coriolis, centrifugal and gravity torques, Nm: M q'' + h = drives and friction."""
     pendulum, s, s2 = J[1] + p.m * p.d**2, math.sin(q[1]), math.sin(2.0 * q[1])
     out[0] = pendulum * s2 * v[0] * v[1] - p.m * p.r * p.d * s * v[1] ** 2
     out[1] = -0.5 * pendulum * s2 * v[0] ** 2 + p.m * G_N * p.d * s
