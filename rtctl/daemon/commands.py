@@ -30,7 +30,7 @@ LOOKS = ("status", "signals", "get", "capture_status", "watch")  # read-only: no
 
 
 class Commands:
-    """Handles one op at a time. `handle` answers at once with the current tick; the op takes effect in the next one."""
+    """Handles one op at a time. `handle` answers at once with the ticks done; the op acts one tick later at the latest."""
 
     def __init__(self, supervisor: "Supervisor"):
         self._of = supervisor

@@ -160,7 +160,7 @@ def run_lockstep(
             break
         mailbox.take(box, staged, p, c)
         skipped = behind(c[0], k, period)
-        for _ in range(skipped):  # the machine goes on while the loop stands still
+        for _ in range(skipped):  # the machine moves on while the loop stalls
             if link.receive(inp, rx, rx_staged) == 0:
                 st.failed = 1
                 break
@@ -212,7 +212,7 @@ def run_fused(
             break
         mailbox.take(box, staged, p, c)
         skipped = behind(c[0], k, period)
-        for _ in range(skipped):  # the machine goes on while the loop stands still
+        for _ in range(skipped):  # the machine moves on while the loop stalls
             advance(pp[0], ps[0], held[0])
             sample(pp[0], ps[0], rx[0])
         virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, late_ns, ahead, k, skipped)
