@@ -30,7 +30,7 @@ LOOKS = ("status", "signals", "get", "capture_status", "watch")  # read-only: no
 
 
 class Commands:
-    """Handles one op at a time. `handle` answers at once with the ticks done; the op acts one tick later at the latest."""
+    """Handles one op at a time. `handle` answers at once with the ticks done; the op acts at most one tick later."""
 
     def __init__(self, supervisor: "Supervisor"):
         self._of = supervisor
