@@ -1,15 +1,15 @@
-"""PD for an encoder of few counts: position and speed are those of a model that the edges of the encoder correct.
+"""PD controller for a coarse encoder: a model estimates position and speed, and each encoder edge corrects the model.
 
-    v' = a_ref + K_p u,  x' = v              the feedforward makes the machine follow a_ref, u does the rest
-    x held in the count [n q, (n + 1) q] that the encoder shows; where it is not, by c,  v += share c / T
+    v' = a_ref + K_p u,  x' = v              feedforward makes the machine follow a_ref; u is the feedback
+    x limited to the shown count [n q, (n + 1) q]; if the limit moves x by c,  v += share c / T
     u = gain ((ref - x) + tau_d (v_ref - v))
 
-A position counted in steps of q jumps by q at an edge, and its derivative is a kick. An edge is exact, however: in the
-tick in which it comes the position is n q to within a tick's motion. T is the time since the edge before. Friction that
-is compensated in the direction of the reference lets the machine stop and not turn round, so v never does.
+A position counted in steps of q jumps by q at an edge, and the derivative has a spike there. The edge itself is exact:
+in the tick of an edge the position is n q to within the motion of one tick. T is the time since the previous edge.
+With friction compensated in the direction of the reference the machine stops but does not reverse. So v keeps its sign.
 
 Source: Franklin, Powell & Workman, Digital Control of Dynamic Systems (1998), 8.2 (estimators); thesis (5.4) for the
-PD. Lygouras, Lalakos & Tsalides, IEEE Trans. Instrum. Meas. 47 (1998), for edges as what is exact.
+PD. Lygouras, Lalakos & Tsalides, IEEE Trans. Instrum. Meas. 47 (1998), for the exactness of edges.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ from rtctl.laws import pd
 
 
 class CoarsePdSettings(pd.PdSettings):
-    """What a person writes in the config: what the PD has, the step of the encoder, and the model."""
+    """Settings in the config: PD settings, encoder step and model."""
 
     count: float = quantity(unit="rad", gt=0, help="angle between two edges of the encoder")
     K_p: float = quantity(5.1, unit="rad/(V*s^2)", gt=0, help="process gain, with the driver")
@@ -27,7 +27,7 @@ class CoarsePdSettings(pd.PdSettings):
 
 
 class CoarsePdParams(NamedTuple):
-    """What a tick needs of it."""
+    """Parameters of a tick."""
 
     gain: float  # V/rad
     D: float  # V s/rad
@@ -41,14 +41,14 @@ COARSE_PD_STATE = state(x=float, v=float, u=float, shown=float, since=float, dir
 
 
 def build(settings: CoarsePdSettings, dt: float) -> CoarsePdParams:
-    """Params for a tick of `dt` s."""
+    """Parameters for a tick of `dt` s."""
     D = settings.gain * settings.tau_d
     return CoarsePdParams(settings.gain, D, settings.count, settings.K_p, settings.share, dt)
 
 
 @tick
 def step(p, s, x, ref, v_ref, a_ref):
-    """Command in V for the position `x` that is shown and the reference `ref`, rad, with its speed and acceleration."""
+    """Command in V for the encoder position `x` and the reference `ref`, rad, with its speed and acceleration."""
     if v_ref != 0.0:
         s.direction = 1.0 if v_ref > 0.0 else -1.0
     s.v += p.dt * (a_ref + p.K_p * s.u)
@@ -68,7 +68,7 @@ def step(p, s, x, ref, v_ref, a_ref):
 
 @tick
 def reset(p, s, x):
-    """The outputs come on where the encoder shows `x`."""
+    """Initial state at switch-on of the outputs, at encoder position `x`."""
     s.x = x
     s.v = 0.0
     s.u = 0.0

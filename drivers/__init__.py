@@ -1,1 +1,1 @@
-"""Boards, converters, sensors and amplifiers: what stands between a number in the loop and a quantity in the plant."""
+"""Boards, converters, sensors and amplifiers between the numbers of the loop and the quantities of the plant."""

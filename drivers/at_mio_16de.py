@@ -1,14 +1,15 @@
-"""Analog side of the AT-MIO-16DE-10: two 12-bit outputs and a 12-bit converter that scans up to sixteen inputs.
+"""Analog part of the AT-MIO-16DE-10: two 12-bit outputs and a 12-bit converter that scans up to sixteen inputs.
 
-Loop and plant exchange codes only, as over the bus of the PC: `volts_to_codes` and `codes_to_input_volts` belong to
-the loop, `output_step` and `input_step` to the board in the plant.
+Loop and plant exchange codes only, as over the bus of the PC. `volts_to_codes` and `codes_to_input_volts` are for the
+loop, `output_step` and `input_step` for the board in the plant.
 
 Outputs: bipolar -V_ref..V_ref in two's complement, one code is V_ref/2048; unipolar 0..V_ref, one code is V_ref/4096.
 Inputs: bipolar +-5 V/gain, unipolar 0..10 V/gain, 4096 codes over either. Converters of other cards have other `bits`.
 
 Source: thesis 7.1.1 and appendix D (mdlCheckParameters); National Instruments, AT-MIO E Series User Manual.
-Erratum: 500 kS/s is the AT-MIO-16E-2 of the same manual; comedi's board table (ni_atmio.c) has 2 us a conversion for
-that one and 10 us for the 16DE-10. The thesis's figures are kept; both are short against its period of 2 ms.
+Erratum: 500 kS/s is the rate of the AT-MIO-16E-2 in that manual. Comedi's board table (ni_atmio.c) has 2 us a
+conversion for the 16E-2 and 10 us for the 16DE-10. The thesis's figures are kept; both are short against its period of
+2 ms.
 """
 
 import math
@@ -22,15 +23,15 @@ from pydantic import Field, model_validator
 from rtctl.counted import mixed, nth
 from rtctl.idiom import Settings, quantity, state, tick
 
-INTERNAL_VOLTS = 10.0
-EXTERNAL_VOLTS = 11.0  # either way
+INTERNAL_VOLTS = 10.0  # V, internal reference
+EXTERNAL_VOLTS = 11.0  # V, largest magnitude of the external reference
 WRITE = 1e-6  # s per AO_VWrite: one 16-bit cycle on the ISA bus; the outputs cannot be written together
 SETTLING = 3e-6  # s, of both outputs
 CONVERSION = 2e-6  # s between two inputs of a scan, at 500 kS/s
 GAINS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-DITHER_CODES = 0.5  # rms
-BITS = 12  # of this board's converters
-MOST_BITS = 24  # of a card's converter
+DITHER_CODES = 0.5  # codes rms
+BITS = 12  # bits of this board's converters
+MOST_BITS = 24  # most bits of a card's converter
 
 
 class AnalogOutputSettings(Settings):
@@ -111,7 +112,7 @@ def check_inputs(inputs: Sequence[AnalogInputSettings]) -> None:
 
 
 def build_output(settings: AnalogOutputSettings, dt: float, write_order: int | None = None) -> AnalogOutputParams:
-    """Params for a tick of `dt` s. Outputs are written in channel order; give `write_order` if one stands alone.
+    """Parameters of an output for a tick of `dt` s. Outputs are written in channel order unless `write_order` is given.
 
     Raises ValueError where dt is too short for the output to settle.
     """
@@ -131,7 +132,7 @@ def build_output(settings: AnalogOutputSettings, dt: float, write_order: int | N
 def build_input(
     settings: AnalogInputSettings, dt: float, dither: bool = False, scan_index: int = 0, seed: int = 0
 ) -> AnalogInputParams:
-    """Params of the input at `scan_index` of a scan. `dither` is one switch for the whole board.
+    """Parameters of the input at position `scan_index` of a scan. `dither` applies to the whole board.
 
     Raises ValueError where dt ends before the input is converted.
     """
@@ -146,26 +147,26 @@ def build_input(
 
 @tick
 def _codes(x, code_min, code_max):
-    if math.isnan(x):  # NaN: nobody's voltage, 0 V
+    if math.isnan(x):  # NaN gives 0 V
         return 0
     return int(min(max(np.rint(x), float(code_min)), float(code_max)))
 
 
 @tick
 def volts_to_codes(p, volts):
-    """Nearest code (half to even), clipped at the ends of the range; NaN gives 0 V."""
+    """Code nearest to a voltage in V (half to even), clipped at the ends of the range; NaN gives the code of 0 V."""
     return _codes(volts / p.volts_per_code, p.code_min, p.code_max)
 
 
 @tick
 def codes_to_volts(p, codes):
-    """Voltage in V that an output holds for `codes`."""
+    """Output voltage in V for `codes`."""
     return codes * p.volts_per_code
 
 
 @tick
 def output_step(p, s, codes, h):
-    """Mean voltage (V) over the coming `h` s. A new code acts after its write, then rises linearly while it settles."""
+    """Mean output voltage (V) over the next `h` s. A new code acts after its write delay, then settles linearly."""
     if codes != s.codes:
         s.before += (s.after - s.before) * min(max((s.age - p.delay) / p.settling, 0.0), 1.0)
         s.after = codes * p.volts_per_code
@@ -201,15 +202,15 @@ def input_step(p, s, volts):
 
 @tick
 def codes_to_input_volts(p, codes):
-    """Voltage in V that an input's `codes` stand for."""
+    """Input voltage in V for `codes`."""
     return codes * p.volts_per_code
 
 
 @tick
 def _noise(seed, n):
-    """The n-th of a sequence of mean 0, rms 1, nearly Gaussian: four uniforms summed, so never beyond 3.5.
+    """The n-th number of a nearly Gaussian sequence, mean 0, rms 1: sum of four uniforms, magnitude below 3.5.
 
-    The uniforms are the four 16-bit parts of a hash of seed and n, so the state is a count and nothing else.
+    The uniforms are the four 16-bit parts of a hash of seed and n, so the state is only a count.
     """
     z = mixed(nth(seed, n))
     total = 0.0

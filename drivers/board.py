@@ -1,12 +1,12 @@
-"""What every board is asked for, emulated or real: samples in, codes out, and zero whenever something is wrong.
+"""Interface of all boards, emulated or real: samples in, codes out, outputs to zero at every error.
 
-A board speaks the frame of the link: codes of the machine's converters, whatever their bits, counts modulo 2^24,
-digital lines as bits. `Board` checks and converts, and takes the outputs to zero at open, at close and at every error;
-a card's own file only fills in `_open`, `_read_volts`, `_read_counts`, `_write_code`, `_write_lines` and `_close`, and
-`enable` where its drives have a switch of their own.
+A board uses the frame of the link: codes of the machine's converters, counts modulo 2^24, digital lines as bits.
+`Board` checks and converts, and sets the outputs to zero at open, at close and at every error. A card implements
+`_open`, `_read_volts`, `_read_counts`, `_write_code`, `_write_lines` and `_close`, and `enable` if it can switch its
+drives.
 
-An output or input is a channel of a card (volts), or a `Quantity` of a described machine (units of a drive's command,
-SI of a sensor), which boards on a bus carry as a number.
+An output or input is a channel of a card (volts), or a `Quantity` of a described machine (unit of a drive's command, SI
+unit of a sensor), which boards on a bus transmit as a number.
 
 Source: thesis 7.1.1 and appendix D for the order of the calls: mdlStart, mdlOutputs, mdlTerminate.
 """
@@ -24,31 +24,31 @@ from rtctl.drivers import at_mio_16de as mio
 from rtctl.drivers import daq_stc
 from rtctl.idiom import Settings
 
-LINES = 8  # digital lines of the board's own port
-DT = 1.0  # s: the range of a channel does not hang on the period
+LINES = 8  # digital lines of the board's port
+DT = 1.0  # s, dummy: the range of a channel does not depend on the period
 
 
 class EmulatedSettings(Settings):
-    """No card: the board is emulated with the machine."""
+    """Settings without a card: the board is emulated with the machine."""
 
     kind: Literal["emulated"] = Field("emulated", description="the machine and its board are emulated")
 
 
 class Quantity(NamedTuple):
-    """A code of the frame that is no channel of a card: a drive's command, or a number that a sensor shows."""
+    """A code of the frame without a channel of a card: a drive's command, or a reading of a sensor."""
 
     name: str
     unit: str
-    params: Any  # AnalogOutputParams or AnalogInputParams; "volts" are of `unit`
+    params: Any  # AnalogOutputParams or AnalogInputParams, with `unit` in place of volts
 
     @property
     def channel(self) -> str:
-        """What it is called in a message."""
+        """Name in messages."""
         return self.name
 
 
 class Wiring(NamedTuple):
-    """Which channels a machine uses, in the order of the frame's codes."""
+    """Channels that a machine uses, in the order of the frame's codes."""
 
     outputs: tuple[Any, ...]  # AnalogOutputSettings of a card's channel, or a Quantity
     inputs: tuple[Any, ...] = ()  # AnalogInputSettings, or a Quantity
@@ -56,8 +56,8 @@ class Wiring(NamedTuple):
     lines: tuple[int, ...] = ()  # digital lines that the loop writes; the others are inputs
     drives: tuple[str, ...] = ()  # names of the outputs, for boards on a bus
     sensors: tuple[str, ...] = ()  # names of the counters, then of the inputs
-    measures: tuple[str, ...] = ()  # position, speed, current, force: what each sensor shows
-    turns: tuple[float | None, ...] = ()  # counts or SI units of each sensor for a turn of its body, where known
+    measures: tuple[str, ...] = ()  # quantity of each sensor: position, speed, current or force
+    turns: tuple[float | None, ...] = ()  # counts or SI units of each sensor per turn of its body, where known
 
     @property
     def mask(self) -> int:
@@ -66,11 +66,11 @@ class Wiring(NamedTuple):
 
 
 class BoardError(Exception):
-    """A call of a card that failed while it runs: what was done, on which channel, and what the card says."""
+    """Failure of a card in a run, with the operation, the channel and the card's message."""
 
 
 class Board(ABC):
-    """One card with a machine's wiring. Open it before use; it may be closed twice."""
+    """A card with a machine's wiring. Open it before use; it may be closed twice."""
 
     def __init__(self, wiring: Wiring) -> None:
         self.wiring = wiring
@@ -81,11 +81,11 @@ class Board(ABC):
 
     @property
     def name(self) -> str:
-        """What card this is, for people."""
+        """Name of the card for messages."""
         return type(self).__name__
 
     def open(self) -> "Board":
-        """Find the card, set its channels up, and zero its outputs. Raises UserError where it cannot be used."""
+        """Open the card, set up its channels, and set its outputs to zero. Raises UserError where that fails."""
         try:
             self._open()
             self.is_open = True
@@ -96,9 +96,9 @@ class Board(ABC):
         return self
 
     def read(self, frame: Any) -> None:
-        """Counters and inputs of now into `frame.counter_codes` and `frame.ai_codes`. Raises BoardError.
+        """Read counters and inputs into `frame.counter_codes` and `frame.ai_codes`. Raises BoardError.
 
-        A failed read takes the outputs to zero: nobody can drive a machine that cannot be seen.
+        A failed read sets the outputs to zero: a machine without readings cannot be controlled.
         """
         with self._guarded():
             counts = self._read_counts()
@@ -111,7 +111,7 @@ class Board(ABC):
                 frame["ai_codes"][n] = nearest_code(p, value)
 
     def write(self, codes: Sequence[int], lines: int) -> None:
-        """Codes of the outputs, and the levels of the digital lines. Raises BoardError; the outputs are zero then."""
+        """Write the codes of the outputs, and the levels of the digital lines. Raises BoardError, with outputs zero."""
         with self._guarded():
             for n, p in enumerate(self.outputs):
                 if not p.code_min <= codes[n] <= p.code_max:
@@ -122,7 +122,7 @@ class Board(ABC):
             self._write([int(codes[n]) for n in range(len(self.outputs))])
 
     def zero(self) -> None:
-        """All outputs to 0 V, all written lines low. Raises BoardError once all have been tried."""
+        """Set all outputs to 0 V and all written lines low. Raises BoardError after trying all of them."""
         troubles = []
         for n in range(len(self.outputs)):
             try:
@@ -138,10 +138,10 @@ class Board(ABC):
             raise BoardError("; ".join(troubles))
 
     def enable(self, on: bool) -> None:  # noqa: B027  most cards have no such switch
-        """Power of the drives on or off, where the board switches it; called when the machine is switched on or off."""
+        """Switch the power of the drives, where the board can; called when the machine is switched on or off."""
 
     def close(self) -> None:
-        """Outputs to zero, then let go of the card."""
+        """Set the outputs to zero, then close the card."""
         if self.is_open:
             with contextlib.suppress(BoardError):
                 self.zero()
@@ -165,7 +165,7 @@ class Board(ABC):
         for n, code in enumerate(codes):
             self._write_code(n, code)
 
-    # What a card fills in; `n` counts the channels of the wiring
+    # Methods that a card implements; `n` is the index of a channel in the wiring
 
     @abstractmethod
     def _open(self) -> None: ...
@@ -187,21 +187,21 @@ class Board(ABC):
 
 
 def input_params(wire: Any) -> mio.AnalogInputParams:
-    """Range and step of an input, a channel or a Quantity."""
+    """Parameters (range and step) of an input, a channel or a Quantity."""
     found: mio.AnalogInputParams = wire.params if isinstance(wire, Quantity) else mio.build_input(wire, DT)
     return found
 
 
 def nearest_code(p: mio.AnalogInputParams, volts: float) -> int:
-    """The frame's code for a voltage, half to even, clipped at the ends of the range."""
+    """Code nearest to a voltage in V, half to even, clipped at the ends of the range."""
     return int(min(max(np.rint(volts / p.volts_per_code), p.code_min), p.code_max))
 
 
 def output_range(p: mio.AnalogOutputParams) -> tuple[float, float]:
-    """Volts of an output's ends, as a card's tables give them: -10 to 10, although the last code is one short of 10."""
+    """Range of an output in V as in a card's tables: -10 to 10, although the last code is one code below 10."""
     return p.code_min * p.volts_per_code, (p.code_max + 1) * p.volts_per_code
 
 
 def input_range(p: mio.AnalogInputParams) -> tuple[float, float]:
-    """Volts of an input's ends, as a card's tables give them."""
+    """Range of an input in V, as in a card's tables."""
     return p.code_min * p.volts_per_code, (p.code_max + 1) * p.volts_per_code

@@ -1,4 +1,4 @@
-"""Which driver stands between loop and machine: `driver:` in the config."""
+"""Choice of the driver between loop and machine: `driver:` in the config."""
 
 from typing import Annotated, Any
 
@@ -18,7 +18,7 @@ BusSettings = Annotated[EmulatedSettings | CanSettings | SerialSettings, Field(d
 
 
 def make(settings: Any, wiring: Wiring, rate: float) -> Board:
-    """The board that the config's `driver` names, not open yet; `rate` (Hz) is that of its samples.
+    """Board of the config's `driver`, not yet open; `rate` is its sample rate, Hz.
 
     Raises UserError where a bus lacks a drive or a sensor of the machine.
     """
@@ -36,7 +36,7 @@ def make(settings: Any, wiring: Wiring, rate: float) -> Board:
 
 
 def check(settings: Any, wiring: Wiring) -> None:
-    """Raise UserError where a bus lacks a drive or a sensor of the machine; of a card that shows when it is opened."""
+    """Raise UserError where a bus lacks a drive or a sensor of the machine; a card is checked when it is opened."""
     if isinstance(settings, CanSettings):
         can.check(settings, wiring)
     if isinstance(settings, SerialSettings):

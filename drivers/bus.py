@@ -1,4 +1,4 @@
-"""A board at the end of a bus or a line, whose compiled reads and writes return -errno where they fail."""
+"""Base class of boards on a bus or a serial line, whose compiled reads and writes return -errno on failure."""
 
 import os
 
@@ -6,17 +6,17 @@ from rtctl.drivers.board import Board, BoardError
 
 
 class BusBoard(Board):
-    """What boards on a CAN bus and on a serial line have in common."""
+    """Common part of boards on a CAN bus and on a serial line."""
 
-    REASONS: dict[int, str] = {}  # noqa: RUF012 -- errno to what it means on this kind of bus
+    REASONS: dict[int, str] = {}  # noqa: RUF012 -- errno -> its meaning on this kind of bus
 
     def _sent(self, result: int, what: str) -> None:
-        """Raise BoardError where something could not be sent."""
+        """Raise BoardError if `result` of a write is negative."""
         if result < 0:
             raise BoardError(f"{self.name}: {what} could not be sent: {self._why(-result)}")
 
     def _received(self, result: int) -> None:
-        """Raise BoardError where the bus could not be read."""
+        """Raise BoardError if `result` of a read is negative."""
         if result < 0:
             raise BoardError(f"{self.name}: nothing can be received: {self._why(-result)}")
 

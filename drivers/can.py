@@ -1,9 +1,9 @@
-"""Drives on a CAN bus that speak ODrive's CANSimple, through SocketCAN: a torque or a speed to each node, and its
-position, speed, current and torque back.
+"""Board of drives on a CAN bus with ODrive's CANSimple, through SocketCAN.
 
-The drive is switched on (closed loop control, torque or velocity mode, input 0) when the machine is, and idle else. A
-node that does not answer within `timeout`, leaves closed loop control, reports an error or sends what CANSimple does
-not have ends the run with every input at zero and every node idle.
+Each node gets a torque or a speed, and returns position, speed, current and torque. A drive is in closed loop control
+(torque or velocity mode, input 0 at first) while the machine is on, and idle otherwise. The run ends with every input
+at zero and every node idle if a node does not answer within `timeout`, leaves closed loop control, reports an error, or
+sends an invalid message.
 
 Source: see can_simple.py; Linux, Documentation/networking/can.rst for the sockets.
 Never run on a drive: see docs/hardware.md.
@@ -27,13 +27,13 @@ from rtctl.drivers.bus import BusBoard
 from rtctl.drivers.can_words import bus_words, error_words, state_words
 from rtctl.idiom import Settings, quantity
 
-PREFIX = "unix:"  # of an interface that is a socket of packets, where the kernel has no virtual CAN
-HELLO = 1.0  # s for the first heartbeat: ODrive sends one each 0.1 s
-TRIES = 3  # of the first answer
-SILENT = 1.0  # s without a heartbeat
+PREFIX = "unix:"  # of an interface that is a unix socket of packets, for a kernel without virtual CAN
+HELLO = 1.0  # s to wait for the first heartbeat: ODrive sends one each 0.1 s
+TRIES = 3  # attempts for the first answer
+SILENT = 1.0  # s without a heartbeat, after which a node has failed
 ENTERING = 1.0  # s for a node to enter closed loop control
 INPUTS = {"torque": (can.INPUT_TORQUE, can.TORQUE_CONTROL), "velocity": (can.INPUT_VELOCITY, can.VELOCITY_CONTROL)}
-SHOWS = {  # what a sensor measures: the message that shows it, and its value there
+SHOWS = {  # quantity of a sensor -> message with it, and field of NODE
     "position": (can.ENCODER, "position"),
     "speed": (can.ENCODER, "speed"),
     "current": (can.IQ, "current"),
@@ -45,7 +45,7 @@ ERROR_FILTER, ALL_ERRORS = 2, 0x1FFFFFFF  # CAN_RAW_ERR_FILTER, CAN_ERR_MASK
 
 
 class CanNodeSettings(Settings):
-    """The node that a drive of the machine is."""
+    """Node of a drive of the machine."""
 
     id: int = Field(ge=0, lt=can.NODES, description="node of the drive on the bus")
     input: Literal["torque", "velocity"] = Field("torque", description="what the drive is commanded with")
@@ -53,7 +53,7 @@ class CanNodeSettings(Settings):
 
 
 class CanSensorSettings(Settings):
-    """What a sensor of the machine is on the bus."""
+    """Node and scale of a sensor of the machine."""
 
     id: int = Field(ge=0, lt=can.NODES, description="node that shows it")
     per_turn: float | None = Field(
@@ -64,7 +64,7 @@ class CanSensorSettings(Settings):
 
 
 class CanSettings(Settings):
-    """Drives on a CAN bus, by ODrive's CANSimple."""
+    """Settings of drives on a CAN bus with ODrive's CANSimple."""
 
     kind: Literal["can"] = "can"
     interface: str = Field("can0", description="SocketCAN interface, or unix:PATH for a socket with emulated nodes")
@@ -76,18 +76,18 @@ class CanSettings(Settings):
 
     @property
     def place(self) -> str:
-        """Where it is, for people."""
+        """Interface, for messages."""
         return self.interface
 
 
 class CanBoard(BusBoard):
-    """The nodes of a machine. `bus` is a socket that is open already, for tests."""
+    """Board of the nodes of a machine. `bus` is an open socket, for tests."""
 
     REASONS = {  # noqa: RUF012
         errno.ENOBUFS: "the interface's queue is full, nobody acknowledges; are power, wires, termination and bit rate "
         "right?",
         errno.ENETDOWN: "the interface is down",
-        errno.EAGAIN: "the interface takes no more for now",
+        errno.EAGAIN: "the send queue of the interface is full",
     }
 
     def __init__(self, settings: CanSettings, wiring: Wiring, rate: float, bus: socket.socket | None = None) -> None:
@@ -114,7 +114,7 @@ class CanBoard(BusBoard):
     def name(self) -> str:
         return f"CANSimple at {self.settings.interface}"
 
-    # What a card fills in
+    # Methods of Board
 
     def _open(self) -> None:
         _compile(self._nodes, self._wanted)
@@ -139,7 +139,7 @@ class CanBoard(BusBoard):
         self._first_sample()
 
     def _prepare(self) -> None:
-        """Inputs to zero and idle first, whatever is said after; then errors cleared, modes set, heartbeats heard."""
+        """Set inputs to zero and nodes idle first, then clear errors, set modes, and wait for heartbeats."""
         self.zero()
         for node in self._ids:
             self._sent(can.send(self._bus, node << 5 | can.CLEAR_ERRORS, 1, 0, 0), f"node {node}: clear errors")
@@ -150,16 +150,16 @@ class CanBoard(BusBoard):
                 f"node {drive.id}: controller mode",
             )
         nodes, begun = self._nodes, time.monotonic_ns()
-        while time.monotonic_ns() - begun < HELLO * SECOND:  # an error stands in heartbeats until it is cleared
+        while time.monotonic_ns() - begun < HELLO * SECOND:  # heartbeats report an error until it is cleared
             self._received(can.sample(self._bus, nodes, self._wanted, 0, 0))
             if (nodes["heartbeat_at"] > 0).all() and not nodes["error"].any():
                 return
             time.sleep(1e-3)
 
     def _first_sample(self) -> None:
-        """Have every message once; counters begin where the machine stands."""
+        """Receive every message once; the current position becomes the zero of the counters."""
         took = []
-        for _ in range(TRIES if self.settings.ask else 1):  # a computer that is busy for a moment is no late node
+        for _ in range(TRIES if self.settings.ask else 1):  # more than once: a busy computer may delay an answer
             begun = time.monotonic_ns()
             self._received(
                 can.sample(self._bus, self._nodes, self._wanted, int(self.settings.ask), round(HELLO * SECOND))
@@ -180,13 +180,13 @@ class CanBoard(BusBoard):
         self._zero = self._values()[: self.wiring.counters]
 
     def _missing(self, since: int) -> list[tuple[int, int]]:
-        """(number in the nodes, command) of each message that has not come since, ns."""
+        """Pairs (index of the node, command) of wanted messages that have not come since `since`, ns."""
         return [
             (n, c) for n, c in self._wanted.tolist() if can.came.py_func(self._nodes.view(np.recarray)[n], c) < since
         ]
 
     def _values(self) -> np.ndarray:
-        """Each sensor (n,) in counts or SI, counters first, from the newest messages."""
+        """Readings (n,) of the sensors in counts or SI, counters first, from the newest messages."""
         values = np.empty(len(self._sensors))
         for n, (_, sensor, measures, scale) in enumerate(self._sensors):
             values[n] = scale * self._nodes[self._ids.index(sensor.id)][SHOWS[measures][1]]
@@ -214,14 +214,14 @@ class CanBoard(BusBoard):
         raise AssertionError("a machine with digital lines is refused before")
 
     def enable(self, on: bool) -> None:
-        """Closed loop control, or idle. Raises BoardError where the bus does not take it."""
+        """Request closed loop control, or idle. Raises BoardError where the request cannot be sent."""
         with self._guarded():
             self._on_since = time.monotonic_ns() if on else None
             for n in range(len(self._drives)):
                 self._request_state(n, can.CLOSED_LOOP if on else can.IDLE)
 
     def zero(self) -> None:
-        """Inputs to zero, nodes idle. Raises BoardError once all have been tried."""
+        """Set inputs to zero and nodes idle. Raises BoardError after trying all of them."""
         self._on_since = None
         troubles = []
         for n in range(len(self._drives)):
@@ -238,21 +238,21 @@ class CanBoard(BusBoard):
             self._socket.close()
         self._socket = None
 
-    # The bus, with what went wrong in words
+    # Bus access, with errors as messages
 
     def _request_state(self, n: int, state: int) -> None:
         node = self._drives[n].id
         self._sent(can.send(self._bus, node << 5 | can.SET_AXIS_STATE, 8, state, 0), f"{self._drive(n)}: its state")
 
     def _look(self) -> None:
-        """Raise BoardError where a node is late, has an error, is in another state than wanted, or talks nonsense."""
+        """Raise BoardError where a node is late, has an error, is in the wrong state, or sends an invalid message."""
         bus, now = self._bus, time.monotonic_ns()
         if bus["garbled"] >= 0:
             identifier, length = int(bus["garbled"]), int(bus["length"])
             bus["garbled"] = -1
             raise BoardError(
                 f"{self.name}: node {identifier >> 5} sent {NAMES.get(identifier & 0x1F, 'a message')} "
-                f"(0x{identifier:03X}) of {length} bytes that are no CANSimple; does another device use the identifier?"
+                f"(0x{identifier:03X}) of {length} bytes, not valid in CANSimple; do two devices use this identifier?"
             )
         if bus["errors"]:
             errors = int(bus["errors"])
@@ -281,7 +281,7 @@ class CanBoard(BusBoard):
                                  f"{state_words(int(node['state']))}; was it calibrated?")  # fmt: skip
 
     def _who(self, n: int) -> str:
-        """A node with the names of what it does in the machine."""
+        """Text for node `n`: its id, and the names of its drives and sensors."""
         node = self._ids[n]
         of = [name for name in self.wiring.drives if self.settings.nodes[name].id == node]
         of += [name for name, sensor, *_ in self._sensors if sensor.id == node and name not in of]
@@ -292,7 +292,7 @@ class CanBoard(BusBoard):
 
 
 def _compile(nodes: np.ndarray, wanted: np.ndarray) -> None:
-    """Have everything compiled before time matters, by a bus that is not there."""
+    """Compile all functions before the run, by calls on an invalid socket."""
     bus = np.zeros(1, can.BUS)[0]
     bus["fd"] = -1
     can.send(bus, 0, 0, 0, 0)
@@ -301,7 +301,7 @@ def _compile(nodes: np.ndarray, wanted: np.ndarray) -> None:
 
 
 def check(settings: CanSettings, wiring: Wiring) -> None:
-    """Raise UserError where the config's drives and sensors are not those of the machine."""
+    """Raise UserError where the drives and sensors of the config do not match the machine."""
     if wiring.lines:
         raise UserError("driver: a CANSimple drive has no digital lines, and this machine writes "
                         f"{', '.join(map(str, wiring.lines))}; use driver.kind serial or a card")  # fmt: skip
@@ -324,7 +324,7 @@ def check(settings: CanSettings, wiring: Wiring) -> None:
 
 
 def factor(name: str, sensor: CanSensorSettings, measures: str, turn: float | None) -> float:
-    """Counts or SI of a sensor for one unit of the node's message. Raises UserError where nobody has said it."""
+    """Counts or SI units of a sensor per unit of the node's message. Raises UserError where they are not known."""
     if measures not in SHOWS:
         raise UserError(f"driver.sensors.{name}: no message of CANSimple shows the {measures} of this sensor; "
                         f"it has {', '.join(SHOWS)}")  # fmt: skip
@@ -338,7 +338,7 @@ def factor(name: str, sensor: CanSensorSettings, measures: str, turn: float | No
 
 
 def connect(interface: str) -> socket.socket:
-    """A socket at an interface that never blocks. Raises UserError."""
+    """Non-blocking socket at an interface. Raises UserError."""
     try:
         if interface.startswith(PREFIX):
             made = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -354,7 +354,7 @@ def connect(interface: str) -> socket.socket:
 
 
 def _refusal(interface: str, code: int) -> str:
-    """What to do about an interface that cannot be opened."""
+    """Error message with remedy for an interface that cannot be opened."""
     if interface.startswith(PREFIX):
         return f"nothing listens at {interface.removeprefix(PREFIX)} ({os.strerror(code)})"
     if code == errno.ENODEV:

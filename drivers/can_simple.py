@@ -21,7 +21,7 @@ VELOCITY_CONTROL, TORQUE_CONTROL, PASSTHROUGH = 2, 1, 1
 NODES = 64
 EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000  # flags of an identifier
 SIZE = 16  # bytes of a frame
-MOST = 256  # frames taken in one turn: a bus that floods us cannot hold it
+MOST = 256  # frames read in one turn, so that a flood of frames cannot delay the turn
 
 NODE = state(
     id=int,
@@ -29,9 +29,9 @@ NODE = state(
     speed=float,  # turns/s
     current=float,  # A, measured
     torque=float,  # Nm, estimated
-    error=int,  # of the axis, by its newest heartbeat
+    error=int,  # error of the axis, from its newest heartbeat
     state=int,
-    encoder_at=int,  # ns, when each message last came; 0 for never
+    encoder_at=int,  # ns, time of the last message; 0 for none. So are the next three
     iq_at=int,
     torques_at=int,
     heartbeat_at=int,
@@ -41,14 +41,14 @@ BUS = state(
     wait=posix.WAIT_STATE,
     frame=(np.uint32, 4),
     errors=int,  # bits of the newest error frame of the controller, 0 for none
-    garbled=int,  # identifier of a frame that cannot be one of CANSimple, -1 for none
-    length=int,  # its bytes
+    garbled=int,  # identifier of an invalid frame, -1 for none
+    length=int,  # bytes of the invalid frame
 )
 
 
 @tick
 def send(bus, identifier, length, first, second):
-    """One frame of two words; returns 0, or -errno where the bus does not take it."""
+    """Send a frame of two words; returns 0, or -errno on failure."""
     bus.frame[0], bus.frame[1], bus.frame[2], bus.frame[3] = identifier, length, first, second
     n = posix.write(bus.fd, bus.frame, SIZE)
     return 0 if n == SIZE else n if n < 0 else posix.GONE
@@ -56,31 +56,31 @@ def send(bus, identifier, length, first, second):
 
 @tick
 def bits(value):
-    """A number as the bits of a float of 32 bits."""
+    """Bits of a number as a 32-bit float."""
     return np.float32(value).view(np.uint32)
 
 
 @tick
 def number(word):
-    """The float of 32 bits that a word holds."""
+    """Value of a word as a 32-bit float."""
     return float(np.uint32(word).view(np.float32))
 
 
 @tick
 def drive(bus, node, command, value):
-    """Input of a node: torque in Nm, or speed in turns/s with no torque beside it; 8 bytes, as ODrive sends it."""
+    """Send the input of a node: torque in Nm, or speed in turns/s without feedforward torque. 8 bytes, as ODrive."""
     return send(bus, node << 5 | command, 8, bits(value), 0)
 
 
 @tick
 def request(bus, node, command):
-    """Ask a node for a message: the same identifier with the remote flag."""
+    """Ask a node for a message, by its identifier with the remote flag."""
     return send(bus, node << 5 | command | REMOTE, 0 if command == HEARTBEAT else 8, 0, 0)
 
 
 @tick
 def take(bus, nodes, now):
-    """The frame in `bus.frame`, into the node that sent it. What is not for us is passed over."""
+    """Store the values of the frame in `bus.frame` in its node. Other frames are ignored."""
     identifier, length = int(bus.frame[0]), int(bus.frame[1]) & 0xFF
     if identifier & ERROR != 0:
         bus.errors = identifier & 0x1FFFFFFF
@@ -114,7 +114,7 @@ def take(bus, nodes, now):
 
 @tick
 def drain(bus, nodes):
-    """Take all frames that have come; returns 0, or -errno where the bus is gone."""
+    """Read all waiting frames, at most MOST; returns 0, or -errno where the bus fails."""
     for _ in range(MOST):
         n = posix.read(bus.fd, bus.frame)
         if n == posix.AGAIN:
@@ -128,7 +128,7 @@ def drain(bus, nodes):
 
 @tick
 def came(node, command):
-    """When a node's message last came, ns."""
+    """Time at which a node's message last came, ns."""
     if command == ENCODER:
         return node.encoder_at
     if command == IQ:
@@ -138,9 +138,9 @@ def came(node, command):
 
 @tick
 def sample(bus, nodes, wanted, asked, patience):
-    """Have the messages `wanted`, rows of (number in `nodes`, command), be of now; asked for where `asked` is not 0.
+    """Read waiting frames and, if `asked` is not 0, request the messages `wanted` and wait for them.
 
-    Waits `patience` ns at most. Returns 0, or -errno.
+    `wanted` is (n, 2), rows of (index in `nodes`, command). The wait is at most `patience` ns. Returns 0, or -errno.
     """
     begun = posix.now(bus.wait)
     result = drain(bus, nodes)

@@ -1,4 +1,4 @@
-"""What numbers of CANSimple and of a CAN controller mean, for people.
+"""Texts for error and state numbers of CANSimple and of a CAN controller.
 
 Source: ODriveArduino, ODriveEnums.h (firmware 0.6); linux/can/error.h.
 """
@@ -42,18 +42,18 @@ BUS_OFF, NO_ACK, BUS_ERROR = 0x40, 0x20, 0x80
 
 
 def error_words(error: int) -> str:
-    """The bits of an axis error by name, with the number. Names are those of firmware 0.6."""
+    """Text for an axis error: its number and the names of its bits in firmware 0.6."""
     known = [words for bit, words in ERRORS.items() if error & bit]
     return f"error 0x{error:X}" + (f" ({', '.join(known)})" if known else "")
 
 
 def state_words(state: int) -> str:
-    """An axis state."""
+    """Text for an axis state."""
     return STATES.get(state, f"in state {state}")
 
 
 def bus_words(errors: int) -> str:
-    """What an error frame of the controller says that ends a run; "" for what a bus recovers from."""
+    """Text for an error frame of the controller that ends a run; "" for an error from which the bus recovers."""
     if errors & BUS_OFF:
         return "the controller is off the bus after too many errors; check wires, termination and bit rate"
     if errors & NO_ACK:

@@ -1,7 +1,7 @@
-"""A real card through Comedi: libcomedi's C API by ctypes, one synchronous call a channel.
+"""Board of a real card through Comedi: libcomedi's C API by ctypes, one synchronous call for each channel.
 
-The AT-MIO-16DE-10 of the thesis is in Comedi's driver ni_atmio; its DAQ-STC counts pulses and direction, so that the
-LS7084 stays between encoder and counter. A card with decoders of its own (M series) takes A and B directly.
+Comedi's driver ni_atmio supports the AT-MIO-16DE-10 of the thesis. Its DAQ-STC counts pulses with a direction, so an
+LS7084 is needed between encoder and counter. A card with quadrature decoders (M series) takes A and B directly.
 
 Source: comedilib.h and comedi.h of Comedilib 0.11; ni_atmio.c and ni_mio_common.c for the card; NI, AT-MIO E Series
 User Manual for the pins: PFI 8 and 3 are the sources of counters 0 and 1, DIO 6 and 7 say up or down.
@@ -34,8 +34,8 @@ ARM_NOW = 0x0  # NI_GPCT_ARM_IMMEDIATE
 NO_GATE = 0x8000  # NI_GPCT_DISABLED_GATE_SELECT
 GATES = (0, 1)
 ENCODER_A, ENCODER_B = 0, 1  # NI_GPCT_SOURCE_ENCODER_?
-SOURCE_PFI = (8, 3)  # of counters 0 and 1
-PHASE_PFI = ((8, 10), (3, 11))  # A and B, M series
+SOURCE_PFI = (8, 3)  # source pins of counters 0 and 1
+PHASE_PFI = ((8, 10), (3, 11))  # pins A and B of counters 0 and 1, M series
 SEARCH = ("comedi",)
 
 
@@ -50,7 +50,7 @@ def pfi_other(pin: int) -> int:
 
 
 class ComediSettings(Settings):
-    """A card that Comedi drives."""
+    """Settings of a card with a Comedi driver."""
 
     kind: Literal["comedi"] = "comedi"
     device: str = Field("/dev/comedi0", description="device file of the card")
@@ -66,7 +66,7 @@ class ComediSettings(Settings):
 
     @property
     def place(self) -> str:
-        """Where it is, for people."""
+        """Device file, for messages."""
         return self.device
 
 
@@ -77,14 +77,14 @@ class Range(ctypes.Structure):
 
 
 class Channel(NamedTuple):
-    """One channel as Comedi addresses it, and how its raw numbers become volts."""
+    """Comedi's address of a channel, and the conversion of its raw numbers to volts."""
 
     number: int
     range: int
     aref: int
     limits: Any  # pointer to Range
     maxdata: int
-    exact: bool  # 12 bits over our range: raw is code - code_min
+    exact: bool  # the card's bits are those of the config: raw is code - code_min
 
 
 PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
@@ -117,7 +117,7 @@ PROTOTYPES: dict[str, tuple[Any, list[Any]]] = {
 
 
 def load(path: str | None) -> Any:
-    """libcomedi with its prototypes. Raises UserError where it is not there or is not whole."""
+    """libcomedi with its prototypes. Raises UserError where it is missing or lacks a function."""
     found = path or next(filter(None, map(ctypes.util.find_library, SEARCH)), None)
     if found is None:
         raise UserError("driver: libcomedi is not installed here; `apt install libcomedi0`, or give driver.library")
@@ -183,7 +183,7 @@ class ComediCard(Board):
             self._start_counter(n)
 
     def _start_counter(self, n: int) -> None:
-        """Count from the middle of the frame's 24 bits, free of any gate."""
+        """Start a counter at the middle of 24 bits, without a gate."""
         lib, dev, sub = self._lib, self._dev, self._counters[n]
         what = f"counter {n}"
         if lib.comedi_get_maxdata(dev, sub, 0) < daq_stc.SIZE - 1:
@@ -192,7 +192,7 @@ class ComediCard(Board):
         self._set(lib.comedi_data_write(dev, sub, 0, 0, 0, daq_stc.INITIAL_COUNT), what)
         for gate in GATES:
             if lib.comedi_set_gate_source(dev, sub, 0, gate, NO_GATE) < 0 and gate == 0:
-                raise self._refused(what)  # the DAQ-STC has no second gate; the others need it off
+                raise self._refused(what)  # the DAQ-STC has no second gate; other chips need it off
         mode = HW_UP_DOWN
         if self.settings.encoders == "quadrature":
             mode |= QUADRATURE[4]
@@ -234,7 +234,7 @@ class ComediCard(Board):
             self._lib.comedi_close(self._dev)
         self._dev = None
 
-    # Comedi's calls, with what went wrong in words
+    # Comedi's calls, with errors as messages
 
     def _data(self, sub: int, channel: int, range_: int, aref: int, what: str) -> int:
         if self._lib.comedi_data_read(self._dev, sub, channel, range_, aref, byref(self._word)) < 0:
@@ -261,7 +261,7 @@ class ComediCard(Board):
         external: bool,
         what: str,
     ) -> Channel:
-        """The channel's range by its ends. Raises UserError where the card has none such."""
+        """Channel with the range `limits`, V. Raises UserError where the card has no such range."""
         lib, dev = self._lib, self._dev
         wanted = (p.code_min / -p.code_min if p.code_min else 0.0, 1.0) if external else limits
         maxdata = int(lib.comedi_get_maxdata(dev, sub, number))
@@ -298,7 +298,7 @@ class ComediCard(Board):
 
 
 def refusal(device: str, code: int, why: str) -> str:
-    """What to do about a device file that does not open."""
+    """Error message with remedy for a device file that does not open."""
     if code == errno.ENOENT:
         return (
             f"driver.device: there is no {device}; load the card's module (`modprobe ni_atmio`), see `ls /dev/comedi*`"

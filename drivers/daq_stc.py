@@ -1,8 +1,8 @@
 """The two 24-bit up/down counters of the AT-MIO-16DE-10's timing chip, the DAQ-STC.
 
-A counter counts edges at its source, up or down as its DIO line says: line 6 for counter 0, line 7 for counter 1.
-It starts at half its size, so that neither direction wraps soon; the reader on the loop side is right through wraps
-all the same, as long as a tick brings fewer than 2^23 counts.
+A counter counts edges at its source. A DIO line gives the direction: line 6 for counter 0, line 7 for counter 1. It
+starts at half its size, so that neither direction wraps soon. The reader on the loop side handles wraps, as long as a
+tick has fewer than 2^23 counts.
 
 Source: thesis 7.1.1 and appendix D; National Instruments, DAQ-STC Technical Reference Manual.
 """
@@ -19,7 +19,7 @@ READER_STATE = state(n=int, previous=int, position=int)
 
 @tick
 def counter_step(s, pulses, up):
-    """Count `pulses` (not negative) up or down as the DIO line says (`up` 1 or 0); returns codes, 0 to 2^24 - 1."""
+    """Count `pulses` (not negative) up or down by the DIO line (`up` 1 or 0); returns the code, 0 to 2^24 - 1."""
     s.n += pulses if up != 0 else -pulses
     return wrapped(INITIAL_COUNT + s.n)
 
@@ -32,13 +32,13 @@ def counter_reset(s):
 
 @tick
 def wrapped(counts):
-    """Code that a counter shows at `counts`, which may lie beyond its ends."""
+    """Code of a counter at `counts`, which may be outside its range."""
     return counts & (SIZE - 1)
 
 
 @tick
 def difference(codes, previous):
-    """Counts from one code to another, by the shorter way."""
+    """Signed counts from code `previous` to `codes`, the shorter way around."""
     return wrapped(codes - previous + INITIAL_COUNT) - INITIAL_COUNT
 
 

@@ -1,6 +1,6 @@
-"""The emulated AT-MIO-16DE-10 behind the interface of a card, by the NI-DAQ calls of the thesis.
+"""Board of the emulated AT-MIO-16DE-10, through the NI-DAQ calls of the thesis.
 
-It is what the real cards are measured against: one suite of tests runs over all of them.
+It is the reference for the real cards: one test suite runs on all boards.
 
 Source: thesis appendix D (ATMIO16DE.tlc).
 """
@@ -16,7 +16,7 @@ DEVICE = 1
 
 
 class EmulatedCard(Board):
-    """A card whose wires are those of `card`, a `nidaq.EmulatedBoard`."""
+    """Board on the emulated card `card`, a `nidaq.EmulatedBoard`."""
 
     def __init__(self, wiring: Wiring, card: nidaq.EmulatedBoard | None = None, dither: bool = False) -> None:
         super().__init__(wiring)

@@ -1,4 +1,4 @@
-"""L292 switch-mode driver: a full bridge that chops at 22 kHz, with a current loop around it.
+"""L292 switch-mode driver: a full bridge that chops at 22 kHz, inside a current loop.
 
     I_M/V_I = K (1 + s R_F C_F) / (1 + 2 zeta s/w_0 + s^2/w_0^2),   K = R_2 R_4 / (R_1 R_3 R_S)
     w_0 = sqrt(G_mo R_S / (R_F C_F R_4 C)),  zeta = sqrt(R_4 C / (4 R_F C_F G_mo R_S)),  G_mo = 2 V_S / (V_R R_M)
@@ -24,7 +24,7 @@ from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
 
-TOLERANCE = 0.1  # of R C against L_M / R_M: beyond it two states do not describe the driver
+TOLERANCE = 0.1  # largest relative difference of R C and L_M / R_M; beyond it the driver has more than two states
 
 
 class L292Settings(Settings):
@@ -52,7 +52,7 @@ class L292Params(NamedTuple):
     f_osc: float  # Hz
 
 
-RIPPLE_STATE = state(cycle=float)  # part of the chopping period that has passed
+RIPPLE_STATE = state(cycle=float)  # phase in the chopping period, 0 to 1
 
 
 def gain(settings: L292Settings) -> float:
@@ -115,7 +115,7 @@ def ripple(settings: L292Settings) -> float:
 
 
 def build(settings: L292Settings, dt: float) -> L292Params:
-    """Nothing hangs on `dt`; the linear part goes into the plant's matrices. Raises as `second_order`."""
+    """Parameters, independent of `dt`; the linear part is in the plant's matrices. Raises as `second_order`."""
     K, _, _ = second_order(settings)
     I_max = min(settings.I_max, settings.V_S / settings.R_M) if settings.supply_limit else settings.I_max
     return L292Params(I_max / K, ripple(settings) if settings.ripple else 0.0, f_osc(settings))
@@ -123,7 +123,7 @@ def build(settings: L292Settings, dt: float) -> L292Params:
 
 @tick
 def limit(p, volts):
-    """Command in V clipped so that the current it asks for stays within the limit. NaN gives 0 V."""
+    """Command in V, clipped to the command of the highest current. NaN gives 0 V."""
     if math.isnan(volts):
         return 0.0
     return min(max(volts, -p.volts_max), p.volts_max)
@@ -131,7 +131,7 @@ def limit(p, volts):
 
 @tick
 def ripple_step(p, s, h):
-    """Mean of the ripple current (A) over the coming `h` s, to be added to the current: exact for a triangle."""
+    """Mean of the triangular ripple current (A) over the next `h` s, to be added to the current."""
     periods = p.f_osc * h
     end = s.cycle + periods
     end -= math.floor(end)

@@ -1,14 +1,14 @@
-"""The LDU's current amplifier: a voltage that cannot be negative, and a bit for the direction.
+"""The LDU's current amplifier: input of a non-negative voltage and a direction bit, output a current.
 
     I = 0.042 A                      V < 0.8 V         always some current
     I = 0.042 + 0.1 (V - 0.8) A      0.8 <= V <= 3.0 V
     I = 5 A                          V > 3.0 V         runaway: the zener cuts off the current feedback     (12.3)
 
-`linear` is what was meant: 0.1 A/V. `compensate` inverts the measured curve, V = |u| + 0.38 V, so that 0.1 A/V comes
-out from 0.042 A upwards. Below that no voltage gives less: 0 V is sent and 0.042 A flows in the direction of u, an
-error of at most 0.042 A that dry friction hides.
+`linear` is the nominal gain, 0.1 A/V. `compensate` inverts the measured curve, V = |u| + 0.38 V, for a gain of 0.1 A/V
+from 0.042 A upwards. Below 0.042 A, 0 V is sent and 0.042 A flows in the direction of u. The error is at most 0.042 A,
+which dry friction hides.
 
-The loop side never sends more than `limit`, rounded down to a whole code: a nearest code could lie above 3.0 V.
+The loop side never sends more than `limit`, rounded down to a whole code: the nearest code could be above 3.0 V.
 
 Source: thesis 12.2, (12.3). Erratum: the text gives 0.23 A at 3.0 V, its equation gives 0.262 A.
 """
@@ -25,7 +25,7 @@ OFFSET_AMPERE = 0.042
 KNEE_VOLTS = 0.8
 ZENER_VOLTS = 3.0
 RUNAWAY_AMPERE = 5.0
-OFFSET_VOLTS = OFFSET_AMPERE / AMPERE_PER_VOLT  # u at which the straight part begins
+OFFSET_VOLTS = OFFSET_AMPERE / AMPERE_PER_VOLT  # V, command u at which the linear part begins
 
 
 class LduAmplifierSettings(Settings):
@@ -41,17 +41,17 @@ class LduAmplifierParams(NamedTuple):
 
 
 def build(settings: LduAmplifierSettings, dt: float, volts_per_code: float = 10.0 / 2048) -> LduAmplifierParams:
-    """`volts_per_code` is that of the output that drives it. Raises ValueError where the limit allows a runaway."""
+    """Parameters for an output of `volts_per_code`. Raises ValueError where the limit allows a runaway."""
     if settings.kind == "measured" and settings.limit > ZENER_VOLTS:
         raise ValueError(f"limit {settings.limit:g} V is above 3.0 V, where the measured amplifier runs away to 5 A")
     limit = math.floor(settings.limit / volts_per_code) * volts_per_code
-    compensate = settings.compensate and settings.kind == "measured"  # the inverse of a straight line is that line
+    compensate = settings.compensate and settings.kind == "measured"  # a linear amplifier needs no compensation
     return LduAmplifierParams(int(settings.kind == "measured"), int(compensate), limit)
 
 
 @tick
 def encode(p, u):
-    """Voltage (V, 0 to limit) for a command of `u` V, meant as 0.1 A/V. NaN gives 0 V."""
+    """Input voltage (V, 0 to limit) for a command of `u` V, nominally 0.1 A/V. NaN gives 0 V."""
     volts = abs(u)
     if math.isnan(volts):
         return 0.0
@@ -81,7 +81,7 @@ def current(p, volts, direction):
 
 @tick
 def drive(p, volts, forward):
-    """Current in A for a signed voltage; at 0 V the direction bit decides, where the amplifier has an offset."""
+    """Current in A for a signed voltage; at 0 V the direction bit `forward` gives the sign of the offset."""
     if volts > 0.0:
         return current(p, volts, 1)
     if volts < 0.0:

@@ -1,7 +1,6 @@
-"""Linear encoder on the carriage: what the load does, not the motor.
+"""Linear encoder on the carriage: position of the load, not of the motor.
 
-Plant side: the scale's interpolator gives one pulse every half micrometre, floor quantised. Loop side: counts to
-metres.
+Plant side: one pulse for each half micrometre, quantised by floor. Loop side: counts to metres.
 
 Source: thesis 11.1, Heidenhain LIDA 477 with a resolution of 0.5 um.
 """
@@ -25,13 +24,13 @@ LINEAR_SCALE_STATE = state(primed=int, index=int)
 
 
 def build(settings: LinearScaleSettings, dt: float) -> LinearScaleParams:
-    """Nothing to discretise."""
+    """Parameters, independent of `dt`."""
     return LinearScaleParams(1.0 / settings.pitch, settings.pitch)
 
 
 @tick
 def step(p, s, x):
-    """Signed pulses since the last call, at position `x` (m). The first call only takes the position."""
+    """Signed pulses since the last call, at position `x` (m). The first call only stores the position."""
     counts = x * p.counts_per_metre
     if not (abs(counts) < 9e15):  # NaN or beyond what a float resolves
         return 0

@@ -1,16 +1,16 @@
-"""LS7084: turns an encoder's A and B into a clock and a direction for an up/down counter.
+"""LS7084 quadrature converter: from an encoder's A and B to clock and direction of an up/down counter.
 
 x4 gives a pulse for every edge of A and B: the count is the floor of the angle in quarter lines. A disc that vibrates
-on an edge gives as many ups as downs (the dual one-shots see both), so nothing adds up.
+on an edge gives as many pulses up as down (the dual one-shots see both), so no error accumulates.
 
-x1 gives a pulse where A rises, up when B is low there and down when B is high. Going back, A rises at the other end of
-its high half, so x1 has a hysteresis of three quarters of a line; an edge passed forth and back again counts once.
+x1 gives a pulse where A rises, up when B is low and down when B is high. In reverse, A rises at the other end of its
+high half, so x1 has a hysteresis of three quarters of a line. An edge passed forwards and back again counts once.
 
-A one-shot makes every pulse as long as the bias resistor says (0.2 us to hundreds of us), and the input filter takes
-only levels that stand for `filter`. Above the rate that follows, counts are lost for good: `s.lost` says how many.
+A one-shot sets the length of every pulse by the bias resistor (0.2 us to hundreds of us). The input filter passes only
+levels longer than `filter`. Both limit the rate; counts above the limit are lost, and `s.lost` counts them.
 
-Source: thesis 7.1.1, 7.4; LSI Computer Systems, LS7083/LS7084 data sheet (T_OW <= T_PS). The sheet's filter time hangs
-on the supply; 0.2 us is of its order.
+Source: thesis 7.1.1, 7.4; LSI Computer Systems, LS7083/LS7084 data sheet (T_OW <= T_PS). In the sheet the filter time
+depends on the supply; 0.2 us is of its order.
 """
 
 import math
@@ -20,7 +20,7 @@ from pydantic import Field
 
 from rtctl.idiom import Settings, quantity, state, tick
 
-EPSILON = 1e-9  # of a pulse: rounding of the carried room must not lose a pulse at exactly the highest rate
+EPSILON = 1e-9  # pulses, against rounding of `room`: no pulse may be lost at exactly the highest rate
 
 
 class Ls7084Settings(Settings):
@@ -42,12 +42,12 @@ LS7084_STATE = state(primed=int, index=int, room=float, lost=int)
 
 
 def highest_rate(settings: Ls7084Settings) -> float:
-    """Pulses per second that the one-shot and the filter let through."""
+    """Highest rate of pulses that one-shot and filter pass, 1/s."""
     return min(1.0 / settings.pulse_width, settings.multiply / (4.0 * settings.filter))
 
 
 def build(settings: Ls7084Settings, dt: float) -> Ls7084Params:
-    """Nothing hangs on `dt`: the steps get their own length."""
+    """Parameters, independent of `dt`: each step gets its own length."""
     counts_per_rev = float(settings.lines * settings.multiply)
     quarters = 4 * settings.lines / (2 * math.pi)
     return Ls7084Params(
@@ -57,9 +57,9 @@ def build(settings: Ls7084Settings, dt: float) -> Ls7084Params:
 
 @tick
 def step(p, s, theta, h):
-    """Signed pulses over a substep of `h` s that ends at `theta` (rad). The first call only takes the position."""
+    """Signed pulses over a substep of `h` s that ends at `theta` (rad). The first call only stores the position."""
     x = theta * p.quarters_per_radian
-    if not (abs(x) < 9e15):  # NaN or beyond what a float resolves: no edge to see
+    if not (abs(x) < 9e15):  # NaN, or beyond the resolution of a float
         return 0
     quarter = math.floor(x)
     if s.primed == 0:
@@ -68,11 +68,11 @@ def step(p, s, theta, h):
         s.room = 1.0
         return 0
     index = quarter
-    if p.multiply == 1:  # up on entering quarter 4n, down on leaving 4n - 2 backwards, as it is in between
+    if p.multiply == 1:  # up at entry of quarter 4n, down at exit of 4n - 2 in reverse, else unchanged
         index = min(max(s.index, quarter // 4), (quarter + 2) // 4)
     pulses = index - s.index
     s.index = index
-    # A one-shot at rest can fire at once, hence one pulse of room on top of what the time allows.
+    # A one-shot at rest can fire at once, so one pulse more than the rate allows may pass.
     room = s.room + p.highest_rate * h
     passed = min(abs(pulses), math.floor(room + EPSILON))
     s.room = min(room - passed, 1.0)

@@ -1,7 +1,7 @@
-"""The NI-DAQ calls of the thesis's driver block, by name, on an emulated board.
+"""Emulated board with the NI-DAQ calls of the thesis's driver block, by name.
 
-Each call takes the device number first, as in C, and raises `NidaqError` with NI-DAQ's code where C returns it. What C
-writes through a pointer is returned. The wires are attributes: `input_volts`, `output_volts()`, `pulse()`, `dio`.
+Each call takes the device number first, as in C. It raises `NidaqError` where C returns an error code, and returns
+values that C writes through a pointer. The plant's side is `input_volts`, `output_volts()`, `pulse()` and `dio`.
 
 Source: thesis appendix D (ATMIO16DE.tlc); National Instruments, NI-DAQ Function Reference Manual for PC Compatibles.
 """
@@ -50,7 +50,7 @@ POLARITIES: tuple[Polarity, ...] = ("bipolar", "unipolar")
 
 
 class NidaqError(Exception):
-    """A call that NI-DAQ would refuse: `code` as in C, and a sentence that says why."""
+    """A call that NI-DAQ would refuse, with its error code `code` as in C, and a reason."""
 
     def __init__(self, name: str, reason: str) -> None:
         super().__init__(f"{name} ({CODES[name]}): {reason}")
@@ -85,7 +85,7 @@ class _Counter:
 class EmulatedBoard:
     """One AT-MIO-16DE-10, or a card of its family with converters of other `bits`.
 
-    `dt` (s) is the period that its outputs have to settle, `seed` that of its dither.
+    `dt` is the sample period, s, in which its outputs must settle; `seed` is the seed of its dither.
     """
 
     def __init__(self, device: int = 1, dt: float = 0.002, seed: int = 0, bits: int = mio.BITS) -> None:
@@ -102,14 +102,14 @@ class EmulatedBoard:
         self.codes = [0, 0]
         self.counters = {ND_COUNTER_0: _Counter(), ND_COUNTER_1: _Counter()}
 
-    # The wires
+    # The plant's side
 
     def output_volts(self, chan: int) -> float:
         """Settled voltage of output `chan`, V."""
         return float(mio.codes_to_volts(self.outputs[chan], self.codes[chan])) if chan in self.outputs else 0.0
 
     def pulse(self, counter: int, pulses: int) -> None:
-        """Edges at the source of counter 0 or 1, counted as its DIO line says."""
+        """Edges at the source of counter 0 or 1, counted in the direction of its DIO line."""
         c = self.counters[(ND_COUNTER_0, ND_COUNTER_1)[counter]]
         if c.armed:
             c.count(pulses, self.dio[daq_stc.DIO_LINE[counter]] if c.hardware else 1)
@@ -123,7 +123,7 @@ class EmulatedBoard:
         return AT_MIO_16DE_10
 
     def MIO_Config(self, device: int, dither: int, use_amux: int) -> None:
-        """Dither on (1) or off (0), for all inputs at once."""
+        """Switch dither on (1) or off (0), for all inputs."""
         self._check(device)
         _require(dither in (0, 1), "invalidValueError", f"dither is 0 or 1, not {dither}")
         _require(use_amux == 0, "invalidValueError", "there is no AMUX-64T on this board; useAMUX is 0")
@@ -139,7 +139,7 @@ class EmulatedBoard:
         self.inputs[chan] = MODES[mode], POLARITIES[polarity]
 
     def SCAN_Setup(self, device: int, num_chans: int, chans: Sequence[int], gains: Sequence[float]) -> None:
-        """The inputs of a scan, ascending, each with its gain; -1 stands for 0.5."""
+        """Set the inputs of a scan, in ascending order, each with its gain; -1 stands for 0.5."""
         self._check(device)
         _require(num_chans == len(chans) == len(gains), "invalidValueError",
                  f"{num_chans} channels, but {len(chans)} numbers and {len(gains)} gains")  # fmt: skip
@@ -213,14 +213,14 @@ class EmulatedBoard:
             raise NidaqError("gpctrBadParamIDError", "parameter is ND_UP_DOWN or ND_INITIAL_COUNT")
 
     def AI_VRead_Scan(self, device: int) -> list[float]:
-        """Voltages of the scan, V, in its order."""
+        """Voltages of the inputs, V, in the order of the scan."""
         self._check(device)
         _require(bool(self.scan), "noSetupError", "SCAN_Setup was not called")
         codes = [(p, mio.input_step(p, s, float(self.input_volts[chan]))) for chan, p, s in self.scan]
         return [float(mio.codes_to_input_volts(p, c)) for p, c in codes]
 
     def GPCTR_Watch(self, device: int, counter: int, entity: int) -> int:
-        """ND_COUNT: the count, 0 to 2^24 - 1, without disturbing it."""
+        """ND_COUNT: the count, 0 to 2^24 - 1, without changing it."""
         c = self._counter(device, counter)
         _require(entity == ND_COUNT, "gpctrBadEntityIDError", "entity is ND_COUNT")
         return c.count(0, 1)

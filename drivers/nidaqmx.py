@@ -1,8 +1,8 @@
-"""A real card through NI-DAQmx: National Instruments' own `nidaqmx` package (`pip install 'rtctl[nidaqmx]'`).
+"""Board of a real card through NI-DAQmx: National Instruments' `nidaqmx` package (`pip install 'rtctl[nidaqmx]'`).
 
-For today's cards (X and M series); DAQmx knows no AT-MIO. One task for the outputs, one for the inputs, one a counter,
-one for the digital lines that the loop writes. With `timing: hardware` the card's clock takes the samples and a read
-waits for the next; otherwise each read takes one when it is asked.
+For current cards (X and M series); DAQmx does not support the AT-MIO. One task for the outputs, one for the inputs, one
+for each counter, and one for the digital lines that the loop writes. With `timing: hardware` the card's clock triggers
+the samples and a read waits for the next one; otherwise each read takes a sample.
 
 Source: NI-DAQmx Python documentation (stream_readers, stream_writers); NI-DAQmx Help, Hardware-Timed Single Point.
 Never run on a card: see docs/hardware.md.
@@ -22,11 +22,11 @@ from rtctl.drivers.board import Board, BoardError, Wiring, input_range, output_r
 from rtctl.idiom import Settings, quantity
 
 TERMINALS = {"rse": "RSE", "nrse": "NRSE", "differential": "DIFF"}
-TIMEOUT = 0.1  # s; a card that takes longer is not there any more
+TIMEOUT = 0.1  # s for a call; after it the card has failed
 
 
 class NidaqmxSettings(Settings):
-    """A card that NI-DAQmx drives."""
+    """Settings of a card with NI-DAQmx."""
 
     kind: Literal["nidaqmx"] = "nidaqmx"
     device: str = Field("Dev1", description="name of the card in NI MAX or `nilsdev`")
@@ -42,12 +42,12 @@ class NidaqmxSettings(Settings):
 
     @property
     def place(self) -> str:
-        """Where it is, for people."""
+        """Device name, for messages."""
         return self.device
 
 
 class NidaqmxCard(Board):
-    """A card by its DAQmx name. `rate` (Hz) is the sample clock's with `timing: hardware`."""
+    """Board of a card by its DAQmx name. `rate` is the sample clock's rate, Hz, with `timing: hardware`."""
 
     def __init__(self, settings: NidaqmxSettings, wiring: Wiring, rate: float) -> None:
         super().__init__(wiring)
@@ -84,7 +84,7 @@ class NidaqmxCard(Board):
                             "docs/hardware.md for what Linux needs") from error  # fmt: skip
 
     def _find(self) -> str:
-        """Product name of the card. Raises UserError where it is not there or has too few channels."""
+        """Product name of the card. Raises UserError where the card is missing or lacks a channel."""
         system = self._daqmx.system.System.local()
         names = list(system.devices.device_names)
         if self.settings.device not in names:
@@ -172,7 +172,7 @@ class NidaqmxCard(Board):
                 )
             task.start()
             reader = self._readers.CounterReader(task.in_stream)
-            scaled = self.settings.encoders == "quadrature"  # positions come as a float, also in ticks
+            scaled = self.settings.encoders == "quadrature"  # positions are floats, even in ticks
             read = reader.read_one_sample_double if scaled else reader.read_one_sample_uint32
             self._counters.append(functools.partial(read, TIMEOUT))
 
@@ -184,7 +184,7 @@ class NidaqmxCard(Board):
         return [int(self._call(f"reading counter {n}", read)) for n, read in enumerate(self._counters)]
 
     def _write(self, codes: Sequence[int]) -> None:
-        """All outputs in one call: the card moves them together."""
+        """Write all outputs in one call, so that the card changes them together."""
         for n, code in enumerate(codes):
             self._volts[n] = code * self.outputs[n].volts_per_code
         self._call("writing outputs", lambda: self._out.write_one_sample(self._volts, TIMEOUT))
@@ -198,7 +198,7 @@ class NidaqmxCard(Board):
 
     def _close(self) -> None:
         while self._tasks:
-            with contextlib.suppress(Exception):  # each of them, whatever the others say
+            with contextlib.suppress(Exception):  # close the others after an error
                 self._tasks.pop().close()
 
     def _call(self, what: str, call: Callable[[], Any]) -> Any:
@@ -209,5 +209,5 @@ class NidaqmxCard(Board):
 
 
 def brief(error: Exception) -> str:
-    """The first sentence of what DAQmx says; it says a page."""
+    """First line of a DAQmx error message, which may fill a page."""
     return str(error).strip().split("\n")[0].strip()

@@ -1,8 +1,7 @@
-"""Optical sensor on a reel: 209 dark and light stretches a turn, one light beam, hence blind to direction.
+"""Optical sensor on a reel: 209 dark and light marks a turn, one light beam, so without direction.
 
-Plant side: a voltage of 0 to 5 V with flanks as wide as the beam. Loop side: an analog input samples it and a
-comparator with hysteresis counts the rising edges, so that noise on a flank is not counted, but a reel that turns
-back counts up all the same.
+Plant side: a voltage of 0 to 5 V with flanks as wide as the beam. Loop side: an analog input samples the voltage, and a
+comparator with hysteresis counts rising edges. Noise on a flank is not counted, but a reel that turns back counts up.
 
 Source: thesis 6.1, 7.1.1, 7.4; appendix B (figures B.2, B.3).
 """
@@ -36,7 +35,7 @@ OPTICAL_SENSOR_STATE = state(primed=int, high=int, counts=int)
 
 
 def build(settings: OpticalSensorSettings, dt: float) -> OpticalSensorParams:
-    """Raises ValueError where the comparator's levels are crossed."""
+    """Parameters, independent of `dt`. Raises ValueError where the comparator's low level is not below the high one."""
     if settings.low >= settings.high:
         raise ValueError(
             f"the comparator's low level {settings.low:g} V must lie below its high level {settings.high:g} V"
@@ -49,7 +48,7 @@ def build(settings: OpticalSensorSettings, dt: float) -> OpticalSensorParams:
 def highest_speed(settings: OpticalSensorSettings, dt: float) -> float:
     """Speed in rad/s up to which no edge is missed when the voltage is sampled every `dt` s.
 
-    Every stretch above `high` and every stretch below `low` must hold a sample. With the defaults 7.2 rad/s at 2 ms.
+    Every interval above `high` and every interval below `low` must contain a sample. Default: 7.2 rad/s at 2 ms.
     """
     over = 0.5 - settings.flank * (2 * settings.high / FULL_VOLTS - 1)
     under = 0.5 - settings.flank * (1 - 2 * settings.low / FULL_VOLTS)
@@ -67,7 +66,7 @@ def volts(p, theta):
 
 @tick
 def count(p, s, volts):
-    """Rising edges so far, from one sample in V. The first call only takes the level."""
+    """Number of rising edges so far, with a new sample in V. The first call only stores the level."""
     if s.primed == 0:
         s.primed = 1
         s.high = 1 if volts > p.high else 0
@@ -81,5 +80,5 @@ def count(p, s, volts):
 
 @tick
 def radians(p, counts):
-    """Angle turned in rad, either way, at `counts`."""
+    """Angle turned in rad, without direction, at `counts`."""
     return counts * p.radians_per_count

@@ -1,4 +1,4 @@
-"""Reads and writes of a file descriptor that never block, from compiled code. What fails returns -errno.
+"""Non-blocking reads and writes of a file descriptor for compiled code. A failed call returns -errno.
 
 Source: read(2), write(2), ppoll(2), clock_gettime(2), errno(3).
 """
@@ -27,28 +27,28 @@ WAIT_STATE = state(polled=(int, 1), spec=(int, 2))  # pollfd and timespec
 
 @tick
 def now(s):
-    """Time in ns of CLOCK_MONOTONIC, as rtctl.tick.clock, which is a floor above, and as time.monotonic_ns."""
+    """Time in ns of CLOCK_MONOTONIC, as time.monotonic_ns; drivers must not import rtctl.tick.clock."""
     _clock(CLOCK_MONOTONIC, s.spec.ctypes.data)
     return s.spec[0] * SECOND + s.spec[1]
 
 
 @tick
 def read(fd, buffer):
-    """Up to as many bytes as `buffer`, an array, holds; returns how many, 0 at the end of a stream."""
+    """Read at most the size of the array `buffer`; returns the number of bytes, 0 at the end of a stream."""
     n = _read(fd, buffer.ctypes.data, buffer.size * buffer.itemsize)
     return n if n >= 0 else -int(carray(_errno(), 1)[0])
 
 
 @tick
 def write(fd, buffer, size):
-    """The first `size` bytes of `buffer`; returns how many were taken."""
+    """Write the first `size` bytes of `buffer`; returns the number of bytes written."""
     n = _write(fd, buffer.ctypes.data, size)
     return n if n >= 0 else -int(carray(_errno(), 1)[0])
 
 
 @tick
 def wait(s, fd, nanoseconds):
-    """Wait for something to read, `nanoseconds` at most; returns 1, 0 where nothing came."""
+    """Wait at most `nanoseconds` for data to read; returns 1, 0 after a time-out, or -errno."""
     s.polled[0] = fd | (POLLIN << 32)
     left = max(nanoseconds, 0)
     s.spec[0], s.spec[1] = left // SECOND, left % SECOND

@@ -1,8 +1,8 @@
-"""A microcontroller on a serial or USB line as a board: outputs, inputs, counters and lines in a small frame.
+"""Board of a microcontroller on a serial or USB line: outputs, inputs, counters and lines in a small frame.
 
-One frame of outputs goes out a turn and one sample comes back. The device takes its outputs to zero by itself where it
-hears nothing for `timeout`; a device that does not answer for that long, reports a fault or whose line is gone ends the
-run with the outputs at zero.
+Each turn sends one frame of outputs and receives one sample. The device sets its outputs to zero by itself if it gets
+no frame for `timeout`. The run ends with the outputs at zero if the device does not answer for `timeout`, reports a
+fault, or its line fails.
 
 Source: serial_frame.py for the frame; examples/serial_board/ for the other end in C; termios(3).
 Never run on a device: see docs/hardware.md.
@@ -27,7 +27,7 @@ from rtctl.drivers.board import LINES, BoardError, Wiring
 from rtctl.drivers.bus import BusBoard
 from rtctl.idiom import Settings, quantity
 
-HELLO = 3.0  # s: a board with a bootloader starts anew when its port is opened
+HELLO = 3.0  # s to wait for the answer to a hello: a board with a bootloader restarts when its port is opened
 AGAIN = 0.2  # s between two hellos
 SECOND = 1_000_000_000
 BAUDS = tuple(
@@ -36,7 +36,7 @@ BAUDS = tuple(
 
 
 class SerialSettings(Settings):
-    """A microcontroller on a serial or USB line."""
+    """Settings of a microcontroller on a serial or USB line."""
 
     kind: Literal["serial"] = "serial"
     port: str = Field("/dev/ttyACM0", description="device file of the line")
@@ -48,16 +48,16 @@ class SerialSettings(Settings):
 
     @property
     def place(self) -> str:
-        """Where it is, for people."""
+        """Device file, for messages."""
         return self.port
 
 
 class SerialBoard(BusBoard):
-    """A device at a port. `fd` is a line that is open already, for tests."""
+    """Board of a device at a port. `fd` is an open line, for tests."""
 
     REASONS = {  # noqa: RUF012
         **dict.fromkeys((errno.EIO, errno.EPIPE, errno.ENXIO), "the port is gone; was the device pulled out?"),
-        errno.EAGAIN: "the line takes no more; does the device read?",
+        errno.EAGAIN: "the send buffer is full; does the device read?",
     }
 
     def __init__(self, settings: SerialSettings, wiring: Wiring, rate: float, fd: int | None = None) -> None:
@@ -70,13 +70,13 @@ class SerialBoard(BusBoard):
         self._device = ""
         self._on, self._levels = 0, 0
         self._start: list[int] = []
-        self.unread = False  # whether the answer to the newest outputs was read yet
+        self.unread = False  # whether the answer to the newest outputs has yet to be read
 
     @property
     def name(self) -> str:
         return self.settings.port + (f" ({self._device})" if self._device else "")
 
-    # What a card fills in
+    # Methods of Board
 
     def _open(self) -> None:
         self._fd = self._given if self._given is not None else connect(self.settings)
@@ -90,7 +90,7 @@ class SerialBoard(BusBoard):
         line["number"], line["answered"], line["sent_at"] = 0, -1, 0
         line["answered_at"] = line["heard_at"] = time.monotonic_ns()
         self.zero()
-        while line["answered"] != line["number"]:  # counters begin where the machine stands
+        while line["answered"] != line["number"]:  # the current position becomes the zero of the counters
             self._received(frame.sample(line, self._patience))
             self._look()
         self._start = [int(n) for n in line["counts"][: w.counters]]
@@ -102,7 +102,7 @@ class SerialBoard(BusBoard):
         while not line["hello"]:
             now = time.monotonic()
             if now - begun > HELLO:
-                what = "answers nothing" if not line["garbled"] else "answers what is no frame of rtctl"
+                what = "does not answer" if not line["garbled"] else "sends bytes that are no rtctl frame"
                 raise UserError(f"driver.port: {self.settings.port} {what} within {HELLO:g} s; does the device run the "
                                 f"firmware of docs/hardware.md, at {self.settings.baud} baud?")  # fmt: skip
             if now - said > AGAIN:
@@ -141,14 +141,14 @@ class SerialBoard(BusBoard):
         self._ship()
 
     def _write_lines(self, bits: int) -> None:
-        self._levels = bits & ((1 << LINES) - 1)  # they go with the outputs, in one frame
+        self._levels = bits & ((1 << LINES) - 1)  # sent with the outputs, in one frame
 
     def enable(self, on: bool) -> None:
-        """Tell the device with the next frame whether the machine is on."""
+        """Set the state, on or off, that the next frame reports to the device."""
         self._on = int(on)
 
     def zero(self) -> None:
-        """Outputs to zero, lines low, off, in one frame. Raises BoardError where the line does not take it."""
+        """Send outputs zero, lines low and state off, in one frame. Raises BoardError where it cannot be sent."""
         self._line["outputs"], self._on, self._levels = 0.0, 0, 0
         self._ship()
 
@@ -158,7 +158,7 @@ class SerialBoard(BusBoard):
 
     def _read_counts(self) -> Sequence[int]:
         line = self._line
-        if not self.unread:  # a second read asks once more, with the same outputs
+        if not self.unread:  # another read without a write: send the outputs again
             self._ship()
         self._received(frame.sample(line, self._patience))
         self.unread = False
@@ -167,7 +167,7 @@ class SerialBoard(BusBoard):
         return [daq_stc.INITIAL_COUNT + int(n) - start for n, start in zip(counts, self._start, strict=True)]
 
     def _look(self) -> None:
-        """Raise BoardError where the device is late, silent, or has a fault."""
+        """Raise BoardError where the device is late or silent, or reports a fault."""
         line, now = self._line, time.monotonic_ns()
         age, silent = ((now - int(line[at])) / 1e6 for at in ("answered_at", "heard_at"))
         limit = self.settings.timeout * 1e3
@@ -191,14 +191,14 @@ class SerialBoard(BusBoard):
 
 
 def check(wiring: Wiring) -> None:
-    """Raise UserError where a machine has more than the frame carries."""
+    """Raise UserError where a machine has more outputs, inputs or counters than a frame can hold."""
     for what, n in (("outputs", len(wiring.outputs)), ("inputs", len(wiring.inputs)), ("counters", wiring.counters)):
         if n > frame.MOST:
             raise UserError(f"driver: the machine has {n} {what}; a serial board carries {frame.MOST}")
 
 
 def _compile() -> None:
-    """Have everything compiled before time matters, by a line that is not there."""
+    """Compile all functions before the run, by calls on an invalid file descriptor."""
     line = np.zeros(1, frame.LINE)[0]
     line["fd"] = -1
     frame.say_hello(line, 0)
@@ -208,7 +208,7 @@ def _compile() -> None:
 
 
 def connect(settings: SerialSettings) -> int:
-    """The file descriptor of a line in raw mode. Raises UserError."""
+    """File descriptor of a line in raw mode. Raises UserError."""
     if settings.baud not in BAUDS:
         raise UserError(f"driver.baud: {settings.baud} is no rate of a serial line here; there is "
                         f"{', '.join(map(str, sorted(BAUDS)))}")  # fmt: skip
@@ -230,7 +230,7 @@ def connect(settings: SerialSettings) -> int:
 
 
 def _refusal(port: str, code: int) -> str:
-    """What to do about a device file that does not open."""
+    """Error message with remedy for a device file that does not open."""
     if code == errno.ENOENT:
         return f"there is no {port}; plug the device in, see `ls /dev/ttyACM* /dev/ttyUSB*`"
     if code in (errno.EACCES, errno.EPERM):

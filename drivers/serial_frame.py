@@ -1,13 +1,14 @@
-"""The frame between rtctl and a microcontroller on a serial or USB line, compiled: bytes to values and back.
+"""Frame between rtctl and a microcontroller on a serial or USB line: compiled encoding and decoding.
 
     A5  kind  length  payload (length bytes)  CRC, two bytes, low one first
 
 The CRC is CRC-16/CCITT-FALSE (polynomial 1021, start FFFF) over kind, length and payload. Numbers are little-endian,
 floats IEEE 754 of 32 bits. docs/hardware.md has the table; examples/serial_board/rtctl_board.h is the other end in C.
 
-01 hello, of the host: version, 2 bytes of time-out in ms. 81 hello, of the device: version, outputs, inputs, counters,
-lines that it can write as bits, name (0 to 16 bytes). 02 outputs, of the host: number, on, lines, a float an output.
-82 sample, of the device: number of the outputs that it answers, fault, lines, 4 bytes a counter, a float an input.
+    01 hello of the host      version, 2 bytes of time-out in ms
+    81 hello of the device    version, outputs, inputs, counters, writable lines as bits, name (0 to 16 bytes)
+    02 outputs of the host    number, on, lines, a float for each output
+    82 sample of the device   number of the answered outputs, fault, lines, 4 bytes a counter, a float an input
 """
 
 import numpy as np
@@ -17,41 +18,41 @@ from rtctl.idiom import state, tick
 
 SYNC, VERSION = 0xA5, 1
 HELLO, HELLO_BACK, OUTPUTS, SAMPLE = 0x01, 0x81, 0x02, 0x82
-MOST = 16  # outputs, inputs and counters, each
-HEAD, TAIL, LONGEST = 3, 2, 255
-FRAME = HEAD + LONGEST + TAIL
-ROOM = 4096  # bytes taken from the line at a time
+MOST = 16  # most outputs, inputs and counters, each
+HEAD, TAIL, LONGEST = 3, 2, 255  # bytes before, after and in the longest payload
+FRAME = HEAD + LONGEST + TAIL  # bytes
+ROOM = 4096  # bytes in one read
 
 LINE = state(
     fd=int,
     wait=posix.WAIT_STATE,
     out=(np.uint8, FRAME),
-    came=(np.uint8, ROOM),  # as read
-    frame=(np.uint8, FRAME),  # that is being put together
-    at=int,  # bytes of it
-    garbled=int,  # frames whose checksum or length was wrong, since the start
-    number=int,  # of the newest outputs
-    sent_at=(int, 256),  # ns, by number
-    answered=int,  # newest number that was answered, -1 for none
-    answered_at=int,  # ns at which the outputs that it answers were sent
+    came=(np.uint8, ROOM),  # bytes as read
+    frame=(np.uint8, FRAME),  # frame in assembly
+    at=int,  # bytes in `frame`
+    garbled=int,  # frames with a wrong checksum, length or kind, since the start
+    number=int,  # number of the newest outputs
+    sent_at=(int, 256),  # ns at which outputs were sent, by number
+    answered=int,  # newest answered number, -1 for none
+    answered_at=int,  # ns at which the answered outputs were sent
     heard_at=int,  # ns at which the newest answer came
-    fault=int,  # of the device, 0 for none
+    fault=int,  # fault of the device, 0 for none
     lines=int,
-    hello=int,  # 1 once the device has said what it is
-    told=(np.uint8, LONGEST),  # its hello
+    hello=int,  # 1 once the device has sent its hello
+    told=(np.uint8, LONGEST),  # payload of the device's hello
     told_length=int,
     counts=(np.uint32, MOST),
     inputs=(np.float32, MOST),
     outputs=(np.float32, MOST),
-    counters=int,  # how many of each
-    reads=int,
-    writes=int,
+    counters=int,  # number of counters
+    reads=int,  # number of inputs
+    writes=int,  # number of outputs
 )
 
 
 @tick
 def checksum(data, begin, end):
-    """CRC-16/CCITT-FALSE of a part of an array of bytes."""
+    """CRC-16/CCITT-FALSE of the bytes `begin` to `end` (not included) of an array."""
     crc = 0xFFFF
     for i in range(begin, end):
         crc ^= int(data[i]) << 8
@@ -62,14 +63,14 @@ def checksum(data, begin, end):
 
 @tick
 def word(line, at):
-    """Four bytes of a frame as a number."""
+    """Unsigned number in four bytes of the received frame."""
     f = line.frame
     return int(f[at]) | int(f[at + 1]) << 8 | int(f[at + 2]) << 16 | int(f[at + 3]) << 24
 
 
 @tick
 def ship(line, kind, length):
-    """Send a frame whose payload stands in `line.out`; returns 0, or -errno where the line does not take it whole."""
+    """Send a frame whose payload is in `line.out`; returns 0, or -errno where it cannot be sent in full."""
     line.out[0], line.out[1], line.out[2] = SYNC, kind, length
     crc = checksum(line.out, 1, HEAD + length)
     line.out[HEAD + length], line.out[HEAD + length + 1] = crc & 0xFF, crc >> 8
@@ -82,7 +83,7 @@ def ship(line, kind, length):
 
 @tick
 def say_hello(line, timeout_ms):
-    """Ask the device what it is; it takes its outputs to zero where it hears nothing for `timeout_ms`."""
+    """Send a hello with the time-out after which the device sets its outputs to zero."""
     line.out[3], line.out[4], line.out[5] = VERSION, timeout_ms & 0xFF, timeout_ms >> 8
     return ship(line, HELLO, 3)
 
@@ -102,7 +103,7 @@ def drive(line, on, lines):
 
 @tick
 def accept(line):
-    """A frame that is whole and whose checksum is right, into the values; one of another length is garbled."""
+    """Store the values of a complete frame with the right checksum; a wrong length or kind counts as garbled."""
     kind, length = int(line.frame[1]), int(line.frame[2])
     if kind == HELLO_BACK:
         for i in range(length):
@@ -125,7 +126,7 @@ def accept(line):
 
 @tick
 def put(line, byte):
-    """The next byte of the line."""
+    """Add the next byte of the line to the frame; a complete frame is checked and stored."""
     if line.at == 0 and byte != SYNC:
         return
     line.frame[line.at] = byte
@@ -140,7 +141,7 @@ def put(line, byte):
         accept(line)
         return
     line.garbled += 1
-    for i in range(1, size):  # the frame may begin within what was taken for one
+    for i in range(1, size):  # the real frame may begin inside these bytes
         if line.frame[i] == SYNC:
             for k in range(i, size):
                 line.frame[k - i] = line.frame[k]
@@ -152,7 +153,7 @@ def put(line, byte):
 
 @tick
 def drain(line):
-    """Take all bytes that have come; returns 0, or -errno where the line is gone."""
+    """Read the waiting bytes; returns 0, or -errno where the line fails."""
     n = posix.read(line.fd, line.came)
     if n == posix.AGAIN:
         return 0
@@ -165,7 +166,7 @@ def drain(line):
 
 @tick
 def sample(line, patience):
-    """Wait for the answer to the newest outputs, `patience` ns at most; returns 0, or -errno."""
+    """Wait at most `patience` ns for the answer to the newest outputs; returns 0, or -errno."""
     end = posix.now(line.wait) + patience
     result = drain(line)
     while result == 0 and line.answered != line.number:

@@ -3,12 +3,12 @@
     M = [ J0 + m r^2 + J sin^2 a    m r d cos a ]      h = [ J sin(2a) q0' q1' - m r d sin a q1'^2   ]
         [ m r d cos a               J           ]          [ -J/2 sin(2a) q0'^2 + m g d sin a        ]
 
-q0 is the angle of the arm, a = q1 that of the pendulum, 0 where it hangs. J0 is the arm's inertia about its axis, with
-what turns with it; J = J1 + m d^2 is the pendulum's about its joint, J1 that of the body `pendulum` about its centre
-of mass.
+q0 is the angle of the arm; a = q1 is the angle of the pendulum, 0 where it hangs. J0 is the inertia of the arm and the
+rotor about the arm's axis. J = J1 + m d^2 is the inertia of the pendulum about its joint; J1 is the inertia of the body
+`pendulum` about its centre of mass.
 
 Source: Cazzolato & Prime, On the dynamics of the Furuta pendulum, J. Control Science and Engineering (2011), eq. 33,
-for a slender pendulum. Friction is that of the bodies in the description.
+for a slender pendulum. The description of the bodies gives the friction.
 """
 
 import math
@@ -21,7 +21,7 @@ G_N = 9.80665  # m/s^2
 
 
 class FurutaSettings(Settings):
-    """What a person writes in the config, under `parameters`."""
+    """Settings in the config, under `parameters`."""
 
     m: float = quantity(unit="kg", gt=0, help="mass of the pendulum")
     r: float = quantity(unit="m", gt=0, help="from the arm's axis to the pendulum's joint")
@@ -29,7 +29,7 @@ class FurutaSettings(Settings):
 
 
 class FurutaParams(NamedTuple):
-    """What M and h need of it."""
+    """Parameters of M and h."""
 
     m: float
     r: float
@@ -37,7 +37,7 @@ class FurutaParams(NamedTuple):
 
 
 def build(settings: FurutaSettings, h: float) -> FurutaParams:
-    """Nothing to discretise."""
+    """Parameters of M and h: nothing depends on the step `h`."""
     return FurutaParams(settings.m, settings.r, settings.d)
 
 
@@ -53,7 +53,7 @@ def M(p, J, q, out):
 
 @tick
 def h(p, J, q, v, out):
-    """Torques of motion and weight, Nm, on the side of M q''."""
+    """Coriolis, centrifugal and gravity torques, Nm: M q'' + h = drives and friction."""
     pendulum, s, s2 = J[1] + p.m * p.d**2, math.sin(q[1]), math.sin(2.0 * q[1])
     out[0] = pendulum * s2 * v[0] * v[1] - p.m * p.r * p.d * s * v[1] ** 2
     out[1] = -0.5 * pendulum * s2 * v[0] ** 2 + p.m * G_N * p.d * s

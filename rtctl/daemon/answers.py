@@ -1,4 +1,4 @@
-"""What others ask of a machine that runs: its state, counts, times and signals of now."""
+"""Answers of a running machine: its current state, counts, times and signals."""
 
 import os
 from typing import Any
@@ -16,7 +16,7 @@ from rtctl.trace.recorder import Recorder
 
 
 class Answers:
-    """A part of the supervisor: it reads what is there and changes nothing."""
+    """Read-only part of the supervisor: answers from its records."""
 
     config: Any
     machine: Machine
@@ -34,7 +34,7 @@ class Answers:
     last_row: Any = None
 
     def snapshot(self) -> dict[str, Any]:
-        """State, counts and times of now, as `rtctl status` and the run's JSON give them."""
+        """Current state, counts and times, as in `rtctl status` and in the run's JSON."""
         s = self.status
         trip = safety.TRIPS[int(s["trip"])]
         return {
@@ -69,17 +69,17 @@ class Answers:
         }
 
     def report(self) -> dict[str, Any]:
-        """The snapshot with the newest row beside it: what `status` of the command socket answers."""
+        """The snapshot and the newest row: answer to `status` of the command socket."""
         row = self.last_row
         return {**self.snapshot(), "signals": {} if row is None else {n: float(row[n]) for n in row.dtype.names}}
 
     def signals(self) -> dict[str, Any]:
-        """Names, units and words of the columns, and where their rows are: what `signals` answers."""
+        """Names, units and descriptions of the columns, and the place of their rows: answer to `signals`."""
         columns = [{"name": c.name, "unit": c.unit, "help": c.help} for c in self.made.columns]
         return {"signals": columns, "ring": tap.describe(self.segment)}
 
     def rows_counted(self) -> dict[str, Any]:
-        """What became of the rows of the trace."""
+        """Counts of trace rows: lost in the ring, recorded, queued, lost by the recorder."""
         lost = {"lost_in_ring": self.reader.lost}
         if self.recorder is None:
             return lost

@@ -1,7 +1,7 @@
-"""A real board in the emulator's place: outputs from the loop to the card, samples from the card to the loop.
+"""A real board in place of the emulator: outputs from the loop to the card, samples from the card to the loop.
 
-It stands where the emulated plant does, at the other end of the link (decision 0009), so that it outlives the loop:
-when the loop dies, hangs or is cut off, the outputs go to zero here.
+The board has a process of its own at the plant's end of the link (decision 0009), so it outlives the loop. When the
+loop dies, hangs or is cut off, this process sets the outputs to zero.
 """
 
 import gc
@@ -36,18 +36,18 @@ class BoardPlant:
     def run(self) -> None:
         """Serve on the wall clock until status.stop is set; the outputs are zero afterwards, whatever happened.
 
-        Raises BoardError where the card fails; the loop then hears no more, and trips.
+        Raises BoardError where the card fails; the loop then gets no samples, and trips.
         """
         real_time = None
         try:
             real_time = RealTime(self._priority, None) if self._priority else None
-            gc.disable()  # a turn leaves nothing behind that refers to itself
+            gc.disable()  # no pauses; a turn makes no reference cycles
             wake = now() + self._period
             while not self.end.stopped:
                 sleep_until(wake)
                 self.turn()
                 behind = (now() - wake) // self._period
-                self._status["skipped"][0] += behind  # a late sample is not made up for
+                self._status["skipped"][0] += behind  # a missed sample is skipped, not repeated
                 wake += (1 + behind) * self._period
         finally:
             self.board.close()
@@ -57,7 +57,7 @@ class BoardPlant:
                 real_time.close()
 
     def turn(self) -> None:
-        """Newest outputs to the card, a sample to the loop."""
+        """Write the newest outputs to the card, and send a sample to the loop."""
         self.end.newest()
         codes, lines = self.due()
         state = self.end.tx["state"]  # as `due` left it
@@ -71,10 +71,10 @@ class BoardPlant:
         self.end.answer()
 
     def due(self) -> tuple[list[int], int]:
-        """Codes and lines that may be written now.
+        """DAC codes (outputs,) and digital lines that may be written now.
 
-        Zero while the machine is off, and where the newest outputs answer a sample that is older than the link's
-        time-out, by this process's own clock. After a trip no output grows, whatever the frame says.
+        They are zero while the machine is off. They are zero, too, if the sample that the newest outputs answer is
+        older than the link's time-out, by this process's clock. After a trip no output grows, whatever the frame says.
         """
         tx = self.end.tx
         off = [0] * len(self._codes)
@@ -90,14 +90,14 @@ class BoardPlant:
         return codes, int(tx["dio_lines"])
 
     def _watchdog(self) -> None:
-        """Outputs were on and no new ones came: count it, and tell the loop with the next sample."""
+        """Count a time-out of the outputs while they were on, and report it to the loop with the next sample."""
         self._status["watchdog"][0] += 1
         self.end.rx["watchdog"] += 1
         self.end.rx["watchdog_seq"] = self.end.tx["seq"]
 
 
 def zero(config: Any) -> str | None:
-    """Open a card whose process has died, take its outputs to zero, and let it go; returns what went wrong."""
+    """Set the outputs of a card to zero after its process has died. Returns the error as text, None if none."""
     try:
         make(config.driver, wiring(config), config.loop.rate).open().close()
     except Exception as error:

@@ -1,4 +1,4 @@
-"""Captures: pieces of the running trace, from now or from a trigger, each a bundle of its own."""
+"""Captures: parts of the running trace, from now or from a trigger, each recorded as a separate bundle."""
 
 from collections import deque
 from datetime import datetime
@@ -13,8 +13,8 @@ from rtctl.trace.capture import Capture
 from rtctl.trace.recorder import Recorder
 from rtctl.trace.trigger import Trigger
 
-PRE_SECONDS = 10.0  # kept in memory for captures that want what was before
-MOST = 8  # captures at a time
+PRE_SECONDS = 10.0  # s of rows kept in memory for captures that begin before their trigger
+MOST = 8  # captures at the same time
 
 
 class Captures:
@@ -25,7 +25,7 @@ class Captures:
         self._running: dict[str, tuple[Capture, Recorder]] = {}
         self._done: dict[str, dict[str, Any]] = {}
         self._history: deque[np.ndarray] = deque()
-        self._held = 0  # rows in it
+        self._held = 0  # rows in _history
         self._number = 0
 
     def start(self, seconds: float, pre: float, trigger: str | None, out: str | None, name: str) -> dict[str, Any]:
@@ -61,12 +61,12 @@ class Captures:
             self._held -= len(self._history.popleft())
 
     def note_lost(self, first: int, count: int) -> None:
-        """Rows that the ring lost are missing in every capture that runs."""
+        """Mark rows that the ring lost as missing in every running capture."""
         for _, recorder in self._running.values():
             recorder.note_lost(first, count)
 
     def status(self, identity: str) -> dict[str, Any]:
-        """What a capture is doing, or where its bundle is."""
+        """Progress of a capture and the folder of its bundle. Raises UserError for an unknown id."""
         if identity in self._done:
             return self._done[identity]
         if identity not in self._running:
@@ -82,13 +82,13 @@ class Captures:
         }
 
     def end(self, identity: str) -> dict[str, Any]:
-        """End a capture now; what it has is its bundle."""
+        """End a capture now; its bundle holds the rows so far."""
         if identity in self._running:
             self._finish(identity)
         return self.status(identity)
 
     def close(self) -> None:
-        """End all."""
+        """End all captures."""
         for identity in list(self._running):
             self._finish(identity)
 
@@ -114,5 +114,5 @@ class Captures:
             if recorder.trouble:
                 entry["error"] = recorder.trouble
         except OSError as error:
-            entry["error"] = f"{recorder.folder}: {error}; what is there can be had with `rtctl trace repair`"
+            entry["error"] = f"{recorder.folder}: {error}; recover the rows written so far with `rtctl trace repair`"
         self._done[identity] = entry

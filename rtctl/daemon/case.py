@@ -1,4 +1,4 @@
-"""The case of a bundle: what the owner of the machine believes, in the exchange format, with the full config beside.
+"""The case of a bundle: the nominal model of the machine in the exchange format, and its full config.
 
 Source: the exchange format for recordings of two-reel units, linear drives and axes (docs/bundle.md).
 """
@@ -25,7 +25,7 @@ TENSION_NOTE = (
 
 
 def describe(machine: Machine, made: generate.Generated) -> dict[str, Any]:
-    """case.json of a recording of this machine, with the model that its config believes in and no hidden term."""
+    """case.json of a recording of this machine: the nominal model of its config, without hidden terms."""
     config = machine.config
     common = {
         **({} if machine.kind == DESCRIBED else {"plant": machine.kind}),
@@ -46,7 +46,7 @@ def describe(machine: Machine, made: generate.Generated) -> dict[str, Any]:
         },
     }
     own = own_plants.get(type(config.plant))
-    if own is not None and own.source is not None:  # its equations are not those of the format: told as a bare machine
+    if own is not None and own.source is not None:  # the format cannot express its equations
         config = config.model_copy(update={"plant": CONFIGS[machine.kind].model_fields["plant"].default})
         common["notes"] = f"{TENSION_NOTE} The emulated machine was {own.source.spec}, in `config.own`."
     case = {**common, **(profile_of(machine.kind).case or _described)(config)}
@@ -56,7 +56,7 @@ def describe(machine: Machine, made: generate.Generated) -> dict[str, Any]:
 
 
 def _described(config: Any) -> dict[str, Any]:
-    """The description, which is the nominal model, in SI; the recorded command is what acted on it."""
+    """Case of a described machine, in SI: the description is the nominal model, the recorded command its input."""
     parts = described.parts_of(config)
     return {
         "format": 2,

@@ -1,4 +1,4 @@
-"""What the loop's and the plant's process have in common: their orders, their reports, and a watch on their parent.
+"""Common parts of the loop's and the plant's process: orders, reports, and a watch on the supervisor.
 
 Orders are one JSON object on the command line. Reports are JSON lines on standard output. Standard input is a pipe
 from the supervisor that carries nothing: its end means that the supervisor is gone.
@@ -26,11 +26,11 @@ from rtctl.machines import Machine
 from rtctl.own.files import trust
 from rtctl.tick.memory import Segment
 
-# Frames a link may hold. ZeroMQ learns what has left its queue only now and then, every 100 frames received at the
-# latest: fewer than twice that, and in lockstep a frame could find a queue full that has long been empty.
+# Frames that a link may queue. ZeroMQ updates the sender's count of queued frames only after every 100 frames received.
+# With fewer than 200 frames, a sender in lockstep could take an empty queue for a full one.
 LINK_WAITING = 256
-# TCP tries again after intervals that double, and would be silent after a cut for as long as the cut was. What has not
-# been acknowledged for this long is given up, and a new connection is made; shorter cuts cost nothing but time.
+# Time in ms without acknowledgement after which a connection is closed and a new one is made. TCP doubles its retry
+# intervals, so without this limit the link would stay silent after a cut for as long as the cut lasted.
 CUT_MS = 1000
 
 
@@ -40,7 +40,7 @@ def orders(argv: list[str]) -> dict[str, Any]:
 
 
 def report(event: str, **values: Any) -> None:
-    """Tell the supervisor, one line at a time. A supervisor that is gone is not an error here."""
+    """Send one report to the supervisor, as a JSON line. A supervisor that is gone is no error."""
     with contextlib.suppress(OSError):
         print(json.dumps({"event": event, **values}), flush=True)
 
@@ -53,7 +53,7 @@ def machine_from(order: dict[str, Any]) -> Machine:
 
 
 def segment_from(order: dict[str, Any], made: generate.Generated) -> Segment:
-    """Map the shared memory that the supervisor made. Raises UserError where a later supervisor has made another."""
+    """Map the shared memory that the supervisor made. Raises UserError where it belongs to a later supervisor."""
     segment = Segment.open(Path(order["segment"]), layout(made.params, made.tables, made.row, order["rows"]))
     if segment.path.stat().st_ino != order["inode"]:
         raise UserError(f"{segment.path} belongs to another supervisor by now; ours has died")
@@ -63,18 +63,18 @@ def segment_from(order: dict[str, Any], made: generate.Generated) -> Segment:
 def watch_parent(on_lost: Callable[[], None], on_stop: Callable[[], None], interrupt: bool = False) -> None:
     """Call `on_lost` when the supervisor's pipe ends and `on_stop` on SIGTERM, even while compiled code runs.
 
-    Compiled code never returns to the interpreter, so a Python signal handler would wait for ever; the wake-up file
-    descriptor is written by the C handler at once and read here, in a thread of its own.
+    Compiled code does not return to the interpreter, so a Python signal handler would never run. The C handler writes
+    to the wake-up file descriptor at once, and a thread reads it here.
     """
     read_end, write_end = os.pipe()
     os.set_blocking(write_end, False)
-    # Ctrl-C goes to the whole group: a child leaves it to the supervisor, a process of its own (`interrupt`) stops
+    # Ctrl-C goes to the whole process group: a child ignores it, a process without supervisor (`interrupt`) stops
     signal.signal(signal.SIGINT, (lambda *_: None) if interrupt else signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: on_stop())  # here too: a wait that it cuts short is no fault
-    # a terminal that closes sends it to the whole group: the supervisor ends its children, a plant by itself stops
+    signal.signal(signal.SIGTERM, lambda *_: on_stop())  # also here, so that an interrupted wait raises no error
+    # a closed terminal sends SIGHUP to the whole group: the supervisor ends its children, a plant without one stops
     if not interrupt:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    elif signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # which nohup has set
+    elif signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup sets SIG_IGN
         signal.signal(signal.SIGHUP, lambda *_: on_stop())
     signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
 
@@ -91,7 +91,10 @@ def watch_parent(on_lost: Callable[[], None], on_stop: Callable[[], None], inter
 
 
 def link_socket(context: zmq.Context, endpoint: str, bind: bool, timeout: float, key_name: str | None) -> zmq.Socket:
-    """One end of the link: the plant binds, the loop connects. Secured by CURVE where it leaves this machine."""
+    """Socket at one end of the link: the plant binds, the loop connects. CURVE secures it with a `key_name`.
+
+    Raises UserError for an endpoint that other computers can reach, without a key.
+    """
     zmq_link.load()
     socket = context.socket(zmq.DEALER)
     socket.set(zmq.LINGER, 100)

@@ -1,4 +1,4 @@
-"""Starting the loop and the plant as processes of their own, and reading what they report."""
+"""Child processes of the supervisor: start of the loop and the plant, and their reports."""
 
 import contextlib
 import json
@@ -11,7 +11,7 @@ from rtctl.config.isolated import python
 
 
 class ChildProcess:
-    """One child: its pipe (the end of which tells it that we are gone), its reports, and its last words."""
+    """One child process: its input pipe, its reports and its last error output. The child ends when the pipe closes."""
 
     def __init__(self, role: str, order: dict[str, Any]):
         self.role = role
@@ -35,7 +35,7 @@ class ChildProcess:
         return self.process.pid
 
     def reports(self) -> list[dict[str, Any]]:
-        """What it has reported since the last call; never waits."""
+        """Reports of the child since the last call; never waits."""
         self._read_errors()
         assert self.process.stdout is not None
         data = self._partial + (_read(self.process.stdout.fileno()) or b"")
@@ -53,12 +53,12 @@ class ChildProcess:
         return self.process.poll() is None
 
     def last_words(self) -> str:
-        """The end of what it wrote to standard error."""
+        """Last 20 lines of the child's standard error, and of output that is no report."""
         self._read_errors()
         return "\n".join(self._errors)
 
     def stop(self, timeout: float = 5.0) -> None:
-        """Close its pipe and wait; what does not end by itself is killed."""
+        """Close the child's pipe and wait at most `timeout` s for its end, then kill it."""
         if self.process.stdin is not None and not self.process.stdin.closed:
             with contextlib.suppress(OSError):
                 self.process.stdin.close()

@@ -1,4 +1,4 @@
-"""The other end of the command socket: one call, one answer, or a sentence for a person."""
+"""Client of the command socket: one call, one answer, or a UserError."""
 
 import itertools
 import os
@@ -25,8 +25,8 @@ class CommandError(UserError):
 class Client:
     """Calls the daemon at `endpoint`, waiting at most `timeout` s for each answer. Not for use from several threads.
 
-    A request is only handed to a daemon that is connected (IMMEDIATE) and is dropped with the socket when no answer
-    comes, so that a command which was given up can not be carried out by a daemon that starts an hour later.
+    A request is sent only over an existing connection (IMMEDIATE). Without an answer the request is dropped with the
+    socket. So no daemon that starts an hour later carries out an old command.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class Client:
         return reply.result
 
     def close(self) -> None:
-        """Drop the connection and what was not sent. The next call connects again."""
+        """Drop the connection and unsent requests. The next call connects again."""
         if self._socket is not None:
             self._socket.close(linger=0)
             self._socket = None
@@ -85,7 +85,7 @@ class Client:
         socket.send(request, zmq.NOBLOCK)
         while socket.poll(_left_ms(deadline), zmq.POLLIN):
             reply = decode_reply(socket.recv_multipart()[-1])
-            if reply.id in (id, None):  # anything else answers a call that was given up
+            if reply.id in (id, None):  # another id belongs to an earlier call that timed out
                 return reply
         raise UserError(
             f"the daemon at {self.endpoint} did not answer within {self.timeout:g} s; it may still do what was asked"
@@ -109,7 +109,7 @@ def _left_ms(deadline: float) -> int:
 
 
 def listens(endpoint: str) -> bool:
-    """Whether somebody listens at an ipc or tcp endpoint, be it as busy as it may."""
+    """Whether a process listens at an ipc or tcp endpoint, even one too busy to answer."""
     family: Any = sockets.AF_UNIX
     address: Any = endpoint.removeprefix("ipc://")
     if endpoint.startswith("tcp://"):
@@ -121,7 +121,7 @@ def listens(endpoint: str) -> bool:
         try:
             probe.connect(address)
         except PermissionError:
-            return True  # somebody else's
+            return True  # a socket of another user
         except OSError:
             return False
         return True

@@ -1,4 +1,4 @@
-"""What the command socket can ask of a running machine. Everything is checked and built here, outside the tick."""
+"""Commands of the command socket to a running machine. They are checked and prepared here, outside the tick."""
 
 import time
 from typing import TYPE_CHECKING, Any
@@ -23,14 +23,14 @@ SWITCHED = (
     "loop", "link", "driver", "record", "commands", "board", "plant", "name", "machine", "reference", "excitation",
     "faults", "metrics", "own", "live", "sensors", "encoder", "output", "amplifier", "R_c",
 )  # fmt: skip
-ORDERS = (  # that are logged
+ORDERS = (  # commands that are logged
     "arm", "disarm", "reset", "play", "stop", "setpoint", "set", "fault", "capture", "capture_stop",
 )  # fmt: skip
-LOOKS = ("status", "signals", "get", "capture_status", "watch")  # who only looks stands in for no commander
+LOOKS = ("status", "signals", "get", "capture_status", "watch")  # read-only: no sign of life of the commander
 
 
 class Commands:
-    """Handles one op at a time; `handle` answers at once, with the tick at the latest at which it takes effect."""
+    """Handles one op at a time. `handle` answers at once with the ticks done; the op acts at most one tick later."""
 
     def __init__(self, supervisor: "Supervisor"):
         self._of = supervisor
@@ -39,7 +39,7 @@ class Commands:
         self.heard()
 
     def handle(self, op: str, args: Args) -> dict[str, Any]:
-        """Carry out `op`. Raises UserError where the request makes no sense now."""
+        """Carry out `op` and return its result. Raises UserError for a request that is not possible now."""
         if op not in LOOKS:
             self.heard()
         given = args.model_dump(exclude_unset=True)
@@ -50,14 +50,14 @@ class Commands:
         return result
 
     def heard(self) -> None:
-        """The commander is there: it commands, or sends a `ping` as its sign of life. The loop reads the time."""
+        """Note the time of a sign of life of the commander, a command or `ping`, for the loop."""
         self._last_heard = time.monotonic()
         self._of.status["commander_ns"] = time.monotonic_ns()
 
     def watch_commander(self) -> None:
-        """On virtual time, tell the loop when the commander is silent for too long, where the config requires one.
+        """On virtual time, report to the loop when a required commander has been silent for too long.
 
-        On the wall clock the loop finds that out by itself: this process may hang.
+        On the wall clock the loop checks this itself, because this process may hang.
         """
         if not self._virtual:
             return
@@ -86,7 +86,7 @@ class Commands:
         return self._of.signals()
 
     def _arm(self) -> dict[str, Any]:
-        taken_in = self._of.mailbox.seen == int(self._of.segment["mailbox"][0]["count"])  # or a reset is on its way
+        taken_in = self._of.mailbox.seen == int(self._of.segment["mailbox"][0]["count"])  # else a reset may be pending
         if taken_in and int(self._of.status["state"]) == safety.TRIPPED:
             raise UserError("the machine has tripped; look at `rtctl status`, then `rtctl reset` and arm again")
         return self._count("arm")
@@ -130,7 +130,7 @@ class Commands:
             raise UserError("outputs are off; `rtctl arm` first")
 
     def _in_own_unit(self, value: float, unit: str | None) -> float:
-        """A length or an angle in the unit of this machine's reference."""
+        """Length or angle `value` converted to the unit of this machine's reference. Raises UserError."""
         machine = self._of.machine
         if unit is None or unit == machine.unit:
             return value
@@ -170,7 +170,7 @@ class Commands:
         return {"path": path, "value": value, "tick": int(self._of.status["tick"])}
 
     def take_over(self, config: Any, machine: Machine, changed: dict[str, Any]) -> None:
-        """Put a machine of the same structure in force, all of it at one tick; `changed` are its settings by path."""
+        """Put parameters of a machine of the same structure in force at one tick; `changed` are settings by path."""
         gains = int(self._of.segment["mailbox"][0]["command"]["gains"]) + 1
 
         def write(params: Any, command: Any) -> None:
@@ -199,6 +199,6 @@ class Commands:
         return self._of.captures.end(id)
 
     def _watch(self, **told: Any) -> dict[str, Any]:
-        """What a model beside the machine finds: for `status`, the log and the metrics; nothing else hears it."""
+        """Keep a report of `rtctl watch` for `status`, the log and the metrics. The report does not affect the loop."""
         self._of.watched.take(told)
         return {"tick": int(self._of.status["tick"])}

@@ -1,4 +1,4 @@
-"""What a child compiles, told to its supervisor while it does so."""
+"""Progress of the compilation in a child process, reported to its supervisor."""
 
 import time
 from typing import Any
@@ -11,7 +11,7 @@ EVERY = 1.0  # s between two reports
 
 
 class _Listener(event.Listener):
-    """Names of functions whose compilation begins."""
+    """Reports the name of a function whose compilation begins, at most once in EVERY s."""
 
     def __init__(self) -> None:
         self._last = 0.0
@@ -24,9 +24,9 @@ class _Listener(event.Listener):
             child.report("compiling", what=getattr(function, "__name__", "a step"))
 
     def on_end(self, event: Any) -> None:
-        """Nothing: the next beginning says enough."""
+        """No report: the next start of a compilation implies this end."""
 
 
 def tell() -> None:
-    """Report from now on what this process compiles."""
+    """Report the compilations of this process from now on."""
     event.register("numba:compile", _Listener())

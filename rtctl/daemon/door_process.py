@@ -1,13 +1,13 @@
-"""Process at the door of a daemon: takes the connections of a listening socket, so many at a time, and passes on bytes.
+"""Proxy process of a daemon ("door"): accepts a limited number of connections and forwards their bytes.
 
-libzmq takes as many connections as there are, and aborts where the process has no file descriptors left. So nobody is
-connected to the daemon itself: each connection has its twin to a socket of the daemon that only this user can reach.
-A flood of connections fills the places here and nothing else. It knows no messages; keys and refusals are the daemon's.
+libzmq accepts every connection, and aborts when the process has no file descriptors left. So clients do not connect to
+the daemon itself. The proxy opens a second connection for each client, to a socket that only this user can reach. A
+flood of connections fills the places of the proxy only. The proxy does not read messages; the daemon checks keys.
 
-Nothing of numpy or ZeroMQ is imported here, so that it is there at the first connection, in some 30 ms.
+This module imports neither numpy nor ZeroMQ, so the process serves its first connection after some 30 ms.
 
-Usage: python -m rtctl.daemon.door_process '[{"fd": 7, "inner": "/run/...", "places": 64, "replaces": true}]'. It ends
-when its standard input does, after what is under way, and one second at most.
+Usage: python -m rtctl.daemon.door_process '[{"fd": 7, "inner": "/run/...", "places": 64, "replaces": true}]'. The
+process ends when its standard input ends, after pending bytes, within one second.
 """
 
 import contextlib
@@ -20,41 +20,41 @@ import time
 from collections.abc import Callable
 from typing import cast
 
-PIECE = 1 << 16  # bytes that are read at once, and that may wait for a slow reader
-AT_ONCE = 16  # connections that are taken before those that are there have their turn again
-LAST = 1.0  # s for what is under way when the daemon ends
-ANSWER = 5.0  # s in which nobody takes the place of who has said something: an answer to it may be under way
+PIECE = 1 << 16  # bytes in one read, and bytes that may wait for a slow reader
+AT_ONCE = 16  # connections accepted before open connections are served again
+LAST = 1.0  # s to forward pending bytes when the daemon ends
+ANSWER = 5.0  # s by which a connection that has sent ranks before one that has not: its answer may be pending
 
 
 class Pair:
-    """A connection and its twin. `keeps` is the time until which its place is its own."""
+    """A client's connection and its connection to the daemon. A new client replaces the pair of lowest `keeps`."""
 
     def __init__(self, door: "Door", outer: socket.socket, inner: socket.socket):
         self.door, self.keeps, self.ends = door, time.monotonic(), False
         self.other = {outer: inner, inner: outer}
         self.outer = outer
-        self.waiting = {outer: bytearray(), inner: bytearray()}  # what goes out there
+        self.waiting = {outer: bytearray(), inner: bytearray()}  # bytes to send, by socket
 
     def move(self, source: socket.socket) -> None:
-        """Pass on what came from `source`. Raises OSError where it is gone."""
+        """Read bytes from `source` for the other socket. Raises OSError where `source` is closed."""
         try:
             data = source.recv(PIECE)
         except BlockingIOError:
             return
         if not data:
-            self.ends = True  # what waits for the other side still goes there
+            self.ends = True  # bytes that wait for the other side are still sent
         if source is self.outer:
             self.keeps = time.monotonic() + ANSWER
         self.waiting[self.other[source]] += data
 
     def flush(self, target: socket.socket) -> None:
-        """Send what waits for `target`, as far as it takes it. Raises OSError where it is gone."""
+        """Send waiting bytes to `target`, as many as it accepts. Raises OSError where `target` is closed."""
         waiting = self.waiting[target]
         with contextlib.suppress(BlockingIOError):
             del waiting[: target.send(waiting)]
 
     def events(self, end: socket.socket) -> int:
-        """What is wanted of one end: to read while the other side keeps up, to write what waits."""
+        """Selector events for one end: read while the other side keeps up, write while bytes wait."""
         wanted = selectors.EVENT_WRITE if self.waiting[end] else 0
         if not self.ends and len(self.waiting[self.other[end]]) < PIECE:
             wanted |= selectors.EVENT_READ
@@ -66,9 +66,12 @@ class Pair:
 
 
 class Door:
-    """A listening socket with `places`. Where all are taken, a new connection has the place of the one that has been
-    silent for longest if the door `replaces`, and none otherwise. Who never said anything counts as ANSWER more silent,
-    so that a crowd of such connections takes no place from which a question was just asked."""
+    """A listening socket with `places` for connections.
+
+    With all places taken, a new connection is refused, or replaces the one that has been silent for longest (with
+    `replaces`). A connection that has never sent counts as silent for ANSWER s more. So a crowd of silent connections
+    does not replace a client that waits for an answer.
+    """
 
     def __init__(self, fd: int, inner: str, places: int, replaces: bool):
         self.listener = socket.socket(fileno=fd)
@@ -77,11 +80,11 @@ class Door:
         self.pairs: list[Pair] = []
 
     def take(self, opened: Callable[[Pair], None], closed: Callable[[Pair], None]) -> None:
-        """Take the connections that wait."""
+        """Accept waiting connections, at most AT_ONCE."""
         for _ in range(AT_ONCE):
             try:
                 outer, _ = self.listener.accept()
-            except OSError:  # none waits, or one that waited is gone
+            except OSError:  # none waits, or the client has left
                 return
             if len(self.pairs) >= self.places:
                 if not self.replaces:
@@ -101,7 +104,7 @@ class Door:
                 outer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             inner.setblocking(False)
             inner.connect(self.inner)
-        except OSError:  # the daemon is ending, or has too many in its queue: who is in earnest comes again
+        except OSError:  # the daemon is ending, or its queue is full: the client may try again
             outer.close()
             inner.close()
             return None
@@ -109,7 +112,7 @@ class Door:
 
 
 class Hall:
-    """All doors of a process, and the connections in them."""
+    """Event loop of a proxy process: all its doors and their connections."""
 
     def __init__(self, doors: list[Door]):
         self.selector = selectors.DefaultSelector()
@@ -131,7 +134,7 @@ class Hall:
                 end.close()
 
     def turn(self, timeout: float | None) -> bool:
-        """Serve what is ready. Returns False when standard input has ended."""
+        """Serve sockets that are ready within `timeout` s. Returns False when standard input has ended."""
         goes_on = True
         for key, events in self.selector.select(timeout):
             if key.data is None:
@@ -143,7 +146,7 @@ class Hall:
         return goes_on
 
     def last(self) -> None:
-        """Let nobody in any more, and bring what is under way to its end."""
+        """Close the listening sockets, and forward pending bytes for at most LAST s."""
         for door in self.doors:
             self.selector.unregister(door.listener)
             door.listener.close()
@@ -152,7 +155,7 @@ class Hall:
             self.turn(left)
 
     def _serve(self, pair: Pair, end: socket.socket, events: int) -> None:
-        if pair not in pair.door.pairs:  # closed in this very turn
+        if pair not in pair.door.pairs:  # closed earlier in this turn
             return
         try:
             if events & selectors.EVENT_READ:

@@ -1,7 +1,7 @@
-"""Doors of the daemon: its listening sockets, each watched until somebody comes, then served by a process of its own.
+"""Doors of a daemon: its listening sockets, each served by a proxy process from the first connection on.
 
-What comes in goes through door_process.py, a limited number at a time. Control has a process of its own, so that
-viewers cannot be in its way. A door that dies is opened again at the next connection.
+door_process.py forwards a limited number of connections. The command socket has a separate process, so that viewers do
+not delay commands. A proxy process that dies is started again at the next connection.
 """
 
 import fcntl
@@ -19,15 +19,15 @@ import structlog
 from rtctl.config.isolated import python
 
 log = structlog.get_logger()
-COMMANDERS = 64  # places at the command socket; one more takes that of who has been silent for longest
-VIEWERS = 32  # at telemetry, and at the rows; one more is not let in
-WAITING = 128  # connections that wait to be taken
-FILES = 65536  # open files that are enough for all that a daemon has
+COMMANDERS = 64  # connections at the command socket; a further one replaces the one silent for longest
+VIEWERS = 32  # connections at telemetry, and at the rows; a further one is refused
+WAITING = 128  # connections that may wait to be accepted
+FILES = 65536  # open files, enough for a daemon
 SIOCGIFADDR = 0x8915  # netdevice(7)
 
 
 def raise_limit() -> int:
-    """Raise the limit of open files of this process to FILES, or to what it may have; returns it."""
+    """Raise the limit of open files of this process to FILES, or to its hard limit; returns the new limit."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = FILES if hard == resource.RLIM_INFINITY else min(FILES, hard)
     if soft == resource.RLIM_INFINITY or soft >= wanted:
@@ -37,7 +37,7 @@ def raise_limit() -> int:
 
 
 class Door:
-    """A way in: `inner` is the path at which the daemon binds, `listener` the socket at which others connect."""
+    """One door: the daemon binds at the path `inner`; clients connect to the socket `listener`."""
 
     def __init__(self, inner: Path, places: int, replaces: bool):
         self.inner, self.places, self.replaces = inner, places, replaces
@@ -50,7 +50,7 @@ class Door:
 
 
 class Doors:
-    """The doors of one daemon. Call `look` now and then; `close` lets what is under way come to its end."""
+    """The doors of one daemon. Call `look` regularly; `close` ends their processes after pending bytes."""
 
     def __init__(self, folder: Path, name: str):
         self._folder, self._name = folder, name
@@ -64,7 +64,7 @@ class Doors:
         return made
 
     def look(self) -> None:
-        """Start the process of each door at which somebody waits and nobody serves."""
+        """Start the process of each door that has a waiting connection and no running process."""
         for process, doors in self._doors.items():
             running = self._processes.get(process)
             if running is not None and running.poll() is None:
@@ -80,7 +80,7 @@ class Doors:
                 self._processes[process] = _start(doors)
 
     def close(self) -> None:
-        """End the processes. The daemon's own sockets are closed before."""
+        """End the processes. Close the daemon's own sockets first."""
         for process in self._processes.values():
             assert process.stdin is not None
             process.stdin.close()
@@ -111,7 +111,7 @@ def _start(doors: list[Door]) -> "subprocess.Popen[bytes]":
 
 
 def listen_ipc(path: Path) -> socket.socket:
-    """A listening socket at a path at which nobody listens. Raises OSError."""
+    """Listening unix socket at `path`, which no process uses. Raises OSError."""
     path.unlink(missing_ok=True)
     made = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
@@ -124,9 +124,9 @@ def listen_ipc(path: Path) -> socket.socket:
 
 
 def listen_tcp(endpoint: str) -> tuple[socket.socket, str]:
-    """A listening socket at tcp://HOST:PORT as ZeroMQ writes it, and the endpoint with its port; `*` is any.
+    """Listening socket at tcp://HOST:PORT, and the endpoint with its port; `*` is any host or port, as in ZeroMQ.
 
-    Raises OSError where it cannot be had, ValueError where it is no such endpoint.
+    Raises OSError where the address is not available, ValueError where the endpoint is malformed.
     """
     host, _, port = endpoint.removeprefix("tcp://").rpartition(":")
     number = 0 if port == "*" else int(port)
@@ -140,7 +140,7 @@ def listen_tcp(endpoint: str) -> tuple[socket.socket, str]:
 
 
 def _of_interface(name: str) -> str | None:
-    """IPv4 address of a network interface; None where it is none."""
+    """IPv4 address of the network interface `name`; None where there is no such interface."""
     if name not in (known for _, known in socket.if_nameindex()):
         return None
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:

@@ -1,6 +1,6 @@
-"""Ends of a run that nobody asked for: the loop's process was killed or crashed, or a child reported an error.
+"""Failures that end a run: the loop's process was killed or crashed, or a child reported an error.
 
-The recording is finished all the same, so the failure is kept and raised at the end of the run.
+The recording is finished first, so the failure is kept and raised at the end of the run.
 """
 
 import contextlib
@@ -11,11 +11,11 @@ from typing import Any
 from rtctl.config.errors import RunFailed, UserError
 from rtctl.daemon.starting import ended
 
-LAST_WORDS = 5.0  # s that the report of a loop may take after its last tick
+LAST_WORDS = 5.0  # s to wait for the report of a loop after its last tick
 
 
 def reported(hear: Callable[[], None]) -> Exception | None:
-    """Error that a child has reported since the last call; `hear` takes in the reports. None without one."""
+    """Error that a child has reported since the last call, else None; `hear` reads the reports."""
     try:
         hear()
     except UserError as error:
@@ -24,7 +24,7 @@ def reported(hear: Callable[[], None]) -> Exception | None:
 
 
 def failure(loop: Any, status: Any, hear: Callable[[], None]) -> Exception | None:
-    """Failure of a loop (ChildProcess) that ticks no more; `status` is its record. None where the end was ordered."""
+    """Failure of a loop (ChildProcess) that has ended; `status` is its record. None where the end was ordered."""
     if status["failed"] or not status["ended"]:
         with contextlib.suppress(subprocess.TimeoutExpired):
             loop.process.wait(LAST_WORDS)

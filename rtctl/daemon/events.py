@@ -1,4 +1,4 @@
-"""Trips and troubles of the recording in the log. A trip has its cause, its tick and the machine's signals then."""
+"""Log entries of trips and recorder errors. A trip is logged with its cause, its tick and the signals in that tick."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,13 +14,13 @@ COMMON = {column.name for column in COMMON_COLUMNS} - {"watchdog", "lateness"}
 
 
 class Recording:
-    """Looks for trouble of the recorder: a disk that takes no more, a folder that was renamed or deleted."""
+    """Logs errors of the recorder: a full disk, a folder that was renamed or deleted."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say, self._told = say, ""
 
     def look(self, trouble: str | None) -> None:
-        """Log and say what is new, once."""
+        """Log and print a new error, once."""
         if trouble and trouble != self._told:
             self._told = trouble
             log.error("recording", trouble=trouble)
@@ -28,7 +28,7 @@ class Recording:
 
 
 class Trips:
-    """Looks for trips in the rows of a run, fed in their order."""
+    """Logs the trips in the rows of a run, fed in their order."""
 
     def __init__(self) -> None:
         self._last = 0.0
@@ -45,6 +45,6 @@ class Trips:
 
 
 def values(row: Any) -> dict[str, float]:
-    """The machine's own signals of a row, without what only an emulator knows, to five digits."""
+    """The machine's signals in a row, to five digits, without the truth_ columns of an emulator."""
     names = [n for n in row.dtype.names if n not in COMMON and not n.startswith("truth_")]
     return {name: float(f"{float(row[name]):.5g}") for name in names}

@@ -1,7 +1,7 @@
-"""Faults on demand in a running machine: `rtctl fault add`, `list` and `clear`, and `faults:` of its config.
+"""Injected faults in a running machine: `rtctl fault add`, `list` and `clear`, and `faults:` of its config.
 
-Those at the loop's boundary go to the loop by mailbox. Those of processes are carried out here, at a turn of the
-supervisor; on virtual time the loop waits for that before the very tick (`status.hold`).
+Faults at the loop's boundary go to the loop by mailbox. Faults of processes are carried out here, at a turn of the
+supervisor. On virtual time the loop waits for this turn before the tick of the fault (`status.hold`).
 """
 
 import os
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
 log = structlog.get_logger()
-FLUSH = 5.0  # s of the wall clock that virtual time waits for the recorder, so that a full disk is full at a tick
+FLUSH = 5.0  # s of wall clock for which virtual time waits for the recorder, so that a disk is full at a given tick
 BUSY = "import os,threading as t; t.Thread(target=lambda: os.read(0, 1) or os._exit(0)).start()\nwhile True: pass"
 Undo = Callable[[], None]
 
@@ -42,7 +42,7 @@ class Planned(NamedTuple):
 
 
 class Faults:
-    """What is wrong with a machine on purpose. `told` says what faults of processes have done so far, and when."""
+    """Injected faults of a machine. `told` lists the beginnings and ends of faults of processes, with their ticks."""
 
     def __init__(self, supervisor: "Supervisor"):
         self._of = supervisor
@@ -57,7 +57,7 @@ class Faults:
     # the command
 
     def handle(self, action: str, fault: dict[str, Any] | None) -> dict[str, Any]:
-        """Add a fault, its time counted from now, take all away, or list what there is. Raises UserError."""
+        """Add a fault, with its time counted from now, clear all faults, or list them. Raises UserError."""
         tick = int(self._of.status["tick"])
         if action == "add":
             self._add(self._settings(fault or {}), tick)
@@ -112,12 +112,12 @@ class Faults:
     # faults of processes
 
     def act(self) -> None:
-        """Carry out what is due. Call at each turn."""
+        """Begin and end the faults of processes that are due. Call at each turn."""
         tick = int(self._of.status["tick"])
         if not any(p.begin <= tick for p in self._due) and not any(p.end <= tick for p, _ in self._on):
             return
         if self._virtual:
-            self._of._drain()  # the loop stands still: now the recorder has all that came before
+            self._of._drain()  # the loop waits, so the recorder gets all earlier rows
         for planned, undo in [entry for entry in self._on if entry[0].end <= tick]:
             self._on.remove((planned, undo))
             undo()
@@ -128,10 +128,7 @@ class Faults:
         self._hold()
 
     def clear(self) -> None:
-        """End all faults of processes: nothing stands still, nobody is busy. What was killed and was to come back does.
-
-        May be called again.
-        """
+        """End all faults of processes. A killed plant is started again, unless the run stops. May be called again."""
         self._due = []
         while self._on:
             planned, undo = self._on.pop()
@@ -140,7 +137,7 @@ class Faults:
         self._hold()
 
     def _hold(self) -> None:
-        """Where virtual time has to wait for us next."""
+        """Set the tick before which virtual time has to wait for the next fault."""
         ends = [p.end for p, _ in self._on if p.end != faults.FOR_EVER]
         before = min([*ends, *(p.begin for p in self._due)], default=0)
         if self._virtual and before != self._held:
@@ -160,8 +157,8 @@ class Faults:
         assert plant is not None
         plant.process.kill()
         plant.process.wait()
-        self._of._plant_died = True  # we know
-        if self._virtual:  # its clock is the plant's turn; it cannot go on
+        self._of._plant_died = True  # expected: no warning
+        if self._virtual:  # virtual time advances with the plant, so the run ends
             self._of.status["stop"] = 1
             self._tell("plant.kill", "ends the run: virtual time does not pass without the plant")
             return lambda: None
@@ -206,7 +203,7 @@ class Faults:
         return lambda: None
 
     def _clock_step(self, planned: Planned) -> Undo:
-        """Under this process alone: all the machine would be too much of a fault."""
+        """Step the clock of this process only, not that of the computer."""
         seconds, nanoseconds = time.time, time.time_ns
         vars(time).update(
             time=lambda: seconds() + planned.size, time_ns=lambda: nanoseconds() + int(planned.size * 1e9)
@@ -214,7 +211,7 @@ class Faults:
         return lambda: vars(time).update(time=seconds, time_ns=nanoseconds)
 
     def _cpu_hog(self, planned: Planned) -> Undo:
-        """They read a pipe of ours: its end is theirs, too, even if we are killed."""
+        """Start busy processes. Each reads a pipe from this process, and ends with it even after a kill."""
         hogs = [subprocess.Popen(python("-S", "-c", BUSY), stdin=subprocess.PIPE) for _ in range(round(planned.size))]
 
         def undo() -> None:
@@ -228,7 +225,7 @@ class Faults:
 
 def _file(recorder: Recorder) -> int:
     """The file descriptor that the recorder writes its rows to."""
-    part: Any = getattr(recorder._bundle, "_part", recorder._bundle)  # the one of now, of a recording in parts
+    part: Any = getattr(recorder._bundle, "_part", recorder._bundle)  # the current part of a recording in parts
     return int(part._writer._file)
 
 

@@ -1,6 +1,6 @@
-"""An FMU in the place of the emulated machine, in lockstep: its drives and sensors behind the emulated board.
+"""An FMU in place of the emulated machine, in lockstep, behind the emulated board.
 
-Encoders, optical sensors and converters are those of the emulator, so that the loop sees codes and counts as always.
+The emulator's encoders, optical sensors and converters turn the readings of the FMU into codes and counts for the loop.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ class FmuPlant:
         self._show()
 
     def _wired(self, config: Any, dt: float) -> list[Sensor]:
-        """What each reading of the FMU does to the board, in the order of the machine's sensors."""
+        """Functions that apply each reading of the FMU to the board, in the order of the machine's sensors."""
         profile = profile_of(config.kind)
         if profile.has(REELS):
             reels = ((config.sensors.reel1, config.board.reel1), (config.sensors.reel2, config.board.reel2))
@@ -73,7 +73,7 @@ class FmuPlant:
             sensor(reading)
 
     def advance(self) -> None:
-        """One tick of the FMU with the outputs of the newest frame."""
+        """Advance the FMU by one tick with the outputs of the newest frame."""
         tx, wires = self.end.tx, self.card.wiring
         self.card.write([int(c) for c in tx["ao_codes"][: len(wires.outputs)]], int(tx["dio_lines"]))
         volts = [self.card.card.output_volts(o.channel) for o in wires.outputs]
@@ -83,7 +83,7 @@ class FmuPlant:
         self._show()
 
     def run(self) -> None:
-        """Sample out, outputs in, one tick on, until status.stop is set."""
+        """Send a sample, receive outputs and advance by one tick, until status.stop is set."""
         try:
             while not self.end.stopped:
                 self.card.read(self.end.rx)

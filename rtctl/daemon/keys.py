@@ -1,7 +1,7 @@
-"""CURVE keys: who may command a daemon over the network, and how a client knows that it speaks to the right one.
+"""CURVE keys: they decide who may command a daemon over the network, and prove the daemon's identity to a client.
 
-A pair NAME is two files in one folder: NAME.key, public, and NAME.key_secret, for the owner's eyes only. The daemon
-uses the pair `server` and lets in the clients whose public files lie in the folder `authorized` next to it.
+A pair NAME is two files in one folder: NAME.key, public, and NAME.key_secret, readable by its owner only. The daemon
+uses the pair `server` and accepts clients whose public files are in the folder `authorized` beside it.
 
 Source: RFC 26/CurveZMQ and RFC 27/ZAP of rfc.zeromq.org.
 """
@@ -35,14 +35,14 @@ class Keys(NamedTuple):
 
 
 class ServerCurve(NamedTuple):
-    """What a daemon needs: its own pair and the public keys of the clients that it lets in."""
+    """Keys of a daemon: its own pair and the public keys of the clients that it accepts."""
 
     keys: Keys
     authorized: frozenset[bytes]
 
 
 class ClientCurve(NamedTuple):
-    """What a client needs: its own pair and the public key of the daemon."""
+    """Keys of a client: its own pair and the public key of the daemon."""
 
     keys: Keys
     server: bytes
@@ -102,7 +102,7 @@ def client_curve(name: str = "client", directory: Path | None = None) -> ClientC
 
 
 def require_curve(endpoint: str) -> bool:
-    """True where others could reach the endpoint: all but ipc, inproc and tcp on a loopback address."""
+    """Whether other computers can reach the endpoint: any but ipc, inproc and tcp on a loopback address."""
     if endpoint.startswith(("ipc://", "inproc://")):
         return False
     address = endpoint.removeprefix("tcp://")
@@ -114,7 +114,7 @@ def require_curve(endpoint: str) -> bool:
 
 
 def refuse_open(endpoint: str) -> UserError:
-    """The error for an endpoint that needs keys and has none."""
+    """UserError for a malformed endpoint, or for one that needs keys and has none."""
     if not endpoint.startswith("tcp://"):
         return UserError(f"'{endpoint}' is no endpoint; expected ipc:///PATH or tcp://ADDRESS:PORT")
     return UserError(
@@ -124,24 +124,24 @@ def refuse_open(endpoint: str) -> UserError:
 
 
 def apply_server(socket: zmq.Socket, keys: Keys, authorized_client_keys: frozenset[bytes]) -> None:
-    """Before bind: let in only clients with one of these public keys. The check runs in a thread of the context."""
+    """Accept only clients with one of these public keys; call before bind. A thread of the context checks them."""
     socket.setsockopt_string(zmq.ZAP_DOMAIN, _doorman(socket.context).admit(authorized_client_keys))
-    socket.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)  # without the doorman nobody gets in, instead of everybody
+    socket.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)  # without the Doorman all clients are refused, not accepted
     socket.curve_server = True
     socket.curve_publickey, socket.curve_secretkey = keys
 
 
 def apply_client(socket: zmq.Socket, keys: Keys, server: bytes) -> None:
-    """Before connect: prove who we are, and speak only to the owner of `server`."""
+    """Set a client's keys, so that it connects only to the owner of `server`; call before connect."""
     socket.curve_serverkey = server
     socket.curve_publickey, socket.curve_secretkey = keys
 
 
 class Doorman:
-    """Answers libzmq, for each new connection of a context, whether the client's key is known.
+    """ZAP authenticator of a context: checks the client's key for each new connection.
 
-    It ends when its context does, so nobody has to stop it. Its socket belongs to a shadow of the context, else
-    `context.destroy()` would close it under the thread that waits on it, which libzmq answers with an abort.
+    Its thread ends with its context. Its socket belongs to a shadow of the context. Otherwise `context.destroy()` would
+    close the socket while the thread waits on it, and libzmq would abort the process.
     """
 
     def __init__(self, context: zmq.Context):
@@ -155,7 +155,7 @@ class Doorman:
         threading.Thread(target=self._serve, name="rtctl-doorman", daemon=True).start()
 
     def admit(self, public_keys: frozenset[bytes]) -> str:
-        """A new ZAP domain whose sockets let in these keys (Z85)."""
+        """Name of a new ZAP domain whose sockets accept these keys (Z85)."""
         domain = f"rtctl-{next(self._numbers)}"
         self._known[domain] = frozenset(public_keys)
         return domain

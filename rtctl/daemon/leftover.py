@@ -1,4 +1,4 @@
-"""Segment of a killed daemon: the rows of its ring, read back with the description that lies beside it."""
+"""Shared-memory segment of a killed daemon: the rows of its ring, read with the description file beside it."""
 
 import fcntl
 import json
@@ -16,7 +16,7 @@ from rtctl.config.errors import UserError
 from rtctl.daemon.shared_memory import ABOUT
 from rtctl.machines.base import Column
 
-ENDING = 10.0  # s that the loop of a killed supervisor may take to end
+ENDING = 10.0  # s to wait for the end of the loop of a killed supervisor
 
 
 class Leftover(NamedTuple):
@@ -24,14 +24,14 @@ class Leftover(NamedTuple):
     rows: np.ndarray  # structured, (n,), oldest first
     columns: tuple[Column, ...]
     case: dict[str, Any]
-    bundle: Path | None  # that the run was recorded into
+    bundle: Path | None  # recording of the run
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[Leftover]:
-    """Rows of a segment, which is locked against another reader meanwhile.
+    """Rows of a segment, locked against other readers inside the context.
 
-    Raises UserError where it cannot be read, where its loop still runs, or where another process reads it.
+    Raises UserError where the segment cannot be read, where its loop still runs, or where another process reads it.
     """
     try:
         fd = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
@@ -57,7 +57,7 @@ def _read(path: Path, fd: int) -> Leftover:
         ring = np.frombuffer(memory, row, about["capacity"], about["rows"])
         _wait(path, memory, about["loop"])
         head = _number(memory, about["head"])
-        # a loop that was killed may have been overwriting the oldest row
+        # a killed loop may have overwritten part of the oldest row
         torn = head >= len(ring) and not _number(memory, about["loop"]["ended"])
         kept = np.arange(max(head - len(ring), 0) + torn, head) % len(ring)
         columns = tuple(Column(*column) for column in about["columns"])
@@ -75,7 +75,7 @@ def _wait(path: Path, memory: mmap.mmap, loop: dict[str, int]) -> None:
             orders = Path(f"/proc/{pid}/cmdline").read_bytes()
         except OSError:
             return
-        if b"loop_process" not in orders:  # it waits to be reaped, or another process has its number
+        if b"loop_process" not in orders:  # a zombie, or another process with this pid
             return
         if time.monotonic() > deadline:
             raise UserError(f"{path}: the loop of that daemon (pid {pid}) still runs; end it: kill {pid}")

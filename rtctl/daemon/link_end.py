@@ -1,6 +1,6 @@
-"""The plant's end of the link for a plant that is Python: a real board, or an FMU.
+"""The plant's end of the link for a plant in Python: a real board, or an FMU.
 
-The same compiled functions as the emulator's, called from the interpreter, so that both ends are always of one make.
+It calls the compiled link functions of the emulator from the interpreter, so that both ends use the same code.
 """
 
 import importlib
@@ -20,7 +20,7 @@ def sleep_until(wake: int) -> None:
 
 
 class LinkEnd:
-    """`tx` is the newest frame of outputs, `rx` the sample that is sent next; both are records."""
+    """Plant's end of a link: `tx` is the record of the newest outputs, `rx` the record of the next sample to send."""
 
     def __init__(self, kind: str, status: Any, out: Any, inp: Any) -> None:
         self._link = importlib.import_module(f"rtctl.loop.{kind}_link")
@@ -28,22 +28,22 @@ class LinkEnd:
         frames = generate.new_frames()
         self._tx, self._staged, self._rx = frames["tx"], frames["tx_staged"], frames["rx"]
         self.tx, self.rx = self._tx[0], self._rx[0]
-        self._link.receive_newest(inp, self._tx, self._staged)  # compiled before time matters
+        self._link.receive_newest(inp, self._tx, self._staged)  # compile before the real-time run
 
     def newest(self) -> bool:
-        """Take the newest outputs, if there are any that were not seen yet; never waits."""
+        """Take the newest outputs without waiting. Returns whether they are new."""
         fresh = self._link.receive_newest(self._from, self._tx, self._staged) > 0
         self._status["frames"][0] += int(fresh)
         return bool(fresh)
 
     def wait(self) -> bool:
-        """Wait for new outputs, at most as long as the link's own time-out."""
+        """Wait for new outputs, at most for the link's time-out. Returns whether outputs came."""
         fresh = self._link.receive(self._from, self._tx, self._staged) == 1
         self._status["frames"][0] += int(fresh)
         return bool(fresh)
 
     def answer(self) -> None:
-        """Send the sample with its number, its time, and which outputs it has seen."""
+        """Send the sample with its number, its time, and the number and time of the outputs before it."""
         rx, tx = self.rx, self.tx
         rx["seq"] += 1
         rx["t_ns"] = now()

@@ -1,7 +1,7 @@
-"""One daemon a machine: a lock file with the pid of who holds it. The kernel drops the lock with its holder.
+"""Lock file of a machine: at most one daemon runs it. The kernel releases the lock when its holder ends.
 
-So no lock is ever stale, however its holder died, and a pid that is used again by another process says nothing: the
-pid in the file is for people only.
+So no lock is stale, however its holder died. The pid in the file is for people only; the program does not use it to
+decide who holds the lock.
 """
 
 import fcntl
@@ -14,9 +14,9 @@ from rtctl.config.errors import UserError
 
 
 class MachineLock:
-    """Held while a daemon runs; `sockets` is the folder of its sockets, for people.
+    """Lock held while a daemon runs; `sockets` is the folder of its sockets, written to the file for people.
 
-    Raises UserError where another daemon holds it, or where the file cannot be had.
+    Raises UserError where another daemon holds the lock, or where the file cannot be opened or locked.
     """
 
     def __init__(self, path: Path, name: str, sockets: Path | None = None):
@@ -33,10 +33,10 @@ class MachineLock:
             except BaseException:
                 self._close()
                 raise
-            self._close()  # its last holder has removed it between our opening and locking it: take the next
+            self._close()  # the last holder removed the file between open and lock: try again
 
     def __exit__(self, *_: Any) -> None:
-        if self._in_place():  # removed while it is held, so that nothing is left that another user could not open
+        if self._in_place():  # removed while it is held: a file left behind could not be opened by another user
             self._path.unlink(missing_ok=True)
         self._close()
 
@@ -72,12 +72,12 @@ class MachineLock:
             ) from None
 
     def _sign(self) -> None:
-        """Write pid and sockets for people. Raises OSError where the disk is full."""
+        """Write pid and folder of sockets for people. Raises OSError where the disk is full."""
         os.ftruncate(self._fd, 0)
         os.write(self._fd, (f"{os.getpid()}\n" + (f"{self._sockets}\n" if self._sockets else "")).encode())
 
     def _in_place(self) -> bool:
-        """Whether the file that we hold is still the one at its path."""
+        """Whether the open file is still the file at its path."""
         try:
             there = self._path.lstat()
         except OSError:
@@ -90,7 +90,7 @@ class MachineLock:
 
 
 def _owner(path: Path) -> str | None:
-    """The name of a file's owner; None where there is no file to be seen."""
+    """User name of a file's owner, else its uid as text; None where the file cannot be read."""
     try:
         uid = path.lstat().st_uid
     except OSError:

@@ -1,6 +1,6 @@
 """The loop's process: `python -m rtctl.daemon.loop_process ORDERS`, started by the supervisor.
 
-Python runs before and after the compiled loop and, on virtual time, between its stretches; never during them.
+The Python interpreter runs before and after the compiled loop, and on virtual time between blocks of ticks.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ FOREVER = 2**62
 
 
 def main(argv: list[str]) -> int:
-    """Run the loop as ordered; reports `ready`, `lacks`, `error` and `ended`."""
+    """Run the loop as ordered and return the exit code; reports `compiling`, `lacks` and `ended`. Raises UserError."""
     order = child.orders(argv)
     machine = child.machine_from(order)
     loop = machine.config.loop
@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
     run = Loop(machine, made, segment, *((0, 0) if over_zmq else (segment["outputs"], segment["inputs"])))
     if over_zmq:
         zmq_link.load()
-    run.warm()  # before the link is up: samples that wait while we compile would be old
+    run.warm()  # before the link connects: samples that arrive during compilation would be old
     context = zmq.Context()
     socket = None
     if over_zmq:
@@ -76,7 +76,7 @@ def main(argv: list[str]) -> int:
 def _wait_for_plant(
     socket: zmq.Socket | None, run: Loop, timeout: float, endpoint: str, mode: str, key_name: str | None
 ) -> None:
-    """Say hello until the plant answers. Raises UserError where it does not."""
+    """Send hello frames until the plant answers. Raises UserError after `timeout` s without an answer."""
     deadline = time.monotonic() + timeout
     hello = generate.new_frames()["tx"]
     hello["seq"] = frames.HELLO
@@ -89,14 +89,14 @@ def _wait_for_plant(
         with contextlib.suppress(zmq.Again):
             socket.send(hello.tobytes(), zmq.DONTWAIT)
         if socket.poll(200, zmq.POLLIN):
-            if mode == "real":  # what waited for us is old by now
+            if mode == "real":  # drop old samples
                 while socket.poll(0):
                     socket.recv()
                 if not socket.poll(200):
                     continue
             return
     if time.monotonic() < deadline:
-        return  # told to stop
+        return  # stop was ordered
     keys = f"; if it runs, its folder `authorized` lacks our {key_name}.key or our server.key is not its own"
     raise UserError(
         f"no plant answers at {endpoint} within {timeout:g} s (link.timeout); start it with `rtctl plant CONFIG`, "

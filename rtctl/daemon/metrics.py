@@ -1,4 +1,4 @@
-"""What a machine counts, for Prometheus: opt-in, on the loopback interface alone, read off shared memory by its thread.
+"""Prometheus metrics of a machine: optional, on loopback only; a thread reads the counts from shared memory.
 
 Source: prometheus_client's custom collectors; the names follow Prometheus' rules (base units, `_total`).
 """
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from rtctl.daemon.supervisor import Supervisor
 
 ADDRESS = "127.0.0.1"
-BUILD = ["machine", "mode", "version", "python"]  # labels of what runs here
-PLACES = 8  # connections at a time; Prometheus needs one
-PATIENCE = 5.0  # s for a request to come
-COUNTS = {  # field of the status record -> what it counts
+BUILD = ["machine", "mode", "version", "python"]  # labels of rtctl_build_info
+PLACES = 8  # connections at the same time; Prometheus needs one
+PATIENCE = 5.0  # s to wait for a request on an open connection
+COUNTS = {  # field of the status record -> name and help text of its counter
     "tick": ("ticks", "ticks of the loop"),
     "missed": ("missed_ticks", "periods that went by without a tick"),
     "late": ("late_ticks", "ticks that woke late"),
@@ -39,7 +39,7 @@ COUNTS = {  # field of the status record -> what it counts
 
 
 class MachineCollector(Collector):
-    """All counts of one machine, as they stand when they are asked for."""
+    """Metrics of one machine, read from its status record at each scrape."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class MachineCollector(Collector):
         self._name, self._status, self._rows, self._told, self._mode = name, status, rows, told, mode
 
     def collect(self) -> Iterator[Metric]:
-        """The metrics, one family after the other."""
+        """Metric families of the machine."""
         s = self._status
         for field, (name, words) in COUNTS.items():
             yield self._count(name, words, int(s[field]))
@@ -85,7 +85,7 @@ class MachineCollector(Collector):
         yield build
 
     def _model(self) -> Iterator[Metric]:
-        """What a watch finds, while one speaks: a model that nobody runs has neither residual nor alarm."""
+        """Metric families of `rtctl watch`; none while no watch reports."""
         told = self._told()
         if told is None or told["silent"]:
             return
@@ -112,7 +112,7 @@ class MachineCollector(Collector):
 
 
 def _buckets(histogram: Any) -> tuple[list[tuple[str, float]], float]:
-    """Counts up to each power of two, and the sum, in seconds."""
+    """Cumulative counts by upper bound in s, a power of two in ns, and the sum in s."""
     pairs = [(repr(ns * 1e-9), float(count)) for ns, count in octaves(histogram)]
     return [*pairs, ("+Inf", float(histogram["count"]))], total(histogram) * 1e-9
 
@@ -121,11 +121,11 @@ class _Request(WSGIRequestHandler):
     timeout = PATIENCE
 
     def log_message(self, *_: Any) -> None:
-        """Every scrape is no news."""
+        """No log entry for a scrape."""
 
 
 class _Server(ThreadingMixIn, WSGIServer):
-    """A thread for each connection, and no more than PLACES: who only connects takes nothing from the daemon."""
+    """HTTP server with a thread for each connection, at most PLACES: idle connections do not load the daemon."""
 
     daemon_threads = True
 
@@ -144,7 +144,7 @@ class _Server(ThreadingMixIn, WSGIServer):
 
 
 def serve(supervisor: "Supervisor", port: int) -> Callable[[], None]:
-    """Answer GET /metrics on loopback; returns what ends it. Raises UserError where the port is taken."""
+    """Answer GET /metrics on loopback; returns a function that ends the server. Raises UserError for a port in use."""
     registry = CollectorRegistry()
     told = (supervisor.status, supervisor.rows_counted, lambda: supervisor.watched.told)
     registry.register(MachineCollector(supervisor.config.name, *told, supervisor.config.loop.mode))

@@ -1,6 +1,6 @@
-"""What a service manager is told: ready, alive, reloading, stopping. Datagrams to $NOTIFY_SOCKET, as sd_notify(3) does.
+"""Messages to a service manager: ready, alive, reloading, stopping. Datagrams to $NOTIFY_SOCKET, as in sd_notify(3).
 
-A process that no service manager started has no such socket, and then nothing here does anything.
+Without a service manager there is no $NOTIFY_SOCKET, and these functions do nothing.
 
 Source: sd_notify(3), sd_watchdog_enabled(3), systemd.service(5) for Type=notify-reload.
 """
@@ -13,18 +13,18 @@ from collections.abc import Callable, MutableMapping
 import structlog
 
 log = structlog.get_logger()
-GOOD_TICKS = 100  # in time, one after the other, before a machine is called ready; a slow one is given a second
-SEND_TIMEOUT = 1.0  # s; a manager that takes nothing for so long must not hold up the recording
+GOOD_TICKS = 100  # consecutive ticks in time before a machine is ready; below 100 Hz the ticks of one second
+SEND_TIMEOUT = 1.0  # s to wait for the service manager, so that a hung manager does not delay the recording
 
-Send = Callable[[str, bool], bool]  # (text, whether it may wait) -> whether it was taken
+Send = Callable[[str, bool], bool]  # (text, whether it may wait) -> whether it was sent
 
 
 class Service:
-    """This process as its service manager knows it.
+    """State of this process towards its service manager.
 
-    `send(text, wait)` delivers one message and returns whether it was taken; None where nobody listens. `watchdog` is
-    the longest time in us between two signs of life, 0 where none are asked for. `clock()` is CLOCK_MONOTONIC in ns.
-    `good_ticks` is how many ticks in a row must be in time before the machine is ready.
+    `send(text, wait)` sends one message and returns whether it was sent; None without a manager. `watchdog` is the
+    longest time in us between two WATCHDOG=1 messages, 0 for no watchdog. `clock()` is CLOCK_MONOTONIC in ns.
+    `good_ticks` is the number of consecutive ticks in time before the machine is ready.
     """
 
     def __init__(
@@ -38,56 +38,56 @@ class Service:
         self._half = watchdog * 1000 // 2  # ns
         self._ready = self._stopping = False
         self._text = ""
-        self._from = (0, 0)  # tick and late ticks where the row of good ones began
+        self._from = (0, 0)  # tick and count of late ticks at the last late tick
         self._fed_at, self._fed_tick = clock(), 0
 
     @property
     def listens(self) -> bool:
-        """Whether there is a service manager to talk to."""
+        """Whether there is a service manager."""
         return self._send is not None
 
     def observe(self, tick: int, late: int) -> None:
-        """Look at the counters of the loop: ready after enough good ticks, a sign of life for as long as it ticks.
+        """Check the loop's counters: send READY=1 after `good_ticks` ticks in time, and WATCHDOG=1 while it ticks.
 
-        `tick` counts ticks done, `late` those that were late or missed. A tick counter that moves says that the config
-        is valid, the tick compiled, and memory locked or its lack accepted: the loop does not start before.
+        `tick` counts ticks done, `late` late or missed ticks. The loop ticks only after the config is valid, the tick
+        is compiled, and memory is locked or its lack accepted.
         """
         if not self._ready and self._good(tick, late):
             self.ready()
         self.feed(tick)
 
     def ready(self, status: str = "") -> None:
-        """Say READY=1, once, and not on the way down."""
+        """Send READY=1, once, and not after STOPPING=1."""
         if not self._ready and not self._stopping:
             self._ready = True
             self._say("READY=1", *self._changed(status))
 
     def feed(self, tick: int) -> None:
-        """Say WATCHDOG=1 after half of the time allowed, but only if the tick counter has moved since the last one."""
+        """Send WATCHDOG=1 after half of the watchdog time, but only if the tick counter has advanced since the last."""
         now = self._clock()
         if not self._half or now - self._fed_at < self._half or tick == self._fed_tick:
             return
-        if self._send is not None and self._send("WATCHDOG=1", False):  # one that is not taken is sent next time
+        if self._send is not None and self._send("WATCHDOG=1", False):  # a failed message is sent again next time
             self._fed_at, self._fed_tick = now, tick
 
     def reloading(self) -> None:
-        """Say RELOADING=1, with the time that tells the manager which of its requests is meant."""
+        """Send RELOADING=1 with the monotonic time, by which the manager identifies its request."""
         if self._ready and not self._stopping:
             self._say("RELOADING=1", f"MONOTONIC_USEC={self._clock() // 1000}")
 
     def reloaded(self, status: str = "") -> None:
-        """Say that the reload is over. A machine that was not ready before is not made so by it."""
+        """Send READY=1 after a reload, only if the machine was ready before."""
         if self._ready and not self._stopping:
             self._say("READY=1", *self._changed(status))
 
     def stopping(self) -> None:
-        """Say STOPPING=1, once."""
+        """Send STOPPING=1, once."""
         if not self._stopping:
             self._stopping = True
             self._say("STOPPING=1")
 
     def status(self, text: str) -> None:
-        """One line for `systemctl status`; sent when it is another than before."""
+        """Send a line for `systemctl status`, if the line has changed."""
         self._say(*self._changed(text))
 
     def _good(self, tick: int, late: int) -> bool:
@@ -110,10 +110,10 @@ class Service:
 def from_environment(
     environ: MutableMapping[str, str] | None = None, rate: float = GOOD_TICKS, clock: Callable[[], int] | None = None
 ) -> Service:
-    """The service that $NOTIFY_SOCKET and $WATCHDOG_USEC describe, for a loop of `rate` in Hz.
+    """Service by $NOTIFY_SOCKET and $WATCHDOG_USEC, for a loop of `rate` in Hz.
 
-    Takes the variables out of the environment: children must not speak for the daemon. An address that cannot be
-    reached is logged and means that nobody listens.
+    Removes the variables from the environment, so that children do not send messages for the daemon. An unreachable
+    address is logged and counts as no service manager.
     """
     environ = os.environ if environ is None else environ
     address = environ.pop("NOTIFY_SOCKET", "")
@@ -125,7 +125,7 @@ def from_environment(
 
 
 def _sender(address: str) -> Send | None:
-    """Sends to a socket in the file system, or to an abstract one, whose name is written with an @ in front."""
+    """Function that sends to a unix socket in the file system, or to an abstract one (name with a leading @)."""
     link = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
     try:
         link.connect("\0" + address[1:] if address.startswith("@") else address)

@@ -1,4 +1,4 @@
-"""An emulated machine that becomes another one in mid-run: the same state goes on under other equations."""
+"""Change of an emulated machine in mid-run: a second machine continues from the state of the first."""
 
 import threading
 from typing import Any
@@ -9,7 +9,7 @@ from rtctl.daemon.plant_process import Plant
 
 
 def carry(source: Any, target: Any) -> None:
-    """Copy the fields that two records have in common, by name and type, records within records alike."""
+    """Copy the fields with the same name and type from one record to another, also in nested records."""
     for name in target.dtype.names or ():
         if name not in (source.dtype.names or ()):
             continue
@@ -20,7 +20,7 @@ def carry(source: Any, target: Any) -> None:
 
 
 class Onset:
-    """Emulates `first`, and `seconds` after that began `second`, which goes on from its state. On the wall clock."""
+    """Emulates `first`, then after `seconds` s of wall clock `second`, which continues from the state of `first`."""
 
     def __init__(self, first: Plant, second: Plant, seconds: float):
         self._first, self._second, self._seconds = first, second, seconds

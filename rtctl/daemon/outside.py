@@ -1,4 +1,4 @@
-"""All that a daemon shows to others: command socket, telemetry and rows, each behind its door."""
+"""Sockets of a daemon for its clients: command socket, telemetry and rows, each behind a door (doors.py)."""
 
 import time
 from typing import Any
@@ -13,13 +13,13 @@ from rtctl.daemon.rows import RowsOut
 from rtctl.daemon.server import CommandServer, default_endpoint, runtime_dir
 from rtctl.daemon.telemetry import Telemetry
 
-MOST_ROWS = 2000  # newest rows from which a message of telemetry is thinned
+MOST_ROWS = 2000  # newest rows considered for a telemetry message
 
 
 class Outside:
     """Sockets of a machine with these settings; `columns` are the names of its signals, `row` is the dtype of its rows.
 
-    Raises UserError where an address cannot be had, or is open to the network without keys.
+    Raises UserError where an address is not available, or is open to the network without keys.
     """
 
     def __init__(self, config: Any, columns: list[str], row: np.dtype, commands: Commands):
@@ -48,12 +48,12 @@ class Outside:
             raise
 
     def look(self) -> None:
-        """See to the doors, and answer what was asked."""
+        """Start door processes that are needed, and answer waiting commands."""
         self._doors.look()
         self.server.process()
 
     def publish(self, rows: np.ndarray) -> None:
-        """Rows (n,) as they were written, for whoever listens."""
+        """Publish trace rows (n,) to the subscribers of telemetry and rows."""
         self._rows.append(rows[-MOST_ROWS:])
         now = time.monotonic()
         if now - self._latest >= self._period:
@@ -64,7 +64,7 @@ class Outside:
         self._rows_out.publish(rows)
 
     def close(self) -> None:
-        """Close what is open, after what is under way."""
+        """Close the sockets, after pending messages."""
         for name in ("_rows_out", "_telemetry", "server"):
             if (socket := getattr(self, name, None)) is not None:
                 socket.close()

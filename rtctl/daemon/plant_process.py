@@ -1,6 +1,6 @@
-"""The process at the plant's end of the link: the emulated machine, a real board in its place, or an FMU.
+"""The process at the plant's end of the link: an emulated machine, a real board, or an FMU.
 
-`python -m rtctl.daemon.plant_process ORDERS`, or `rtctl plant CONFIG` by itself.
+`python -m rtctl.daemon.plant_process ORDERS`, started by the supervisor, or `rtctl plant CONFIG`.
 """
 
 import contextlib
@@ -21,18 +21,18 @@ from rtctl.machines import Machine, fmu_of
 from rtctl.tick import frames
 
 SECOND = 1_000_000_000
-MOST_BEHIND = 200  # periods that the emulator makes up for before it lets time slip
+MOST_BEHIND = 200  # periods of delay that the emulator catches up; a longer delay is skipped
 
 
 class Plant:
-    """All arrays that the compiled emulator works on."""
+    """The compiled emulator and its arrays."""
 
     def __init__(self, machine: Machine, made: generate.Generated, status: Any, out: Any, inp: Any):
         frame = generate.new_frames()
         p, s = np.zeros(1, made.plant_params), np.zeros(1, made.plant_state)
         generate.fill(p[0], machine.plant_diagram.blocks)
         self.status = status
-        self.records = (s, frame["tx"], frame["tx_staged"], frame["rx"])  # all that it remembers
+        self.records = (s, frame["tx"], frame["tx_staged"], frame["rx"])  # the emulator's whole state
         arguments: tuple[Any, ...] = (status, p, s, frame["tx"], frame["tx_staged"], frame["rx"], out, inp)
         if machine.config.loop.mode == "lockstep":
             self._entry = made.module.plant_lockstep
@@ -50,7 +50,7 @@ class Plant:
 
 
 def plant(machine: Machine, made: generate.Generated, link: str, status: Any, out: Any, inp: Any) -> Any:
-    """What stands at the plant's end, by the config; `run()` serves the loop. Raises UserError where it cannot."""
+    """Board, FMU or emulator by the config; its `run()` serves the loop. Raises UserError where it cannot start."""
     if machine.config.driver.kind != "emulated":
         from rtctl.daemon.board_plant import BoardPlant
 
@@ -65,8 +65,10 @@ def plant(machine: Machine, made: generate.Generated, link: str, status: Any, ou
 def serve(
     machine: Machine, endpoint: str, status: Any, announce: Any, later: tuple[Machine, float] | None = None
 ) -> None:
-    """Listen at a ZeroMQ endpoint and emulate; `announce()` is called when it listens. `later` is the machine that it
-    becomes, and after how many s."""
+    """Listen at a ZeroMQ endpoint and serve the plant; `announce()` is called once the socket listens.
+
+    `later` is a second machine and the time in s after which the emulator continues with it.
+    """
     made = generate.generate(machine, "zmq")
     context = zmq.Context()
     link = machine.config.link
@@ -87,7 +89,7 @@ def serve(
 
 
 def _wait_for_hello(socket: zmq.Socket, status: Any) -> None:
-    """Until the loop says hello there is nobody to take the first sample."""
+    """Wait for the hello frame of the loop, or for status.stop: before, nobody would take the first sample."""
     while not status[0]["stop"]:
         if not socket.poll(200, zmq.POLLIN):
             continue
@@ -99,7 +101,7 @@ def _wait_for_hello(socket: zmq.Socket, status: Any) -> None:
 
 
 def main(argv: list[str]) -> int:
-    """Emulate as ordered by the supervisor."""
+    """Serve the plant as ordered by the supervisor; returns the exit code."""
     order = child.orders(argv)
     machine = child.machine_from(order)
     made = generate.generate(machine, order["link"])
@@ -113,7 +115,7 @@ def main(argv: list[str]) -> int:
     compiling.tell()
     child.watch_parent(stop, stop)
     if order.get("cpu") is not None:
-        with contextlib.suppress(OSError):  # it runs anywhere; only its samples come a little later
+        with contextlib.suppress(OSError):  # another CPU only delays samples a little
             os.sched_setaffinity(0, {order["cpu"]})
     if order["link"] == "zmq":
         serve(machine, order["endpoint"], status, lambda: None)
@@ -124,7 +126,7 @@ def main(argv: list[str]) -> int:
 
 
 def alone(machine: Machine, endpoint: str, announce: Any, later: tuple[Machine, float] | None = None) -> None:
-    """As `rtctl plant`: emulate until interrupted; `later` is the machine that it becomes, and after how many s."""
+    """Serve the plant for `rtctl plant` until interrupted; `later` as in `serve`."""
     status = np.zeros(1, PLANT_STATUS)
 
     def stop() -> None:
@@ -140,6 +142,6 @@ if __name__ == "__main__":
     except UserError as error:
         child.report("error", message=str(error), code=2)
         sys.exit(2)
-    except BoardError as error:  # the loop hears no more and trips; the supervisor passes our last words on
+    except BoardError as error:  # the loop gets no samples and trips; the supervisor reports this error output
         print(f"{error}; its outputs are off", file=sys.stderr)
         sys.exit(1)

@@ -1,11 +1,11 @@
-"""The command protocol: one msgpack map there, one back. Nothing here knows of sockets.
+"""The command protocol: a request and a reply, each a msgpack map. Independent of sockets.
 
     request  {"v": 1, "id": 7, "op": "setpoint", "args": {"value": 0.25}}
     reply    {"v": 1, "id": 7, "ok": true, "result": {...}}
              {"v": 1, "id": 7, "ok": false, "error": {"code": "refused", "message": "..."}}
 
-A request is not trusted: its size, depth, types, keys and numbers are checked before anyone looks at its meaning, and
-whatever is wrong with it becomes a ProtocolError. docs/protocol.md is the long form.
+A request is not trusted: its size, depth, types, keys and numbers are checked before its meaning. Any fault becomes a
+ProtocolError. docs/protocol.md describes the protocol in full.
 """
 
 import difflib
@@ -36,7 +36,7 @@ ERRORS = {
 
 
 class ProtocolError(Exception):
-    """A message that cannot be taken. `code` is a key of ERRORS; `id` is that of the request where it could be read."""
+    """An invalid message. `code` is a key of ERRORS; `id` is the id of the request, None where it cannot be read."""
 
     def __init__(self, code: str, message: str, id: int | str | None = None):
         super().__init__(message)
@@ -45,26 +45,29 @@ class ProtocolError(Exception):
         self.id = id
 
 
-# Control characters have no business in a name, and would let a client write lines of its own into the log.
+# No control characters: with them a client could write lines of its own into the log.
 Text = Annotated[str, StringConstraints(min_length=1, max_length=256, pattern=r"^[^\x00-\x1f\x7f]+$")]
-# Factors and small powers only: what converts a unit also evaluates "m**9**9**9", for a very long time.
+# Factors and small powers only: the unit converter would also evaluate "m**9**9**9", for a very long time.
 Unit = Annotated[str, StringConstraints(max_length=32, pattern=r"^[A-Za-z%]+(\^-?\d)?([*/ ][A-Za-z%]+(\^-?\d)?)*$")]
 Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 
 
 class Args(BaseModel):
-    """Arguments of an op. No conversion between types but int to float; an unknown key is an error."""
+    """Arguments of an op. Types are converted from int to float only; an unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 class NoArgs(Args):
-    """For ops that take none."""
+    """No arguments."""
 
 
 class SetpointArgs(Args):
-    """A new setpoint: SI without `unit`; `name` where a machine has several. `ramp` is how fast to go there, in `unit`
-    per second or in `ramp_unit`, such as mm/s; at once without it."""
+    """A new setpoint, in SI units without `unit`; `name` where a machine has several.
+
+    `ramp` is the speed of the change, in `unit` per second or in `ramp_unit`, such as mm/s. Without it the setpoint
+    steps.
+    """
 
     name: Text | None = None
     value: float
@@ -112,14 +115,14 @@ Sentence = Annotated[str, StringConstraints(min_length=1, max_length=2000, patte
 
 
 class LaneArgs(Args):
-    """A signal of a model beside the machine: `values` at the times `t` of the call."""
+    """A signal of the model in `rtctl watch`: `values` (n,) at the times `t` of the call."""
 
     unit: Unit | Literal["sigma", ""]
     values: Annotated[list[float], Field(max_length=400)]
 
 
 class AlarmArgs(Args):
-    """A departure from the model: controller clock in s, the sentence, and what came of it."""
+    """A departure from the model: controller time `t` in s, sentence, bundle, diagnosis and page."""
 
     t: float
     words: Sentence
@@ -129,7 +132,7 @@ class AlarmArgs(Args):
 
 
 class WatchArgs(Args):
-    """What a model beside the machine finds: `residual` by sensor in standard deviations, `lanes` by name."""
+    """Report of `rtctl watch`: `residual` by sensor in standard deviations, `lanes` (signals of the model) by name."""
 
     state: Literal["waiting", "learning", "watching", "astray"]
     learned: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
@@ -167,7 +170,7 @@ class Request(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """`code` and `message` are empty where the request was carried out, `result` where it was not."""
+    """A reply: `code` and `message` are empty after success, `result` is empty after an error."""
 
     id: int | str | None
     result: dict[str, Any]
@@ -180,8 +183,10 @@ def encode_request(id: int | str, op: str, args: dict[str, Any]) -> bytes:
 
 
 def encode_result(id: int | str, result: dict[str, Any]) -> bytes:
-    """Numpy scalars and arrays and paths in `result` become numbers, lists and text. Raises ProtocolError if too large,
-    TypeError, ValueError or OverflowError for what msgpack cannot hold."""
+    """Encoded reply with `result`. Numpy scalars, arrays and paths become numbers, lists and text.
+
+    Raises ProtocolError if too large, TypeError, ValueError or OverflowError for values that msgpack cannot hold.
+    """
     return _pack({"v": VERSION, "id": id, "ok": True, "result": result})
 
 
@@ -191,7 +196,7 @@ def encode_error(id: int | str | None, code: str, message: str) -> bytes:
 
 
 def decode_request(data: bytes) -> Request:
-    """The request in `data`, with typed arguments. Raises ProtocolError and nothing else, whatever `data` is."""
+    """The request in `data`, with typed arguments. Raises only ProtocolError, for any `data`."""
     message = _unpack(data, **LIMITS)
     id = message.get("id")
     known_id = id if _is_id(id) else None
@@ -208,7 +213,7 @@ def decode_request(data: bytes) -> Request:
 
 
 def decode_reply(data: bytes) -> Reply:
-    """The reply in `data`. Raises ProtocolError where it is none."""
+    """The reply in `data`. Raises ProtocolError where `data` is not a reply."""
     message = _unpack(data)
     _check_version(message)
     result, error = message.get("result", {}), message.get("error", {})
@@ -220,7 +225,7 @@ def decode_reply(data: bytes) -> Reply:
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """The end of a sentence about an unknown `name`: the one that was probably meant, else all there are."""
+    """End of a sentence about an unknown `name`: the nearest of `names`, else all of them."""
     names = list(names)
     close = difflib.get_close_matches(name[:64], names, 1)
     return f"; did you mean '{close[0]}'?" if close else f"; expected {', '.join(names) or 'none'}"
@@ -328,7 +333,7 @@ def _unpack(data: bytes, **limits: int) -> dict[str, Any]:
 def _unique(pairs: list[tuple[Any, Any]]) -> dict[Any, Any]:
     made = dict(pairs)
     if len(made) != len(pairs):
-        raise ValueError("a key stands twice in one map")
+        raise ValueError("a key occurs twice in one map")
     return made
 
 

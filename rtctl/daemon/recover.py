@@ -1,7 +1,7 @@
 """Recovery of the rows that a killed daemon left in shared memory: `rtctl trace recover NAME`.
 
-The segment of a dead daemon is moved aside under the machine's lock, so that the next start need not wait. A segment
-is removed once its rows are on the disk.
+The segment of a dead daemon is renamed under the machine's lock, so that the next start need not wait. A segment is
+removed once its rows are on the disk.
 """
 
 import re
@@ -18,14 +18,14 @@ NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
 class Recovered(NamedTuple):
-    """What became of the rows of one segment."""
+    """Result of the recovery of one segment."""
 
     segment: Path  # removed
-    bundle: Path | None  # that the rows are in now; None where there was no row
-    rows: int  # that were recovered
-    ticks: tuple[int, int] | None  # first and last of them
-    lost: int  # rows that are in neither
-    alone: str | None  # why they make a bundle of their own
+    bundle: Path | None  # bundle with the recovered rows; None where there was no row
+    rows: int  # recovered rows
+    ticks: tuple[int, int] | None  # first and last recovered tick
+    lost: int  # rows in neither the segment nor the recording
+    alone: str | None  # reason for a separate bundle
 
     def __str__(self) -> str:
         if self.ticks is None:
@@ -37,10 +37,10 @@ class Recovered(NamedTuple):
 
 
 def recover(name: str, out: Path | None = None) -> tuple[list[Recovered], list[str]]:
-    """Join the rows of all segments of a machine to their recordings. Returns those done, and what could not be done.
+    """Join the rows of all segments of a machine to their recordings. Returns the recovered segments and the failures.
 
-    `out` is where the recording lies now, or a new folder for rows without one; NAME-recovered-DATE-TIME if not given.
-    Raises UserError where there is no segment, or none but that of a daemon that runs.
+    `out` is the folder of a moved recording, or a new folder for rows without one; default NAME-recovered-DATE-TIME.
+    Raises UserError where there is no segment, or only the segment of a running daemon.
     """
     if not NAME.fullmatch(name):
         raise UserError(f"'{name}' is no machine's name: letters, digits, '_' and '-', at most 40")
@@ -76,7 +76,7 @@ def _segment(name: str, path: Path, out: Path | None) -> Recovered:
                 "the run was not recorded" if left.bundle is None else f"its recording is not at {left.bundle} any more"
             )
             done = join.alone(_free(name, path, out), left.rows, left.columns, left.case)
-        shared_memory.remove(path)  # all is on the disk
+        shared_memory.remove(path)  # the rows are on the disk
     if done is None:
         return Recovered(path, None, 0, None, 0, None)
     ticks = None if done.first is None or done.last is None else (done.first, done.last)
@@ -84,12 +84,12 @@ def _segment(name: str, path: Path, out: Path | None) -> Recovered:
 
 
 def _bundle(left: leftover.Leftover, out: Path | None) -> Path | None:
-    """Folder of the recording of the same run; None where it is gone."""
+    """Folder of the recording of the segment's run; None where there is none."""
     return next((place for place in (left.bundle, out) if place is not None and join.is_of(place, left.case)), None)
 
 
 def _free(name: str, path: Path, out: Path | None) -> Path:
-    """A folder that is not there yet, or is empty."""
+    """Path of a folder that does not exist or is empty."""
     when = datetime.fromtimestamp(path.stat().st_mtime).strftime("%Y%m%d-%H%M%S")
     base = out if out is not None else Path(f"{name}-recovered-{when}")
     folder, number = base, 2

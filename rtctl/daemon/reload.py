@@ -1,4 +1,4 @@
-"""A config that is read again while its machine runs: what `rtctl set` could change is taken over, the rest refused."""
+"""Reload of a config while its machine runs: settings that `rtctl set` could change are applied, others refused."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 def reload(supervisor: "Supervisor", fresh: Any) -> tuple[list[str], list[str]]:
-    """Take over what may change, all of it at one tick. Returns paths taken over, and sentences about what was refused.
+    """Apply the settings that may change, at one tick. Returns applied paths, and sentences about refused settings.
 
-    `fresh` are the settings as the file has them now. Raises UserError where the new values do not go together: then
-    all old ones stay.
+    `fresh` are the settings of the file as it is now. Raises UserError where the new values contradict each other; then
+    all old values stay.
     """
     old = supervisor.config
     if fresh.machine != old.machine:
@@ -52,7 +52,7 @@ def reload(supervisor: "Supervisor", fresh: Any) -> tuple[list[str], list[str]]:
 
 
 def differences(old: Any, new: Any, at: str = "") -> list[str]:
-    """Dotted paths whose values differ; a choice of another kind, and a list, count as one."""
+    """Dotted paths whose values differ. A list is one path, and so is a group of settings that changes its kind."""
     if type(old) is not type(new) or not hasattr(type(old), "model_fields"):
         return [] if type(old) is type(new) and old == new else [at]
     names = type(old).model_fields
@@ -60,7 +60,7 @@ def differences(old: Any, new: Any, at: str = "") -> list[str]:
 
 
 def mixed(old: Any, new: Any, paths: list[str]) -> Any:
-    """Settings `old` with the values that `new` has at `paths`. Raises UserError where they do not go together."""
+    """Settings `old` with the values of `new` at `paths`. Raises UserError where the values contradict each other."""
     config = old
     for path in paths:
         config = _with(config, path.split("."), get_path(new, path))
@@ -76,7 +76,7 @@ def _with(settings: Any, parts: list[str], value: Any) -> Any:
 
 
 def _rebuilds(supervisor: "Supervisor", fresh: Any, paths: list[str]) -> bool:
-    """Whether these values need another tick. Some that do not fit by themselves may still fit with others."""
+    """Whether these values change the code of the tick. False where they are invalid without other changes."""
     try:
         machine = _built(mixed(supervisor.config, fresh, paths))
     except UserError:

@@ -1,9 +1,9 @@
-"""Every row of the trace, as the loop wrote it, for a scope: an XPUB socket beside the telemetry, local only.
+"""Rows socket: every row of the trace for a scope, on an XPUB socket of this computer.
 
-A message is three parts: the topic (the machine's name), a msgpack map that says how a row looks and whose it is,
-`{"pid": 4711, "names": ["tick", "t", ...], "types": ["<i8", "<f8", ...]}`, and the rows, each of them the values one
-after the other. The telemetry is thinned and easy to read; this is neither, and costs a copy of the rows. The daemon
-never waits: a subscriber that is slow loses messages, and sees it by a jump in `tick`. Without one nothing is sent.
+A message has three parts. The first is the topic, the machine's name. The second is a msgpack map with the daemon's pid
+and the row layout, `{"pid": 4711, "names": ["tick", "t", ...], "types": ["<i8", "<f8", ...]}`. The third holds the
+rows, each as its values one after the other. The daemon never waits: a slow subscriber loses messages, and sees the
+loss as a jump in `tick`. Without a subscriber nothing is sent.
 """
 
 import os
@@ -18,12 +18,12 @@ from rtctl.daemon.doors import Door
 from rtctl.daemon.server import bind, release
 from rtctl.daemon.telemetry import LONGEST_TOPIC
 
-MESSAGES_WAITING = 200  # for each subscriber: two seconds of turns
-MOST_ROWS = 8192  # in one message; of a run on virtual time that makes more, the newest
+MESSAGES_WAITING = 200  # queued messages for each subscriber: two seconds of turns
+MOST_ROWS = 8192  # rows in one message, the newest; a run on virtual time may make more in a turn
 
 
 class RowsOut:
-    """Publishes rows of dtype `row` under `topic`, while somebody listens."""
+    """Publishes rows of dtype `row` under `topic`, while there is a subscriber."""
 
     def __init__(self, endpoint: str, topic: str, row: np.dtype, context: zmq.Context, door: Door | None = None):
         self.socket = context.socket(zmq.XPUB)
@@ -32,7 +32,7 @@ class RowsOut:
         self.socket.sndhwm = MESSAGES_WAITING
         self.endpoint = bind(self.socket, endpoint, door=door)
         path = Path(self.endpoint.removeprefix("ipc://"))
-        path.chmod(path.stat().st_mode | stat.S_IRGRP | stat.S_IWGRP)  # who may enter the folder may listen
+        path.chmod(path.stat().st_mode | stat.S_IRGRP | stat.S_IWGRP)  # the group may subscribe
         self._topic = topic.encode()
         self._packed = packed(row)
         types = [self._packed[name].str for name in self._packed.names or ()]
@@ -40,7 +40,7 @@ class RowsOut:
         self._asked: set[bytes] = set()
 
     def publish(self, rows: np.ndarray) -> bool:
-        """Send an array of rows; returns False where nobody listens."""
+        """Send rows (n,); returns False where there is no subscriber."""
         while self.socket.poll(0):
             message = self.socket.recv(zmq.NOBLOCK)
             (self._asked.add if message[:1] == b"\x01" else self._asked.discard)(message[1:])
@@ -55,12 +55,12 @@ class RowsOut:
 
 
 def packed(row: np.dtype) -> np.dtype:
-    """The same fields without gaps between them, in the byte order of x86 and ARM."""
+    """Row dtype without padding, in little-endian byte order."""
     return np.dtype([(name, row[name].newbyteorder("<")) for name in row.names or ()])
 
 
 def decode(head: bytes) -> tuple[int, np.dtype]:
-    """The pid of the daemon and the dtype of its rows. Raises ValueError where `head` is none."""
+    """The pid of the daemon and the dtype of its rows, from the second part `head`. Raises ValueError if malformed."""
     try:
         found = msgpack.unpackb(head)
         return int(found["pid"]), np.dtype(list(zip(found["names"], found["types"], strict=True)))

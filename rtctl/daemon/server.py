@@ -1,6 +1,6 @@
-"""The command socket of the daemon, where it lives in the file system, and who may bind it.
+"""The command socket of the daemon, its place in the file system, and the checks before it is bound.
 
-`CommandServer` is a ROUTER whose socket the supervisor's poller watches; nothing here blocks or starts a thread.
+`CommandServer` has a ROUTER socket in the supervisor's poller. Nothing here blocks or starts a thread.
 """
 
 import errno
@@ -31,23 +31,23 @@ log = structlog.get_logger()
 SYSTEM_DIR = Path("/run/rtctl")
 TEMPORARY_DIR = Path("/tmp")
 MAX_SOCKET_PATH = 107  # bytes; sockaddr_un holds 108 with the closing zero
-MAX_FRAME = 1024 * 1024  # larger than a message may be, so that one somewhat too large is told so; beyond, cut off
-WAITING = 100  # messages a peer may have waiting in either direction
+MAX_FRAME = 1024 * 1024  # bytes; a larger frame ends the connection. Above MAX_BYTES, so that `too_large` is answered
+WAITING = 100  # queued messages for each peer, in either direction
 T = TypeVar("T")
 MACHINE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 
 
 class Handler(Protocol):
-    """What the supervisor brings: does `op`, returns its result, raises UserError to refuse."""
+    """Interface to the supervisor: `handle` carries out `op`, returns its result, raises UserError to refuse."""
 
     def handle(self, op: str, args: Args) -> dict[str, Any]: ...
 
 
 class CommandServer:
-    """Takes requests from any number of clients. `accepted` and `refused[code]` count the answers given.
+    """Server for requests of any number of clients. `accepted` and `refused[code]` count the answers.
 
-    `ping` is answered here, so that it tells of the socket and the process and needs nothing else to be alive; `heard`
-    is called for it.
+    `ping` is answered here, without the handler, so that it tests the socket and the process only. `heard` is called
+    for each `ping`.
     """
 
     def __init__(
@@ -67,11 +67,11 @@ class CommandServer:
         self.socket.linger = 0
         self.socket.rcvhwm = self.socket.sndhwm = WAITING
         self.socket.maxmsgsize = MAX_FRAME
-        self.socket.router_mandatory = False  # a reply to a client that is gone or full is dropped, never waited for
+        self.socket.router_mandatory = False  # a reply to a closed or slow client is dropped
         self.endpoint = bind(self.socket, endpoint, curve, door)
 
     def process(self, max_messages: int = 16) -> int:
-        """Answer at most `max_messages` that wait, without blocking. Returns how many there were."""
+        """Answer at most `max_messages` waiting requests, without blocking. Returns their number."""
         for count in range(max_messages):
             try:
                 frames = self.socket.recv_multipart(zmq.NOBLOCK)
@@ -90,7 +90,7 @@ class CommandServer:
         return max_messages
 
     def answer(self, payload: bytes) -> bytes:
-        """The reply to one request. Never raises, whatever the request is and whatever the handler does."""
+        """Encoded reply to one request. Never raises, for any request and any error of the handler."""
         try:
             request = decode_request(payload)
         except ProtocolError as error:
@@ -127,9 +127,9 @@ class CommandServer:
 
 
 def runtime_dir() -> Path:
-    """Where sockets live: $XDG_RUNTIME_DIR/rtctl, else /run/rtctl if writable, else /tmp/rtctl-UID. Made if missing.
+    """Folder of sockets: $XDG_RUNTIME_DIR/rtctl, else /run/rtctl if writable, else /tmp/rtctl-UID. Made if missing.
 
-    Raises UserError where it cannot be made, or where somebody else could put a socket into it.
+    Raises UserError where the folder cannot be made, or where another user could put a socket into it.
     """
     given = os.environ.get("XDG_RUNTIME_DIR")
     if given:
@@ -155,14 +155,14 @@ def default_endpoint(machine_name: str, which: Literal["command", "telemetry", "
 
 
 def find_endpoint(machine_name: str, which: Literal["command", "telemetry", "rows"]) -> str:
-    """For clients: the user's own daemon, or else the one that runs as a system service."""
+    """Endpoint for clients: the socket of the user's own daemon, else of the system service, if there is one."""
     own = default_endpoint(machine_name, which)
     service = SYSTEM_DIR / f"{machine_name}.{which}"
     return f"ipc://{service}" if service.exists() and not Path(own.removeprefix("ipc://")).exists() else own
 
 
 def bind(socket: zmq.Socket, endpoint: str, curve: ServerCurve | None = None, door: Door | None = None) -> str:
-    """Bind and return the endpoint as bound (a tcp port `*` filled in). With a `door`, others connect there.
+    """Bind and return the endpoint as bound, with a tcp port for `*`. With a `door`, clients connect to its listener.
 
     Raises UserError, with the socket closed, for a bad address, one in use, or one open to the network without keys.
     """
@@ -189,14 +189,14 @@ def bind(socket: zmq.Socket, endpoint: str, curve: ServerCurve | None = None, do
 
 
 def release(socket: zmq.Socket, endpoint: str) -> None:
-    """Close a socket that `bind` bound, and take its file away, so that nobody looks for a daemon there."""
+    """Close a socket that `bind` bound, and remove its file, so that no client looks for a daemon there."""
     socket.close(linger=0)
     if endpoint.startswith("ipc://"):
         Path(endpoint.removeprefix("ipc://")).unlink(missing_ok=True)
 
 
 def _bind_behind(socket: zmq.Socket, endpoint: str, door: Door) -> str:
-    """Bind at the inner end of a door, and listen at its outer end; returns that endpoint."""
+    """Bind at the inner end of a door, and listen at its outer end; returns the outer endpoint."""
     _check_path(door.inner)
     if endpoint.startswith("ipc://"):
         path, bound = Path(endpoint.removeprefix("ipc://")), endpoint
@@ -216,8 +216,11 @@ def _bind_behind(socket: zmq.Socket, endpoint: str, door: Door) -> str:
 
 
 def _bind_ipc(path: Path, binds: Callable[[], T]) -> T:
-    """What `binds` makes at `path`. It removes whatever lies there, be it a live daemon's socket or a person's file. So
-    look first, with the folder locked against another daemon that looks at the same time."""
+    """Result of `binds`, which binds at `path`. Raises UserError where the path is in use.
+
+    `binds` removes any file at the path, even the socket of a running daemon or a person's file. So the path is checked
+    first, with the folder locked against another daemon that checks at the same time.
+    """
     _check_path(path)
     try:
         folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
@@ -234,7 +237,7 @@ def _bind_ipc(path: Path, binds: Callable[[], T]) -> T:
 
 
 def _listener(path: Path) -> int | None:
-    """The pid of who listens on a socket file; None where nobody does: no file, or one that a crash left behind."""
+    """The pid of the process that listens on a socket file; None without a file, or with one left by a crash."""
     try:
         if not stat.S_ISSOCK(path.lstat().st_mode):
             raise UserError(f"{path} exists and is not a socket; remove it, or use another endpoint")

@@ -1,4 +1,4 @@
-"""A run from start to end: supervise, arm, play the reference, record, and tell what came of it."""
+"""A run from start to end: supervise, arm, play the reference, record, and return the results."""
 
 import contextlib
 import signal
@@ -14,13 +14,13 @@ from rtctl.config.errors import RunFailed, UserError
 from rtctl.daemon.notify import from_environment
 from rtctl.daemon.supervisor import Supervisor
 
-MOST_ROWS = 3_000_000  # read back for steps and picture; of a longer run, draw a part with `rtctl trace plot`
+MOST_ROWS = 3_000_000  # longest run with step metrics and picture; draw part of a longer one with `rtctl trace plot`
 
 
 class Session:
-    """One `rtctl run`. `length` in s ends it; None leaves that to `stop`, Ctrl-C or a trip.
+    """One `rtctl run` of `length` s; None runs until `stop` or Ctrl-C.
 
-    `reread()` gives the settings as their file has them now; a service manager asks for that with SIGHUP.
+    `reread()` returns the settings of the config file as it is now; a service manager asks for a reload with SIGHUP.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Session:
         if config.loop.mode == "fused" and not ticks:
             raise UserError("a fused run has no wall clock to follow: say how long with --for")
         self.config, self.arm, self.say = config, arm, say
-        if not structlog.is_configured():  # standard output belongs to whoever runs this
+        if not structlog.is_configured():  # log to standard error: standard output is for the caller
             structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(sys.stderr))
         self.supervisor = Supervisor(config, out, ticks, say)
         self.supervisor.reread = reread
@@ -46,10 +46,10 @@ class Session:
         self.result: dict[str, Any] | None = None  # there once the recording is finished
 
     def run(self, update: Callable[[Supervisor], None] = lambda _: None) -> dict[str, Any]:
-        """Run to the end; `update` is called at every turn. Returns what `rtctl run --json` prints.
+        """Run to the end; `update` is called at every turn. Returns the results that `rtctl run --json` prints.
 
         Raises RunFailed where the loop's process died, UserError where a process reported an error. The recording is
-        finished and `result` is there then, too.
+        finished and `result` is set also after a failure.
         """
         supervisor = self.supervisor
         supervisor.armed_at_start = self.arm
@@ -61,7 +61,7 @@ class Session:
                 self.bundle = supervisor.finish()
             except OSError as error:
                 raise UserError(_not_taken(supervisor, error)) from error
-            result = supervisor.snapshot()  # now that all rows are on disk
+            result = supervisor.snapshot()  # after all rows are on disk
         self.steps = self._metrics()
         self.result = {
             **result,
@@ -76,7 +76,7 @@ class Session:
         return self.result
 
     def _rows(self) -> int:
-        """Rows in the bundle: none where the run ended before its first tick."""
+        """Number of rows in the bundle: 0 where the run ended before its first tick."""
         recorder = self.supervisor.recorder
         return 0 if recorder is None else recorder.stats().rows_written
 
@@ -95,7 +95,7 @@ class Session:
         return machine_steps(machine, t, target, y)
 
     def draw(self) -> str | None:
-        """Draw the run beside its bundle; returns the picture's path."""
+        """Draw the run into its bundle; returns the picture's path, None without a picture."""
         if self.bundle is None or not 0 < self._rows() <= MOST_ROWS:
             return None
         from rtctl.trace.bundle import load_bundle
@@ -107,7 +107,7 @@ class Session:
 
 
 def _not_taken(supervisor: Supervisor, error: OSError) -> str:
-    """Sentence about a recording that the disk did not take at the end."""
+    """Error message for a recording that could not be completed on the disk."""
     where = supervisor.out if supervisor.recorder is None else supervisor.recorder.folder
     way_on = f"make room, then `rtctl trace repair {where}`"
     if where is not None and not where.exists():
@@ -116,9 +116,9 @@ def _not_taken(supervisor: Supervisor, error: OSError) -> str:
 
 
 def whole(result: dict[str, Any]) -> dict[str, Any]:
-    """Result of a run, for a program that goes on with its recording.
+    """Result of a complete run, for a program that continues with its recording.
 
-    Raises KeyboardInterrupt where it was interrupted, RunFailed where the recording stopped or was moved.
+    Raises KeyboardInterrupt where the run was interrupted, RunFailed where the recording stopped or was moved.
     """
     if result["interrupted"]:
         raise KeyboardInterrupt
@@ -128,17 +128,17 @@ def whole(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def lost_rows(rows: dict[str, Any]) -> int:
-    """Rows of a run that are in no recording; without a recorder those that the ring lost."""
+    """Number of rows of a run that are in no recording; without a recorder the rows that the ring lost."""
     return int(rows.get("lost", rows["lost_in_ring"]))
 
 
 @contextlib.contextmanager
 def _signals(supervisor: Supervisor) -> Iterator[None]:
-    """Ctrl-C, SIGTERM and a closed terminal end the run at its next turn; a second Ctrl-C does not wait for that.
+    """Signal handlers: Ctrl-C, SIGTERM and a closed terminal end the run at its next turn; a second Ctrl-C at once.
 
-    SIGHUP has a service read its config again, and does nothing where it is ignored already, as under nohup.
+    SIGHUP makes a service read its config again. An ignored SIGHUP, as under nohup, stays ignored.
 
-    An exception at any point whatever could leave a lock of the recorder taken, and the recording unfinished.
+    The handlers raise no exception at first: it could leave a lock of the recorder taken, and the recording unfinished.
     """
 
     noted = False
@@ -152,7 +152,7 @@ def _signals(supervisor: Supervisor) -> Iterator[None]:
     def reload(*_: Any) -> None:
         supervisor.hung_up = True
 
-    def closed(*_: Any) -> None:  # comes twice and more, from the kernel and from the shell
+    def closed(*_: Any) -> None:  # SIGHUP comes more than once, from the kernel and from the shell
         supervisor.terminal_gone = supervisor.interrupted = True
 
     if threading.current_thread() is not threading.main_thread():

@@ -1,7 +1,7 @@
-"""Folder of a user's shared memory: mode 0700, below /dev/shm. Segment, lock and description of each machine lie there.
+"""Folder of a user's shared memory, mode 0700, below /dev/shm: segment, lock and description of each machine.
 
-Its place depends on the user alone, not on XDG_RUNTIME_DIR, so that one machine has one lock and one segment.
-A segment outlives a killed daemon. The next start moves the segment aside, with the description of its rows.
+Its path depends only on the user, not on XDG_RUNTIME_DIR, so that one machine has one lock and one segment.
+A segment outlives a killed daemon. The next start renames the segment and the description of its rows.
 """
 
 import errno
@@ -37,7 +37,7 @@ def shared_folder() -> Path:
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
     except FileExistsError:
-        pass  # a file: told below
+        pass  # a file: refused below
     except OSError as error:
         raise UserError(f"{folder}: no folder for shared memory here: {error.strerror}; {way_on}") from None
     found = folder.lstat()
@@ -61,7 +61,7 @@ def lock_path(name: str) -> Path:
 
 
 def create(path: Path, shape: dict[str, tuple[np.dtype, int]]) -> Segment:
-    """Segment whose memory is there to the last byte. Raises UserError where it is not."""
+    """New segment with all its memory allocated. Raises UserError where there is not enough shared memory."""
     try:
         return Segment.create(path, shape)
     except OSError as error:
@@ -99,10 +99,10 @@ def remove(path: Path) -> None:
 
 
 def put_aside(name: str, most: int | None = KEPT) -> Path | None:
-    """Rename the segment of a killed daemon, with the machine's lock held. Returns the new path, None without one.
+    """Rename the segment of a killed daemon; call with the machine's lock held. Returns the new path, or None.
 
-    At most `most` segments of a machine are kept, None for all. A segment without description is removed: nothing can
-    read it.
+    At most `most` segments of a machine are kept, None for all. A segment without description cannot be read and is
+    removed.
     """
     path = segment_path(name)
     if not path.exists():
@@ -126,7 +126,7 @@ def kept(name: str) -> list[Path]:
 
 
 def names() -> list[str]:
-    """Machines of this user that have a segment here: they run, or were killed."""
+    """Names of this user's machines with a segment: running machines and killed ones."""
     return sorted({path.name.removesuffix(SEGMENT).partition("@")[0] for path in shared_folder().glob(f"*{SEGMENT}")})
 
 

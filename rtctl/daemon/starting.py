@@ -1,7 +1,7 @@
-"""Waiting for the first tick: as long as a child works, however slow the machine; what it does is shown.
+"""Waiting for the first tick: without time limit while a child uses the CPU, with a progress line.
 
-A cold cache compiles for ten seconds, or for many minutes on a small or busy machine, so no time is too long by
-itself. A child that uses no CPU for `HUNG` s has hung; its state in /proc says how.
+Compilation with a cold cache takes ten seconds, or many minutes on a small or busy computer, so there is no limit on
+the total time. If no child uses the CPU for `HUNG` s, the start has hung; the states in /proc give the cause.
 """
 
 import signal
@@ -13,8 +13,8 @@ from typing import Any
 from rtctl.config.errors import UserError
 from rtctl.daemon.children import ChildProcess
 
-HUNG = 120.0  # s without CPU time in any child
-TELL = 10.0  # s between two lines about it
+HUNG = 120.0  # s without CPU time in any child, after which the start has hung
+TELL = 10.0  # s between two progress lines
 STATES = {
     "T": "it is stopped (SIGSTOP, or Ctrl-Z): continue it with SIGCONT",
     "D": "it waits for a disk or a driver that does not answer",
@@ -23,7 +23,7 @@ STATES = {
 
 
 class Starting:
-    """Progress of children that have not ticked yet. `say` gets a line now and then."""
+    """Progress of child processes before the first tick. `say` gets a progress line every TELL s."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class Starting:
         self.compiling: dict[str, str] = {}  # role -> function that it compiles
 
     def look(self) -> None:
-        """Call now and then. Raises UserError where no child has used the CPU for too long."""
+        """Check the children; call regularly. Raises UserError where no child has used the CPU for HUNG s."""
         now = self._clock()
         found = [self._cpu(child.pid) for child in self._children]
         seconds = [spent for _, spent in found]
@@ -68,7 +68,7 @@ def used(pid: int) -> tuple[str, float]:
 
 
 def ended(child: Any) -> str:
-    """How a child has ended, in words: its last ones, or the signal that killed it."""
+    """Cause of a child's end as text: the signal that killed it, its last error output, or its exit code."""
     code, words = child.process.poll(), child.last_words()
     if code is not None and code < 0:
         memory = (

@@ -1,9 +1,9 @@
-"""The supervisor: starts loop and plant, and does for them everything that is not real-time.
+"""The supervisor: starts loop and plant, and does all work that is not real-time.
 
     loop -> ring -> supervisor -> recorder, captures, telemetry, status
     command socket -> supervisor -> mailbox -> loop
 
-Its own loop takes a turn every few milliseconds. It never holds up the loop: what it is too late for is counted.
+It takes a turn every few milliseconds. It never delays the loop: rows that it reads too late are counted as lost.
 """
 
 import contextlib
@@ -47,15 +47,15 @@ from rtctl.trace.recorder import Recorder
 from rtctl.trace.rotation import Rotation
 
 log = structlog.get_logger()
-TURN_MS = 10  # between two turns of the supervisor on the wall clock
-FOREVER = 1e9  # s that a loop waits for a plant of ours, which may have to compile; if it dies we hear of it
+TURN_MS = 10  # ms between two turns of the supervisor on the wall clock
+FOREVER = 1e9  # s for which a loop waits for the supervisor's plant, which may compile; its death is noticed
 
 
 class Supervisor(Answers):
-    """A running machine. Use as a context: leaving it stops the loop with its outputs at zero.
+    """A running machine. Use as a context: its exit stops the loop with the outputs at zero.
 
-    `out` is the folder of the run's bundle; None records nothing but captures. `ticks` ends the run, 0 never.
-    `say` gets one-line messages for the person who started it.
+    `out` is the folder of the run's bundle; None records only captures. The run ends after `ticks` ticks, with 0 never.
+    `say` gets one-line messages for the person who started the run.
     """
 
     def __init__(self, config: Any, out: Path | None, ticks: int = 0, say: Callable[[str], None] = lambda _: None):
@@ -64,15 +64,15 @@ class Supervisor(Answers):
             self.machine = machines.build(config)
         except ValueError as error:
             raise UserError(f"{config.name}: {error}") from error
-        self.bounds = Bounds(config)  # what the file says now, whatever is changed later
+        self.bounds = Bounds(config)  # bounds of the file at the start; later changes do not move them
         self.link = "shm" if config.loop.mode == "fused" else config.link.kind
         self.made = generate.generate(self.machine, self.link)
         self.lacks: list[str] = []
         self.armed_at_start = False
-        self.interrupted = False  # set by a signal handler; looked at between turns, never in the middle of one
-        self.hung_up = False  # so is this, by SIGHUP: read the config again
-        self.reread: Callable[[], Any] | None = None  # gives the settings as the config file has them now
-        self.terminal_gone = False  # so is this: the terminal was closed, and with it whoever watched
+        self.interrupted = False  # set by a signal handler, read only between turns
+        self.hung_up = False  # set by the handler of SIGHUP: read the config again
+        self.reread: Callable[[], Any] | None = None  # returns the settings of the config file as it is now
+        self.terminal_gone = False  # set by a signal handler: the terminal was closed
         self.service = Service()
         self._trips, self._recording = Trips(), Recording(say)
         self.changes: list[dict[str, Any]] = []
@@ -105,7 +105,7 @@ class Supervisor(Answers):
         rows = max(int(config.record.seconds * self.machine.rate), 1000)
         path = shared_memory.segment_path(config.name)
         self.segment = shared_memory.create(path, layout(made.params, made.tables, made.row, rows))
-        stack.callback(shared_memory.remove, path)  # a crash leaves it, with the last seconds of the trace
+        stack.callback(shared_memory.remove, path)  # after a crash it stays, with the last seconds of the trace
         self.status = self.segment["status"][0]
         self.mailbox = Mailbox(self.segment)
         self.reader = Reader(self.segment)
@@ -113,7 +113,7 @@ class Supervisor(Answers):
         self.journal = Journal()
         stack.callback(self.journal.close)
         if self.armed_at_start:
-            self.order(_arm_and_play)  # there before the first tick, so that a virtual run repeats to the bit
+            self.order(_arm_and_play)  # before the first tick, so that a virtual run is repeatable to the bit
         self.faults = Faults(self)
         self.watched = Watched()
         self.commands = Commands(self)
@@ -136,7 +136,7 @@ class Supervisor(Answers):
         case = self.case if self.recorder is None else self.recorder.case
         shared_memory.describe(self.segment, made.columns, case, self.out)
         if config.metrics.port is not None:
-            from rtctl.daemon import metrics  # here: few want it, and it takes its time to load
+            from rtctl.daemon import metrics  # imported here: slow to load and seldom used
 
             stack.callback(metrics.serve(self, config.metrics.port))
         self._start_children(stack, rows)
@@ -149,7 +149,7 @@ class Supervisor(Answers):
         order = {
             "config": config.model_dump(mode="json", exclude_unset=True),
             "segment": str(self.segment.path),
-            "inode": self.segment.path.stat().st_ino,  # a child that outlives us must not take the next one's segment
+            "inode": self.segment.path.stat().st_ino,  # a child that outlives this process must not use a later segment
             "rows": rows,
             "link": self.link,
             "endpoint": endpoint,
@@ -190,7 +190,7 @@ class Supervisor(Answers):
             time.sleep(0.002)
 
     def _hear(self) -> None:
-        """Reports of the children: what they lack, errors as exceptions, ends."""
+        """Read the reports of the children: compilation, missing rights. Raises UserError for a reported error."""
         for child in self.children:
             for report in child.reports():
                 if report["event"] == "error":
@@ -204,7 +204,7 @@ class Supervisor(Answers):
     # one turn
 
     def turn(self) -> bool:
-        """Drain, record, publish, answer. Returns False once the loop has ended and all of it is taken in."""
+        """Read rows, record, publish and answer. Returns False once the loop has ended and all its rows are read."""
         self._beat()
         over = bool(self.status["ended"]) or not self.loop.running()
         self._drain()
@@ -230,21 +230,21 @@ class Supervisor(Answers):
         return not self._ended
 
     def _fail(self, why: Exception | None) -> None:
-        """The run ends by itself: its rows are taken in to the last, and whoever runs it raises `failure` then."""
+        """Stop the run for the failure `why`. All rows are still recorded; the session then raises `failure`."""
         if why is not None and self.failure is None:
             self.failure = why
             self.status["stop"] = 1
             log.error("the run failed", why=str(why), tick=int(self.status["tick"]))
 
     def _beat(self) -> None:
-        """Tell the loop that there is somebody to take a disarm."""
+        """Write the heartbeat time: the loop sees that the supervisor runs and can take a disarm."""
         self.status["heartbeat_ns"] = time.monotonic_ns()
 
     _starting: Starting | None = None
     _plant_died = False
 
     def _board_off(self) -> None:
-        """The process of a real board is gone; killed, it has left its outputs as they were."""
+        """Set the outputs of a real board to zero after its process has ended: a killed process leaves them on."""
         from rtctl.daemon.board_plant import zero
 
         assert self.plant is not None
@@ -270,7 +270,7 @@ class Supervisor(Answers):
             self.outside.publish(rows)
 
     def run(self) -> Iterator[None]:
-        """Turns until the run ends; yields after each, so that the caller can show a status line."""
+        """Take turns until the run ends; yields after each turn, so that the caller can show a status line."""
         virtual = self.config.loop.mode != "real"
         poller = zmq.Poller()
         poller.register(self.server.socket, zmq.POLLIN)
@@ -279,7 +279,7 @@ class Supervisor(Answers):
             self._answer(poller, 1 if virtual else TURN_MS)
 
     def _answer(self, poller: zmq.Poller, wait_ms: int) -> None:
-        """Commands are answered as they come, but a thousand of them a second do not make a thousand turns."""
+        """Answer commands as they come for `wait_ms` ms, without a turn for each command."""
         end = time.monotonic() + wait_ms / 1000
         while not self.interrupted and (left := end - time.monotonic()) > 0 and poller.poll(math.ceil(left * 1000)):
             self.server.process()
@@ -294,8 +294,8 @@ class Supervisor(Answers):
         self.service.status(f"{safety.STATES[int(s['state'])]}{trip}{lacks}")
 
     def _reload(self) -> None:
-        """Read the config again. Whatever is wrong with it is told, and the old values stay."""
-        self.hung_up = False  # first: a SIGHUP from now on means a file that we have not read yet
+        """Read the config again. Errors in it are logged, and the old values stay."""
+        self.hung_up = False  # cleared before the read: a later SIGHUP asks for another read
         self.service.reloading()
         try:
             if self.reread is None:
@@ -309,16 +309,16 @@ class Supervisor(Answers):
         self.service.reloaded()
 
     def order(self, write: Callable[[Any, Any], None], changed: dict[str, Any] | None = None) -> None:
-        """Post what `write(params, command)` changes and keep it for a replay; `changed` are settings by their path."""
+        """Post the changes of `write(params, command)` and keep them for a replay; `changed` are settings by path."""
         self.mailbox.post(write)
         self.journal.note(self.segment["mailbox"][0]["command"], changed or {})
 
     def note_change(self, path: str, value: Any) -> None:
-        """Remember a setting that was changed while running, for the bundle."""
+        """Keep a setting that was changed during the run, for the bundle."""
         self.changes.append({"tick": int(self.status["tick"]), "path": path, "value": value})
 
     def stop(self) -> None:
-        """End the loop with its outputs at zero and take in what it still wrote."""
+        """End the loop with its outputs at zero and read its last rows."""
         self.service.stopping()
         if hasattr(self, "status"):
             self.status["stop"] = 1
@@ -349,7 +349,7 @@ class Supervisor(Answers):
     def _stop_children(self) -> None:
         self.segment["plant_status"][0]["stop"] = 1
         self.status["stop"] = 1
-        started = bool(self.status["ready"])  # a child that compiles does not hear us, and has nothing on
+        started = bool(self.status["ready"])  # a compiling child does not react, and its outputs are off
         for child in reversed(self.children):
             child.stop() if started else child.stop(0.5)
 

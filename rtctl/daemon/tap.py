@@ -1,10 +1,9 @@
-"""A tap: one more reader of the ring, in any process of the same user on the same machine.
+"""A tap: read-only access to the ring from any process of the same user on the same computer.
 
-It sees every row of the trace at the loop's own rate, and nobody sees the tap: it maps the ring for reading alone,
-moves no counter, and neither the loop nor the supervisor does anything for it. Whoever reads too late loses rows and is
-told how many, as the supervisor is.
+A tap sees every row of the trace at the loop's rate. It maps the ring read-only and moves no counter, so it costs the
+loop and the supervisor nothing. A tap that reads too late loses rows and counts them.
 
-`signals` of the command socket says where the ring is. A daemon of another machine or user has none for us.
+`signals` of the command socket returns the place of the ring. Other users and computers have no access to it.
 """
 
 import mmap
@@ -19,7 +18,7 @@ from rtctl.tick.memory import Segment
 
 
 def describe(segment: Segment) -> dict[str, Any]:
-    """Where a tap finds the ring of a segment: file, offsets in bytes, length in rows, and the type of a row."""
+    """Place of a segment's ring for a tap: file, offsets in bytes, length in rows, and fields of a row."""
     base = segment["status"].ctypes.data  # the first record of a segment, see loop.records.layout
     ring, rows = segment["ring"][0], segment["rows"]
     head, tail = (segment["ring"].ctypes.data + ring.dtype.fields[name][1] - base for name in ("head", "tail"))
@@ -35,10 +34,10 @@ def describe(segment: Segment) -> dict[str, Any]:
 
 
 class Tap:
-    """Rows of a running machine from now on, as structured arrays; `lost` counts those that came and went unseen.
+    """Rows of a running machine from now on, as structured arrays; `lost` counts rows that were overwritten unread.
 
-    `Tap(client.call("signals")["ring"])`. Raises OSError where the ring is not on this machine, not ours to read, or
-    belongs to a daemon that has been started since.
+    `Tap(client.call("signals")["ring"])`. Raises OSError where the ring is not on this computer, is not readable for
+    this user, or belongs to a later daemon.
     """
 
     def __init__(self, ring: dict[str, Any]):
@@ -60,11 +59,11 @@ class Tap:
 
     @property
     def filled(self) -> float:
-        """Share of the ring that waits for the supervisor, 0 to 1; at 1 rows are lost."""
+        """Fraction of the ring, 0 to 1, with rows that the supervisor has not read; at 1 rows are lost."""
         return min((int(self._head[0]) - int(self._tail[0])) / len(self._rows), 1.0)
 
     def take(self, names: Sequence[str] | None = None) -> np.ndarray:
-        """New rows, oldest first, copied; only the fields `names` if given."""
+        """Copy of the new rows (n,), oldest first; only the fields `names` if given."""
         capacity = len(self._rows)
         head = int(self._head[0])
         first = max(self._at, head - capacity)
@@ -76,7 +75,7 @@ class Tap:
             return taken
         for name in names:
             taken[name] = np.concatenate([self._rows[name][piece] for piece in pieces])
-        torn = int(self._head[0]) - capacity + 1  # rows below may have been overwritten while they were copied
+        torn = int(self._head[0]) - capacity + 1  # earlier rows may have been overwritten during the copy
         skip = min(max(torn - first, 0), head - first)
         self.lost += first + skip - self._at
         self._at = head

@@ -1,7 +1,7 @@
-"""Signals as they happen, for whoever cares to look: a PUB socket that PlotJuggler reads.
+"""Telemetry: signals of a running machine on a PUB socket, in the format of PlotJuggler.
 
 A message is two parts, the topic and a msgpack list of rows: `[{"timestamp": t, name: value, ...}, ...]`. The daemon
-publishes every 10 to 20 ms what the loop has left since. It never waits: a subscriber that is slow loses messages.
+publishes the new rows once in `commands.telemetry_period` (20 ms). It never waits: a slow subscriber loses messages.
 
 Source: PlotJuggler's ZeroMQ subscriber takes topic and payload as two parts (its pull request 951), its MessagePack
 parser a list of rows since February 2026 (1285); before that, one row a message. No third part with the time: a
@@ -21,15 +21,15 @@ from rtctl.daemon.doors import Door
 from rtctl.daemon.keys import ServerCurve
 from rtctl.daemon.server import bind, release
 
-MESSAGES_WAITING = 20  # for each subscriber: a few tenths of a second
-LONGEST_TOPIC = 1024  # bytes that a subscriber may ask for; who sends more is cut off
+MESSAGES_WAITING = 20  # queued messages for each subscriber: a few tenths of a second
+LONGEST_TOPIC = 1024  # bytes of a subscription; a longer one ends the connection
 
 
 class Telemetry:
     """Publishes rows of `columns` under `topic`. `sent` counts rows published, `thinned` rows left out.
 
-    `max_rows_per_message` bounds the work and the traffic at high rates. With `batch` off each row is a message of its
-    own, a map instead of a list, for older versions of PlotJuggler.
+    `max_rows_per_message` limits the work and the traffic at high rates. Without `batch` each row is a separate
+    message, a map instead of a list, for older versions of PlotJuggler.
     """
 
     def __init__(
@@ -60,15 +60,15 @@ class Telemetry:
         self.socket.maxmsgsize = LONGEST_TOPIC
         self.socket.sndhwm = MESSAGES_WAITING * (1 if batch else max_rows_per_message)
         self.endpoint = bind(self.socket, endpoint, curve, door)
-        if self.endpoint.startswith("ipc://"):  # a group that may enter the folder may listen, if not command
+        if self.endpoint.startswith("ipc://"):  # group members may subscribe, but not command
             path = Path(self.endpoint.removeprefix("ipc://"))
             path.chmod(path.stat().st_mode | stat.S_IRGRP | stat.S_IWGRP)
 
     def publish(self, rows: np.ndarray) -> int:
-        """Send an array (rows, 1 + columns) whose first column is the time in s; returns how many rows went out.
+        """Send an array (rows, 1 + columns) whose first column is the time in s; returns the number of rows sent.
 
-        Of more than `max_rows_per_message` every n-th goes, the newest always, so that a plot has no gaps. Thinned rows
-        alias: a recording has all of them. Raises ValueError where the shape is not that of the columns.
+        Of more than `max_rows_per_message` rows every n-th is sent, and always the newest, so that a plot has no gaps.
+        Thinned rows alias; a recording has all rows. Raises ValueError where the shape does not match the columns.
         """
         if rows.ndim != 2 or rows.shape[1] != len(self._names):
             raise ValueError(f"rows of shape {rows.shape} for {len(self._names)} names: {', '.join(self._names)}")
@@ -90,6 +90,6 @@ class Telemetry:
 
 
 def thin(rows: np.ndarray, max_rows: int) -> np.ndarray:
-    """Every n-th row counted back from the newest, with the smallest n that leaves at most `max_rows`. A view."""
+    """View of every n-th row counted back from the newest, with the smallest n that leaves at most `max_rows`."""
     stride = max(1, -(-len(rows) // max_rows))
     return rows[::-1][::stride][::-1]

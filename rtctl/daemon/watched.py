@@ -1,4 +1,4 @@
-"""What a model beside the machine has told last (`rtctl watch`): for `status`, the log and the metrics."""
+"""Last report of `rtctl watch`, the model beside the machine: for `status`, the log and the metrics."""
 
 import time
 from typing import Any
@@ -6,11 +6,11 @@ from typing import Any
 import structlog
 
 log = structlog.get_logger()
-SILENT = 10.0  # s without a word, after which a watch counts as gone
+SILENT = 10.0  # s without a report, after which a watch counts as ended
 
 
 class Watched:
-    """The last report of a watch. `told` is None where there was none."""
+    """The last report of a watch, as `told`; None before the first report."""
 
     def __init__(self) -> None:
         self._report: dict[str, Any] | None = None
@@ -19,7 +19,7 @@ class Watched:
         self._noted: list[str] = []
 
     def take(self, report: dict[str, Any]) -> None:
-        """Keep a report; a new alarm, what comes of it, and new notes go to the log."""
+        """Keep a report; new alarms, their bundle and diagnosis, and new notes go to the log."""
         self._report, self._at = report, time.monotonic()
         alarm = report.get("alarm")
         heard = () if alarm is None else tuple(alarm.get(key) for key in ("t", "words", "bundle", "diagnosis"))
@@ -34,20 +34,20 @@ class Watched:
 
     @property
     def told(self) -> dict[str, Any] | None:
-        """The last report, and whether the watch is `silent` by now."""
+        """The last report with its age in s, and whether the watch is `silent`."""
         if self._report is None:
             return None
         age = time.monotonic() - self._at
         return {**self._report, "silent": age > SILENT, "age_s": round(age, 1)}
 
     def sentence(self) -> str | None:
-        """The state of the model in a sentence, as `rtctl status` shows it."""
+        """State of the model as a sentence, as `rtctl status` shows it."""
         told = self.told
         return None if told is None else sentence(told)
 
 
 def sentence(told: dict[str, Any]) -> str:
-    """A report in a sentence."""
+    """A report as a sentence."""
     alarm = told.get("alarm")
     if alarm is not None:
         found = f"; {alarm['diagnosis']}" if alarm.get("diagnosis") else ""
@@ -62,5 +62,5 @@ def sentence(told: dict[str, Any]) -> str:
     if told["state"] == "learning":
         return f"learns the band of the machine, {100 * told['learned']:.0f} %{beside}"
     if told["state"] == "astray":
-        return f"runs away from the rows and is no judge{beside}"
+        return f"diverges from the rows and cannot judge the machine{beside}"
     return f"waits for motion{beside}"

@@ -1,1 +1,1 @@
-"""A running machine in Foxglove: its rows, status and events as channels, its settings as parameters."""
+"""Foxglove server of a running machine: rows, status and events as channels, settings as parameters."""

@@ -1,4 +1,4 @@
-"""Between a running machine and Foxglove: a WebSocket server here, the machine's ring and command socket there."""
+"""Bridge from a running machine to Foxglove: reads the ring and the command socket, and serves a WebSocket."""
 
 import time
 from types import TracebackType
@@ -17,19 +17,19 @@ from rtctl.foxglove.parameters import SETPOINT, Parameters
 from rtctl.machines.base import Column
 from rtctl.tick import safety
 
-TURN = 0.02  # s between two looks at the ring
-STATUS = 0.25  # s between two of the status
-SETTINGS = 1.0  # s between two looks for settings that somebody else has changed
-LOOK = 0.25  # s between two looks for a daemon that has gone
+TURN = 0.02  # s between two reads of the ring
+STATUS = 0.25  # s between two requests of the status
+SETTINGS = 1.0  # s between two requests of the settings
+LOOK = 0.25  # s between two connection attempts to a daemon that has ended
 WATCHED = ("state", "trip", "order")  # columns whose changes are events
-BACKLOG = 4096  # messages that wait for a slow viewer; then it loses the oldest
+BACKLOG = 4096  # most queued messages for a slow viewer; then the oldest are dropped
 
 
 class Bridge:
-    """Serves the machine of `client` while entered; `turn` takes it one step further, `run` for good.
+    """Foxglove server for the machine of `client`; `turn` sends new data once, `run` until an exception.
 
-    At most `rate` rows a second go out, with the extremes of the others; `rate` None is every row. Raises UserError
-    where the ring is out of sight or the port is taken.
+    At most `rate` rows a second are sent, with the extremes of the rows left out; None sends every row. Raises
+    UserError where the ring cannot be read or the port is in use.
     """
 
     def __init__(self, client: Client, host: str, port: int, rate: float | None, control: bool):
@@ -60,7 +60,7 @@ class Bridge:
 
     @property
     def app_url(self) -> str:
-        """Opens this in Foxglove's web application."""
+        """Address that opens this server in Foxglove's web application."""
         return str(self._server.app_url())
 
     def run(self) -> None:
@@ -70,7 +70,7 @@ class Bridge:
             self.turn()
 
     def turn(self) -> None:
-        """Send what is new. A daemon that has gone is told and waited for."""
+        """Send new rows, status and settings. If the daemon has ended, report it and wait for its return."""
         try:
             if self.gone:
                 self._return()
@@ -82,7 +82,7 @@ class Bridge:
             self._leave()
 
     def _begin(self) -> None:
-        status = self._status = self._client.call("status")  # before the tap: no change falls between the two
+        status = self._status = self._client.call("status")  # before the tap, so that no change is missed
         signals = self._client.call("signals")
         try:
             self._tap = Tap(signals["ring"])
@@ -116,7 +116,7 @@ class Bridge:
         self._channels.rows(self._envelope.feed(rows))
 
     def _send_changes(self, rows: np.ndarray) -> None:
-        """Events at the very tick: states, trips, orders taken in."""
+        """Send events of the rows with their ticks: states, trips, commands carried out."""
         assert self._channels is not None
         whole = {name: np.concatenate(([self._seen[name]], rows[name])) for name in WATCHED}
         self._seen = {name: float(rows[name][-1]) for name in WATCHED}
@@ -144,7 +144,7 @@ class Bridge:
         self._channels.status(self._status, self._t)
 
     def _send_settings(self) -> None:
-        """What has changed, whoever changed it."""
+        """Send settings that any client has changed."""
         if time.monotonic() < self._next_settings:
             return
         self._next_settings = time.monotonic() + SETTINGS
@@ -155,7 +155,7 @@ class Bridge:
             self._server.publish_parameter_values([foxglove.Parameter(n, value=v) for n, v in changed.items()])
         for name, value in changed.items():
             if name == SETPOINT:
-                continue  # a reference that plays moves it all the time
+                continue  # a playing reference changes the setpoint all the time
             self._event(f"{name} is {value}", INFO)
 
     def _leave(self) -> None:

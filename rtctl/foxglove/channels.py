@@ -1,12 +1,12 @@
-"""The channels: rows with their envelope, status, and events that Foxglove's Log panel shows. All of them JSON.
+"""Channels of a machine in Foxglove, as JSON: rows with their envelope, status, and events for the Log panel.
 
-    /ldu         rows; the same topic and schema as in an exported MCAP file
-    /ldu/min     smallest and largest of each signal since the row before, where rows are left out
-    /ldu/max
-    /ldu/status  what `rtctl status --json` prints, without the signals
+    /ldu         rows; topic and schema as in an exported MCAP file
+    /ldu/min     lowest value of each signal since the row before, where rows are left out
+    /ldu/max     highest value of each signal since the row before, where rows are left out
+    /ldu/status  as `rtctl status --json`, without signals and late ticks
     /ldu/events  foxglove.Log
 
-Nothing is encoded for a channel that nobody has subscribed to.
+Rows and status are encoded only while their channel has a subscriber.
 """
 
 import json
@@ -38,7 +38,7 @@ TYPES = {bool: "boolean", int: "number", float: "number", str: "string", list: "
 
 
 class Channels:
-    """Channels of one machine in a context of their own. `zero` is the host's clock at t = 0, ns since 1970."""
+    """Channels of one machine in a Foxglove context. `zero` is the host's clock at t = 0, ns since 1970."""
 
     def __init__(
         self, context: Any, kind: str, columns: list[Column], status: dict[str, Any], thinned: bool, zero: int
@@ -64,11 +64,11 @@ class Channels:
             channel.close()
 
     def at(self, t: float) -> int:
-        """Log time of the tick at `t`, ns since 1970."""
+        """Log time of controller time `t`, ns since 1970."""
         return self.zero + round(t * 1e9)
 
     def rows(self, thinned: Thinned) -> None:
-        """Send rows and, where there are any, their extremes."""
+        """Send rows and, where rows were left out, their extremes."""
         for channel, rows in zip((self._rows, *self._extremes), thinned, strict=False):
             if len(rows) and channel.has_sinks():
                 self._send(channel, rows)
@@ -78,7 +78,7 @@ class Channels:
             self._status.log(_finite(_told(status)), log_time=self.at(t))
 
     def event(self, text: str, t: float, name: str, level: int = INFO) -> None:
-        """A line for the Log panel."""
+        """Send a line for the Log panel."""
         at = self.at(t)
         stamp = {"sec": at // 1_000_000_000, "nsec": at % 1_000_000_000}
         message = {"timestamp": stamp, "level": level, "message": text, "name": name, "file": "", "line": 0}
@@ -95,7 +95,7 @@ def _told(status: dict[str, Any]) -> dict[str, Any]:
 
 
 def _schema_of(title: str, value: Any) -> dict[str, Any]:
-    """JSON Schema of a status by the one at hand; a key that may be null has no type."""
+    """JSON Schema inferred from the status `value`; a key whose value is null has no type."""
     if isinstance(value, dict):
         parts = {key: _schema_of("", item) for key, item in value.items()}
         return {**({"title": title} if title else {}), "type": "object", "properties": parts}

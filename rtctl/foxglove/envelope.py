@@ -1,14 +1,14 @@
-"""Fewer rows that hide nothing: of so many rows the newest, the smallest and the largest of each signal."""
+"""Thinned rows with extremes: of each `every` rows the newest, and the lowest and highest value of each signal."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-CLOCKS = ("tick", "t")  # of the newest row, in all three
+CLOCKS = ("tick", "t")  # columns with the value of the newest row, in all three arrays
 
 
 class Thinned(NamedTuple):
-    """Three structured arrays of equal length; `low` and `high` are empty where nothing was left out."""
+    """Three structured arrays (n,); `low` and `high` are empty where no row was left out."""
 
     newest: np.ndarray
     low: np.ndarray
@@ -16,7 +16,7 @@ class Thinned(NamedTuple):
 
 
 class Envelope:
-    """Thins rows to one of `every`; what does not fill that number waits for the next rows."""
+    """Thins rows to one of `every`; rows of an incomplete group wait for the next call."""
 
     def __init__(self, every: int):
         if every < 1:
@@ -25,7 +25,7 @@ class Envelope:
         self._rest: np.ndarray | None = None
 
     def feed(self, rows: np.ndarray) -> Thinned:
-        """Rows (structured, oldest first) thinned; nan counts only where there is nothing else."""
+        """Thinned rows (structured, oldest first); an extreme is NaN only where all values are NaN."""
         if self.every == 1:
             return Thinned(rows, rows[:0], rows[:0])
         if self._rest is not None and len(self._rest):

@@ -1,6 +1,7 @@
-"""The settings of a running machine as Foxglove's parameters: `law.position.gain`, in SI, and `setpoint`.
+"""Foxglove parameters of a running machine: settings such as `law.position.gain`, in SI, and `setpoint`.
 
-The daemon checks and refuses; its message goes to everybody who is connected, and the old value back into the panel.
+The daemon checks each new value. Its error message goes to all connected viewers, and the panel shows the old value
+again.
 """
 
 import threading
@@ -12,16 +13,16 @@ from foxglove.websocket import ServerListener
 
 from rtctl.config.errors import UserError
 
-SECTIONS = ("law", "radius", "safety")  # what can change while a machine runs
+SECTIONS = ("law", "radius", "safety")  # sections of the config that can change while a machine runs
 SETPOINT = "setpoint"
 READ_ONLY = "settings are shown, not changed: start `rtctl foxglove` with --control"
 
 
 class Parameters(ServerListener):
-    """Called from the server's threads, one request at a time. `client` is for nobody else's use."""
+    """Listener of the Foxglove server, called from its threads. A lock serialises the use of its own `client`."""
 
     def __init__(self, client: Any, control: bool):
-        self.server: Any = None  # there once it has started
+        self.server: Any = None  # set once the server has started
         self._client, self._control = client, control
         self._lock = threading.Lock()
 
@@ -30,14 +31,14 @@ class Parameters(ServerListener):
             self._client.close()
 
     def values(self) -> dict[str, Any]:
-        """Every setting that has a value, by its path, and the setpoint. Raises UserError where no daemon answers."""
+        """Settings with a value, by path, and the setpoint. Raises UserError where no daemon answers."""
         with self._lock:
             return self._values()
 
     def on_get_parameters(
         self, client: Viewer, param_names: list[str], request_id: str | None = None
     ) -> list[foxglove.Parameter]:
-        """All of them where no names are given."""
+        """Parameters by name; all of them where no names are given."""
         try:
             found = self.values()
         except UserError as error:
@@ -48,7 +49,7 @@ class Parameters(ServerListener):
     def on_set_parameters(
         self, client: Viewer, parameters: list[foxglove.Parameter], request_id: str | None = None
     ) -> list[foxglove.Parameter]:
-        """Set what can be set; returns the values then in force, so that a refused one springs back."""
+        """Set the parameters; returns the values in force, so that the panel resets a refused one."""
         for parameter in parameters:
             self._set(parameter.name, parameter.get_value())
         return self.on_get_parameters(client, [parameter.name for parameter in parameters])
@@ -61,7 +62,7 @@ class Parameters(ServerListener):
             with self._lock:
                 if name == SETPOINT:
                     self._client.call("setpoint", value=value)
-                elif value is not None:  # to take a parameter away is no request here
+                elif value is not None:  # None: removal of a parameter is ignored
                     self._client.call("set", path=name, value=value)
         except UserError as error:
             self._tell(foxglove.StatusLevel.Error, str(error), f"set {name}")
@@ -97,5 +98,5 @@ def _flatten(path: str, value: Any, into: dict[str, Any]) -> None:
 
 
 def _is_row(value: Any) -> bool:
-    """A list of numbers; other lists, and settings that were left out, have no form among parameters."""
+    """Whether a value is a list of floats: no other list can be a parameter."""
     return isinstance(value, list) and bool(value) and all(type(item) is float for item in value)

@@ -1,1 +1,1 @@
-"""The real-time side, nothing else: clock, links, mailbox, ring, safety, and the generator of the tick."""
+"""The real-time loop: links, mailbox, ring, histograms, and the generator of the tick."""

@@ -1,6 +1,6 @@
-"""A machine run on virtual time inside this process: no sockets, no children, no clock.
+"""Run of a machine on virtual time inside this process, without sockets, child processes or clock.
 
-What experiments, designs and tests use where they need a run of a machine as it would be recorded, and nothing else.
+Experiments, designs and tests use it for the rows of a run as they would be recorded.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from rtctl.tick import safety
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Rows of a run, one a tick, with the columns of the recording; and the loop as it stands at its end."""
+    """Rows of a run (ticks,), with the columns of a recording, and the loop after the last tick."""
 
     rows: np.ndarray
     loop: Loop
@@ -27,29 +27,29 @@ class Run:
 
     @property
     def start(self) -> float:
-        """Seconds from arming to running, when the reference begins to play."""
+        """Controller time in s of the first tick in state `running`, when the reference begins to play."""
         return float(self.rows["t"][np.argmax(self.rows["state"] == safety.RUNNING)])
 
     def between(self, begin: float, end: float) -> np.ndarray:
-        """Rows of `begin` to `end` s of the reference."""
+        """Rows from `begin` to `end`, s of the reference's time."""
         t = self.rows["t"] - self.start
         return self.rows[(t > begin - 1e-9) & (t < end - 1e-9)]
 
     @property
     def tripped(self) -> str:
-        """Name of the trip that ended it, "" for none."""
+        """Code of the trip in the last row, "" for none."""
         cause = int(self.rows["trip"][-1])
         return "" if cause == safety.NONE else safety.TRIPS[cause][0]
 
     @property
     def trip_time(self) -> float:
-        """Controller clock at the trip that ended it, s; nan for none."""
+        """Controller time at the first row with a trip, s; nan for none."""
         causes = np.flatnonzero(self.rows["trip"])
         return float(self.rows["t"][causes[0]]) if len(causes) else float("nan")
 
 
 def run(config: Any, seconds: float) -> Run:
-    """Arm and play a config from the first tick on, for `seconds`; `loop.mode` has to be fused.
+    """Run of a config that is armed and played from the first tick on, for `seconds` s; `loop.mode` must be fused.
 
     Raises ValueError where the settings contradict each other.
     """
@@ -58,16 +58,16 @@ def run(config: Any, seconds: float) -> Run:
 
 
 def play(machine: machines.Machine, made: generate.Generated, ticks: int) -> Run:
-    """As `run`, with a module that was generated for a machine of the same structure."""
+    """As `run`, for `ticks` ticks of a machine, with a module generated for a machine of the same structure."""
     arrays = segment(made, ticks)
     generate.prepare(arrays, machine)
     loop = Loop(machine, made, arrays, arrays["outputs"], arrays["inputs"])
-    loop.c["arm"] = loop.c["play"] = loop.c["order"] = 1  # an order as of a person, so that a bundle can be replayed
+    loop.c["arm"] = loop.c["play"] = loop.c["order"] = 1  # as a person's command, for a replay
     loop.stretch(0, ticks)
     return Run(arrays["rows"], loop)
 
 
 def segment(made: generate.Generated, rows: int) -> Any:
-    """What loop and supervisor share, as arrays of this process alone; `rows` is the length of the ring."""
+    """Records of a shared segment as arrays of this process; `rows` is the length of the ring."""
     records = layout(made.params, made.tables, made.row, rows)
     return {name: np.zeros(count, dtype) for name, (dtype, count) in records.items()}

@@ -1,7 +1,7 @@
-"""Histograms of times, counted inside the tick and read outside it.
+"""Histograms of times in ns, counted inside the tick and read outside it.
 
-Log-linear buckets: 32 to the octave, so a percentile is right to 3 % from nanoseconds to minutes, and adding a value
-is a handful of instructions.
+Log-linear buckets, 32 per octave: a percentile is accurate to 3 % from nanoseconds to minutes. Adding a value takes a
+few instructions.
 
 Source: the bucket layout of HdrHistogram (G. Tene).
 """
@@ -13,8 +13,8 @@ import numpy as np
 
 from rtctl.idiom import state, tick
 
-SUB = 32  # buckets to the octave
-BUCKETS = SUB * 33  # up to 2^37 ns, two minutes
+SUB = 32  # buckets per octave
+BUCKETS = SUB * 33  # buckets, up to 2^37 ns, two minutes
 HISTOGRAM = state(count=int, max=int, bucket=(int, BUCKETS))
 
 
@@ -58,20 +58,20 @@ def _middle(index: int) -> float:
 
 
 def octaves(h: np.void) -> list[tuple[int, int]]:
-    """Pairs of 2^k ns and how many times were shorter, from 64 ns to the octave of the longest."""
+    """Cumulative counts: pairs of 2^k ns and the number of shorter times, from 64 ns to the octave of the longest."""
     cumulative = np.cumsum(h["bucket"])
     longest = max(int(h["max"]), 64).bit_length()
     return [(1 << k, int(cumulative[SUB * (k - 4) - 1])) for k in range(6, min(longest, 36) + 1)]
 
 
 def total(h: np.void) -> float:
-    """Sum of all times, ns, as exact as the buckets are."""
+    """Sum of all times, ns, to the resolution of the buckets."""
     counted = np.flatnonzero(h["bucket"])
     return float(sum(_middle(int(i)) * int(h["bucket"][i]) for i in counted))
 
 
 def account(h: np.void) -> dict[str, Any]:
-    """A histogram to keep: percentiles and max in us, counted buckets as pairs of their middle in ns and count."""
+    """Histogram for JSON: count, percentiles and max in us, and non-empty buckets as pairs (middle in ns, count)."""
     counted = np.flatnonzero(h["bucket"])
     return {
         "count": int(h["count"]),

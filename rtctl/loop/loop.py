@@ -1,4 +1,4 @@
-"""The compiled loop and all arrays that it works on, in whatever process it runs."""
+"""The compiled loop and its arrays, for any process that runs it."""
 
 import time
 from typing import Any
@@ -11,12 +11,12 @@ from rtctl.machines import Machine
 from rtctl.tick import faults
 from rtctl.tick.memory import Segment
 
-STRETCH = 20_000  # ticks of virtual time between two looks at the ring's reader
+STRETCH = 20_000  # most ticks of virtual time between two checks of the ring's reader
 SECOND = 1_000_000_000
 
 
 class Loop:
-    """All arrays that the compiled loop works on, and the three ways to run it."""
+    """The compiled loop with its arrays, and the three modes to run it."""
 
     def __init__(
         self, machine: Machine, made: generate.Generated, segment: Segment | dict[str, Any], out: Any, inp: Any
@@ -41,7 +41,10 @@ class Loop:
         self.ahead = int(machine.config.loop.write == "next_tick")
 
     def entry(self) -> tuple[Any, tuple[Any, ...]]:
-        """The compiled function of this mode and its arguments, but for the last two of a virtual one."""
+        """The compiled function of the mode and its arguments.
+
+        The last argument (most ticks), and on virtual time the one before (first tick), are 0 and must be set.
+        """
         loop, module = self.machine.config.loop, self.made.module
         timing = (self.period, int(loop.late * self.period), self.ahead)
         if loop.mode == "fused":
@@ -52,30 +55,30 @@ class Loop:
         return module.run_lockstep, (*linked, 0, 0)
 
     def warm(self) -> None:
-        """Compile, before anything waits for us."""
+        """Compile the loop, before samples or commands wait for it."""
         generate.warm(*self.entry())
 
     def real(self, ticks: int) -> None:
-        """On the wall clock, to the end."""
+        """Run at most `ticks` ticks on the wall clock."""
         run, arguments = self.entry()
         run(*arguments[:-1], ticks)
 
     def stretch(self, first: int, most: int) -> None:
-        """A stretch of virtual time, with the plant inside or in turns with its process."""
+        """Run at most `most` ticks of virtual time from tick `first` on, with the plant fused or in lockstep."""
         run, arguments = self.entry()
         run(*arguments[:-2], first, most)
 
     def virtual(self, ticks: int) -> None:
-        """Stretches of virtual time, never further than the ring's reader can follow: nothing is lost."""
+        """Run `ticks` ticks of virtual time in blocks, no further than the ring has room: no row is lost."""
         status, ring = self.status[0], self.segment["ring"][0]
-        room = len(self.segment["rows"]) - 1  # the reader gives up the oldest row of a full ring: it may be torn
+        room = len(self.segment["rows"]) - 1  # in a full ring the reader drops the oldest row, which may be torn
         done = 0
         while done < ticks and not status["stop"] and not status["supervisor_lost"] and not status["failed"]:
             free = room - int(ring["head"] - ring["tail"])
             hold = int(status["hold"])
             most = min(ticks - done, STRETCH, free, hold - done if hold else STRETCH)
             if most <= 0:
-                time.sleep(0.0005)  # the reader is behind, or something is to be done first; virtual time waits for it
+                time.sleep(0.0005)  # wait for the reader, or for a fault of a process (hold)
                 continue
             self.stretch(done, most)
             done = int(status["tick"])

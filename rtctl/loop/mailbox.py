@@ -1,7 +1,7 @@
-"""The mailbox from the supervisor to the loop: parameters and commands, swapped in at the start of a tick.
+"""The mailbox from the supervisor to the loop: parameters and commands, copied at the start of a tick.
 
-A sequence lock: the count is odd while the supervisor writes. The loop never waits: a mailbox that is being written,
-or that changed while it was copied, is left for the next tick.
+The mailbox has a sequence lock: the count is odd while the supervisor writes. The loop never waits. A mailbox that is
+being written, or that changed during the copy, is read in the next tick.
 """
 
 import threading
@@ -17,28 +17,28 @@ from rtctl.tick.memory import Segment, fence
 
 COMMAND = state(
     stop=int,  # 1: outputs to zero, then end
-    arm=int,  # each counts up: a new count is a new request
+    arm=int,  # request counter: a new count is a new request; so are disarm and reset
     disarm=int,
     reset=int,
-    gains=int,  # counts up where parameters changed, so that the law takes them over without a jump
+    gains=int,  # counts up when parameters have changed, for a bumpless transfer in the law
     play=int,  # play the reference table from its start
-    table=int,  # which of the two tables is in force
-    commander_lost=int,  # 1 while `require_commander` finds nobody
+    table=int,  # index of the table in force, 0 or 1
+    commander_lost=int,  # 1 while a required commander is silent, on virtual time
     setpoint=SETPOINT,
-    order=int,  # number of this post, which every row carries
-    faulty=int,  # faults in the slots below
+    order=int,  # number of this post, written to every row
+    faulty=int,  # number of fault slots in use
     faults=(FAULT, SLOTS),
 )
 
 
 def mailbox_dtype(params: np.dtype) -> np.dtype:
-    """Record of the mailbox for a tick with these params; written by the supervisor but for `seen`."""
+    """Dtype of the mailbox for a tick with these parameters. The supervisor writes all fields except `seen`."""
     return np.dtype([("count", np.int64), ("seen", np.int64), ("params", params), ("command", COMMAND)], align=True)
 
 
 @tick
 def take(box, staged, p, c):
-    """Copy new parameters and commands into the loop's own `p` and `c`; returns 1 where there were any."""
+    """Copy new parameters and commands into the loop's `p` and `c`; returns 1 if there were any, else 0."""
     count = box[0].count
     if count == box[0].seen or count % 2 == 1:
         return 0
@@ -54,7 +54,7 @@ def take(box, staged, p, c):
 
 
 class Mailbox:
-    """The supervisor's end."""
+    """The supervisor's end of the mailbox."""
 
     def __init__(self, segment: Segment):
         self._box = segment["mailbox"][0]
@@ -81,6 +81,6 @@ _lock = threading.Lock()
 
 
 def fence_python() -> None:
-    """A fence of the supervisor's: to take a lock and give it back orders memory, by POSIX, and compiles nothing."""
+    """Memory fence for Python code: by POSIX, acquiring and releasing a lock orders memory. Needs no compilation."""
     with _lock:
         pass

@@ -1,6 +1,6 @@
-"""What makes a thread real-time on Linux: FIFO scheduling, locked memory, one CPU, no deep sleep of the CPU.
+"""Real-time settings of a thread on Linux: SCHED_FIFO, locked memory, one CPU, no deep sleep of the CPU.
 
-Each is asked for and, where it is not allowed, named with what its absence costs. Nothing here runs in the tick.
+A setting that is not allowed is reported with its consequence and remedy. Nothing here runs in the tick.
 
 Source: sched(7), mlock(2), /dev/cpu_dma_latency in the kernel's power management documentation.
 """
@@ -14,7 +14,7 @@ MCL_CURRENT, MCL_FUTURE = 1, 2
 
 
 class Lack(NamedTuple):
-    """Something that this machine or account does not allow."""
+    """A real-time setting that this computer or account does not allow, with its consequence and remedy."""
 
     what: str
     cost: str
@@ -25,13 +25,14 @@ class Lack(NamedTuple):
 
 
 class RealTime:
-    """Make the calling thread real-time. `lacks` says what was refused; keep the object as long as it should last."""
+    """Real-time settings of the calling thread. `lacks` lists refused settings. Keep the object: CPU sleep states stay
+    limited until `close`."""
 
     def __init__(self, priority: int, cpu: int | None):
         self.lacks: list[Lack] = []
         self._dma_latency: int | None = None
         gc.collect()
-        gc.freeze()  # what start-up made is never looked at again by the collector
+        gc.freeze()  # the collector ignores objects of the start-up from now on
         self._lock_memory()
         self._pin(cpu)
         self._no_deep_sleep()

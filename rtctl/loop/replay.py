@@ -1,7 +1,7 @@
-"""The tick of a machine with a recording in the place of its sensors: what was read goes in, what it writes comes out.
+"""Replay of a machine's tick on a recording: recorded readings in, recomputed rows out.
 
-The module is generated as the loop's own is, from the same lines, but for the stage `read`: its signals are taken from
-the recorded rows. So the law, its states and its limits are the machine's own, to the bit.
+The module is generated as for the loop, except for the stage `read`, which takes its signals from the recorded rows. So
+the law, its states and its limits are those of the machine, to the bit.
 """
 
 import re
@@ -19,19 +19,19 @@ ASSIGNED = re.compile(r"^y\.(\w+) = ", re.MULTILINE)
 
 
 def read_columns(machine: Machine) -> tuple[str, ...]:
-    """Signals that the tick reads off the machine, and what only an emulator tells: in a replay they come from rows."""
+    """Names of the signals that a replay takes from the recorded rows: readings of sensors, truth of an emulator."""
     read = next(lines for name, lines in machine.diagram.stages if name == "read")
     return (*ASSIGNED.findall("\n".join(read)), *(c.name for c in machine.truth))
 
 
 def written_columns(machine: Machine) -> tuple[str, ...]:
-    """Voltages that the tick writes."""
+    """Names of the output voltages that the tick writes."""
     write = next(lines for name, lines in machine.diagram.stages if name == "write")
     return tuple(name for name in ASSIGNED.findall("\n".join(write)) if name.startswith("u"))
 
 
 def source(machine: Machine) -> str:
-    """The module's text."""
+    """Text of the generated module."""
     taken = tuple(f"y.{name} = rx.{name}" for name in read_columns(machine))
     stages = tuple((name, taken if name == "read" else lines) for name, lines in machine.diagram.stages)
     traced = tuple(lines for lines in generate.extras(machine) if lines[0] == "traced state")
@@ -46,7 +46,7 @@ def source(machine: Machine) -> str:
 
 
 def run(recorded, rows, p, s, tables, c, tx, y, m, late_ns, period):
-    """Tick by tick over the recorded rows (n,); what comes of it goes to `rows` (n,)."""
+    """Run the tick on each of the recorded rows (n,), and write the resulting rows to `rows` (n,)."""
     for k in range(len(recorded)):
         r = recorded[k]
         y[0].tick, y[0].t, y[0].period, y[0].lateness = r.tick, r.t, r.period, r.lateness
@@ -55,13 +55,13 @@ def run(recorded, rows, p, s, tables, c, tx, y, m, late_ns, period):
         passed = 1 + int(np.round(r.lateness * 1e9)) // period
         gone = (
             int(r.trip) if r.trip == safety.COMMANDER or r.trip == safety.SUPERVISOR else 0
-        )  # what the loop had found
+        )  # causes that the loop itself had found
         tick(p[0], s[0], tables[c[0].table], c[0], r, tx[0], y[0], m[0], r.tick, fresh, late, passed, gone)
         rows[k] = y[0]
 
 
 class Replay:
-    """A machine's law and all that it remembers, from the first tick on."""
+    """Replay of a machine from the first tick on: its law with parameters, states and commands."""
 
     def __init__(self, machine: Machine):
         path = generate.write_text(machine.kind, source(machine))
@@ -79,11 +79,11 @@ class Replay:
         self.use(machine)
 
     def use(self, machine: Machine) -> None:
-        """Take over the params of a machine of the same structure."""
+        """Use the parameters of `machine`, which must have the same structure."""
         generate.fill(self.p[0], machine.diagram.blocks)
 
     def over(self, recorded: np.ndarray) -> np.ndarray:
-        """Rows (n,) that come of the recorded rows (n,), which follow those of the call before."""
+        """Recomputed rows (n,) for the recorded rows (n,), which must follow the rows of the previous call."""
         rows = np.zeros(len(recorded), self.row)
         self._run(
             recorded, rows, self.p, self.s, self._tables, self.c, self._tx, self._y, self._m,

@@ -1,7 +1,7 @@
-"""The ring of trace rows from the loop to the supervisor: one writer, one reader, nobody waits.
+"""The ring buffer of trace rows from the loop to the supervisor: one writer, one reader, no waiting.
 
-The writer overwrites the oldest rows, so that the newest seconds survive a reader that died; the reader counts what
-it did not get. Rows are numbered from 0, so rows written = rows read + rows lost, exactly.
+The writer overwrites the oldest rows, so that the newest seconds survive the death of the reader. The reader counts
+overwritten rows. Rows are numbered from 0, so rows written = rows read + rows lost, exactly.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from rtctl.tick.memory import Segment, release
 
 RING = state(
     head=int,  # rows written; the loop writes it
-    tail=int,  # rows the reader has taken or given up; the supervisor writes it
+    tail=int,  # rows that the reader has taken or lost; the supervisor writes it
 )
 
 
@@ -19,12 +19,12 @@ RING = state(
 def put(ring, rows, row):
     """Append the record `row[0]`; allocates nothing."""
     rows[ring.head % rows.shape[0]] = row[0]
-    release()  # the row is whole before the head says that it is there
+    release()  # the row is complete before the head counts it
     ring.head += 1
 
 
 class Reader:
-    """The supervisor's end. `take()` returns a copy of the rows that are new; `lost` counts those overwritten."""
+    """The supervisor's end of the ring. `take()` returns a copy of the new rows; `lost` counts overwritten rows."""
 
     def __init__(self, segment: Segment):
         self._ring = segment["ring"][0]
@@ -33,7 +33,7 @@ class Reader:
         self.gaps: list[tuple[int, int]] = []  # (first row lost, how many) since the last take
 
     def take(self, most: int | None = None) -> np.ndarray:
-        """New rows, oldest first, at most `most` of them; what was lost before them is in `gaps`."""
+        """New rows (n,), oldest first, at most `most`; rows lost before them are in `gaps`."""
         capacity = len(self._rows)
         head, tail = int(self._ring["head"]), int(self._ring["tail"])
         self.gaps = []
@@ -44,7 +44,7 @@ class Reader:
             rows = self._rows[begin : begin + last - first].copy()
         else:
             rows = np.concatenate((self._rows[begin:], self._rows[:end]))
-        torn = int(self._ring["head"]) - capacity + 1  # rows below may have been overwritten while they were copied
+        torn = int(self._ring["head"]) - capacity + 1  # earlier rows may have been overwritten during the copy
         if torn > first:
             skip = min(torn, last) - first
             rows, first = rows[skip:], first + skip

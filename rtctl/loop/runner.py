@@ -1,6 +1,6 @@
-"""The loops. The generator copies them into the generated module, beneath the `tick` and the plant that it wrote.
+"""Loops of the controller and the emulated plant. The generator copies their source into the generated module.
 
-What stands here is the loop as it runs; `tick`, `start`, `advance`, `sample` and `link` are the generated module's.
+There, `tick`, `start`, `advance` and `sample` are generated functions, and `link` is the module of the link.
 """
 
 from typing import Any
@@ -41,21 +41,21 @@ def run_real(
     spin,
     most,
 ):
-    """Wake, tick, sleep, on the wall clock, until told to stop or `most` ticks are done."""
+    """Run the loop on the wall clock until `status.stop` is set or `most` ticks are done."""
     box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
     p, s, c, staged, y, m, f = (
         borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y), borrowed(m), borrowed(f)
     )  # fmt: skip
     tx, rx, held, rx_staged = borrowed(tx), borrowed(rx), borrowed(held), borrowed(rx_staged)
     st = status[0]
-    for _ in range(1000):  # samples that waited for us are old
+    for _ in range(1000):  # drop old samples
         if link.receive_newest(inp, rx, rx_staged) == 0:
             break
     wake = clock.now() + period
     st.first_ns = wake
     before = wake
-    # grows by the time that the computer is suspended; where this process is stopped between two reads, too large here
-    # and too small below, so that nothing else counts as that
+    # CLOCK_BOOTTIME less CLOCK_MONOTONIC, ns: grows by the time in suspend. The order of the two reads here is opposite
+    # to the order below, so that a stop of this process between two reads never counts as a suspend.
     awake = -(clock.now() - clock.boot())
     m[0].on = 1
     for k in range(most):
@@ -67,20 +67,20 @@ def run_real(
         while woke < due:  # short spin, and sleeps cut short by a signal
             woke = clock.now()
         suspended = clock.boot() - clock.now() - awake
-        if suspended < period:  # what two clocks differ by from read to read
+        if suspended < period:  # jitter of the two reads
             suspended = 0
         awake += suspended
         lateness = woke - wake + suspended
-        skipped = lateness // period  # a late tick is counted and never made up for
+        skipped = lateness // period  # a missed tick is counted, never caught up
         late = 1 if lateness > late_ns else 0
-        if ahead != 0 and skipped == 0:  # outputs that waited through a missed period are old
+        if ahead != 0 and skipped == 0:  # after a missed period the outputs of the last tick are old
             send(st, out, c[0], f[0], tx, held, k, woke)
         fresh = link.receive_newest(inp, rx, rx_staged)
         begun = clock.now()
         mailbox.take(box, staged, p, c)
         if c[0].faulty != 0:
             fresh = faults.receive(c[0], f[0], rx, fresh, k)
-        if tx[0].seq - rx[0].outputs_seq > p[0].safety.link:  # it answers outputs of long ago: what a cut cable kept
+        if tx[0].seq - rx[0].outputs_seq > p[0].safety.link:  # answers old outputs: a frame delayed by a cut cable
             fresh = 0
         y[0].tick = k
         y[0].t = (woke - st.first_ns) * 1e-9
@@ -148,7 +148,7 @@ def run_lockstep(
     first,
     most,
 ):
-    """Loop and plant take turns on a virtual clock: wait for a sample, tick, send what acts until the next."""
+    """Run the loop in lockstep with the plant on virtual time: wait for a sample, tick, send the outputs."""
     box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
     p, s, c, staged, y, m, f = (
         borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y), borrowed(m), borrowed(f)
@@ -160,7 +160,7 @@ def run_lockstep(
             break
         mailbox.take(box, staged, p, c)
         skipped = behind(c[0], k, period)
-        for _ in range(skipped):  # the machine goes on while the loop stands still
+        for _ in range(skipped):  # the machine moves on while the loop stalls
             if link.receive(inp, rx, rx_staged) == 0:
                 st.failed = 1
                 break
@@ -197,7 +197,7 @@ def run_fused(
     first,
     most,
 ):
-    """Loop and plant in one process on a virtual clock, as fast as they go; to the bit as in lockstep."""
+    """Run loop and plant in one process on virtual time, as fast as possible; equal to lockstep to the bit."""
     box, tables, ring_, rows = borrowed(box), borrowed(tables), borrowed(ring_), borrowed(rows)
     p, s, c, staged, y, m, f = (
         borrowed(p), borrowed(s), borrowed(c), borrowed(staged), borrowed(y), borrowed(m), borrowed(f)
@@ -212,7 +212,7 @@ def run_fused(
             break
         mailbox.take(box, staged, p, c)
         skipped = behind(c[0], k, period)
-        for _ in range(skipped):  # the machine goes on while the loop stands still
+        for _ in range(skipped):  # the machine moves on while the loop stalls
             advance(pp[0], ps[0], held[0])
             sample(pp[0], ps[0], rx[0])
         virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, late_ns, ahead, k, skipped)
@@ -221,14 +221,14 @@ def run_fused(
 
 
 def behind(c, k, period):
-    """Whole periods that pass before tick `k` because a fault has the loop stand still."""
+    """Number of whole periods before tick `k` that an injected stall of the loop takes."""
     return faults.lateness(c, k) // period if c.faulty != 0 else 0
 
 
 def virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, late_ns, ahead, k, skipped):
-    """One tick on the virtual clock, before which `skipped` periods passed without one.
+    """One tick on virtual time, after `skipped` periods without a tick.
 
-    `held` then has the outputs that act until the next.
+    Writes the outputs that act until the next tick to `held`.
     """
     st.missed += skipped
     if ahead != 0 and skipped == 0:
@@ -261,13 +261,13 @@ def virtual(st, tables, ring_, rows, p, s, c, y, m, f, tx, rx, held, period, lat
 
 
 def send(st, out, c, f, tx, wire, k, now):
-    """Send the outputs, or what a fault leaves of them."""
+    """Send the outputs, as changed by injected faults."""
     if faults.transmit(c, f, tx, wire, k) != 0:
         post(st, out, wire, now)
 
 
 def post(st, out, frame, now):
-    """Send a frame with a number and the time on it."""
+    """Send a frame with its sequence number and time."""
     frame[0].seq += 1
     frame[0].t_ns = now
     if not link.send(out, frame):
@@ -275,7 +275,7 @@ def post(st, out, frame, now):
 
 
 def stages(st, m, begun, wrote, ticked):
-    """Count how long the stages of a tick took."""
+    """Add the durations of the stages of a tick to their histograms."""
     histogram.add(st.read, m.read - begun)
     histogram.add(st.law, m.law - m.read)
     histogram.add(st.write, wrote - m.law)
@@ -284,7 +284,7 @@ def stages(st, m, begun, wrote, ticked):
 
 
 def note_late(st, k, lateness):
-    """Count a late tick, and remember the latest of them."""
+    """Count a late tick, and keep it among the newest ones."""
     last = st.late_ticks[st.late % len(st.late_ticks)]
     last.tick = k
     last.lateness = lateness
@@ -292,7 +292,7 @@ def note_late(st, k, lateness):
 
 
 def account(st, safety, k, lost_counts):
-    """What the supervisor sees at once, without reading the ring."""
+    """Write tick, state and trip to the status record, which the supervisor reads without the ring."""
     st.tick = k + 1
     st.state = safety.state
     st.trip = safety.trip
@@ -302,10 +302,10 @@ def account(st, safety, k, lost_counts):
 
 
 def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind, hold):
-    """The emulated machine on its own clock: newest outputs in, one period on, sample out.
+    """Run the emulated machine on the wall clock: take the newest outputs, advance one period, send a sample.
 
-    Its board has a watchdog: outputs that answer a sample older than `hold` ns, by the plant's own clock, are off. So a
-    loop that is gone leaves nothing on, and what waited in a cut cable does nothing when it comes.
+    The board has a watchdog: outputs that answer a sample older than `hold` ns, by the plant's clock, are set to zero.
+    So a dead loop leaves no output on, and frames delayed in a cut cable have no effect.
     """
     p, s, tx, tx_staged, rx = borrowed(p), borrowed(s), borrowed(tx), borrowed(tx_staged), borrowed(rx)
     st = status[0]
@@ -318,7 +318,7 @@ def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind, h
         if link.receive_newest(inp, tx, tx_staged) > 0:
             st.frames += 1
         guard(st, tx[0], rx[0], woke - tx[0].inputs_t_ns > hold)
-        periods = 1 + (woke - wake) // period  # a machine does not stop because its emulator was late
+        periods = 1 + (woke - wake) // period  # a late emulator catches up
         if periods > 1:
             st.catch_ups += 1
         if periods > most_behind:
@@ -334,7 +334,7 @@ def plant_real(status, p, s, tx, tx_staged, rx, out, inp, period, most_behind, h
 
 
 def guard(st, tx, rx, old):
-    """The board's watchdog: outputs that are too `old` are off; that they were on is counted and told to the loop."""
+    """The board's watchdog: set outputs that are too `old` to zero. Outputs that were on are counted and reported."""
     if not old:
         return
     if tx.state == safety.ARMED or tx.state == safety.RUNNING:
@@ -347,7 +347,7 @@ def guard(st, tx, rx, old):
 
 
 def plant_lockstep(status, p, s, tx, tx_staged, rx, out, inp):
-    """The emulated machine on the loop's virtual clock: sample out, outputs in, one period on."""
+    """Run the emulated machine in lockstep on virtual time: send a sample, take outputs, advance one period."""
     p, s, tx, tx_staged, rx = borrowed(p), borrowed(s), borrowed(tx), borrowed(tx_staged), borrowed(rx)
     st = status[0]
     start(p[0], s[0])
@@ -362,7 +362,7 @@ def plant_lockstep(status, p, s, tx, tx_staged, rx, out, inp):
 
 
 def answer(st, rx, tx, out, now):
-    """Send a sample with its number, its time, and which outputs it has seen."""
+    """Send a sample with its number, its time, and the number and time of the newest outputs."""
     rx[0].seq += 1
     rx[0].t_ns = now
     rx[0].outputs_seq = tx[0].seq

@@ -1,6 +1,6 @@
-"""The link over shared memory: one slot each way and a futex to wait on. Same machine only; five microseconds.
+"""The link over shared memory: one slot in each direction, with a futex to wait on. Same computer only; 5 us.
 
-A slot is a sequence lock: odd while it is written. Whoever reads takes the newest whole frame or none.
+A slot has a sequence lock: its count is odd while it is written. A reader takes the newest complete frame or none.
 
 Source: futex(2).
 """
@@ -17,10 +17,10 @@ from rtctl.idiom import tick
 from rtctl.tick import frames
 from rtctl.tick.memory import fence
 
-FUTEX = {"x86_64": 202, "aarch64": 98}  # number of the system call, from the kernel's unistd.h of each architecture
+FUTEX = {"x86_64": 202, "aarch64": 98}  # system call number, from the kernel's unistd.h of each architecture
 SYS_FUTEX = FUTEX.get(platform.machine(), 0)
 WAIT, WAKE = 0, 1
-TIMEOUT_NS = 5_000_000_000
+TIMEOUT_NS = 5_000_000_000  # longest wait for a frame
 
 syscall: Any = types.ExternalFunction(
     "syscall", types.int64(types.int64, types.intp, types.int64, types.int64, types.intp, types.intp, types.int64)
@@ -28,7 +28,7 @@ syscall: Any = types.ExternalFunction(
 
 
 def check_architecture(machine: str = platform.machine(), bits: int = sys.maxsize.bit_length() + 1) -> None:
-    """Refusal of an architecture whose system calls are not known here. Raises UserError.
+    """Check that the system call numbers of this architecture are known. Raises UserError if not.
 
     `machine` is the name by uname(2), `bits` the width of an address in this Python.
     """
@@ -40,7 +40,7 @@ def check_architecture(machine: str = platform.machine(), bits: int = sys.maxsiz
 
 
 def slot_dtype(frame: np.dtype) -> np.dtype:
-    """Record of one direction: written by its sender but for `seen`, which its receiver writes."""
+    """Dtype of the slot of one direction. Its sender writes it, except `seen` and `wait`, which its receiver writes."""
     return np.dtype(
         [("count", np.int32), ("pad", np.int32), ("seen", np.int64), ("wait", np.int64, (2,)), ("frame", frame)],
         align=True,
@@ -52,7 +52,7 @@ OUTPUTS_SLOT, INPUTS_SLOT = slot_dtype(frames.OUTPUTS), slot_dtype(frames.INPUTS
 
 @tick
 def send(slot, frame):
-    """Write the frame into the slot and wake who waits for it."""
+    """Write the frame into the slot and wake its receiver."""
     slot[0].count += 1
     fence()
     slot[0].frame = frame[0]
@@ -64,7 +64,7 @@ def send(slot, frame):
 
 @tick
 def receive_newest(slot, frame, staged):
-    """The newest frame, if there is one not yet seen; returns 1 or 0, and never waits."""
+    """Take the newest frame into `frame` (1,) without waiting; returns 1 if it is new and valid, else 0."""
     count = slot[0].count
     if count == slot[0].seen or count % 2 == 1:
         return 0
@@ -82,14 +82,14 @@ def receive_newest(slot, frame, staged):
 
 @tick
 def receive(slot, frame, staged):
-    """Wait for a new frame, at most five seconds; returns 1, or 0 where none came."""
+    """Wait for a new frame, at most 5 s; returns 1, or 0 where none came."""
     for _ in range(1000):
         if receive_newest(slot, frame, staged) == 1:
             return 1
         count = slot[0].count
         slot[0].wait[0] = TIMEOUT_NS // 1_000_000_000
         slot[0].wait[1] = 0
-        none = count == slot[0].seen or count % 2 == 1  # yet, or its sender was interrupted in the middle of it
+        none = count == slot[0].seen or count % 2 == 1  # no new frame yet, or one that is being written
         if none and syscall(SYS_FUTEX, slot.ctypes.data, WAIT, count, slot.wait.ctypes.data, 0, 0) < 0:
             if receive_newest(slot, frame, staged) == 1:
                 return 1

@@ -1,7 +1,7 @@
-"""The link over ZeroMQ, called from compiled code: one DEALER socket at each end, whole frames, newest wins.
+"""The link over ZeroMQ, called from compiled code: one DEALER socket at each end; the newest frame is used.
 
-The sockets are made and secured in Python (pyzmq); the tick gets their handles. Sending never blocks: a plant that is
-gone costs frames, not time. The libzmq is the one inside the pyzmq wheel, made known to the compiler by `load()`.
+The sockets are made and secured in Python (pyzmq); the tick gets their handles. Sending never blocks: without a plant
+frames are lost, but no time. `load()` makes the libzmq inside the pyzmq wheel known to the compiler.
 
 Source: zmq_send(3), zmq_recv(3); thread safety: the handle stays with the thread that runs the loop.
 """
@@ -17,7 +17,7 @@ from rtctl.idiom import tick
 from rtctl.tick import frames
 
 DONTWAIT = 1
-MOST = 64  # frames drained in one tick: a peer that floods us cannot hold the tick
+MOST = 64  # frames read in one tick, so that a flood of frames cannot delay the tick
 
 zmq_send: Any = types.ExternalFunction("zmq_send", types.int32(types.intp, types.intp, types.uintp, types.int32))
 zmq_recv: Any = types.ExternalFunction("zmq_recv", types.int32(types.intp, types.intp, types.uintp, types.int32))
@@ -40,13 +40,13 @@ def load() -> None:
 
 @tick
 def send(link, frame):
-    """Send the record array `frame` (1,) without waiting; returns whether it was taken."""
+    """Send the record array `frame` (1,) without waiting; returns whether it was sent."""
     return zmq_send(link, frame.ctypes.data, frame.itemsize, DONTWAIT) == frame.itemsize
 
 
 @tick
 def receive_newest(link, frame, staged):
-    """Drain the socket; the newest valid frame is in `frame`. Returns how many valid ones came."""
+    """Read waiting frames, at most MOST, and keep the newest valid one in `frame`. Returns the number of valid ones."""
     fresh = 0
     for _ in range(MOST):
         length = zmq_recv(link, staged.ctypes.data, staged.itemsize, DONTWAIT)
@@ -60,7 +60,7 @@ def receive_newest(link, frame, staged):
 
 @tick
 def receive(link, frame, staged):
-    """Wait for the next valid frame, as long as the socket's timeout; returns 1, or 0 where none came."""
+    """Wait for the next valid frame, at most for the socket's time-out; returns 1, or 0 where none came."""
     for _ in range(MOST):
         length = zmq_recv(link, staged.ctypes.data, staged.itemsize, 0)
         if length < 0:

@@ -1,1 +1,1 @@
-"""The scope: rows of a running machine to a page in the browser, and commands back where that is allowed."""
+"""The scope: a page in the browser with the signals of a running machine, and commands to it where allowed."""

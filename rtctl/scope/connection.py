@@ -1,4 +1,4 @@
-"""One browser: what it asks, and what is sent to it without ever waiting for it."""
+"""Connection to one browser: its requests, and frames and texts to it, sent without waiting."""
 
 import asyncio
 import contextlib
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from rtctl.scope.server import Scope
 
 log = structlog.get_logger()
-COMMANDS = ("arm", "disarm", "reset", "play", "setpoint", "set")  # what the page may ask of the daemon
-MOST_WAITING = 100  # texts that a browser has not taken; then it is given up
+COMMANDS = ("arm", "disarm", "reset", "play", "setpoint", "set")  # commands to the daemon that the page may send
+MOST_WAITING = 100  # unsent messages, above which the connection is closed
 
 
 class Connection:
     """A WebSocket with its viewer. Messages of the page are JSON texts with a key `op`:
 
-    view     {"op": "view", "view": {...}}    what it wants to see, see View
-    drawn    {"op": "drawn"}                  a frame is on the screen: it can take another
+    view     {"op": "view", "view": {...}}    the view to show, see View
+    drawn    {"op": "drawn"}                  a frame is on the screen: the page can take another
     others   {"op": "set", "id": 3, "args": {...}}, answered by {"kind": "reply", "id": 3, "ok": ..., ...}
     """
 
@@ -35,10 +35,10 @@ class Connection:
         self._sending: set[asyncio.Task[None]] = set()
 
     def send_frame(self, turn: int) -> None:
-        """Send the frame that is due, if there is one and the browser has drawn those before."""
+        """Send the frame that is due, if the browser has drawn the earlier ones."""
         try:
             frame = self.viewer.frame(turn)
-        except Exception as error:  # one viewer's trouble is not that of the others
+        except Exception as error:  # an error of one viewer must not stop the others
             log.exception("no frame", error=str(error))
             self._send(self._socket.close(code=1011))
             return
@@ -52,7 +52,7 @@ class Connection:
             self._send(self._socket.send_str(json.dumps(finite(message))))
 
     async def hear(self, text: str) -> None:
-        """Do what a message of the page asks. Whatever is wrong with it is answered, and changes nothing."""
+        """Carry out a message of the page. A message with an error is answered with the error and has no effect."""
         id = None
         try:
             message = read(text)
@@ -90,12 +90,12 @@ class Connection:
 
 
 async def _unless_gone(work: Any) -> None:
-    with contextlib.suppress(ConnectionError, RuntimeError):  # it went away meanwhile; the reading end notices as well
+    with contextlib.suppress(ConnectionError, RuntimeError):  # the browser has left; the reading end notices too
         await work
 
 
 def read(text: str) -> dict[str, Any]:
-    """A message of the page. Raises UserError where it is none."""
+    """Message of the page as a dict. Raises UserError where the text is too long or no JSON object."""
     if len(text) > MOST_BYTES:
         raise UserError(f"a message of {len(text)} characters; at most {MOST_BYTES} are taken")
     try:
@@ -108,7 +108,7 @@ def read(text: str) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """The same without NaN and infinity, which JSON cannot hold: they become null."""
+    """Copy of `value` with None for NaN and infinity, which JSON cannot hold."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

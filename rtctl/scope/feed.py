@@ -1,4 +1,4 @@
-"""The daemon as the scope sees it: rows from its rows socket, status and commands through an ordinary client."""
+"""Data feed of the scope: rows from the daemon's rows socket, status and commands through a client."""
 
 import asyncio
 import contextlib
@@ -17,15 +17,15 @@ from rtctl.scope.history import MOST_ROWS, MOST_SECONDS, History
 from rtctl.scope.lanes import Lanes
 
 log = structlog.get_logger()
-TIMEOUT = 1.0  # s for an answer of the daemon
-EDGES_US = [2.0**k for k in range(-2, 15)]  # of the lateness histogram
+TIMEOUT = 1.0  # s to wait for an answer of the daemon
+EDGES_US = [2.0**k for k in range(-2, 15)]  # bin edges of the lateness histogram, us
 
 
 class Feed:
-    """Follows the machine `name`, through restarts of its daemon. Use in one event loop.
+    """Feed of the machine `name`, also after restarts of its daemon. Use in one event loop.
 
-    `run` counts up with each daemon that is met; `history` holds its rows. `alive` says whether it answers, `there`
-    whether its socket is there: a daemon that starts has one long before it answers.
+    `run` counts the daemons seen; `history` holds the rows of the current one. `alive` is whether the daemon answers,
+    `there` whether its socket exists: a starting daemon has a socket long before it answers.
     """
 
     def __init__(self, name: str):
@@ -50,11 +50,11 @@ class Feed:
         self._thread = ThreadPoolExecutor(1, "daemon")  # a client is for one thread
 
     async def call(self, op: str, **args: Any) -> dict[str, Any]:
-        """Ask the daemon, without holding up the frames. Raises UserError as Client.call does."""
+        """Ask the daemon in a thread, so that frames are not delayed. Raises UserError as Client.call does."""
         return await asyncio.get_running_loop().run_in_executor(self._thread, lambda: self._client.call(op, **args))
 
     async def look(self) -> None:
-        """Ask for the status; of a daemon that was not there before, for its signals as well."""
+        """Ask the daemon for its status; ask a new daemon also for its signals."""
         try:
             self.status = self._without_lanes(await self.call("status"))
             if not self.signals:
@@ -67,13 +67,13 @@ class Feed:
             self.there = await asyncio.get_running_loop().run_in_executor(self._thread, self._find)
 
     def _without_lanes(self, status: dict[str, Any]) -> dict[str, Any]:
-        """A status whose model says no lanes any more: they are taken in."""
+        """Copy of a status without the lanes of its model, which are stored in `lanes`."""
         model = status.get("model")
         self.lanes.take(model)
         return status if model is None else {**status, "model": {**model, "t": [], "lanes": {}}}
 
     def _show_lanes(self) -> None:
-        """Lanes that have come are signals as others are."""
+        """Add new lanes to the signals and the history."""
         known = {signal["name"] for signal in self.signals}
         new = [signal for signal in self.lanes.signals if signal["name"] not in known]
         if self.history is not None and new:
@@ -81,7 +81,7 @@ class Feed:
             self.signals = [*self.signals, *new]
 
     def drain(self) -> int:
-        """Take in the rows that have come; returns how many."""
+        """Store all waiting rows in the history; returns their number."""
         taken = 0
         with contextlib.suppress(zmq.Again):
             while True:
@@ -93,7 +93,7 @@ class Feed:
         return taken
 
     def _find(self) -> bool:
-        """Whether somebody listens where the daemon's socket would be: ours, or by now that of a system service."""
+        """Whether a process listens at the daemon's socket: the user's own daemon, or a system service."""
         at = find_endpoint(self.name, "command")
         if at != self._client.endpoint:
             self._client.close()
@@ -101,7 +101,7 @@ class Feed:
         return listens(at)
 
     def _follow(self) -> None:
-        """Take the rows from where the daemon is now."""
+        """Connect to the rows socket at its current address."""
         at = find_endpoint(self.name, "rows")
         if at != self._rows_at:
             self._rows.disconnect(self._rows_at)
@@ -109,9 +109,9 @@ class Feed:
             self._rows_at = at
 
     def _take(self, topic: bytes, head: bytes, payload: bytes) -> int:
-        """Take in one message. Raises ValueError or TypeError where it is none of a daemon."""
+        """Store the rows of one message; returns their number. Raises ValueError or TypeError if malformed."""
         if topic != self.name.encode():
-            return 0  # of a machine whose name only begins like this one's
+            return 0  # another machine whose name begins with this name
         if head != self._head:
             self._begin(head)
         if self.history is None or self._row is None:
@@ -129,12 +129,12 @@ class Feed:
         self._context.term()
 
     def _begin(self, head: bytes) -> None:
-        """Rows of another daemon, or the first ones: what was there before belongs to another run."""
+        """Begin a new run and history with the first rows of a daemon."""
         if not self.signals or not self.rate:
-            return  # not before we know its rate
+            return  # wait for the rate
         pid, self._row = decode(head)
         if pid != self.status.get("pid"):
-            self.signals = []  # of the one before; look() asks the new one
+            self.signals = []  # of the previous daemon; look() asks the new one
             self.history, self.lanes = None, Lanes()
             return
         self._head = head

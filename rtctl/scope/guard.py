@@ -1,8 +1,8 @@
-"""Who may speak to the page's server: a browser of this machine that was given the token, and no other page in it.
+"""Access check of the page's server: only browsers on this computer with the token, and only this server's page.
 
-    Host     must be a loopback name, or a page elsewhere could have its own name point here (DNS rebinding)
-    Origin   of a WebSocket must be this server, or any page could open one (cross-site WebSocket hijacking)
-    token    a secret in a file of mode 0600, for other accounts of this machine reach loopback as well
+    Host     must be a loopback name; otherwise a foreign name could point to this server (DNS rebinding)
+    Origin   of a WebSocket must be this server; otherwise any page could open one (cross-site WebSocket hijacking)
+    token    a secret in a file of mode 0600, because other accounts of this computer reach loopback, too
 
 Source: OWASP cheat sheets on cross-site request forgery and WebSocket security.
 """
@@ -24,7 +24,7 @@ HEADERS = {
     "form-action 'none'",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
-    "Referrer-Policy": "no-referrer",  # the first address holds the token
+    "Referrer-Policy": "no-referrer",  # the first address contains the token
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-cache",
 }
@@ -35,7 +35,7 @@ ASK = (
 
 
 class Guard:
-    """Checks requests to the server on `port`. The token is kept, so that a page finds the next server as well."""
+    """Checks requests to the server on `port`. The token stays in a file, so that a page can use the next server."""
 
     def __init__(self, folder: Path | None = None):
         self.path = (folder or runtime_dir()) / "scope.token"
@@ -44,11 +44,11 @@ class Guard:
 
     @property
     def cookie(self) -> str:
-        """Name of the cookie: cookies know no ports, and there may be several scopes."""
+        """Name of the cookie, with the port: browsers share cookies between ports, and several scopes may run."""
         return f"rtctl_scope_{self.port}"
 
     def refuse(self, request: web.Request) -> web.Response | None:
-        """The answer to a request that is not to be served, else None."""
+        """Response that refuses a request; None for a request to serve."""
         host = request.headers.get("Host", "")
         hosts = [f"{name}:{self.port}" for name in LOOPBACK]
         if host not in hosts:
@@ -64,7 +64,7 @@ class Guard:
         return None
 
     def welcome(self, response: web.StreamResponse) -> None:
-        """Let the browser keep the token, out of reach of scripts and of other sites."""
+        """Store the token in a cookie that scripts and other sites cannot read."""
         response.set_cookie(self.cookie, self.token, httponly=True, samesite="Strict", path="/")
 
     def _is_token(self, given: str) -> bool:
@@ -75,7 +75,7 @@ class Guard:
 
 
 def kept_token(path: Path) -> str:
-    """The token in a file that only its owner can read, made if there is none. Raises UserError if it is not."""
+    """Token in a file, which is made if missing. Raises UserError if other users can read the file."""
     try:
         fd = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     except OSError as error:

@@ -1,18 +1,18 @@
-"""The newest seconds of every signal, by the number of the row."""
+"""History of the newest rows of every signal, addressed by row number."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-MOST_ROWS = 300_000  # 30 s at 10 kHz
-MOST_SECONDS = 120.0
+MOST_ROWS = 300_000  # rows kept, 30 s at 10 kHz
+MOST_SECONDS = 120.0  # s of rows kept
 
 
 class History:
-    """Rows of the dtype `row`, at most `capacity` of them, numbered from 0 as they came.
+    """Circular buffer of at most `capacity` rows of dtype `row`, numbered from 0 in order of arrival.
 
-    `head` is the number of the next row, `first` that of the oldest still there, `lost` how many the sender's `tick`
-    says are missing between those that came.
+    `head` is the number of the next row, `first` the number of the oldest row kept. `lost` counts missing rows, from
+    jumps of `tick`.
     """
 
     def __init__(self, row: np.dtype, capacity: int):
@@ -29,14 +29,14 @@ class History:
         return max(0, self.head - self.capacity)
 
     def extend(self, names: tuple[str, ...]) -> None:
-        """Further signals beside those of the rows, 0 in the rows that are there."""
+        """Add signals that are not in the rows; they are 0 in the rows so far."""
         new = tuple(name for name in names if name not in self.index)
         self.names += new
         self.index = {name: i for i, name in enumerate(self.names)}
         self._kept = np.concatenate((self._kept, np.zeros((len(new), self.capacity))))
 
     def append(self, rows: np.ndarray, beside: Mapping[str, np.ndarray] | None = None) -> None:
-        """Take in rows, oldest first, and the values (n,) of the signals `beside` them."""
+        """Append rows (n,), oldest first, and values (n,) of the added signals in `beside`."""
         if not len(rows):
             return
         if "tick" in self.index:
@@ -57,7 +57,7 @@ class History:
                 kept[:end] = values[-end:]
 
     def take(self, names: tuple[str, ...], first: int, last: int) -> np.ndarray:
-        """Rows `first` to `last` (not included), as far as they are there: an array (names, rows)."""
+        """Array (names, rows) of the rows `first` to `last` (not included), as far as they are kept."""
         first, last = max(first, self.first), min(last, self.head)
         which = [self.index[name] for name in names]
         if first >= last:

@@ -1,6 +1,6 @@
-"""Signals of a model beside the machine as lanes: they come with the status, later than the rows, and are shown so.
+"""Lanes: signals of the model in `rtctl watch`, which come with the status, later than the rows.
 
-A lane is drawn DELAY seconds late, always the same, so that a page that rolls need not draw a column twice.
+A lane is drawn with a constant delay of DELAY seconds, so that a rolling page need not draw a column twice.
 """
 
 from collections.abc import Iterable, Mapping
@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-DELAY = 3.0  # s by which a lane is late: a window, the turns of the watch and of the scope
-KEPT = 30.0  # s of values
+DELAY = 3.0  # s by which a lane is drawn late: a window and the update intervals of watch and scope
+KEPT = 30.0  # s of values kept
 
 
 class Lanes:
-    """Lanes by name, as reports of a watch bring them. `signals` are their names, units and words."""
+    """Lanes by name, from the reports of a watch. `signals` are their names, units and descriptions."""
 
     def __init__(self) -> None:
         self.signals: list[dict[str, str]] = []
@@ -21,11 +21,11 @@ class Lanes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the lanes, in the order in which they came."""
+        """Names of the lanes, in order of arrival."""
         return tuple(self._kept)
 
     def take(self, model: Mapping[str, Any] | None) -> None:
-        """Take in the lanes of a report, where it has some."""
+        """Store the lanes of a report, if it has any."""
         if model is None or not model.get("t"):
             return
         t = np.asarray(model["t"], float)
@@ -46,7 +46,7 @@ class Lanes:
             self._kept[name] = old[recent], kept[recent]
 
     def at(self, t: np.ndarray, names: Iterable[str]) -> dict[str, np.ndarray]:
-        """Values (n,) of lanes at the times of rows (n,), DELAY late; 0 where there are none yet."""
+        """Values (n,) of each lane at the times `t` (n,) of rows, DELAY s late; 0 before the first value."""
         out = {}
         for name in names:
             old, kept = self._kept.get(name, (np.empty(0), np.empty(0)))

@@ -1,18 +1,18 @@
-"""What is drawn of many rows: envelopes that keep every extreme, points of one signal over another, spectra."""
+"""Data reduction for drawing: envelopes that keep every extreme, thinned points, and amplitude spectra."""
 
 from functools import lru_cache
 
 import numpy as np
 from scipy.fft import rfft
 
-MOST_POINTS = 4000  # of one signal over another
-FEWEST, LONGEST_SPECTRUM = 8, 1 << 16  # rows of a spectrum
+MOST_POINTS = 4000  # most points of an XY plot
+FEWEST, LONGEST_SPECTRUM = 8, 1 << 16  # fewest and most rows of a spectrum
 
 
 def envelope(values: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest of each `rows` rows of an array (signals, n); the last bucket may hold fewer.
+    """Envelope of an array (signals, n): two arrays (signals, buckets), lowest and highest of each `rows` rows.
 
-    Two arrays (signals, buckets). Values that are not a number are passed over where a bucket has others.
+    The last bucket may hold fewer rows. NaN is ignored where a bucket has other values.
     """
     if rows == 1 or not values.size:
         return values, values
@@ -27,18 +27,18 @@ def envelope(values: np.ndarray, rows: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def thinned(values: np.ndarray, most: int = MOST_POINTS) -> tuple[np.ndarray, int]:
-    """Every n-th row of an array (signals, rows), the newest included, and n: at most `most` are left."""
+    """Every n-th row of an array (signals, rows), including the newest, at most `most` rows; and n."""
     step = max(1, -(-values.shape[1] // most))
     return values[:, ::-1][:, ::step][:, ::-1], step
 
 
 def spectrum(values: np.ndarray, dt: float, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Amplitude spectra of an array (signals, rows) that was sampled every `dt` s, without their means.
+    """Amplitude spectra of an array (signals, rows) that was sampled every `dt` s, without the means.
 
-    Frequencies in Hz (points,) and amplitudes (signals, points) in the units of the signals: a sine of amplitude 1
-    reads 1 where its frequency falls on a line (Hann window, at worst 15 % less between two lines). Of several lines
-    in a column of the logarithmic axis the highest is kept, at the middle of the column. Of more than 65536 rows, the
-    newest.
+    Returns frequencies in Hz (points,) and amplitudes (signals, points) in the units of the signals. A sine of
+    amplitude 1 reads 1 on a spectral line, and up to 15 % less between two lines (Hann window). Of several lines in a
+    column of the logarithmic axis the highest is kept, at the middle of the column. Of more rows the newest 65536 are
+    used.
 
     Source: Heinzel, Ruediger & Schilling, Spectrum and spectral density estimation by the DFT (2002).
     """
@@ -46,27 +46,27 @@ def spectrum(values: np.ndarray, dt: float, columns: int) -> tuple[np.ndarray, n
 
 
 def lines(values: np.ndarray) -> np.ndarray:
-    """Squared amplitudes (signals, lines) of an array (signals, rows), from the first frequency beyond zero on.
+    """Squared amplitudes (signals, lines) of an array (signals, rows), from the first frequency above zero on.
 
-    The transform is in single precision, which takes a third of the time; without mean and scale that loses what lies
-    some 140 dB below the signal.
+    The transform is in single precision, which takes a third of the time. Mean and scale are removed before, so only
+    lines some 140 dB below the signal are lost.
     """
     values = values[:, -LONGEST_SPECTRUM:]
     if values.shape[1] < FEWEST:
         return np.empty((len(values), 0))
     window, scale = _hann(values.shape[1])
     short, largest = np.empty(values.shape, np.float32), np.empty((len(values), 1))
-    for k, signal in enumerate(values):  # one by one: they stay in the cache
+    for k, signal in enumerate(values):  # one by one, to stay in the CPU cache
         moved = signal - signal.mean()
         largest[k] = max(moved.max(), -moved.min()) or 1.0
         moved *= window
         np.divide(moved, largest[k], out=short[k], casting="same_kind")
-    found = rfft(short, overwrite_x=True)[:, 1:]  # all at once: then it works on several in one instruction
+    found = rfft(short, overwrite_x=True)[:, 1:]  # all at once, for vector instructions
     return (found.real**2 + found.imag**2) * (scale * largest**2)
 
 
 def in_columns(squared: np.ndarray, rows: int, dt: float, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies and amplitudes, as `spectrum` gives them, of the `lines` of so many rows."""
+    """Frequencies (points,) and amplitudes (signals, points), as in `spectrum`, from the `lines` of `rows` rows."""
     if rows < FEWEST:
         return np.empty(0), np.empty((len(squared), 0))
     frequency, begins = _columns(rows, dt, columns)
@@ -75,14 +75,14 @@ def in_columns(squared: np.ndarray, rows: int, dt: float, columns: int) -> tuple
 
 @lru_cache(maxsize=4)
 def _hann(n: int) -> tuple[np.ndarray, float]:
-    """The window, and what makes squared amplitudes of squared lines."""
+    """Hann window (n,), and the factor from squared lines to squared amplitudes."""
     window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
     return window, (2.0 / window.sum()) ** 2
 
 
 @lru_cache(maxsize=8)
 def _columns(n: int, dt: float, columns: int) -> tuple[np.ndarray, np.ndarray | None]:
-    """Frequencies, and at which line each column begins; None where each line has its own."""
+    """Frequencies of the columns, Hz, and the first line of each; None where each line has its own column."""
     frequency = np.fft.rfftfreq(n, dt)[1:]
     if len(frequency) <= columns:
         return frequency, None

@@ -1,4 +1,4 @@
-"""The scope's server: one page on loopback, frames to its viewers, commands from them where `control` is on."""
+"""The scope's server: one page on loopback, frames to its viewers, and their commands where `control` is on."""
 
 import asyncio
 import contextlib
@@ -22,16 +22,16 @@ from rtctl.scope.tunable import PARTS, tunable
 
 ADDRESS = "127.0.0.1"
 STATIC = Path(__file__).parent / "static"
-FRAMES = 30.0  # a second
-LOOK = 0.25  # s between two looks at the status
-SETTINGS_EVERY = 4  # looks
+FRAMES = 30.0  # frames a second
+LOOK = 0.25  # s between two requests of the status
+SETTINGS_EVERY = 4  # status requests between two requests of the settings
 MOST_VIEWERS = 8
 STARTING = "is there but does not answer yet: it compiles its tick, or hangs; waiting for it"
 ABSENT = "does not run yet; waiting for it, start it with `rtctl run`"
 
 
 class Scope:
-    """Serves the page of the machine that `feed` follows. Without `control` nothing on it can change the machine."""
+    """Server of the page for the machine of `feed`. Without `control` the page cannot command the machine."""
 
     def __init__(self, feed: Feed, guard: Guard, control: bool = False):
         self.feed, self.guard, self.control = feed, guard, control
@@ -48,9 +48,9 @@ class Scope:
     async def serve(
         self, port: int, ready: Callable[["Scope"], None] = lambda _: None, say: Callable[[str], None] = lambda _: None
     ) -> None:
-        """Serve on loopback until cancelled, SIGINT or SIGTERM. Raises UserError where the port cannot be had.
+        """Serve on loopback until cancelled, SIGINT or SIGTERM. Raises UserError where the port is not available.
 
-        `ready` is called once pages are served; `say` gets what it waits for as long as no daemon has answered.
+        `ready` is called once pages are served; `say` gets messages while no daemon has answered.
         """
         app = web.Application(middlewares=[self._guarded], client_max_size=1024)
         app.add_routes([web.get("/", self._page), web.get("/stream", self._stream), web.static("/static", STATIC)])
@@ -80,7 +80,7 @@ class Scope:
     # what is sent
 
     async def _frames(self) -> None:
-        """Thirty times a second: take in rows, and a frame for each viewer that can take one."""
+        """Thirty times a second, store new rows and send a frame to each viewer that can take one."""
         clock = asyncio.get_running_loop()
         due = clock.time()
         for turn in itertools.count():
@@ -95,7 +95,7 @@ class Scope:
             await asyncio.sleep(due - clock.time())
 
     async def _looks(self) -> None:
-        """Four times a second: how the machine is, and once a second whether somebody changed its settings."""
+        """Four times a second, send the status; once a second, ask for changed settings."""
         turn = 0
         while True:
             await self.feed.look()
@@ -111,7 +111,7 @@ class Scope:
             await asyncio.sleep(LOOK)
 
     async def _first_answer(self, say: Callable[[str], None]) -> None:
-        """Say what is waited for until the daemon answers, and that it does."""
+        """Report a missing or starting daemon until it answers, and then its answer."""
         told = ""
         while not self.feed.alive:
             lack = STARTING if self.feed.there else ABSENT
@@ -183,7 +183,7 @@ class Scope:
 
     async def _stream(self, request: web.Request) -> web.StreamResponse:
         if len(self.connections) >= MOST_VIEWERS:
-            return web.Response(status=503, text=f"{MOST_VIEWERS} viewers look already\n")
+            return web.Response(status=503, text=f"this scope serves at most {MOST_VIEWERS} pages; close another one\n")
         socket = web.WebSocketResponse(heartbeat=20.0, max_msg_size=64 * 1024, compress=False)
         await socket.prepare(request)
         connection = Connection(socket, self)
@@ -202,7 +202,7 @@ class Scope:
 
 
 async def first_of(*works: Coroutine[Any, Any, Any]) -> None:
-    """Run all of them until the first one ends; the others are cancelled. Raises what that one raised."""
+    """Run all coroutines until the first one ends, then cancel the others. Raises the exception of the first one."""
     tasks = [asyncio.create_task(work) for work in works]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)

@@ -1,4 +1,4 @@
-"""Spectra of the newest rows, each computed once for all viewers that ask for it in one frame."""
+"""Spectra of the newest rows, each computed once for all viewers that show it in a frame."""
 
 import numpy as np
 
@@ -7,18 +7,18 @@ from rtctl.scope.reduce import LONGEST_SPECTRUM, in_columns, lines
 
 
 class Spectra:
-    """What viewers share. Their widths may differ: the Fourier transform is what costs, and it knows of no columns."""
+    """Fourier transforms shared by the viewers. Only the columns, which cost little, depend on a viewer's width."""
 
     def __init__(self) -> None:
         self._of: History | None = None
         self._head = 0
-        self._lines: dict[tuple[str, int], np.ndarray] = {}  # of these rows; by signal and first row
+        self._lines: dict[tuple[str, int], np.ndarray] = {}  # of the newest rows, by signal and first row
 
     def newest(
         self, history: History, names: list[str], rows: int, dt: float, columns: int
     ) -> tuple[np.ndarray, np.ndarray, int]:
-        """Frequencies (points,) in Hz and amplitudes (signals, points) of the newest `rows`, and of how many rows they
-        are; see `spectrum`."""
+        """Frequencies (points,) in Hz and amplitudes (signals, points) of the newest `rows`, and the number of rows
+        used; see `spectrum`."""
         if history is not self._of or history.head != self._head:
             self._of, self._head = history, history.head
             self._lines.clear()

@@ -1,8 +1,8 @@
-"""The trigger: where a signal crosses a level, and the sweep of rows around that.
+"""The trigger: crossings of a level by a signal, and the sweep of rows around each.
 
-auto     sweeps, and rolls while there is no crossing
-normal   sweeps only
-single   one sweep, then waits until it is armed again
+auto     shows sweeps, and rolls while there is no crossing
+normal   shows sweeps only
+single   shows one sweep, then waits until it is armed again
 """
 
 from typing import Literal, NamedTuple
@@ -12,11 +12,11 @@ import numpy as np
 from rtctl.scope.history import History
 
 Edge = Literal["rising", "falling", "either"]
-PATIENCE = 0.5  # s beyond one and a half sweeps until `auto` rolls
+PATIENCE = 0.5  # s after one and a half sweeps without a crossing, until `auto` rolls
 
 
 class Sweep(NamedTuple):
-    """Rows `first` to `last` (not included) around the row `at`, the first one beyond the level."""
+    """Numbers of rows: `first` to `last` (not included), around `at`, the first row beyond the level."""
 
     first: int
     at: int
@@ -24,7 +24,7 @@ class Sweep(NamedTuple):
 
 
 def crossings(values: np.ndarray, level: float, edge: Edge) -> np.ndarray:
-    """Indices i where values[i - 1] is on the one side of the level and values[i] on or beyond the other."""
+    """Indices i of crossings: values[i - 1] is on one side of the level, values[i] on the level or the other side."""
     before, after = values[:-1], values[1:]
     rising = (before < level) & (after >= level)
     falling = (before > level) & (after <= level)
@@ -33,24 +33,24 @@ def crossings(values: np.ndarray, level: float, edge: Edge) -> np.ndarray:
 
 
 class Trigger:
-    """Finds sweeps of `rows` rows, `before` of them before the crossing. `count` says how many it has found.
+    """Finds sweeps of `rows` rows, `before` of them before the crossing. `count` is the number of sweeps found.
 
-    The next crossing is looked for after the end of a sweep. `single` makes it stop after one.
+    The search for the next crossing begins at the end of a sweep. With `single` it ends after one sweep.
     """
 
     def __init__(self, level: float, edge: Edge, rows: int, before: int, single: bool, start: int):
         self.level, self.edge, self.single = level, edge, single
         self.rows, self.before = rows, before
         self.count = 0
-        self.waits_for: int | None = None  # the crossing whose sweep is not yet full
-        self._looked = start  # rows before this one have been looked at
+        self.waits_for: int | None = None  # crossing whose sweep is not yet complete
+        self._looked = start  # rows before this one have been searched
 
     @property
     def done(self) -> bool:
         return self.single and self.count > 0
 
     def feed(self, history: History, signal: str) -> Sweep | None:
-        """Look at the rows that are new; returns the newest sweep that is full."""
+        """Search the new rows; returns the newest complete sweep, or None."""
         latest = None
         while not self.done:
             at = self._find(history, signal) if self.waits_for is None else self.waits_for
@@ -64,7 +64,7 @@ class Trigger:
         return latest
 
     def _find(self, history: History, signal: str) -> int | None:
-        """The first crossing among rows not yet looked at."""
+        """Number of the first row after a crossing, among rows not yet searched; None without a crossing."""
         first = max(self._looked - 1, history.first)
         values = history.take((signal,), first, history.head)[0]
         found = crossings(values, self.level, self.edge)

@@ -1,20 +1,20 @@
-"""The settings that can be changed while a machine runs, each with its value now, its unit and its bounds."""
+"""Settings that can change while a machine runs, each with its current value, unit and bounds."""
 
 from typing import Any
 
 from rtctl.config.fields import Shape, child, literals
 from rtctl.config.schema import bounds
 
-PARTS = ("law", "safety")  # of the config, in the order of the page
+PARTS = ("law", "safety")  # parts of the config, in the order of the page
 SIDES = ("gt", "ge", "lt", "le")
 
 
 def tunable(machine: Any, values: dict[str, Any]) -> list[dict[str, Any]]:
-    """Rows for the page from the parts of a running machine's config, as `get` returns them; `machine` is that of the
-    config, a name or a description.
+    """Rows of settings for the page. `values` are parts of the config, as `get` returns them.
 
-    `path`, `value`, `type` (number, integer, boolean or choice), `unit`, `help`, `bounds` as a person writes them, and
-    each bound under its own name (gt, ge, lt, le). Lists are left out: they are the structure of a law.
+    `machine` is the machine of the config, a name or a description. Keys of a row: `path`, `value`, `type` (number,
+    integer, boolean or choice), `unit`, `help`, `bounds` as text, and each bound by name (gt, ge, lt, le). Lists are
+    left out: they are the structure of a law.
     """
     from rtctl import machines
 

@@ -1,4 +1,4 @@
-"""What a viewer wants to see. The page sends all of it whenever some of it changes."""
+"""View of a viewer: signals, kind of plot, window and trigger. The page sends the whole view at each change."""
 
 import json
 from typing import Annotated, Literal
@@ -21,23 +21,23 @@ class TriggerView(Part):
     signal: Name = ""
     level: float = 0.0
     edge: Literal["rising", "falling", "either"] = "rising"
-    pre: float = Field(default=0.2, ge=0.0, le=1.0)  # share of the sweep that lies before the crossing
-    armed: int = 0  # counts up: look for a crossing from now on
+    pre: float = Field(default=0.2, ge=0.0, le=1.0)  # fraction of the sweep before the crossing
+    armed: int = 0  # a new count starts a new search
 
 
 class View(Part):
     kind: Literal["time", "xy", "spectrum"] = "time"
     signals: tuple[Name, ...] = Field(default=(), max_length=MOST_SIGNALS)
-    x: Name = ""  # of xy; y are the signals
+    x: Name = ""  # x axis of xy; the signals are on the y axis
     window: float = Field(default=5.0, gt=0.0, le=120.0)  # s
     columns: int = Field(default=1000, ge=50, le=4000)
     hold: bool = False
-    span: tuple[float, float] | None = None  # s on the axis that is shown; zooms into what is held
+    span: tuple[float, float] | None = None  # s on the shown axis: zoomed part of a held picture
     trigger: TriggerView = TriggerView()
 
 
 def read_view(data: object, names: tuple[str, ...]) -> View:
-    """The view in a message of the page. Raises UserError with what is wrong with it."""
+    """The view in a message of the page. Raises UserError for an invalid view or an unknown signal."""
     try:
         view = View.model_validate_json(json.dumps(data))
     except (ValidationError, ValueError, TypeError) as error:

@@ -1,7 +1,7 @@
-"""One viewer: from what it wants to see and the history to the next frame. Nothing here knows of sockets.
+"""Frames of one viewer, from its view and the history. Independent of sockets.
 
-A frame is made when it can be sent, from all rows since the last one. So a slow viewer gets fewer frames, each of
-which holds more, and never a picture with something left out.
+A frame is made when it can be sent, from all rows since the last one. So a slow viewer gets fewer and larger frames,
+and no row is left out.
 """
 
 import json
@@ -16,23 +16,25 @@ from rtctl.scope.spectra import Spectra
 from rtctl.scope.trigger import PATIENCE, Trigger
 from rtctl.scope.view import View
 
-OUTSTANDING = 2  # frames that a viewer may have that it has not drawn
-SLOW = {"time": 1, "xy": 2, "spectrum": 6}  # a picture of the whole window comes with every n-th frame only
+OUTSTANDING = 2  # most frames sent and not yet drawn
+SLOW = {"time": 1, "xy": 2, "spectrum": 6}  # kind of view -> n; it is drawn in every n-th frame
 
 
 class Picture(NamedTuple):
-    """Rows that stay on the screen, all signals of them: a sweep, or what was held."""
+    """Rows that stay on the screen, with all signals: a sweep or a held picture."""
 
     names: tuple[str, ...]
     values: np.ndarray  # (names, rows)
-    zero: float  # t of the axis' zero, s
+    zero: float  # t at zero of the axis, s
     sweep: bool
-    last: int  # number of the row after its last
+    last: int  # number of the last row, plus 1
 
 
 class Viewer:
-    """`frame()` gives the next frame; `drawn()` says that the viewer has drawn one. `dropped` counts frames that were
-    due while it had not drawn those it had. Viewers of one history may share `spectra`."""
+    """Maker of a viewer's frames: `frame()` returns the next one, `drawn()` reports that one was drawn.
+
+    `dropped` counts frames that were due before earlier ones were drawn. Viewers of one history may share `spectra`.
+    """
 
     def __init__(self, spectra: Spectra | None = None) -> None:
         self.view = View()
@@ -42,22 +44,22 @@ class Viewer:
         self._history: History | None = None
         self._rate = 1.0
         self._trigger: Trigger | None = None
-        self._sweep: Picture | None = None  # the newest
+        self._sweep: Picture | None = None  # newest sweep
         self._held: Picture | None = None
-        self._fresh = False  # the sweep, or what is held, has not been sent as it is wanted now
-        self._sent = 0  # rows before this one are in frames that were made
+        self._fresh = False  # the sweep or held picture must be sent for the current view
+        self._sent = 0  # rows before this one are in earlier frames
         self._restart = True
         self._turn = 0
         self._asked = False
 
     def start(self, history: History, rate: float) -> None:
-        """A run begins: nothing of what was before counts any more, but what is held stays on the screen."""
+        """Begin a new run with a new history; a held picture stays on the screen."""
         self._history, self._rate = history, rate
         self._sweep = None
         self._begin()
 
     def look(self, view: View) -> None:
-        """Show this from now on."""
+        """Show `view` from now on."""
         old, self.view, self._asked = self.view, view, True
         released = old.hold and not view.hold and not (self._trigger is not None and self._trigger.done)
         if (view.trigger, view.window) != (old.trigger, old.window):
@@ -75,9 +77,9 @@ class Viewer:
         self.outstanding = max(0, self.outstanding - 1)
 
     def frame(self, turn: int | None = None) -> bytes | None:
-        """The frame that is due now; None where there is nothing new, or the viewer has not drawn the last ones.
+        """The frame that is due; None where there is nothing new, or the viewer has not drawn the last ones.
 
-        `turn` counts frames for all viewers, so that those who see the same get it in the same one.
+        `turn` counts frames for all viewers, so that viewers of one spectrum get it in one frame.
         """
         if self._history is None or not self._asked:
             return None
@@ -92,17 +94,17 @@ class Viewer:
 
     @property
     def rows(self) -> int:
-        """Rows of the window, as far as the history reaches."""
+        """Number of rows of the window, limited by the history."""
         assert self._history is not None
         return int(min(max(round(self.view.window * self._rate), 8), 0.9 * self._history.capacity))
 
     @property
     def bucket(self) -> int:
-        """Rows that share a column."""
+        """Number of rows in a column."""
         return max(1, math.ceil(self.rows / self.view.columns))
 
     def _begin(self) -> None:
-        """Frames from the start of the window again; the trigger looks from now on."""
+        """Restart the frames from the start of the window, and the trigger's search from the newest row."""
         self._restart = True
         t, history = self.view.trigger, self._history
         if history is None:
@@ -120,7 +122,7 @@ class Viewer:
             self._sweep, self._fresh = self._copy(found.first, found.last, found.at), True
 
     def _copy(self, first: int, last: int, zero: int = -1) -> Picture:
-        """All signals of these rows; `zero` is the row of the axis' zero, -1 for that of the controller's clock."""
+        """Picture of rows `first` to `last`; `zero` is the row at zero of the axis, -1 for the controller's clock."""
         assert self._history is not None
         names = self._history.names
         at = float(self._history.take(("t",), zero, zero + 1)[0, 0]) if zero >= 0 else 0.0
@@ -136,7 +138,7 @@ class Viewer:
             self._held = self._sweep or self._copy(history.head, history.head)
 
     def _rolls(self) -> bool:
-        """Whether the newest rows are shown, and not a sweep."""
+        """Whether the view shows the newest rows and not a sweep."""
         assert self._history is not None
         if self.view.trigger.mode == "off":
             return True
@@ -163,12 +165,12 @@ class Viewer:
         return self._picture(Picture(names, self._history.take(names, head - self.rows, head), 0.0, False, head))
 
     def _wanted(self, there: tuple[str, ...]) -> list[str]:
-        """Names of what is shown, of those that are there."""
+        """Names of the view's signals, as far as they are in `there`."""
         names = [self.view.x, *self.view.signals] if self.view.kind == "xy" else self.view.signals
         return [name for name in names if name in there]
 
     def _roll(self) -> bytes | None:
-        """The columns that have become full since the last frame."""
+        """Frame with the columns that are complete since the last frame."""
         history, size = self._history, self.bucket
         assert history is not None
         oldest = -(-max(history.first, history.head - self.rows) // size) * size
@@ -182,13 +184,13 @@ class Viewer:
         return self._time(names, values, size, {"kind": "roll", "restart": restart, "window": self.rows / self._rate})
 
     def _picture(self, still: Picture) -> bytes:
-        """The whole of what is shown, in one frame."""
+        """Frame with the whole of a sweep, a held picture or the window."""
         names = self._wanted(still.names)
         values = still.values[[still.names.index(name) for name in ("t", *names)]]
         values[0] -= still.zero
         held = self._held is not None
         if held and self.view.span is not None:
-            first = int(np.searchsorted(values[0], self.view.span[0])) - 1  # and a row beyond either end: lines go on
+            first = int(np.searchsorted(values[0], self.view.span[0])) - 1  # one row beyond each end: lines continue
             last = int(np.searchsorted(values[0], self.view.span[1], "right")) + 1
             values = values[:, max(first, 0) : last]
         about = self._about(names, still.sweep)
@@ -202,7 +204,7 @@ class Viewer:
         return self._time(names, values, size, {**about, "kind": "picture"})
 
     def _newest_spectrum(self) -> bytes:
-        """The spectrum of the window's rows, which other viewers may have asked for as well."""
+        """Frame with the spectrum of the window's rows, shared with other viewers."""
         history = self._history
         assert history is not None
         names = self._wanted(history.names)
@@ -210,7 +212,7 @@ class Viewer:
         return pack({**self._about(names, sweep=False), "kind": "spectrum", "rows": rows}, [f, *level])
 
     def _about(self, names: list[str], sweep: bool) -> dict[str, Any]:
-        """What each picture says of itself."""
+        """Metadata of a picture frame."""
         about = {"names": names, "sweep": sweep, "held": self._held is not None, "span": self.view.span}
         if self._trigger is not None:
             about |= {"sweeps": self._trigger.count, "done": self._trigger.done}
@@ -223,8 +225,8 @@ class Viewer:
 
 
 def pack(about: dict[str, Any], arrays: Any) -> bytes:
-    """A frame: the length of a JSON text, the text, and arrays of float64, all of one length, one after the other."""
+    """Bytes of a frame: length of a JSON text, the text, and arrays of float64 of equal length."""
     text = json.dumps({**about, "arrays": len(arrays)}).encode()
-    text += b" " * (-(4 + len(text)) % 8)  # so that the numbers are aligned
+    text += b" " * (-(4 + len(text)) % 8)  # to align the numbers to 8 bytes
     body = b"".join(np.ascontiguousarray(a, "<f8").tobytes() for a in arrays)
     return len(text).to_bytes(4, "little") + text + body

@@ -1,4 +1,4 @@
-"""Rows in, violations out: the compiled pass with its two records, and a bundle of the rows around what it found."""
+"""Checker of the invariants: rows in, violations out, with a bundle of the rows around each violation."""
 
 import shutil
 from collections import deque
@@ -14,12 +14,12 @@ from rtctl.soak import invariants, ranges
 from rtctl.soak.invariants import NAMES, NEVER
 from rtctl.tick import safety
 
-MOST_KEPT = 20  # violations with a bundle
-BEFORE, AFTER = 2.0, 0.5  # s of rows in it
+MOST_KEPT = 20  # violations that are kept with a bundle
+BEFORE, AFTER = 2.0, 0.5  # s of rows before and after a violation, in its bundle
 
 
 class Violation(NamedTuple):
-    """One invariant that did not hold, from `tick` on."""
+    """Violation of one invariant, from `tick` on."""
 
     name: str
     tick: int
@@ -27,7 +27,7 @@ class Violation(NamedTuple):
     seed: int
     value: float
     bound: float
-    signals: dict[str, float]  # of the row; empty where there was none
+    signals: dict[str, float]  # of the row; empty without a row
     bundle: str | None  # folder
 
     def as_json(self) -> dict[str, Any]:
@@ -35,9 +35,9 @@ class Violation(NamedTuple):
 
 
 class Checker:
-    """Checks every row that it is fed. `windows` is where the player of the day says what to expect.
+    """Checks every row of a soak. The player of the day (`Day`) writes its expectations to `windows`.
 
-    `lost` counts rows that the ring lost; the sum of both must be the ticks of the loop.
+    Rows checked and rows lost in the ring must sum to the ticks of the loop.
     """
 
     def __init__(self, machine: Machine, made: generate.Generated, out: Path, seed: int):
@@ -57,7 +57,7 @@ class Checker:
 
     @property
     def windows(self) -> Any:
-        """What the player says of the ticks to come: a record of WINDOWS."""
+        """Record of WINDOWS: the player's expectations for the coming ticks."""
         return self.w[0]
 
     @property
@@ -100,11 +100,11 @@ class Checker:
         w["quiet_from"] = w["counts_from"] = NEVER if machine.faults else 0
 
     def feed(self, rows: np.ndarray) -> None:
-        """Check rows, in order; they are kept for a while and must not change."""
+        """Check rows (n,), in order. The rows are kept for bundles and must not be changed afterwards."""
         if not len(rows):
             return
         width = rows.dtype.itemsize // 8
-        flat = rows.view(np.float64).reshape(len(rows), width)  # tick is an integer: tiny as a float, and finite
+        flat = rows.view(np.float64).reshape(len(rows), width)  # the integer `tick` reads as a tiny finite float
         self.s["found"] = 0
         invariants.check(flat, rows["tick"], self.w, self.s, self._found)
         self.last = rows[-1]
@@ -117,34 +117,34 @@ class Checker:
         self.count = int(self.s["episodes"].sum())
 
     def note_lost(self, first: int, count: int) -> None:
-        """Rows that the ring gave up are accounted for: not a hole."""
+        """Count rows that the ring lost, so that their tick numbers are no violation."""
         self.s["lost"] += count
         self.s["tick"] = first + count
 
     def account(self, ticks: int) -> None:
-        """`ticks` are those that the loop says it has done: all of them must be here, or counted as lost."""
+        """Compare rows checked and rows lost with the `ticks` of the loop; a difference is a violation of `ring`."""
         seen = int(self.s["rows"][0] + self.s["lost"][0])
         if seen != ticks:
             self.note("ring", ticks, float(seen), float(ticks))
 
     def note(self, name: str, tick: int, value: float, bound: float) -> None:
-        """A violation that no single row shows."""
+        """Note a violation that is not visible in a single row."""
         self.s["episodes"][0, NAMES.index(name)] += 1
         self.count += 1
         self._keep(name, tick, value, bound, self.last)
 
     def checked(self, name: str, ticks: int = 1) -> None:
-        """Count ticks for an invariant that is checked here and not in the pass."""
+        """Count ticks for an invariant that is checked outside the compiled pass."""
         self.s["checked"][0, NAMES.index(name)] += ticks
 
     def capture(self, first: int, last: int, name: str) -> None:
-        """A bundle of rows that are to come or that have just been, as a person would capture them."""
+        """Request a bundle of the rows from tick `first` to `last`, as a person would capture them."""
         folder = self.out / name
         self.captures.append(folder.name)
         self._waiting.append((first, last, folder))
 
     def flush(self) -> None:
-        """Write what still waits for rows, with those that there are."""
+        """Write the bundles that still wait for rows, with the rows so far."""
         self._finish_bundles(NEVER)
 
     def _keep(self, name: str, tick: int, value: float, bound: float, row: Any) -> None:
@@ -173,7 +173,7 @@ class Checker:
             rows = np.concatenate(self._history) if self._history else np.zeros(0, self.made.row)
             rows = rows[(rows["tick"] >= first) & (rows["tick"] <= last)]
             case = {**describe(self.machine, self.made), "soak": {"seed": self.seed, "name": folder.name}}
-            if _of_a_soak(folder):  # one that was killed after its last progress file, and is played again from there
+            if _of_a_soak(folder):  # left by a killed soak that resumed from an earlier progress file
                 shutil.rmtree(folder)
             try:
                 recorder = Recorder(folder, self.made.columns, self.made.row, case)
@@ -185,7 +185,7 @@ class Checker:
 
 
 def _of_a_soak(folder: Path) -> bool:
-    """Whether a folder is a bundle that a soak has written."""
+    """Whether a folder is a bundle of a soak."""
     from rtctl.trace.bundle import load_case
 
     try:

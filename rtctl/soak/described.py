@@ -1,4 +1,4 @@
-"""What a random day may ask of a described machine: moves as large and as fast as those of its own reference."""
+"""Ranges of a soak on a described machine: moves as large and as fast as those of its reference."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ from rtctl.machines.described_plant import converter, is_counter
 from rtctl.machines.profile import Range
 
 DESCRIBED_GAINS = {"law.position.gain": (0.8, 1.05), "law.position.velocity_gain": (0.9, 1.1)}
-SETTLE = 3.0  # s, from the end of a move until it has to be there
-LAST = 0.1  # share of the largest move that dry friction may keep it from its target
+SETTLE = 3.0  # s from the end of a move until the machine must be at its target
+LAST = 0.1  # tolerance at the target for dry friction, as a fraction of the largest move
 
 
 def described_range(config: Any) -> Range:
-    """Ranges by the reference of the config. Raises UserError where it has none to go by."""
+    """Ranges of a soak, from the reference of the config. Raises UserError where the reference does not move."""
     parts, seen = parts_of(config), signals(config)
     table = reference.build(config.reference, 1.0 / config.loop.rate)
     t, r = table.t[: table.n], table.r[: table.n]
@@ -36,13 +36,13 @@ def described_range(config: Any) -> Range:
 
 
 def described_counts(config: Any) -> float:
-    """Counts for one unit of the truth column; nan where the column holds no counts."""
+    """Counts per unit of the truth column; nan where the feedback sensor has no counts."""
     sensor = parts_of(config).machine.sensors[parts_of(config).feedback]
     return float(sensor.scale) if is_counter(sensor) else float("nan")
 
 
 def full_commands(config: Any) -> tuple[float, float]:
-    """Lowest and highest command of any drive, with half a code for rounding."""
+    """Lowest and highest command of any drive, in its unit, with half a code for rounding."""
     limit, drives = config.law.limit, config.machine.drives
     low = -limit.high if limit.low is None else limit.low
     most = max(abs(low), limit.high) * max(1.0, *(abs(s) for s in config.law.shares.values()), 0.0)
@@ -51,5 +51,5 @@ def full_commands(config: Any) -> tuple[float, float]:
 
 
 def rounding_of(config: Any) -> float:
-    """Command that a row may differ from what the law wanted: half a code, and one lost at the end of the scale."""
+    """Largest difference of a row's command from the law's: half a code, and one code at the end of the scale."""
     return 2.0 * max(converter(config, n).volts_per_code for n in range(len(config.machine.drives)))

@@ -1,7 +1,8 @@
-"""What happens in a random day, one event after the other, each drawn from the seed and its own number alone.
+"""Events of a random day, one after the other, each drawn only from the seed and its number.
 
-An event knows what must come of it and tells the checker: from when on nothing is wrong, by when a fault must have
-tripped, where a move must have ended. A day on another kind of machine, or in another mode of time, is the same day.
+Each event tells the checker what to expect: the tick from which no trip may occur, the tick by which a fault must trip,
+and the target of a move. The sequence of events does not depend on the mode of time, nor on the machine if its law has
+gains to change.
 """
 
 from collections import Counter
@@ -14,21 +15,21 @@ from rtctl.soak.invariants import NEVER
 from rtctl.soak.rig import Rig
 from rtctl.tick import faults, safety
 
-WEIGHTS = {
+WEIGHTS = {  # probability of each event
     "move": 0.28, "ramp": 0.2, "burst": 0.1, "gains": 0.1, "switch": 0.04, "play": 0.06, "capture": 0.02, "wait": 0.05,
     "fault": 0.15,
 }  # fmt: skip
-GAIN_STEPS = 5  # values that a gain may take
-PATIENCE = 60.0  # s of the machine's time for what has to come about: standing still, running
+GAIN_STEPS = 5  # number of values that a gain may take
+PATIENCE = 60.0  # s of machine time to wait for standstill or state running
 MOST_CAPTURES = 8
-CAPTURE = 1.5  # s
-STILL = 0.1  # s in which a machine at rest does not move
-TRIES = 3  # of arming after a fault
+CAPTURE = 1.5  # s of a capture
+STILL = 0.1  # s over which standstill is checked
+TRIES = 3  # attempts to arm after a fault
 KINDS = [name for name, kind in faults.KINDS.items() if kind.number != faults.NONE]  # those in the tick
 
 
 class Day:
-    """The events of a day on a rig. All that they remember from one to the next is in `counts` and `number`."""
+    """Player of a day's events on a rig. Its state between events is `number`, `moves` and the four counters."""
 
     def __init__(self, rig: Rig, seed: int, with_faults: bool = True):
         self.rig, self.seed, self.with_faults = rig, seed, with_faults
@@ -69,7 +70,7 @@ class Day:
 
     @property
     def _off(self) -> float:
-        """What the encoder says beyond where the machine is, after counts were missed: the day keeps to the truth."""
+        """Encoder position less true position, from missed counts; 0 without a truth. Moves use the true position."""
         last = self.rig.checker.last
         true = float(last[self.range.truth]) if self.range.truth in last.dtype.names else np.nan
         return self._position - true if np.isfinite(true) else 0.0
@@ -78,7 +79,7 @@ class Day:
         self.rig.run(max(round(seconds * self.rig.machine.rate), 1))
 
     def _restless(self) -> None:
-        """A command is under way: no target holds for now."""
+        """Switch off the check of the target while a command is carried out."""
         self.rig.checker.windows["settled_from"] = NEVER
 
     # events
@@ -118,7 +119,7 @@ class Day:
         self._go(target, 0.0)
 
     def _gains(self) -> None:
-        """Another value for one setting of the law, while it moves, or while it stands."""
+        """Another value for one setting of the law, while the machine moves or stands still."""
         path = str(self.rng.choice(list(self.gains)))
         low, high = self.gains[path]
         value = low + (high - low) * int(self.rng.integers(GAIN_STEPS)) / (GAIN_STEPS - 1)
@@ -138,7 +139,7 @@ class Day:
         self._get_running()
 
     def _play(self) -> None:
-        """The table of the config from its start."""
+        """Play of the config's reference from its start."""
         self._restless()
         table = self.rig.machine.reference
         self.rig.ask("play")
@@ -146,7 +147,7 @@ class Day:
         self._go(self._position, 0.0)
 
     def _capture(self) -> None:
-        """A bundle of what happens now."""
+        """A capture of the current motion."""
         checker, rate = self.rig.checker, self.rig.machine.rate
         if len(checker.captures) < MOST_CAPTURES:
             first = self.rig.tick
@@ -155,11 +156,11 @@ class Day:
         self._run(CAPTURE)
 
     def _wait(self) -> None:
-        """Nothing at all."""
+        """A pause without commands."""
         self._run(float(np.exp(self.rng.uniform(np.log(0.1), np.log(20.0)))))
 
     def _fault(self) -> None:
-        """A fault of a random kind, most of them while the machine moves; then all is brought back."""
+        """A fault of a random kind, in 70 % of cases during a move; then recovery to running."""
         kind, settings = self._draw()
         checker, moving = self.rig.checker, bool(self.rng.random() < 0.7)
         self._restless()
@@ -182,11 +183,11 @@ class Day:
         checker.checked("recovery")
         self.recovered[kind] += int(tripped and ready)
         w["must_by"] = NEVER
-        if kind in ("encoder.missed", "encoder.freeze") or self.rig.lost_counts != lost:  # gone for good
+        if kind in ("encoder.missed", "encoder.freeze") or self.rig.lost_counts != lost:  # counts are lost
             ready = ready and self._find_anew()
-            checker.carry["has_base"] = 0  # they are compared from here on
+            checker.carry["has_base"] = 0  # new zero for the comparison of counts
         w["counts_from"] = NEVER if self.config.faults else self.rig.tick
-        if ready and not self.config.faults:  # those of the config have a time of their own
+        if ready and not self.config.faults:  # faults of the config have their own times
             w["quiet_from"] = self.rig.tick
 
     def _draw(self) -> tuple[str, faults.FaultSettings]:
@@ -199,26 +200,26 @@ class Day:
         low, high = SIZES.get(kind, (max(known.usual / 4, 1e-9), max(min(2 * known.usual, known.high), 2e-9)))
         size = float(np.exp(rng.uniform(np.log(low), np.log(high)))) if known.size else None
         if kind == "link.silent":
-            lasts *= 2.0  # longer than the longest that is borne
+            lasts *= 2.0  # longer than the link time-out more often
         if kind == "loop.stall":
             size = float(size or 0.0) * dt
         if kind == "dac.stuck":
             at = faults.FaultSettings(fault=kind, channel=channel)
             bits = faults.bits_of(faults.build(at, dt, 0, self.rig.machine.diagram.blocks))
-            size, lasts = float(rng.integers(bits)), min(lasts, 0.2)  # it drives the machine whatever the law says
+            size, lasts = float(rng.integers(bits)), min(lasts, 0.2)  # short: the stuck bit drives the machine
         return kind, faults.FaultSettings(
             fault=kind, at=float(rng.uniform(0.0, 0.05)), lasts=max(lasts, dt), channel=channel, size=size
         )
 
     def _start_ramp(self) -> None:
-        """A move that is under way for longer than any fault lasts."""
+        """Start a move that takes longer than any fault."""
         r = self.range
         here = self._position - self._off
         self.rig.setpoint(self._off - np.sign(here or 1.0) * r.travel, r.travel / 3.0)
         self._run(0.5)
 
     def _must(self, kind: str, fault: faults.Fault, moving: bool) -> int | None:
-        """Ticks from the begin of a fault within which it must have tripped; None where it need not."""
+        """Number of ticks from the beginning of a fault by which it must trip; None where it need not trip."""
         limits, rate = self.config.safety, self.rig.machine.rate
         w = self.rig.checker.windows
         lasts = fault.end - fault.begin
@@ -238,7 +239,7 @@ class Day:
     # getting back
 
     def _bring_back(self) -> bool:
-        """To running, at rest, within the travel. Returns whether that came about."""
+        """Bring the machine back to running, at rest and within the travel. Returns whether it is running."""
         for _ in range(TRIES):
             self._stand_still()
             if not self._get_running():
@@ -254,7 +255,7 @@ class Day:
         return False
 
     def _find_anew(self) -> bool:
-        """What the law followed by counts that were lost has the machine measure anew, as its owner would."""
+        """Let the machine measure again a quantity that depends on lost counts. Returns whether it is running."""
         if self.range.measure is None:
             return True
         path, measured = self.range.measure
@@ -267,7 +268,7 @@ class Day:
         return ready
 
     def _stand_still(self) -> None:
-        """Wait until a machine that coasts has come to rest, if its outputs are off."""
+        """Wait until a coasting machine is at rest, if it is not running."""
         if self._state == safety.RUNNING:
             return
         for _ in range(round(PATIENCE / STILL)):
@@ -277,7 +278,7 @@ class Day:
                 return
 
     def _get_running(self) -> bool:
-        """Reset where tripped, arm, and wait for running; a machine that does not get there is a violation."""
+        """Reset if tripped, arm, and wait for running. Returns whether it runs; if not, that is a violation."""
         if self._state == safety.RUNNING:
             return True
         if self._state == safety.TRIPPED:
@@ -300,7 +301,7 @@ class Day:
         return False
 
 
-SIZES = {  # lowest and highest; of loop.stall in periods
+SIZES = {  # lowest and highest size of a fault; loop.stall in periods
     "link.delay": (1e-3, 20e-3), "link.loss": (0.02, 0.9), "link.reorder": (0.02, 0.9), "encoder.missed": (0.01, 0.3),
     "encoder.noise": (1.0, 1000.0), "dac.stuck": (1.0, 11.0), "supply.sag": (0.01, 0.5), "loop.stall": (0.2, 20.0),
 }  # fmt: skip

@@ -1,8 +1,8 @@
-"""The invariants, each with a name, and the compiled pass that checks a stretch of rows for all of them.
+"""The invariants by name, and the compiled pass that checks a block of rows for all of them.
 
-Everything that the pass must know stands in two records: WINDOWS, limits of the machine and what the player of the day
-has said of the ticks to come, and CARRY, what goes on from one stretch to the next. Rows are seen as a matrix, so one
-compiled function serves every machine; it costs a tenth of the tick that made the row.
+The pass uses two records. WINDOWS holds limits of the machine and the player's expectations for the coming ticks. CARRY
+holds the state from block to block. Rows are read as a matrix, so one compiled function serves every machine. A check
+takes a tenth of the time of the tick that made the row.
 """
 
 import numpy as np
@@ -35,35 +35,35 @@ NAMES = tuple(INVARIANTS)
     MUST_TRIP, SETTLED, ORDER, RECOVERY, MEMORY,
 ) = range(len(NAMES))  # fmt: skip
 NEVER = 2**62
-MOST_FOUND = 256  # in one stretch; the rest is counted
-LONGEST_LINK = 1.0  # s without a frame that no bench may bear, whatever its config says
+MOST_FOUND = 256  # violations kept of one block; further ones are only counted
+LONGEST_LINK = 1.0  # s without a frame after which any machine must trip, even with a longer safety.link_timeout
 BIGGEST = np.finfo(np.float64).max
-FADE_VOLTS = 1e-9  # rounding of the arithmetic itself
+FADE_VOLTS = 1e-9  # V, rounding of the arithmetic
 
 WINDOWS = state(
     # columns of the matrix; -1 for none
     state=int, trip=int, age=int, lateness=int, order=int, position=int, error=int, counts=int, truth=int,
     outputs=(int, 2), n_outputs=int, tensions=(int, 4), n_tensions=int,  # estimates first, then the truth
-    empty=(int, 8), n_empty=int,  # of a plant that does not know them
+    empty=(int, 8), n_empty=int,  # truth columns that this plant leaves empty
     # limits
     low=float, high=float, rounding=float, fade=float,  # V, V, V between law and row, share a tick
     tension_min=float, tension_max=float, tension_ticks=int,
     link_ticks=int, following=float, late=float, missed=int,  # ticks, unit of the reference, s, ticks
-    per_unit=float, counts_off=float,  # counts for one unit of truth; how many may be missing
-    tolerance=float,
-    # what the player says
-    quiet_from=int,  # nothing is wrong from this tick on
+    per_unit=float, counts_off=float,  # counts per unit of truth; largest difference in counts
+    tolerance=float,  # largest distance from a target, unit of the reference
+    # expectations of the player
+    quiet_from=int,  # no fault is active from this tick on, so nothing may trip
     counts_from=int,  # counts are comparable from this tick on
-    settled_from=int, target=float,  # the move must have ended
-    must_by=int, must_above=int,  # by this tick there must have been more trips than that
+    settled_from=int, target=float,  # from this tick on the position is at the target
+    must_by=int, must_above=int,  # by tick must_by there must be more trips than must_above
     arm=int, disarm=int, reset=int, newest=int,  # numbers of the newest orders of each kind
 )  # fmt: skip
 CARRY = state(
-    tick=int,  # next that is due
+    tick=int,  # number of the next row
     state=int, trip=int, order=int,
     slack=int, late=int, faded=int,  # ticks in a row; ticks since the trip
-    hold=(float, 2),  # outputs of the last tick, and before the trip
-    base=float, has_base=int,  # counts less truth
+    hold=(float, 2),  # outputs of the last tick, or of the last one before the trip
+    base=float, has_base=int,  # counts less truth, at the first comparison
     trips=int, by_cause=(int, len(TRIPS)),
     rows=int, lost=int,
     checked=(int, len(NAMES)), episodes=(int, len(NAMES)), last_bad=(int, len(NAMES)),
@@ -76,7 +76,7 @@ compiled = njit(nogil=True, error_model="numpy", cache=True)
 
 @compiled
 def note(s, found, code, k, value, bound):
-    """Keep a violation: one for a run of ticks, with what was seen and what would have been allowed."""
+    """Keep one violation for a run of consecutive ticks, with the value found and the bound."""
     if s.last_bad[code] != k - 1:
         s.episodes[code] += 1
         if s.found < len(found):
@@ -177,7 +177,7 @@ def _states(w, s, found, y, k, now):
 
 @compiled
 def _legal(w, s, now, order):
-    """Whether the step from the state before is one that the safety machine has, asked for by an order of now."""
+    """Whether the safety machine has the transition from the previous state to `now`, by an order in this tick."""
     if s.state == IDLE:
         return now != RUNNING and s.order < w.arm <= order
     if s.state == TRIPPED:

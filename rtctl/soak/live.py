@@ -1,6 +1,6 @@
-"""A machine that a day is played on through a running daemon: its commands, and the rows that its supervisor drains.
+"""Rig of a soak on a running supervisor: its commands, and the rows that it reads.
 
-Events come when the supervisor takes a turn, so a day is not repeated to the bit here; what must hold is the same.
+Events are carried out at turns of the supervisor, so a day is not repeatable to the bit. The invariants are unchanged.
 """
 
 import contextlib
@@ -18,13 +18,13 @@ from rtctl.daemon.supervisor import Supervisor
 from rtctl.soak.checker import Checker
 from rtctl.tick import faults
 
-HANG = 60.0  # s without a tick
+HANG = 60.0  # s without a new row, after which the loop has hung
 
 
 class Live:
-    """A supervisor in this process with its loop and plant beside it. A context.
+    """Context with a supervisor in this process, and its loop and plant as child processes.
 
-    `slack` is how many ticks a command may be under way: the loop runs on while it is given.
+    `slack` is the longest delay of a command, in ticks of the loop.
     """
 
     def __init__(self, config: Any, out: Path, seed: int):
@@ -58,7 +58,7 @@ class Live:
 
     @property
     def tick(self) -> int:
-        """Of the newest row that was checked: the loop itself may be ahead."""
+        """Number of the next row to check; the loop may be ahead."""
         return int(self.checker.carry["tick"])
 
     @property
@@ -76,31 +76,31 @@ class Live:
         return int(self.supervisor.segment["mailbox"][0]["command"]["order"])
 
     def ask(self, request: str) -> None:
-        """arm, disarm, reset or play."""
-        with contextlib.suppress(UserError):  # it has tripped in the meantime; what comes of that is checked
+        """Send the command arm, disarm, reset or play."""
+        with contextlib.suppress(UserError):  # refused after a trip; the checker sees the trip
             self._handle(request)
             if request != "play":
                 self.checker.windows[request] = self._order
 
     def setpoint(self, target: float, rate: float) -> None:
-        """A new target in the unit of the reference, at `rate` a second; a jump where that is 0."""
+        """Set a new target in the unit of the reference, reached at `rate` per second, or at once for rate 0."""
         with contextlib.suppress(UserError):
             self._handle("setpoint", value=target, ramp=rate or None)
 
     def set(self, path: str, value: float | str) -> None:
-        """One setting of the law, the others as the config has them."""
+        """Set one setting of the law; a setting changed before returns to its value in the config."""
         if self._changed is not None and self._changed != path:
             self._handle("set", path=self._changed, value=get_path(self._config, self._changed))
         self._handle("set", path=path, value=value)
         self._changed = path
 
     def fault(self, settings: faults.FaultSettings) -> faults.Fault:
-        """Add a fault, its time counted from now."""
+        """Add a fault, with its time counted from now."""
         answer = self._handle("fault", action="add", fault=settings.model_dump(exclude_none=True))
         return faults.build(settings, self.machine.dt, int(answer["tick"]), self.machine.diagram.blocks)
 
     def run(self, ticks: int) -> None:
-        """Turns of the supervisor until so many more rows have been checked. Raises RuntimeError where none come."""
+        """Take turns of the supervisor until `ticks` more rows are checked. Raises RuntimeError where no rows come."""
         goal, seen, heard = self.tick + ticks, self.tick, time.monotonic()
         while self.tick < goal:
             if not self.supervisor.turn():
@@ -114,6 +114,6 @@ class Live:
             self._poller.poll(1)
 
     def finish(self) -> None:
-        """Stop the loop, check its last rows, and see that none is missing."""
+        """Stop the loop, check its last rows, and check that none is missing."""
         self.supervisor.stop()
         self.checker.account(int(self.supervisor.status["tick"]))

@@ -1,12 +1,12 @@
-"""Memory of the process, sampled: it may grow while all is warming up, and not afterwards."""
+"""Samples of the process's memory, which may grow during the warm-up only."""
 
 import resource
 from pathlib import Path
 
 from rtctl.soak.checker import Checker
 
-MOST_MB = 64.0  # beyond the most while it warmed up
-WARM, LEAST = 0.1, 40  # share of the soak, and events, of which each kind loads something the first time
+MOST_MB = 64.0  # MB of growth allowed beyond the largest value in the warm-up
+WARM, LEAST = 0.1, 40  # least warm-up: fraction of the soak, and events (each kind allocates at its first use)
 PAGE_MB = resource.getpagesize() / 2**20
 
 
@@ -16,7 +16,7 @@ def resident_mb() -> float:
 
 
 class Memory:
-    """Sampled at event boundaries. `share` is how far the soak is, as this process has seen it, 0 to 1."""
+    """Memory samples between events; `base` is the largest value in the warm-up, `most` of all, MB."""
 
     def __init__(self) -> None:
         self.base = self.most = resident_mb()
@@ -24,7 +24,10 @@ class Memory:
         self._samples = 0
 
     def sample(self, share: float, checker: Checker, tick: int) -> None:
-        """A violation, once, where the memory has grown beyond what a flat one would."""
+        """Take a sample; note a violation once if the memory has grown too far after the warm-up.
+
+        `share` is the part of the soak done by this process, 0 to 1.
+        """
         now = resident_mb()
         self.most = max(self.most, now)
         self._samples += 1

@@ -1,7 +1,7 @@
-"""The state of a soak between two events, in one file: what it needs to go on as if it had never stopped.
+"""Progress file of a soak: the state between two events, from which the soak resumes with identical results.
 
-`progress.npz` holds every record of the loop, the emulated machine and the checker as bytes, and one JSON text. It is
-written beside and renamed, so that at any moment the old one or the new one is there.
+`progress.npz` holds every record of the loop, the emulated machine and the checker as bytes, and one JSON text. The
+file is replaced atomically, so that there is always a complete one.
 """
 
 import json
@@ -32,7 +32,7 @@ def _arrays(rig: Fused) -> dict[str, np.ndarray]:
 
 
 def identity(rig: Fused, day: Day) -> dict[str, Any]:
-    """What must be the same for a soak to go on: another length may be."""
+    """Values that must be equal for a soak to resume; its length may differ."""
     return {
         "config": rig.config.model_dump(mode="json"),
         "tick": rig.made.path.stem,
@@ -42,7 +42,7 @@ def identity(rig: Fused, day: Day) -> dict[str, Any]:
 
 
 def save(folder: Path, rig: Fused, day: Day, wall_s: float) -> None:
-    """Write the progress file. Raises UserError where the disk does not take it."""
+    """Write the progress file. Raises UserError where it cannot be written."""
     checker = rig.checker
     checker.flush()
     text = {
@@ -66,9 +66,9 @@ def save(folder: Path, rig: Fused, day: Day, wall_s: float) -> None:
 
 
 def load(folder: Path, rig: Fused, day: Day) -> float:
-    """Put rig, checker and day back to where they were; returns the wall time spent so far, s.
+    """Restore rig, checker and day from the progress file; returns the wall time spent so far, s.
 
-    Raises UserError where there is no progress or it is of another soak, NoAnswer where the file is damaged.
+    Raises UserError where the file is missing or belongs to another soak, NoAnswer where it is damaged.
     """
     path = folder / PROGRESS
     if not path.exists():

@@ -1,7 +1,7 @@
-"""What a random day may ask of each machine, and where the invariants find their signals in its rows.
+"""Ranges of a soak for each machine, and the signals of its rows that the invariants use.
 
-The ranges are those that a bench would allow: moves that the law follows, gains that leave it a margin. They stand in
-the profile of a machine (machines/profile.py).
+The ranges suit a bench: moves that the law can follow, and gains with a stability margin. They are in the profile of a
+machine (machines/profile.py).
 """
 
 from typing import Any
@@ -18,9 +18,9 @@ from rtctl.tick.faults import CODES
 
 
 def range_of(machine: Machine) -> Range:
-    """The row of this machine's kind; of a described machine one that follows from its own reference.
+    """Ranges for a machine's kind; for a described machine from its reference.
 
-    Raises UserError where there is none.
+    Raises UserError where there are none.
     """
     if machine.kind == DESCRIBED:
         return described_range(machine.config)
@@ -31,7 +31,7 @@ def range_of(machine: Machine) -> Range:
 
 
 def with_reference(config: Any) -> Any:
-    """The config with a reference to play, where it has none."""
+    """The config; with the default reference of its machine where it has none."""
     given = config.reference
     if given.steps or len(given.knots) > 1:
         return config
@@ -39,7 +39,7 @@ def with_reference(config: Any) -> Any:
 
 
 def knots_of(config: Any) -> list[tuple[float, float]]:
-    """Reference of a config that has none."""
+    """Knots of the default reference of a machine. Raises UserError for a described machine."""
     if config.kind == DESCRIBED:
         raise UserError(f"{config.name}: a soak moves as the reference does; give the config one")
     found = profile_of(config.kind).range
@@ -48,7 +48,7 @@ def knots_of(config: Any) -> list[tuple[float, float]]:
 
 
 def gains_of(config: Any) -> dict[str, tuple[float, float]]:
-    """Settings that this config's law has and uses, each with its lowest and highest value in SI."""
+    """Gains that the config's law uses, by path, each with its lowest and highest value in SI."""
     out = {}
     found = profile_of(config.kind).range
     for path, (low, high) in (found.gains if found is not None else DESCRIBED_GAINS).items():
@@ -83,8 +83,10 @@ def full_scale(config: Any) -> float:
 
 
 def rounding(config: Any) -> float:
-    """V that a row's output may differ from what the law wanted: half a code, one lost at the end of the scale, and
-    what makes up for the knee of a measured amplifier."""
+    """Largest difference of a row's output from the law's, V.
+
+    It allows half a code, one code at the end of the scale, and the compensation of a measured amplifier's knee.
+    """
     if config.kind == DESCRIBED:
         return rounding_of(config)
     code = full_scale(config) / CODES
@@ -93,7 +95,7 @@ def rounding(config: Any) -> float:
 
 
 def unknown(config: Any) -> set[str]:
-    """Truth columns that stay empty: those that an own plant has no state of, and all of an FMU."""
+    """Names of truth columns that stay empty: those without a state in a user's plant, and all with an FMU."""
     from rtctl.machines import own_plant
 
     if config.kind == DESCRIBED:
@@ -108,8 +110,10 @@ def unknown(config: Any) -> set[str]:
 
 
 def counts_per_unit(config: Any) -> float:
-    """Counts for one unit of the truth column; nan where a term of physics stands between the two, and where only an
-    own plant knows what the linear drive's encoder turns on."""
+    """Counts per unit of the truth column; nan where the ratio is not known.
+
+    A term of physics on the reading changes the ratio. So may a user's plant of a linear drive.
+    """
     from rtctl.machines import own_plant
     from rtctl.plants.physics import TERMS
 

@@ -1,4 +1,4 @@
-"""What came of a soak: a JSON summary, JUnit XML for a CI server, and a few lines for a person."""
+"""Report of a soak: a JSON summary, JUnit XML for a CI server, and lines for a terminal."""
 
 import math
 from pathlib import Path
@@ -11,11 +11,11 @@ from rtctl.tick.safety import TRIPS
 from rtctl.trace.bundle import as_json
 
 SUMMARY = "summary.json"
-TIMES = ("wall_s", "memory_mb")  # fields that two runs of the same day do not share
+TIMES = ("wall_s", "memory_mb")  # fields that differ between two runs of one day
 
 
 def summary(day: Day, wall_s: float, memory_mb: float, mode: str, out: Path) -> dict[str, Any]:
-    """The summary as `--json` prints it: `violations` counts them, `violation_list` tells the first ones."""
+    """The summary as `--json` prints it: `violations` is their number, `violation_list` the first ones."""
     rig, checker = day.rig, day.rig.checker
     carry, rate = checker.carry, rig.machine.rate
     return {
@@ -44,7 +44,7 @@ def summary(day: Day, wall_s: float, memory_mb: float, mode: str, out: Path) -> 
 
 
 def as_text(found: dict[str, Any]) -> str:
-    """The summary for its file. What is no number becomes null there, which JSON can hold."""
+    """The summary as JSON text for its file; NaN and infinity become null."""
     return as_json({**found, "violation_list": [_numbers(v) for v in found["violation_list"]]}, indent=1) + "\n"
 
 
@@ -55,7 +55,7 @@ def _numbers(value: Any) -> Any:
 
 
 def junit(found: dict[str, Any], path: Path) -> None:
-    """One test case an invariant. Raises OSError."""
+    """Write JUnit XML with one test case for each invariant. Raises OSError."""
     failures = len(found["violated"])
     skipped = sum(not n for n in found["invariants"].values())
     suite = ElementTree.Element(
@@ -68,17 +68,17 @@ def junit(found: dict[str, Any], path: Path) -> None:
         )  # fmt: skip
         if name in found["violated"]:
             told = [v for v in found["violation_list"] if v["name"] == name]
-            failure = ElementTree.SubElement(case, "failure", message=f"{words}: {found['violated'][name]} times not")
+            failure = ElementTree.SubElement(case, "failure", message=f"{words}: {found['violated'][name]} violations")
             failure.text = "\n".join(map(sentence, told))
         elif not found["invariants"][name]:
-            ElementTree.SubElement(case, "skipped", message="this machine or mode has nothing to check it by")
+            ElementTree.SubElement(case, "skipped", message="not checked on this machine or in this mode")
     path.parent.mkdir(parents=True, exist_ok=True)
     ElementTree.indent(suite)
     ElementTree.ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
 
 
 def sentence(v: dict[str, Any]) -> str:
-    """A violation in one line."""
+    """A violation as one line of text."""
     where = f", see {v['bundle']}" if v["bundle"] else ""
     return (
         f"{v['name']} at tick {v['tick']}, event {v['event']} of seed {v['seed']}: "
@@ -87,7 +87,7 @@ def sentence(v: dict[str, Any]) -> str:
 
 
 def words(found: dict[str, Any]) -> list[str]:
-    """The summary for a terminal."""
+    """The summary as lines for a terminal."""
     faults = found["faults"].values()
     speed = found["simulated_hours"] * 3600.0 / found["wall_s"] if found["wall_s"] else 0.0
     lines = [
@@ -99,7 +99,7 @@ def words(found: dict[str, Any]) -> list[str]:
     for name, ticks in found["invariants"].items():
         bad = found["violated"].get(name, 0)
         mark = "FAIL" if bad else "ok  " if ticks else "-   "
-        lines.append(f"{mark} {name:20}{ticks:>12}  {INVARIANTS[name]}" + (f": {bad} times not" if bad else ""))
+        lines.append(f"{mark} {name:20}{ticks:>12}  {INVARIANTS[name]}" + (f": {bad} violations" if bad else ""))
     lines += [sentence(v) for v in found["violation_list"]]
     lines.append(f"{found['violations'] or 'no'} violations; {found['out']}")
     return lines

@@ -1,6 +1,6 @@
-"""A machine that a day is played on, in this process and on virtual time: what a command socket can ask, and rows.
+"""Rig of a soak in this process, on virtual time: the commands of a command socket, and checked rows.
 
-The same few calls are made on a running daemon by `rtctl.soak.live`.
+`rtctl.soak.live` has the same interface for a running supervisor.
 """
 
 from typing import Any, Protocol
@@ -15,15 +15,15 @@ from rtctl.machines import Machine
 from rtctl.soak.checker import Checker
 from rtctl.tick import faults
 
-STRETCH = 4096  # ticks: their rows fit into the cache
+STRETCH = 4096  # ticks in one block, whose rows fit into the CPU cache
 
 
 class Rig(Protocol):
-    """What the day needs of a machine."""
+    """Interface of a machine to the player of a day."""
 
     machine: Machine
     checker: Checker
-    slack: int  # ticks that a command may be under way
+    slack: int  # longest delay of a command, ticks
 
     @property
     def tick(self) -> int: ...
@@ -72,7 +72,7 @@ class Fused:
         return order
 
     def ask(self, request: str) -> None:
-        """arm, disarm, reset or play."""
+        """Post the command arm, disarm, reset or play."""
 
         def write(_: Any, command: Any) -> None:
             command[request] += 1
@@ -82,7 +82,7 @@ class Fused:
             self.checker.windows[request] = order
 
     def setpoint(self, target: float, rate: float) -> None:
-        """A new target in the unit of the reference, at `rate` a second; a jump where that is 0."""
+        """Set a new target in the unit of the reference, reached at `rate` per second, or at once for rate 0."""
 
         def write(_: Any, command: Any) -> None:
             command["setpoint"]["target"], command["setpoint"]["rate"] = target, rate
@@ -91,7 +91,7 @@ class Fused:
         self._post(write)
 
     def set(self, path: str, value: float | str) -> None:
-        """One setting of the law, the others as the config has them; swapped in at a tick, without a jump."""
+        """Set one setting of the law, with the others as in the config; in force from a tick on, bumpless."""
         key = (path, value)
         if key not in self._built:
             self._built[key] = machines.build(set_path(self.config, path, value))
@@ -104,14 +104,14 @@ class Fused:
         self._post(write)
 
     def fault(self, settings: faults.FaultSettings) -> faults.Fault:
-        """Add a fault, its time counted from now; those that are over leave their slots."""
+        """Add a fault, with its time counted from now; faults that have ended are removed."""
         made = faults.build(settings, self.machine.dt, self.tick, self.machine.diagram.blocks)
         kept = [f for f in faults.in_force(self.segment["mailbox"][0]["command"]) if f.end > self.tick]
         self._post(lambda _, c: faults.fill(c, [*kept, made]))
         return made
 
     def run(self, ticks: int) -> None:
-        """Virtual time goes on, and every row of it is checked."""
+        """Run `ticks` ticks of virtual time, and check every row."""
         while ticks > 0:
             most = min(ticks, STRETCH)
             self._entry(*self._arguments[:-2], self.tick, most)
@@ -123,4 +123,4 @@ class Fused:
         self.checker.account(self.tick)
 
     def finish(self) -> None:
-        """Nothing is left over: `run` has checked every row."""
+        """Nothing to do: `run` has checked every row."""

@@ -1,4 +1,4 @@
-"""A soak from start to end: play the day, check it, keep the progress, and say what came of it."""
+"""A soak from start to end: play the day, check it, save the progress, and write the summary."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from rtctl.soak.memory import Memory
 from rtctl.soak.rig import Fused
 
 SAVE = 10.0  # s of wall time between two writes of the progress file
-Update = Callable[[int, int, int], None]  # ticks done, ticks in all, violations
+Update = Callable[[int, int, int], None]  # ticks done, total ticks, violations
 
 
 def soak(
@@ -26,10 +26,10 @@ def soak(
     update: Update = lambda *_: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> dict[str, Any]:
-    """Play `hours` of a random day in the mode of the config; returns the summary, which is in `out` as well.
+    """Play `hours` of a random day in the mode of the config; returns the summary and writes it to `out`.
 
-    `stopped()` is asked between events: a soak that it ends can be resumed. Raises UserError for a folder that holds
-    another soak, or for a resume on a wall clock.
+    The soak ends between events once `stopped()` is true; in mode fused it can be resumed. Raises UserError for a
+    folder that holds another soak, or for a resume in another mode.
     """
     mode = config.loop.mode
     if resume and mode != "fused":
@@ -91,6 +91,6 @@ def _play(
 
 
 def _warm() -> None:
-    """What the first bundle would import belongs to the memory of the start."""
+    """Import modules of the first bundle now, so that their memory counts as start-up memory."""
     import rtctl.daemon.case
     import rtctl.trace.recorder  # noqa: F401

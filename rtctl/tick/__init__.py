@@ -1,1 +1,1 @@
-"""What every tick has, whatever the machine: frames, clock, shared memory, safety, and faults of link and board."""
+"""Common parts of the tick of every machine: frames, clock, shared memory, safety, and injected faults."""

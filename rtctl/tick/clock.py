@@ -1,4 +1,4 @@
-"""The monotonic clock, read and slept on from compiled code. Nanoseconds since boot, as 64-bit integers."""
+"""Monotonic clock and sleep for compiled code, in ns as 64-bit integers."""
 
 from llvmlite import ir
 from numba import types
@@ -17,7 +17,7 @@ _POINTER = _TIMESPEC.as_pointer()
 
 
 def _read(builder, which):
-    """Code that reads a clock, ns."""
+    """LLVM code that reads the clock `which`, ns."""
     function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(_I32, [_I32, _POINTER]), "clock_gettime")
     spec = cgutils.alloca_once(builder, _TIMESPEC)
     builder.call(function, [ir.Constant(_I32, which), spec])
@@ -39,7 +39,7 @@ def now(typing_context):
 
 @intrinsic
 def boot(typing_context):
-    """Time in ns as `now`, with the time in it that the computer was suspended: clock_gettime(CLOCK_BOOTTIME)."""
+    """Time in ns that includes the time in suspend: clock_gettime(CLOCK_BOOTTIME)."""
 
     def codegen(context, builder, signature, args):
         return _read(builder, CLOCK_BOOTTIME)
@@ -49,7 +49,7 @@ def boot(typing_context):
 
 @intrinsic
 def sleep_until(typing_context, wake):
-    """Sleep until `wake` in ns: clock_nanosleep(TIMER_ABSTIME), so that no drift adds up. Returns 0, or EINTR."""
+    """Sleep until the absolute time `wake`, ns, without drift: clock_nanosleep(TIMER_ABSTIME). Returns 0, or EINTR."""
 
     def codegen(context, builder, signature, args):
         function = cgutils.get_or_insert_function(

@@ -1,13 +1,12 @@
-"""Faults between the loop and its machine: what a bad cable, a broken encoder or a hot amplifier would do to it.
+"""Injected faults between the loop and its machine: effects of a bad cable, a broken encoder or a hot amplifier.
 
-They act on frames, after they have come in and before they go out, so that a real board, an emulator over a link and
-one inside the process have them alike, and a recording holds what the law was made to believe. The truth of an
-emulator stays the truth. In a run without faults one comparison a tick is all that this costs.
+Faults change frames after their receipt and before they are sent. So they act equally on a real board, an emulator over
+a link, and an emulator inside the process. A recording holds the faulty readings; the truth columns stay unchanged.
+Without faults the cost is one comparison a tick.
 
-A fault lasts from tick `begin` to before tick `end`. What it has cost stays: counts that were missed are not found
-again.
+A fault lasts from tick `begin` to before tick `end`. Missed counts stay missed after the end.
 
-Faults of processes (`PROCESSES`) are in the same catalogue; the supervisor carries them out, rtctl/daemon/faults.py.
+The catalogue includes faults of processes (`PROCESSES`); the supervisor carries them out (rtctl/daemon/faults.py).
 """
 
 from collections.abc import Sequence
@@ -22,11 +21,11 @@ from rtctl.drivers.at_mio_16de import AnalogInputParams, AnalogOutputParams
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.tick import frames
 
-SLOTS = 16  # faults at a time
-DEPTH = 1024  # ticks that a link may be late
-FOR_EVER = 2**62
-CODES = 2048  # of a bipolar 12-bit converter, to either side
-BITS = 32  # of the widest converter that a frame has room for
+SLOTS = 16  # most faults at the same time
+DEPTH = 1024  # ticks in the delay line of a link
+FOR_EVER = 2**62  # end tick of a fault without end
+CODES = 2048  # codes to either side of zero of a bipolar 12-bit converter
+BITS = 32  # bits of the widest converter in a frame
 
 (
     NONE, LINK_DELAY, LINK_LOSS, LINK_REORDER, LINK_SILENT, ENCODER_FREEZE, ENCODER_MISSED, ENCODER_NOISE, ADC_OPEN,
@@ -35,7 +34,7 @@ BITS = 32  # of the widest converter that a frame has room for
 
 
 class Kind(NamedTuple):
-    """What a fault is: its number in the tick, what it does, and what its size means ("" for one that has none)."""
+    """Kind of a fault: number in the tick, description, and meaning of its size ("" without a size)."""
 
     number: int
     words: str
@@ -90,7 +89,7 @@ PROCESSES = tuple(name for name, kind in KINDS.items() if kind.number == NONE)
 
 
 class FaultSettings(Settings):
-    """One fault. Times count from the start of the loop."""
+    """Settings of one fault. Times count from the start of the loop."""
 
     fault: Literal[*KINDS] = Field(description="which; `rtctl fault list` explains each")  # type: ignore[valid-type]
     at: float = quantity(0.0, unit="s", ge=0, help="when it begins")
@@ -117,7 +116,7 @@ class Fault(NamedTuple):
     channel: int
     begin: int  # ticks
     end: int
-    size: float  # in ticks where it is a time
+    size: float  # link.delay in ticks, loop.stall in s, adc.open as a code
     lowest: tuple[int, ...] = (-CODES,) * frames.AO_CHANNELS  # code of each analog output
     highest: tuple[int, ...] = (CODES - 1,) * frames.AO_CHANNELS
 
@@ -131,23 +130,23 @@ FAULT = np.dtype(
 )  # fmt: skip
 FAULTS_STATE = state(
     seed=int,
-    raw=frames.INPUTS,  # the newest that the board has sent
-    last=frames.INPUTS,  # the newest that has come through
-    past=(frames.INPUTS, DEPTH),
-    came=(int, DEPTH),  # how many were new
-    gone=(frames.OUTPUTS, DEPTH),
-    known=int,  # 1 from the first tick on that came through here
-    since=int,  # that tick
-    before=(int, frames.COUNTERS),  # its counts
-    missed=(float, frames.COUNTERS),  # so far
-    overtaken=int,  # 1 while a frame comes with the next one
+    raw=frames.INPUTS,  # newest frame that the board has sent
+    last=frames.INPUTS,  # newest frame that the loop has got
+    past=(frames.INPUTS, DEPTH),  # delay line of received frames
+    came=(int, DEPTH),  # number of new frames in each tick
+    gone=(frames.OUTPUTS, DEPTH),  # delay line of outputs
+    known=int,  # 1 from the first tick with faults on
+    since=int,  # first tick with faults
+    before=(int, frames.COUNTERS),  # counts of the previous tick
+    missed=(float, frames.COUNTERS),  # counts missed so far
+    overtaken=int,  # 1 while a frame waits for the next one
 )
 
 
 def build(settings: FaultSettings, dt: float, now: int = 0, blocks: Sequence[Any] = ()) -> Fault:
-    """In ticks of `dt` s from tick `now` on, at the analog outputs that stand in the diagram's `blocks`.
+    """Fault in ticks of `dt` s, counted from tick `now`; the diagram's `blocks` give the converters.
 
-    Raises ValueError for a delay that is longer than the line, and for a bit that an output does not have.
+    Raises ValueError for a delay longer than the delay line, and for a bit that an output does not have.
     """
     kind = KINDS[settings.fault]
     size = kind.usual if settings.size is None else settings.size
@@ -170,12 +169,12 @@ def build(settings: FaultSettings, dt: float, now: int = 0, blocks: Sequence[Any
 
 
 def bits_of(fault: Fault) -> int:
-    """Bits of the analog output that a fault is at."""
+    """Number of bits of the analog output of a fault."""
     return (fault.highest[fault.channel] - fault.lowest[fault.channel]).bit_length()
 
 
 def _rail(channel: int, blocks: Sequence[Any]) -> int:
-    """Code of an open analog input, half of its converter's codes up; of 12 bits where it has none."""
+    """Code at the positive rail of an open analog input: half of its converter's codes; 12 bits if unknown."""
     inputs = [b.params for b in blocks if isinstance(b.params, AnalogInputParams)]
     if channel >= len(inputs):
         return CODES - 1
@@ -183,7 +182,7 @@ def _rail(channel: int, blocks: Sequence[Any]) -> int:
 
 
 def _codes(blocks: Sequence[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Lowest and highest code of each analog output, in the order of the frame, which is that of the diagram."""
+    """Lowest and highest code of each analog output, in the order of the frame and the diagram."""
     outputs = [b.params for b in blocks if isinstance(b.params, AnalogOutputParams)]
     usual = [(-CODES, CODES - 1)] * (frames.AO_CHANNELS - len(outputs))
     lowest, highest = zip(*((p.code_min, p.code_max) for p in outputs), *usual, strict=True)
@@ -191,23 +190,23 @@ def _codes(blocks: Sequence[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 
 def fill(command: Any, wanted: Sequence[Fault]) -> None:
-    """Write the faults of a run into its command record. Raises ValueError for more than there are slots.
+    """Write the faults of a run into its command record, without faults of processes. Raises ValueError for too many.
 
-    Those of processes are left out. Where there have been faults one slot stays in use: missed counts stay missed.
+    After a first fault one slot stays in use, so that missed counts stay missed.
     """
     wanted = [fault for fault in wanted if fault.kind != NONE]
     if len(wanted) > SLOTS:
         raise ValueError(f"{len(wanted)} faults; {SLOTS} is the most at a time")
     slots = max(len(wanted), min(int(command["faulty"]), 1))
     command["faults"] = 0
-    command["faults"]["lowest"], command["faults"]["highest"] = -CODES, CODES - 1  # of an order without: older ones
+    command["faults"]["lowest"], command["faults"]["highest"] = -CODES, CODES - 1  # for older recordings
     for j, fault in enumerate(wanted):
         command["faults"][j] = fault
     command["faulty"] = slots
 
 
 def in_force(command: Any) -> list[Fault]:
-    """The faults that a command record holds, those that are over included."""
+    """The faults in a command record, including those that have ended."""
     rows = command["faults"][: int(command["faulty"])]
     faults = [
         Fault(int(r["kind"]), int(r["channel"]), int(r["begin"]), int(r["end"]), float(r["size"]),
@@ -219,19 +218,19 @@ def in_force(command: Any) -> list[Fault]:
 
 @tick
 def active(fault, k):
-    """Whether a fault is on in tick `k`."""
+    """Whether a fault is active in tick `k`."""
     return fault.begin <= k and k < fault.end
 
 
 @tick
 def chance(f, slot, k):
-    """A number in (0, 1) of its own for each slot and tick."""
+    """Uniform random number in (0, 1), determined by seed, slot and tick."""
     return counted.uniform(counted.nth(f.seed * SLOTS + slot, k))
 
 
 @tick
 def lateness(c, k):
-    """How late tick `k` wakes beyond what the machine makes of it, ns."""
+    """Injected lateness of tick `k`, ns."""
     most = 0.0
     for j in range(c.faulty):
         if c.faults[j].kind == LOOP_STALL and active(c.faults[j], k):
@@ -241,7 +240,10 @@ def lateness(c, k):
 
 @tick
 def receive(c, f, rx, fresh, k):
-    """What of the frame `rx` (1,), of which `fresh` are new, tick `k` gets to see. Returns how many it is told of."""
+    """Apply the faults of tick `k` to the received frame `rx` (1,). Returns the number of new frames after the faults.
+
+    `fresh` is the number of new frames before.
+    """
     if fresh > 0 or f.known == 0:
         f.raw = rx[0]
     if f.known == 0:
@@ -258,7 +260,7 @@ def receive(c, f, rx, fresh, k):
 
 @tick
 def link_in(c, f, rx, k):
-    """The frame that comes through in tick `k`: the one of now, an older one, or again the last."""
+    """Write the frame that arrives in tick `k` (new, delayed or last) to `rx` (1,). Returns the count of new frames."""
     late, lost = 0, False
     begun = f.since
     came = f.overtaken
@@ -273,7 +275,7 @@ def link_in(c, f, rx, k):
             lost = True
         elif fault.kind == LINK_REORDER and came == 0 and chance(f, j, k) < fault.size:
             f.overtaken = 1
-    lost = lost or k - late < begun  # what was sent before has arrived; the first that is late is on its way
+    lost = lost or k - late < begun  # frames from before the delay have arrived; the first delayed one has not
     if not lost and f.overtaken == 0:
         came += f.came[(k - late) % DEPTH]
         f.last = f.past[(k - late) % DEPTH]
@@ -286,7 +288,7 @@ def link_in(c, f, rx, k):
 
 @tick
 def misread(c, f, rx, k):
-    """Counters and analog inputs as a broken sensor or wire gives them."""
+    """Apply faults of encoders and analog inputs to the frame `rx` in tick `k`."""
     for n in range(frames.COUNTERS):
         share, jump = 0.0, 0
         for j in range(c.faulty):
@@ -305,12 +307,12 @@ def misread(c, f, rx, k):
     for j in range(c.faulty):
         if c.faults[j].kind == ADC_OPEN and active(c.faults[j], k):
             size = int(c.faults[j].size)
-            rx.ai_codes[c.faults[j].channel] = size if size > 0 else CODES - 1  # 0: an order of an older recording
+            rx.ai_codes[c.faults[j].channel] = size if size > 0 else CODES - 1  # 0 in a command of an older recording
 
 
 @tick
 def transmit(c, f, tx, wire, k):
-    """What of the outputs `tx` (1,) leaves in tick `k`, into `wire` (1,). Returns 0 where nothing does."""
+    """Apply the faults of tick `k` to the outputs `tx` (1,), into `wire` (1,). Returns 1, or 0 for no frame to send."""
     if c.faulty == 0:
         put(wire[0], tx[0])
         return 1
@@ -333,14 +335,14 @@ def transmit(c, f, tx, wire, k):
 
 @tick
 def assign(to, of):
-    """Copy an array. Not `to[:] = of`: what that would say of arrays of two lengths takes a second to compile."""
+    """Copy an array. Not `to[:] = of`, whose length check takes a second to compile."""
     for i in range(len(to)):
         to[i] = of[i]
 
 
 @tick
 def put(wire, tx):
-    """Copy the outputs, and leave number and time of the frame alone."""
+    """Copy the outputs from `tx` to `wire`, without the frame's number and time."""
     wire.inputs_t_ns = tx.inputs_t_ns
     assign(wire.ao_codes, tx.ao_codes)
     wire.dio_lines = tx.dio_lines
@@ -349,7 +351,7 @@ def put(wire, tx):
 
 @tick
 def distort(c, wire, k):
-    """Outputs as a broken converter, amplifier or supply gives them."""
+    """Apply faults of converters, amplifiers and supply to the outputs `wire` in tick `k`."""
     for j in range(c.faulty):
         fault, n = c.faults[j], c.faults[j].channel
         if not active(fault, k):

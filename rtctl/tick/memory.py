@@ -1,6 +1,6 @@
-"""Memory shared between supervisor, loop and plant: one file of named numpy records, and the fence between writers.
+"""Memory shared between supervisor, loop and plant: one file of named numpy records, and memory fences.
 
-A segment lives in /dev/shm and outlives whoever made it, so that the last seconds before a crash can be read back.
+A segment is a file in /dev/shm. It outlives its process, so that the last seconds before a crash can be read.
 """
 
 import mmap
@@ -12,13 +12,13 @@ import numpy as np
 from llvmlite import ir
 from numba import extending, types
 
-intrinsic: Any = extending.intrinsic  # it drops its first argument, which its annotations do not say
-ALIGN = 64  # one cache line: two writers never share one
+intrinsic: Any = extending.intrinsic  # Any: its annotations are wrong about the first argument
+ALIGN = 64  # bytes, one cache line: two writers never share a line
 
 
 @intrinsic
 def fence(typing_context):
-    """A full memory fence: what is written before it is seen before what is written after it."""
+    """Full memory fence: reads and writes before it take effect before those after it."""
 
     def codegen(context, builder, signature, args):
         builder.fence("seq_cst")
@@ -29,7 +29,7 @@ def fence(typing_context):
 
 @intrinsic
 def release(typing_context):
-    """A release fence: what is written before it is seen before what is written after it. Costs nothing on x86."""
+    """Release fence: writes before it are visible before writes after it. No cost on x86."""
 
     def codegen(context, builder, signature, args):
         builder.fence("release")
@@ -40,10 +40,10 @@ def release(typing_context):
 
 @intrinsic
 def borrowed(typing_context, array):
-    """The same array, without a share in its memory: nobody counts references while the tick hands it around.
+    """View of an array without reference counting, for use inside the tick.
 
-    Counting is an atomic instruction each time, which took half the time of a fused tick. The caller of the compiled
-    loop keeps the arrays alive.
+    Each count is an atomic instruction; the counts took half the time of a fused tick. The caller of the compiled loop
+    keeps the arrays alive.
     """
 
     def codegen(context, builder, signature, args):
@@ -59,8 +59,8 @@ class Segment:
     """Named arrays of records in one shared file.
 
     `Segment.create(path, {"status": (STATUS, 1), ...})` makes it, zeroed; `Segment.open(path, same layout)` maps it in
-    another process. `create` raises FileExistsError where a file is there, OSError where the memory cannot be had.
-    `open` raises FileNotFoundError where there is none, ValueError where its size does not fit the layout.
+    another process. `create` raises FileExistsError for an existing file, OSError where memory is short.
+    `open` raises FileNotFoundError without a file, ValueError where its size does not fit the layout.
     """
 
     def __init__(self, path: Path, layout: dict[str, tuple[np.dtype, int]], buffer: mmap.mmap):
@@ -78,7 +78,7 @@ class Segment:
         path.parent.mkdir(parents=True, exist_ok=True)
         fd = os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
         try:
-            os.posix_fallocate(fd, 0, size)  # a full file system is an error here, not SIGBUS in the middle of a tick
+            os.posix_fallocate(fd, 0, size)  # a full file system raises an error here, not SIGBUS during a tick
             return cls(path, layout, mmap.mmap(fd, size))
         except BaseException:
             path.unlink()

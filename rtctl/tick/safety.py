@@ -1,11 +1,11 @@
-"""The safety machine: idle, armed, running, tripped, and what trips it.
+"""The safety state machine: states idle, armed, running and tripped, and the causes of a trip.
 
     idle     outputs at zero
-    armed    outputs on, the machine is brought to its starting point and holds it
+    armed    outputs on; the machine moves to its starting point and holds it
     running  follows the reference
-    tripped  outputs are taken to zero from the very tick of the trip; only `reset` leads back to idle
+    tripped  outputs go to zero, from the tick of the trip on; only `reset` leads back to idle
 
-A trip latches its first cause. Every limit that is 0 (or infinite) is switched off.
+A trip latches its first cause. A limit of 0 (or infinity) is switched off.
 
 Source: the state machine of IEC 61800-7 drives, reduced to what a bench needs.
 """
@@ -106,7 +106,7 @@ class SafetySettings(Settings):
 
 
 class SafetyParams(NamedTuple):
-    """Times are in periods of the loop, counted by the clock whether a tick ran in a period or not."""
+    """Limits; times in periods of the loop, counted by the clock, including periods without a tick."""
 
     link: int
     frozen: int
@@ -119,9 +119,9 @@ class SafetyParams(NamedTuple):
     current_time: int
     missed: int
     disagreement: float  # m
-    fade: float  # share of the output that a trip takes away each period
-    commander: int  # ns that the commander may be silent; 0 where none is required
-    supervisor: int  # ns that the supervisor may be silent; 0 for ever
+    fade: float  # fraction of the output by which it falls each period after a trip
+    commander: int  # ns for which the commander may be silent; 0 where none is required
+    supervisor: int  # ns for which the supervisor may be silent; 0 for no limit
 
 
 SAFETY_STATE = state(
@@ -131,22 +131,22 @@ SAFETY_STATE = state(
     arm=int,  # requests seen
     disarm=int,
     reset=int,
-    passed=int,  # periods since the tick before
+    passed=int,  # periods since the previous tick
     armed_for=int,  # periods in `armed`
     silent=int,  # periods without a frame
-    still=int,
-    over=int,
-    slack=int,
-    late=int,
-    counts=int,
-    apart=float,  # of two sensors in the tick in which the outputs came on, m
+    still=int,  # periods with effort and without a count
+    over=int,  # periods above the continuous current
+    slack=int,  # periods with a tension out of range
+    late=int,  # periods of consecutive late ticks
+    counts=int,  # encoder counts of the previous sample
+    apart=float,  # difference of two sensors at switch-on of the outputs, m
     hold=(float, frames.AO_CHANNELS),  # outputs of the last tick before the trip, V
-    gate=float,  # share of them that is still written: 1, falling to 0 after a trip
-    on=int,  # 1 in the tick in which the outputs come on
-    board=int,  # times that the board says it has taken outputs to zero by itself
+    gate=float,  # fraction of `hold` that is written: 1, falling to 0 after a trip
+    on=int,  # 1 in the tick in which the outputs are switched on
+    board=int,  # trips of the board's watchdog, by the board
     off_seq=int,  # number of the latest outputs that were off
-    watchdog=int,  # of those times, the ones that were outputs of this arming
-    watchdog_seen=int,
+    watchdog=int,  # trips of the board's watchdog with outputs on since the latest arming
+    watchdog_seen=int,  # value of `watchdog` in the previous tick
 )
 
 
@@ -174,7 +174,7 @@ def build(settings: SafetySettings, dt: float) -> SafetyParams:
 
 @tick
 def trip(s, cause, k):
-    """Latch a cause, unless one is latched already or nothing is on."""
+    """Trip with a cause in tick `k`, if the outputs are on (armed or running)."""
     if s.state == ARMED or s.state == RUNNING:
         s.state = TRIPPED
         s.trip = cause
@@ -183,9 +183,9 @@ def trip(s, cause, k):
 
 @tick
 def command(s, c, passed):
-    """Take requests: arm leads from idle to armed, disarm to idle, reset from tripped to idle. Sets s.on.
+    """Carry out requests: arm leads from idle to armed, disarm to idle, reset from tripped to idle. Sets s.on.
 
-    `passed` is the number of periods since the tick before, by the clock: 1 where none was missed.
+    `passed` is the number of periods since the previous tick, by the clock: 1 where none was missed.
     """
     s.on = 0
     s.passed = passed
@@ -203,10 +203,10 @@ def command(s, c, passed):
         if s.state == IDLE:
             s.state = ARMED
             s.on = 1
-            s.passed = 1  # what was missed while the outputs were off is not held against it
+            s.passed = 1  # periods missed while the outputs were off do not count
             s.armed_for = 0
             s.gate = 1.0
-            s.hold[:] = 0.0  # a trip in this very tick has nothing to fade
+            s.hold[:] = 0.0  # a trip in this tick has no outputs to fade
             s.silent = 0
             s.still = 0
             s.over = 0
@@ -218,10 +218,10 @@ def command(s, c, passed):
 
 @tick
 def check_timing(p, s, c, fresh, late, gone, watchdog, k):
-    """Link, lateness, commander and board, at the start of tick `k`.
+    """Trip for link, lateness, commander, supervisor or board watchdog, at the start of tick `k`.
 
-    `fresh` frames came, `late` is 1 where it woke late, `gone` is the cause (COMMANDER, SUPERVISOR) of who has been
-    silent for too long, or 0. `watchdog` is the count of `board_watchdog`.
+    `fresh` is the number of new frames. `late` is 1 for a late tick. `gone` is the result of `gone`: COMMANDER,
+    SUPERVISOR or 0. `watchdog` is the count of `board_watchdog`.
     """
     s.silent = 0 if fresh > 0 else s.silent + s.passed
     s.late = s.late + s.passed if late != 0 else 0
@@ -240,9 +240,9 @@ def check_timing(p, s, c, fresh, late, gone, watchdog, k):
 
 @tick
 def board_watchdog(s, rx, tx):
-    """Times that the board has taken outputs to zero by itself that were on since the latest arming.
+    """Count of board watchdog trips whose outputs were on since the latest arming.
 
-    Its word of older ones may come late, out of a cable that was cut, and is not held against a new start.
+    Reports about earlier outputs may arrive late, after a cut cable; they do not trip a new start.
     """
     if s.state != ARMED and s.state != RUNNING:
         s.off_seq = tx.seq
@@ -255,9 +255,9 @@ def board_watchdog(s, rx, tx):
 
 @tick
 def gone(p, now, commander, supervisor):
-    """Cause of who has been silent for too long at `now`: COMMANDER, SUPERVISOR, or 0. Times in ns of one clock.
+    """Trip cause at time `now` for a silent commander or supervisor: COMMANDER, SUPERVISOR, or 0. Times in ns.
 
-    `commander` and `supervisor` are when they were last heard; 0 where nobody writes that down.
+    `commander` and `supervisor` are the times of their last sign of life; 0 where they are not recorded.
     """
     if p.commander > 0 and commander > 0 and now - commander > p.commander:
         return COMMANDER
@@ -268,7 +268,7 @@ def gone(p, now, commander, supervisor):
 
 @tick
 def check_sensors(p, s, apart, k):
-    """Two sensors of one motion, which stand `apart` m from each other."""
+    """Trip where two sensors of one motion, which differ by `apart` m, have moved apart since switch-on."""
     if s.on != 0:
         s.apart = apart
     if p.disagreement > 0.0 and abs(apart - s.apart) > p.disagreement:
@@ -277,13 +277,13 @@ def check_sensors(p, s, apart, k):
 
 @tick
 def check_motion(p, s, error, counts, effort, amperes, k):
-    """Following error (rad or m), encoder against `effort` (V), current (A), anything not a number."""
+    """Trip for following error (rad or m), frozen encoder despite `effort` (V), current (A), or NaN."""
     total = error + effort + amperes
     if total != total or abs(total) > 1e300:
         trip(s, NOT_A_NUMBER, k)
     if p.following > 0.0 and abs(error) > p.following:
         trip(s, FOLLOWING, k)
-    if s.silent == 0:  # an old sample says nothing of the encoder: a silent link is no frozen one
+    if s.silent == 0:  # only a new sample can show a frozen encoder
         s.still = s.still + s.passed if counts == s.counts and abs(effort) > p.frozen_effort else 0
         s.counts = counts
     if p.frozen > 0 and s.still > p.frozen:
@@ -295,14 +295,14 @@ def check_motion(p, s, error, counts, effort, amperes, k):
 
 @tick
 def check_number(s, u, k):
-    """The law's command `u` (V) as it is before any limit, which would hide what is not a number."""
+    """Trip where the law's command `u` (V) is not a finite number; call before limits, which would hide it."""
     if not abs(u) <= 1e300:
         trip(s, NOT_A_NUMBER, k)
 
 
 @tick
 def check_tension(p, s, T1, T2, k):
-    """Estimated tensions in N, while running."""
+    """Trip where an estimated tension `T1` or `T2`, N, is out of range for too long while running."""
     out = min(T1, T2) < p.tension_min or max(T1, T2) > p.tension_max
     s.slack = s.slack + s.passed if out and s.state == RUNNING else 0
     if s.slack > p.tension:
@@ -311,7 +311,7 @@ def check_tension(p, s, T1, T2, k):
 
 @tick
 def gate(p, s, u, channel):
-    """The voltage that may be written: `u` while on, what is left of the last one after a trip, else 0."""
+    """Output voltage of a channel, V: `u` while on, the fading last output after a trip, else 0."""
     if s.state == ARMED or s.state == RUNNING:
         s.hold[channel] = u if u == u else 0.0
         return s.hold[channel]
@@ -322,6 +322,6 @@ def gate(p, s, u, channel):
 
 @tick
 def fade(p, s):
-    """After a trip, the share of the periods that have passed less of the outputs. Call once a tick, before `gate`."""
+    """Reduce the fraction of the outputs that is still written after a trip. Call once a tick, before `gate`."""
     if s.state == TRIPPED:
         s.gate = max(s.gate - p.fade * s.passed, 0.0)

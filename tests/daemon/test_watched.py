@@ -43,7 +43,7 @@ def test_a_watch_that_is_silent_is_told(clock):
         ({"state": "learning", "learned": 0.4}, "learns the band of the machine, 40 %"),
         (
             {"state": "astray", "notes": ["the model ran away"]},
-            "runs away from the rows and is no judge; the model ran",
+            "diverges from the rows and cannot judge the machine; the model ran",
         ),
         (ALARM, "departs from the machine since 12 s: drag that the model lacks"),
     ],

@@ -145,8 +145,8 @@ def not_a_number(node):
         (late, {"timeout": 0.3}, r"has sent no encoder estimates for [3-9]\d\d ms"),
         (no_heartbeat, {}, r"node 5 .* has sent no heartbeat for 1 s"),
         (faulty, {}, r"node 5 .* reports error 0x200 \(bus voltage too low\)"),
-        (garbled, {}, r"node 5 sent encoder estimates \(0x0A9\) of 4 bytes that are no CANSimple"),
-        (not_a_number, {}, r"node 5 sent encoder estimates \(0x0A9\) of 8 bytes that are no CANSimple"),
+        (garbled, {}, r"node 5 sent encoder estimates \(0x0A9\) of 4 bytes, not valid in CANSimple"),
+        (not_a_number, {}, r"node 5 sent encoder estimates \(0x0A9\) of 8 bytes, not valid in CANSimple"),
     ],
 )
 def test_a_bad_node_ends_it_with_its_input_at_zero(bench, frame, spoil, settings, words):

@@ -171,8 +171,8 @@ def _resealed(body):
 @pytest.mark.parametrize(
     ("prepare", "device", "words"),
     [
-        (silent, {}, r"driver.port: /dev/pts/\d+ answers nothing within 0.7 s; does the device run the firmware"),
-        (garbled, {}, r"driver.port: /dev/pts/\d+ answers what is no frame of rtctl within 0.7 s"),
+        (silent, {}, r"driver.port: /dev/pts/\d+ does not answer within 0.7 s; does the device run the firmware"),
+        (garbled, {}, r"driver.port: /dev/pts/\d+ sends bytes that are no rtctl frame within 0.7 s"),
         (version, {}, r"the device speaks version 9 of the frame, not 1"),
         (lambda device: None, {"outputs": 2}, r"has 2 outputs and the machine has 1; set the same number"),
         (lambda device: None, {"counters": 0}, r"has 0 counters and the machine has 1"),

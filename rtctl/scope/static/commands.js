@@ -1,9 +1,9 @@
-// What the page asks of the machine: switches, setpoint, settings. The server refuses all of it without --control.
+// Commands of the page to the machine: switches, setpoint, settings. Without --control the server refuses them.
 
 import { typed, withUnit } from "./units.js";
 
 const $ = (id) => document.getElementById(id);
-// The line at the bottom, until the next thing is said.
+// Show a message in the line at the bottom, until the next message.
 export function say(text, bad = false) {
   const time = new Date().toLocaleTimeString([], { hour12: false });
   Object.assign($("said"), { textContent: `${time}  ${text}`, className: bad ? "bad" : "" });
@@ -78,7 +78,7 @@ export class Commands {
     await this.ask("setpoint", args, `setpoint ${value} ${args.unit}`);
   }
 
-  // A step from the target, in the unit chosen. Only units of the machine's own kind can be added to it.
+  // A step from the target, in the chosen unit, which must be of the same kind as the target's unit.
   async step(sign) {
     const size = this.number("setpoint-step");
     if (size === null) return;
@@ -88,13 +88,13 @@ export class Commands {
     await this.ask("setpoint", { value: this.target + sign * size * inOwn }, `step by ${sign * size} ${unit}`);
   }
 
-  // One row for each setting. A value is a number in SI, or has its unit: 160 ms.
+  // One row for each setting. A value is a number in SI, or a text with a unit such as 160 ms.
   settings(rows, control) {
     const text = JSON.stringify([rows, control]);
     if (text === this.shown) return;
     this.shown = text;
     const place = $("settings-rows");
-    if (place.contains(document.activeElement) && document.activeElement.dataset.path) { // not under the hands of who types
+    if (place.contains(document.activeElement) && document.activeElement.dataset.path) { // not while a person types in a field
       this.shown = "";
       place.onfocusout = () => setTimeout(() => this.settings(rows, control));
       return;

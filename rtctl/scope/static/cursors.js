@@ -1,4 +1,4 @@
-// Two cursors A and B on the common axis, and a table of what the signals are there.
+// Two cursors A and B on the common axis, and a table of the signals' values at them.
 
 import { css } from "./plots.js";
 import { prefixed, short, withUnit } from "./units.js";
@@ -23,7 +23,7 @@ export class Cursors {
     this.changed();
   }
 
-  // Move the cursor last set by a number of columns. Returns whether there was one.
+  // Move the cursor last set by a number of columns. Returns whether one was set.
   move(columns, traces) {
     const x = this.at[this.last];
     if (x === null || !traces.x.length) return false;
@@ -75,7 +75,7 @@ export class Cursors {
         const low = traces.low[i][k], high = traces.high[i][k];
         values[n] = low === null ? null : (low + high) / 2;
         const [from, to] = [short(low / scale.factor, 5), short(high / scale.factor, 5)];
-        return from === to ? from : `${from}\n${to}`; // the lowest and the highest of its rows
+        return from === to ? from : `${from}\n${to}`; // lowest and highest value of the column's rows
       });
       const difference = values.A !== null && values.B !== null ? short((values.B - values.A) / scale.factor, 5) : "";
       rows.push([`${name} [${scale.unit || "-"}]`, ...texts, difference]);

@@ -1,4 +1,4 @@
-// Keys of the whole page. Where somebody types, keys are theirs; space and arrows stay with the element that has them.
+// Keyboard shortcuts of the page, except in input fields, and except keys that the focused element uses itself.
 
 const OWN = { BUTTON: [" "], SUMMARY: [" "], SELECT: null, TEXTAREA: null, INPUT: null };
 

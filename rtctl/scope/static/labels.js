@@ -1,10 +1,10 @@
-// Labels of ticks: never twice the same, and never wider than their place.
+// Tick labels of an axis: distinct, and no wider than their space.
 
 const CHARACTER = 6.6; // px of a digit at 11 px
 const GAP = 14; // px between labels
 
 export class Labels {
-  // `longest` is how many characters there is room for. Where the numbers need more, they are differences to `offset`.
+  // `longest` is the most characters of a label. Longer numbers are shown as differences to `offset`.
   constructor(longest = 8) {
     this.longest = longest;
     this.offset = 0;
@@ -22,7 +22,7 @@ export class Labels {
   }
 }
 
-// px that labels from low to high need, so that neighbours do not touch; ticks are at most as many as have room.
+// Space between two labels in px, so that labels from low to high do not touch.
 export function spaceFor(low, high, width, factor) {
   let space = 50;
   for (let i = 0; i < 3; i++) {

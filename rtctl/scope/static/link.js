@@ -1,7 +1,7 @@
-// The WebSocket to the scope's server: it comes back by itself, and tells the server when a frame is on the screen.
+// The WebSocket to the scope's server: it reconnects by itself, and reports to the server when a frame is on the screen.
 
-const FIRST_PAUSE = 250; // ms between two attempts, doubled up to
-const LONGEST_PAUSE = 2000;
+const FIRST_PAUSE = 250; // ms between two attempts to connect; doubled each time
+const LONGEST_PAUSE = 2000; // ms
 
 export class Link {
   // `on` has hello(message), status(message), frame(about, arrays), closed() and opened().
@@ -20,7 +20,7 @@ export class Link {
     socket.onopen = () => { this.pause = FIRST_PAUSE; this.on.opened(); };
     socket.onmessage = (event) => (typeof event.data === "string" ? this.text(JSON.parse(event.data)) : this.frame(event.data));
     socket.onclose = () => {
-      for (const call of this.calls.values()) call.reject(new Error("the scope's server went away"));
+      for (const call of this.calls.values()) call.reject(new Error("the connection to the scope's server was lost"));
       this.calls.clear();
       this.on.closed();
       setTimeout(() => this.open(), this.pause);
@@ -33,7 +33,7 @@ export class Link {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
-  // Ask the daemon; resolves with the result, rejects with its words.
+  // Send a command to the daemon; resolves with the result, rejects with the error message.
   call(op, args = {}) {
     return new Promise((resolve, reject) => {
       if (this.socket.readyState !== WebSocket.OPEN) return reject(new Error("the scope's server does not answer"));
@@ -55,7 +55,7 @@ export class Link {
     }
   }
 
-  // Frames are drawn when the browser draws, and none is left out: each holds what the ones before do not.
+  // Draw all frames at the browser's next repaint; none may be left out, because each holds only new rows.
   frame(buffer) {
     this.waiting.push(buffer);
     if (this.waiting.length === 1) requestAnimationFrame(() => this.draw());

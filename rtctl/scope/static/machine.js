@@ -1,10 +1,10 @@
-// What the machine says of itself: lamps, banner, counts, the lateness histogram, and the values of its signals.
+// State of the machine: lamps, banner, counts, the lateness histogram, and the values of its signals.
 
 import { withUnit } from "./units.js";
 
 const $ = (id) => document.getElementById(id);
-const FRESH = 3000; // ms that a lamp tells of something that has happened
-const FIRST_EDGE = 0.25; // us, upper edge of the first bar; each next one is twice as far
+const FRESH = 3000; // ms for which a lamp shows an event
+const FIRST_EDGE = 0.25; // us, upper edge of the first bar; each next edge is twice as high
 
 export function showMachine(hello, message, connected) {
   const status = message?.status ?? {};
@@ -17,9 +17,9 @@ export function showMachine(hello, message, connected) {
   }
 }
 
-const before = new Map(); // count -> what it was, and when it last went up
+const before = new Map(); // name -> last count, and time of its last increase
 
-// Whether a count has gone up in the last seconds.
+// Whether a count has risen within the last FRESH ms.
 function rises(name, count) {
   const known = before.get(name);
   if (!known || count < known.count) before.set(name, { count, at: -Infinity });
@@ -53,12 +53,12 @@ function lamps(hello, status, message, connected, alive) {
   }));
 }
 
-// The model beside the machine, where `rtctl watch` runs one.
+// Lamp of the model in `rtctl watch`.
 function modelLamp(model, alive) {
   if (!alive) return ["off", "model", "-"];
   if (model.alarm) return ["bad", "model", "departs"];
   if (model.silent) return ["warn", "model", "silent"];
-  const words = { waiting: "waits for motion", learning: `learns, ${Math.round(100 * model.learned)} %`, watching: "holds", astray: "runs away" };
+  const words = { waiting: "waits for motion", learning: `learns, ${Math.round(100 * model.learned)} %`, watching: "holds", astray: "diverges" };
   return [{ watching: "good", learning: "off", waiting: "off", astray: "warn" }[model.state] ?? "off", "model", words[model.state] ?? model.state];
 }
 
@@ -69,8 +69,8 @@ function banner(status, connected, alive, there) {
   const trip = status.trip ? `Tripped at tick ${status.trip.tick}, ${status.trip.code}: ${status.trip.why}.` : "";
   const alarm = status.model?.alarm;
   if (!connected) text = "The scope's server does not answer; trying again.";
-  else if (!alive && there) text = "The daemon does not answer: it starts, which may take a minute, or it hangs. Waiting for it.";
-  else if (!alive) text = "The daemon does not answer: it does not run. Waiting for it; what is shown is its last." + (trip ? ` ${trip}` : "");
+  else if (!alive && there) text = "The daemon does not answer. It is starting, which may take a minute, or it hangs. Waiting for it.";
+  else if (!alive) text = "The daemon does not answer: it does not run. Waiting for it; the page shows its last values." + (trip ? ` ${trip}` : "");
   else if (trip && status.state === "tripped") { text = trip; warn = false; }
   else if (alarm) text = `The machine departs from its model since ${alarm.t.toFixed(0)} s: ${alarm.words}.${alarm.diagnosis ? ` Diagnosis: ${alarm.diagnosis}` : ""}${alarm.page ? ` Page: ${alarm.page}` : ""}`;
   else if (faults.length) text = `Faults are injected on purpose: ${faults.join(", ")}.`;

@@ -1,4 +1,4 @@
-// The page: what is wanted (`want`) goes to the server, frames come back and are drawn.
+// The page: sends the wanted view (`want`) to the server, and draws the frames that come back.
 
 import { Commands, say } from "./commands.js";
 import { Cursors } from "./cursors.js";
@@ -14,7 +14,7 @@ import { withUnit } from "./units.js";
 
 const $ = (id) => document.getElementById(id);
 const WINDOWS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 60];
-const KEPT_LAST = ["tick", "t", "period", "lateness", "state", "trip", "link_age", "order"]; // of interest now and then
+const KEPT_LAST = ["tick", "t", "period", "lateness", "state", "trip", "link_age", "order"]; // seldom of interest: at the end of the list
 const MEASURED = ["capstan", "position", "x", "feedback"];
 
 const want = { kind: "time", signals: [], x: "", window: 5, columns: 1000, hold: false, span: null, trigger: { mode: "off", signal: "", level: 0, edge: "rising", pre: 0.2, armed: 0 } };
@@ -32,7 +32,7 @@ const link = new Link({
   hello: greet,
   status(message) { status = message; refresh(); },
   frame(about, arrays) {
-    if (want.hold && about.kind === "roll") return; // was on its way
+    if (want.hold && about.kind === "roll") return; // sent before the server knew of the hold
     traces.take(about, arrays);
     stale = true;
   },
@@ -40,7 +40,7 @@ const link = new Link({
   refused(words) { say(words, true); },
 });
 
-// A daemon is there: its signals, settings and rate.
+// Take the signals, settings and rate of a daemon.
 function greet(message) {
   const other = !hello || hello.name !== message.name;
   const again = hello && hello.run !== message.run && hello.run > 0;
@@ -70,7 +70,7 @@ function remembered(names) {
     for (const key of ["kind", "signals", "x", "window"]) if (key in kept) want[key] = kept[key];
     Object.assign(want.trigger, kept.trigger ?? {}, { armed: 0 });
     if (!names.includes(want.trigger.signal)) want.trigger.mode = "off";
-  } catch { /* nothing of use was kept */ }
+  } catch { /* ignore an unreadable entry */ }
 }
 
 function usual(names) {
@@ -106,7 +106,7 @@ function learn(all) {
   swatches();
 }
 
-// A colour for each signal that is shown; the others have none.
+// Assign a colour to each shown signal.
 function slots() {
   want.signals.forEach((name, i) => { signals.get(name).slot = i; });
   swatches();
@@ -126,7 +126,7 @@ function windows() {
   $("window").replaceChildren(...list.map((w) => new Option(withUnit(w, "s"), w, false, w === want.window)));
 }
 
-// Tell the server what is wanted now.
+// Send the wanted view to the server.
 function ask() {
   want.columns = Math.max(200, Math.min(4000, Math.round(($("plots").clientWidth || 1000) - 80)));
   mark();
@@ -136,7 +136,7 @@ function ask() {
   localStorage.setItem(`scope ${hello.name}`, JSON.stringify({ kind, signals: names, x, window: seconds, trigger: t }));
 }
 
-// Buttons show what is wanted.
+// Set the buttons to the wanted view.
 function mark() {
   for (const button of document.querySelectorAll("[data-kind]")) button.setAttribute("aria-pressed", button.dataset.kind === want.kind);
   $("hold").setAttribute("aria-pressed", want.hold);
@@ -177,7 +177,7 @@ function draw(plot, lane) {
   if (traces.kind === "time" && want.trigger.mode !== "off" && lane.names.includes(want.trigger.signal)) levelLine(plot);
 }
 
-// Where the trigger looks: a dotted line at its level, and a mark at the crossing.
+// Draw the trigger: a dotted line at its level, and a mark at the crossing.
 function levelLine(plot) {
   const { ctx, bbox } = plot;
   const y = plot.valToPos(want.trigger.level, "y", true);
@@ -242,7 +242,7 @@ function moved(share) {
   zoom(want.span[0] + step, want.span[1] + step);
 }
 
-// Set a cursor at the mouse, or a third and two thirds along; take it away if it is there. A rolling picture is held.
+// Set a cursor at the mouse, or at one or two thirds of the axis; remove it if it is set. A rolling picture is held.
 function cursor(which) {
   if (want.kind === "xy") return say("cursors are for time and spectrum", true);
   if (cursors.at[which] !== null) return cursors.set(which, null), show();
@@ -254,7 +254,7 @@ function cursor(which) {
   show();
 }
 
-// A file of what is shown at this moment, named by machine, kind and time.
+// Save the shown picture or numbers to a file, named by machine, kind and time.
 function save(ending) {
   if (!traces.x.length) return say("nothing is shown yet", true);
   const stamp = new Date().toISOString().slice(0, 19).replaceAll(":", "");

@@ -1,18 +1,18 @@
-// The plots: one lane for each unit, under each other, with a common axis. Errors have a lane of their own.
+// The plots: one lane for each unit, one below the other, with a common axis. Errors have a separate lane.
 
 import { Labels, spaceFor } from "./labels.js";
 import { Scales } from "./scales.js";
 import { prefixed } from "./units.js";
 
 const uPlot = window.uPlot;
-const AXIS = 78; // px of the y axes, so that the lanes line up
-const DECADES = 6; // of a spectrum
+const AXIS = 78; // px, width of the y axes, so that the lanes are aligned
+const DECADES = 6; // decades on the y axis of a spectrum
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 export const colour = (slot) => css(`--c${slot % 8}`);
 
 export class Plots {
-  // `on` has zoom(from, to), unzoom() and draw(plot, lane, last), the last for cursors and the like.
+  // `on` has zoom(from, to), unzoom(), and draw(plot, lane) for cursors and the trigger.
   constructor(place, on) {
     this.place = place;
     this.on = on;
@@ -30,15 +30,15 @@ export class Plots {
     for (const lane of this.lanes) this.update(lane);
   }
 
-  // Draw again from nothing: the theme has changed.
+  // Build the plots again at the next draw, after a change of the theme.
   rebuild() { this.key = ""; }
 
-  // Draw what is shown once more: a scale was set.
+  // Draw again, after a change of a scale.
   again() { for (const lane of this.lanes) this.update(lane); }
 
   redraw() { for (const lane of this.lanes) lane.plot.redraw(false); }
 
-  // Where the mouse is on the axis, or null.
+  // Position of the mouse on the axis, or null.
   pointer() {
     for (const { plot } of this.lanes) if (plot.cursor.left >= 0) return plot.posToVal(plot.cursor.left, "x");
     return null;
@@ -115,7 +115,7 @@ export class Plots {
     };
   }
 
-  // Where the labels are differences, the number that they are differences to.
+  // Label of the y axis, with the offset of the tick labels if they have one.
   yLabel(lane) {
     const { offset } = lane.labels;
     return `${lane.error ? "error " : ""}[${lane.scale.unit || "-"}]${offset ? ` ${offset < 0 ? "-" : "+"} ${Math.abs(offset)}` : ""}`;
@@ -128,7 +128,7 @@ export class Plots {
     return `${about.sweep ? "t from the trigger" : "t of the controller"} [${lane.xScale.unit}]`;
   }
 
-  // New data and scales for one lane. Everything is redrawn once.
+  // Set data and scales of one lane, with one redraw.
   update(lane) {
     const { traces } = this;
     const shown = series(traces.kind, lane, traces);
@@ -178,7 +178,7 @@ function grouped(names, signals) {
   return [...lanes.values()];
 }
 
-// What uPlot draws of a lane: over time the lower and the upper edge of each signal, else one line.
+// Series of a lane for uPlot: over time the lower and upper edge of each signal, else one line.
 function series(kind, lane, traces) {
   return lane.names.flatMap((name, n) => {
     const i = lane.at[n];
@@ -201,7 +201,7 @@ function padded(low, high) {
   return [low - room, high + room];
 }
 
-// One signal over another: a line from point to point in the order of time.
+// Path of an XY plot: a line from point to point in order of time.
 function line(plot, index) {
   uPlot.orient(plot, index, (serie, _dx, _dy, scaleX, scaleY, toX, toY, left, top, width, height) => {
     const [xs, ys] = plot.data[index];

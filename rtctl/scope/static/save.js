@@ -1,10 +1,10 @@
-// What is shown, as a file: its numbers as CSV, its picture as PNG.
+// Files of the shown plots: numbers as CSV, picture as PNG.
 
 import { css } from "./plots.js";
 
 const NAMES = 170; // px for the names beside the traces
 
-// Lines of CSV: the axis, then each signal; where a column stands for several rows, its lowest and its highest.
+// CSV text: the axis, then each signal; lowest and highest value where a column covers several rows.
 export function table(traces, signals) {
   const head = (name, word = "") => quoted(`${name}${word} [${signals.get(name)?.unit || "-"}]`);
   const spread = traces.kind === "time" && traces.bucket > 1;
@@ -23,7 +23,7 @@ export function table(traces, signals) {
   return [heads.join(","), ...rows, ""].join("\r\n");
 }
 
-// A canvas with all lanes under each other, the names of their traces beside them.
+// Canvas with all lanes, one below the other, and the names of their traces.
 export function picture(lanes, title) {
   const ratio = devicePixelRatio, line = 16 * ratio;
   const canvases = lanes.map((lane) => lane.plot.ctx.canvas);
@@ -57,7 +57,7 @@ export function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 
-// Without the last digits, which binary numbers have and nothing has measured.
+// Number with 12 digits: further ones are rounding errors.
 const number = (value) => (value === null || value === undefined ? "" : String(Number(value.toPrecision(12))));
 
 const quoted = (text) => (/[",]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);

@@ -1,4 +1,4 @@
-// The scale of each lane: as its traces need it, or fixed between two numbers, which the page remembers.
+// The scale of each lane: automatic, or fixed between two numbers, which the browser stores.
 
 import { short, typed } from "./units.js";
 
@@ -11,7 +11,7 @@ export class Scales {
     try {
       this.fixed = new Map(JSON.parse(localStorage.getItem(KEPT)) ?? []);
     } catch {
-      this.fixed = new Map(); // nothing of use was kept
+      this.fixed = new Map(); // ignore an unreadable entry
     }
   }
 
@@ -20,10 +20,10 @@ export class Scales {
     return this.fixed.get(lane.key) ?? null;
   }
 
-  // A button that holds the scale of a lane as it is, and two fields for its ends.
+  // A button that fixes the current scale of a lane, and two fields for its ends.
   controls(lane) {
     const place = Object.assign(document.createElement("span"), { className: "scale" });
-    const button = Object.assign(document.createElement("button"), { type: "button", title: "hold the scale of this lane as it is, or let it follow" });
+    const button = Object.assign(document.createElement("button"), { type: "button", title: "fix the current scale of this lane, or scale automatically" });
     lane.lock = button;
     lane.ends = [0, 1].map((i) => {
       const field = Object.assign(document.createElement("input"), { inputMode: "decimal", title: `${i ? "upper" : "lower"} end of the scale` });
@@ -54,7 +54,7 @@ export class Scales {
     this.changed();
   }
 
-  // Show what the scale of a lane is; a field that somebody types in is left alone.
+  // Show the scale of a lane; a field with the focus stays unchanged.
   tell(lane) {
     const fixed = this.fixed.has(lane.key);
     lane.lock.setAttribute("aria-pressed", fixed);

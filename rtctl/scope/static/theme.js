@@ -1,4 +1,4 @@
-// Dark or light: as the system says, or as the button was set.
+// Dark or light theme: by the system, or by the button.
 
 const NEXT = { system: "dark", dark: "light", light: "system" };
 const dark = matchMedia("(prefers-color-scheme: dark)");

@@ -1,4 +1,4 @@
-// What is on the screen: a common axis and, for each signal, its lowest and highest value in each column.
+// Shown traces: a common axis and, for each signal, the lowest and highest value in each column.
 
 export class Traces {
   constructor() { this.clear(); }
@@ -14,7 +14,7 @@ export class Traces {
     this.about = {};
   }
 
-  // Take in a frame, see Viewer in rtctl/scope/viewer.py.
+  // Store a frame, see Viewer in rtctl/scope/viewer.py.
   take(about, arrays) {
     this.about = about;
     if (about.kind === "roll") return this.roll(about, arrays);
@@ -63,13 +63,13 @@ export class Traces {
     this.range = [end - about.window, end];
   }
 
-  // Rows are missing: no line is drawn there.
+  // Leave a gap in the lines where rows are missing.
   gap(x) {
     this.x.push((this.x[this.x.length - 1] + x) / 2);
     for (const list of new Set([...this.low, ...this.high])) list.push(null);
   }
 
-  // Index of the column nearest to a place on the axis; -1 where there is none.
+  // Index of the column nearest to `x` on the axis; -1 without columns.
   nearest(x) {
     const list = this.x;
     if (!list.length) return -1;

@@ -1,4 +1,4 @@
-// The panel of the trigger; the server looks for the crossing in every row.
+// The trigger panel; the server searches every row for the crossing.
 
 import { typed } from "./units.js";
 
@@ -43,7 +43,7 @@ export class TriggerPanel {
     $("trigger-signal").replaceChildren(...names.map((name) => new Option(name, name, false, name === this.want.signal)));
   }
 
-  // The form shows what is wanted.
+  // Show the wanted trigger in the form.
   mark() {
     const { mode, signal, edge, level, pre } = this.want;
     $("trigger-mode").value = mode;

@@ -1,7 +1,7 @@
-// Numbers as a person reads them: three to five digits, and a prefix that suits the unit.
+// Numbers for people: three to five digits, and an SI prefix that suits the unit.
 
 const PREFIXES = [["n", 1e-9], ["u", 1e-6], ["m", 1e-3], ["", 1], ["k", 1e3], ["M", 1e6]];
-const NOTHING = 1e-12; // of a unit: what is left of a decay
+const NOTHING = 1e-12; // in the unit; smaller values are shown as 0
 const PREFIXED = /^(m|s|V|A|N|rad|Hz|Nm|W|J|m\/s|rad\/s|V\/s|N\/s)$/;
 
 // The factor and the prefixed unit in which numbers up to `size` are short.
@@ -30,7 +30,7 @@ export function withUnit(value, unit) {
   return `${Number.isInteger(scaled) ? scaled : short(scaled, 4)} ${scale.unit}`.trim();
 }
 
-// A number as typed, or null. A comma is taken for a decimal point.
+// A typed number, or null. A comma counts as a decimal point.
 export function typed(text) {
   const cleaned = String(text).trim().replace(",", ".");
   const value = Number(cleaned);
