@@ -176,8 +176,8 @@ class Monitor:
         batch = self._cutter.feed(columns["t"], u, y, ref, self._late(columns))
         if self._cutter.away > away:
             self._away.append(self.windows)
-            self.notes.append("the model ran away and begins anew" + (
-                "; it does so again and again: it is no judge of this machine" if self.astray else ""))  # fmt: skip
+            self.notes.append("the model diverged from the rows and was started again" + (
+                "; it diverges repeatedly and cannot judge this machine" if self.astray else ""))  # fmt: skip
         return None if batch is None else self._judge(batch)
 
     def _late(self, columns: dict[str, np.ndarray]) -> np.ndarray:

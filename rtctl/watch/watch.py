@@ -165,6 +165,6 @@ STATES = {
     "waiting": "waits for motion, from which the model is begun",
     "learning": "learns how far the healthy machine is from its model; leave it as it is and let it move",
     "watching": "watches",
-    "astray": "the model runs away from the rows again and again and is no judge; look at the description of the "
+    "astray": "the model diverges from the rows repeatedly and cannot judge the machine; check the description of the "
     "machine with `rtctl diagnose`",
 }

@@ -91,7 +91,7 @@ def test_a_model_that_runs_away_is_no_judge(rehearsed, monitor):
     alarms = [monitor.feed(rehearsed.after[k : k + 2000]) for k in range(10_000, 60_000, 2000)]
     assert alarms == [None] * len(alarms)
     assert monitor.state == "astray"
-    assert [note for note in monitor.notes if "no judge of this machine" in note]
+    assert [note for note in monitor.notes if "cannot judge this machine" in note]
 
 
 def test_a_machine_at_rest_is_waited_for(rehearsed):
