@@ -1,13 +1,12 @@
-"""Faults between the loop and its machine: what a bad cable, a broken encoder or a hot amplifier would do to it.
+"""Faults between the loop and its machine: the effects of a bad cable, a broken encoder or a hot amplifier.
 
-They act on frames, after they have come in and before they go out, so that a real board, an emulator over a link and
-one inside the process have them alike, and a recording holds what the law was made to believe. The truth of an
-emulator stays the truth. In a run without faults one comparison a tick is all that this costs.
+Faults act on frames: on inputs after they are received, on outputs before they are sent. A real board, an emulator over
+a link and an emulator inside the process therefore have the same faults. A recording holds the inputs that the law got;
+the `truth_...` columns of an emulator are not changed. A run without faults pays one comparison a tick.
 
-A fault lasts from tick `begin` to before tick `end`. What it has cost stays: counts that were missed are not found
-again.
+A fault is active from tick `begin` to before tick `end`. Counts that were missed stay missed afterwards.
 
-Faults of processes (`PROCESSES`) are in the same catalogue; the supervisor carries them out, rtctl/daemon/faults.py.
+Faults of processes (`PROCESSES`) are in the same catalogue; rtctl/daemon/faults.py of the supervisor carries them out.
 """
 
 from collections.abc import Sequence
@@ -22,11 +21,11 @@ from rtctl.drivers.at_mio_16de import AnalogInputParams, AnalogOutputParams
 from rtctl.idiom import Settings, quantity, state, tick
 from rtctl.tick import frames
 
-SLOTS = 16  # faults at a time
-DEPTH = 1024  # ticks that a link may be late
-FOR_EVER = 2**62
-CODES = 2048  # of a bipolar 12-bit converter, to either side
-BITS = 32  # of the widest converter that a frame has room for
+SLOTS = 16  # faults at a time, at most
+DEPTH = 1024  # ticks: length of the delay line of a link
+FOR_EVER = 2**62  # tick: end of a fault without an end
+CODES = 2048  # codes of a bipolar 12-bit converter, in each direction
+BITS = 32  # bits of the widest converter of a frame
 
 (
     NONE, LINK_DELAY, LINK_LOSS, LINK_REORDER, LINK_SILENT, ENCODER_FREEZE, ENCODER_MISSED, ENCODER_NOISE, ADC_OPEN,
@@ -35,7 +34,7 @@ BITS = 32  # of the widest converter that a frame has room for
 
 
 class Kind(NamedTuple):
-    """What a fault is: its number in the tick, what it does, and what its size means ("" for one that has none)."""
+    """Kind of fault: its number in the tick, its effect, and the meaning of its size ("" without a size)."""
 
     number: int
     words: str
@@ -51,21 +50,21 @@ KINDS: dict[str, Kind] = {
     "link.delay": Kind(LINK_DELAY, "frames arrive late, both ways", "how late", "s", 4e-3, 0.0, 2.0),
     "link.loss": Kind(LINK_LOSS, "frames are lost at random, both ways", "share lost", "", 0.3, 0.0, 1.0),
     "link.reorder": Kind(
-        LINK_REORDER, "frames are overtaken by the next; the newest wins", "share overtaken", "", 0.3, 0.0, 1.0
+        LINK_REORDER, "frames are overtaken by the next one; the newest wins", "share overtaken", "", 0.3, 0.0, 1.0
     ),
-    "link.silent": Kind(LINK_SILENT, "nothing comes and nothing arrives, as with the plant dead or the cable out"),
+    "link.silent": Kind(LINK_SILENT, "no frame arrives in either direction, as with a dead plant or a pulled cable"),
     "encoder.freeze": Kind(
-        ENCODER_FREEZE, "the counter stands still; what it did not count is lost", channels=frames.COUNTERS
+        ENCODER_FREEZE, "the counter stops; the counts of the meantime are lost", channels=frames.COUNTERS
     ),
     "encoder.missed": Kind(
-        ENCODER_MISSED, "a share of the counts is missed, for good", "share", "", 0.1, 0.0, 1.0, frames.COUNTERS
+        ENCODER_MISSED, "a share of the counts is missed, and stays missed", "share", "", 0.1, 0.0, 1.0, frames.COUNTERS
     ),
     "encoder.noise": Kind(
-        ENCODER_NOISE, "the count jumps about at random", "largest jump", "counts", 200.0, 1.0, 1e6, frames.COUNTERS
+        ENCODER_NOISE, "the count jumps at random", "largest jump", "counts", 200.0, 1.0, 1e6, frames.COUNTERS
     ),
-    "adc.open": Kind(ADC_OPEN, "an analog input hangs open and drifts to its rail", channels=frames.AI_CHANNELS),
+    "adc.open": Kind(ADC_OPEN, "an analog input is open and drifts to its top reading", channels=frames.AI_CHANNELS),
     "dac.stuck": Kind(
-        DAC_STUCK, "a bit of an analog output is stuck at one", "which bit", "", 9.0, 0.0, BITS - 2.0,
+        DAC_STUCK, "a bit of an analog output stays one", "which bit", "", 9.0, 0.0, BITS - 2.0,
         frames.AO_CHANNELS,
     ),
     "driver.hot": Kind(
@@ -75,14 +74,14 @@ KINDS: dict[str, Kind] = {
         SUPPLY_SAG, "the supply sags: no output gives more than a share of its full scale", "share left", "", 0.02,
         0.0, 1.0,
     ),
-    "loop.stall": Kind(LOOP_STALL, "the loop wakes late, as with a CPU hog or a machine asleep", "how late", "s",
+    "loop.stall": Kind(LOOP_STALL, "the loop wakes late, as on a busy or suspended computer", "how late", "s",
                        1e-3, 0.0, 10.0),
-    "plant.kill": Kind(NONE, "the emulator's process is killed; a new one comes when the fault has passed"),
+    "plant.kill": Kind(NONE, "the process of the emulator is killed; a new one starts when the fault ends"),
     "supervisor.kill": Kind(NONE, "the supervisor is killed"),
-    "recorder.stall": Kind(NONE, "the recorder stands still, as on a disk that does not answer"),
-    "disk.full": Kind(NONE, "the disk takes no more of the recording, for good"),
+    "recorder.stall": Kind(NONE, "the recorder stops, as on a disk that does not answer"),
+    "disk.full": Kind(NONE, "the disk is full: from then on no rows are recorded"),
     "clock.step": Kind(
-        NONE, "the wall clock is set to another time under the supervisor", "by how much", "s", 3600.0, -1e9, 1e9
+        NONE, "the wall clock of the supervisor is set to another time", "by how much", "s", 3600.0, -1e9, 1e9
     ),
     "cpu.hog": Kind(NONE, "busy processes of normal priority on all CPUs", "how many", "", 4.0, 1.0, 256.0),
 }  # fmt: skip
@@ -90,7 +89,7 @@ PROCESSES = tuple(name for name, kind in KINDS.items() if kind.number == NONE)
 
 
 class FaultSettings(Settings):
-    """One fault. Times count from the start of the loop."""
+    """Settings of a fault. Times count from the start of the loop."""
 
     fault: Literal[*KINDS] = Field(description="which; `rtctl fault list` explains each")  # type: ignore[valid-type]
     at: float = quantity(0.0, unit="s", ge=0, help="when it begins")
@@ -117,8 +116,8 @@ class Fault(NamedTuple):
     channel: int
     begin: int  # ticks
     end: int
-    size: float  # in ticks where it is a time
-    lowest: tuple[int, ...] = (-CODES,) * frames.AO_CHANNELS  # code of each analog output
+    size: float  # ticks for the delay of a link, else in the unit of the kind
+    lowest: tuple[int, ...] = (-CODES,) * frames.AO_CHANNELS  # lowest code of each analog output
     highest: tuple[int, ...] = (CODES - 1,) * frames.AO_CHANNELS
 
 
@@ -131,23 +130,23 @@ FAULT = np.dtype(
 )  # fmt: skip
 FAULTS_STATE = state(
     seed=int,
-    raw=frames.INPUTS,  # the newest that the board has sent
-    last=frames.INPUTS,  # the newest that has come through
+    raw=frames.INPUTS,  # newest frame of the board
+    last=frames.INPUTS,  # newest frame that passed the link
     past=(frames.INPUTS, DEPTH),
-    came=(int, DEPTH),  # how many were new
+    came=(int, DEPTH),  # number of new frames, by tick
     gone=(frames.OUTPUTS, DEPTH),
-    known=int,  # 1 from the first tick on that came through here
-    since=int,  # that tick
-    before=(int, frames.COUNTERS),  # its counts
-    missed=(float, frames.COUNTERS),  # so far
-    overtaken=int,  # 1 while a frame comes with the next one
+    known=int,  # 1 from the first tick with a fault slot in use
+    since=int,  # this first tick
+    before=(int, frames.COUNTERS),  # counts of the last tick
+    missed=(float, frames.COUNTERS),  # counts missed so far
+    overtaken=int,  # 1 while a frame waits for the next one
 )
 
 
 def build(settings: FaultSettings, dt: float, now: int = 0, blocks: Sequence[Any] = ()) -> Fault:
-    """In ticks of `dt` s from tick `now` on, at the analog outputs that stand in the diagram's `blocks`.
+    """Fault in ticks of `dt` s from tick `now` on, with the codes of the analog outputs in the diagram's `blocks`.
 
-    Raises ValueError for a delay that is longer than the line, and for a bit that an output does not have.
+    Raises ValueError for a delay longer than the delay line, and for a bit that an output does not have.
     """
     kind = KINDS[settings.fault]
     size = kind.usual if settings.size is None else settings.size
@@ -170,12 +169,12 @@ def build(settings: FaultSettings, dt: float, now: int = 0, blocks: Sequence[Any
 
 
 def bits_of(fault: Fault) -> int:
-    """Bits of the analog output that a fault is at."""
+    """Number of bits of the analog output of a fault."""
     return (fault.highest[fault.channel] - fault.lowest[fault.channel]).bit_length()
 
 
 def _rail(channel: int, blocks: Sequence[Any]) -> int:
-    """Code of an open analog input, half of its converter's codes up; of 12 bits where it has none."""
+    """Highest code of an analog input, which an open input shows; of 12 bits for a channel without a converter."""
     inputs = [b.params for b in blocks if isinstance(b.params, AnalogInputParams)]
     if channel >= len(inputs):
         return CODES - 1
@@ -183,7 +182,7 @@ def _rail(channel: int, blocks: Sequence[Any]) -> int:
 
 
 def _codes(blocks: Sequence[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Lowest and highest code of each analog output, in the order of the frame, which is that of the diagram."""
+    """Lowest and highest code of each analog output, in the order of the frame, which is the order of the diagram."""
     outputs = [b.params for b in blocks if isinstance(b.params, AnalogOutputParams)]
     usual = [(-CODES, CODES - 1)] * (frames.AO_CHANNELS - len(outputs))
     lowest, highest = zip(*((p.code_min, p.code_max) for p in outputs), *usual, strict=True)
@@ -191,23 +190,23 @@ def _codes(blocks: Sequence[Any]) -> tuple[tuple[int, ...], tuple[int, ...]]:
 
 
 def fill(command: Any, wanted: Sequence[Fault]) -> None:
-    """Write the faults of a run into its command record. Raises ValueError for more than there are slots.
+    """Write the faults of a run into its command record. Raises ValueError for more faults than slots.
 
-    Those of processes are left out. Where there have been faults one slot stays in use: missed counts stay missed.
+    Faults of processes are left out. Once a run had a fault, one slot stays in use, so that missed counts stay missed.
     """
     wanted = [fault for fault in wanted if fault.kind != NONE]
     if len(wanted) > SLOTS:
         raise ValueError(f"{len(wanted)} faults; {SLOTS} is the most at a time")
     slots = max(len(wanted), min(int(command["faulty"]), 1))
     command["faults"] = 0
-    command["faults"]["lowest"], command["faults"]["highest"] = -CODES, CODES - 1  # of an order without: older ones
+    command["faults"]["lowest"], command["faults"]["highest"] = -CODES, CODES - 1  # of orders of older recordings
     for j, fault in enumerate(wanted):
         command["faults"][j] = fault
     command["faulty"] = slots
 
 
 def in_force(command: Any) -> list[Fault]:
-    """The faults that a command record holds, those that are over included."""
+    """Faults of a command record, including those that have ended."""
     rows = command["faults"][: int(command["faulty"])]
     faults = [
         Fault(int(r["kind"]), int(r["channel"]), int(r["begin"]), int(r["end"]), float(r["size"]),
@@ -219,19 +218,19 @@ def in_force(command: Any) -> list[Fault]:
 
 @tick
 def active(fault, k):
-    """Whether a fault is on in tick `k`."""
+    """Whether a fault is active in tick `k`."""
     return fault.begin <= k and k < fault.end
 
 
 @tick
 def chance(f, slot, k):
-    """A number in (0, 1) of its own for each slot and tick."""
+    """Random number in (0, 1), independent for each slot and tick."""
     return counted.uniform(counted.nth(f.seed * SLOTS + slot, k))
 
 
 @tick
 def lateness(c, k):
-    """How late tick `k` wakes beyond what the machine makes of it, ns."""
+    """Additional lateness of tick `k` by faults, ns."""
     most = 0.0
     for j in range(c.faulty):
         if c.faults[j].kind == LOOP_STALL and active(c.faults[j], k):
@@ -241,7 +240,7 @@ def lateness(c, k):
 
 @tick
 def receive(c, f, rx, fresh, k):
-    """What of the frame `rx` (1,), of which `fresh` are new, tick `k` gets to see. Returns how many it is told of."""
+    """Replace frame `rx` (1,), `fresh` of them new, by the one that tick `k` receives; returns the number received."""
     if fresh > 0 or f.known == 0:
         f.raw = rx[0]
     if f.known == 0:
@@ -258,7 +257,7 @@ def receive(c, f, rx, fresh, k):
 
 @tick
 def link_in(c, f, rx, k):
-    """The frame that comes through in tick `k`: the one of now, an older one, or again the last."""
+    """Write the frame that passes the link in tick `k` into `rx`: the newest, a delayed one, or the last one again."""
     late, lost = 0, False
     begun = f.since
     came = f.overtaken
@@ -273,7 +272,7 @@ def link_in(c, f, rx, k):
             lost = True
         elif fault.kind == LINK_REORDER and came == 0 and chance(f, j, k) < fault.size:
             f.overtaken = 1
-    lost = lost or k - late < begun  # what was sent before has arrived; the first that is late is on its way
+    lost = lost or k - late < begun  # frames before the fault have arrived; the first delayed frame is under way
     if not lost and f.overtaken == 0:
         came += f.came[(k - late) % DEPTH]
         f.last = f.past[(k - late) % DEPTH]
@@ -286,7 +285,7 @@ def link_in(c, f, rx, k):
 
 @tick
 def misread(c, f, rx, k):
-    """Counters and analog inputs as a broken sensor or wire gives them."""
+    """Change counters and analog inputs of a frame as a broken sensor or wire does."""
     for n in range(frames.COUNTERS):
         share, jump = 0.0, 0
         for j in range(c.faulty):
@@ -305,12 +304,12 @@ def misread(c, f, rx, k):
     for j in range(c.faulty):
         if c.faults[j].kind == ADC_OPEN and active(c.faults[j], k):
             size = int(c.faults[j].size)
-            rx.ai_codes[c.faults[j].channel] = size if size > 0 else CODES - 1  # 0: an order of an older recording
+            rx.ai_codes[c.faults[j].channel] = size if size > 0 else CODES - 1  # 0: order of an older recording
 
 
 @tick
 def transmit(c, f, tx, wire, k):
-    """What of the outputs `tx` (1,) leaves in tick `k`, into `wire` (1,). Returns 0 where nothing does."""
+    """Write the outputs that leave in tick `k`, of `tx` (1,), into `wire` (1,). Returns 0 if none leave, else 1."""
     if c.faulty == 0:
         put(wire[0], tx[0])
         return 1
@@ -333,14 +332,14 @@ def transmit(c, f, tx, wire, k):
 
 @tick
 def assign(to, of):
-    """Copy an array. Not `to[:] = of`: what that would say of arrays of two lengths takes a second to compile."""
+    """Copy an array. `to[:] = of` is avoided: its message for different lengths takes a second to compile."""
     for i in range(len(to)):
         to[i] = of[i]
 
 
 @tick
 def put(wire, tx):
-    """Copy the outputs, and leave number and time of the frame alone."""
+    """Copy the outputs, but not the number and the time of the frame."""
     wire.inputs_t_ns = tx.inputs_t_ns
     assign(wire.ao_codes, tx.ao_codes)
     wire.dio_lines = tx.dio_lines
@@ -349,7 +348,7 @@ def put(wire, tx):
 
 @tick
 def distort(c, wire, k):
-    """Outputs as a broken converter, amplifier or supply gives them."""
+    """Change outputs as a broken converter, amplifier or supply does."""
     for j in range(c.faulty):
         fault, n = c.faults[j], c.faults[j].channel
         if not active(fault, k):
