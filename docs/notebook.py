@@ -1,13 +1,13 @@
 # %% [markdown]
 # # From a recording to a named effect
 #
-# This page is `docs/notebook.py`, executed: open that file in VS Code or Spyder, or make a notebook of it with
-# `jupytext --to notebook`. It needs `pip install 'rtctl[notebook]'`, and nothing of the command line.
+# This page is the output of `docs/notebook.py`. Open the file in VS Code or Spyder, or make a notebook of it with
+# `jupytext --to notebook`. It needs `pip install 'rtctl[notebook]'`, and no command line.
 #
 # ## A recording
 #
-# The bench here is emulated, so that the page runs anywhere. It has something that its owner does not know of: at a
-# command of zero its drive gives 0.8 V. The recording says nothing of that.
+# The bench is emulated, so the page runs anywhere. Its drive has an offset that the nominal model lacks: at a command
+# of zero it gives 0.8 V. The recording does not mention the offset.
 
 # %%
 import rtctl
@@ -31,9 +31,9 @@ bundle = rtctl.record(bench, 12.0, "bench")
 bundle
 
 # %% [markdown]
-# A recording of your own comes in by `rtctl.import_recording("log.csv", "bench", machine="machine.yaml",
+# Your own recording is imported with `rtctl.import_recording("log.csv", "bench", machine="machine.yaml",
 # columns={"u": "volts"}, units={"x": "mm"})`, from csv, mat, parquet, mcap, mf4, tdms, hdf5 and more; see
-# [recordings](traces.md). `rtctl.load_bundle("bench")` opens one that is there.
+# [recordings](traces.md). `rtctl.load_bundle("bench")` opens an existing bundle.
 #
 # ## Looking at it
 
@@ -47,9 +47,9 @@ bundle.plot("ref", "x", "position_error", "u")
 bundle.to_pandas()[["ref", "x", "u"]].describe().round(4)
 
 # %% [markdown]
-# ## What its owner believes
+# ## The nominal model
 #
-# The model in the recording's `case.json`, run freely beside the recording:
+# The free run of the nominal model in `case.json`, compared with the recording:
 
 # %%
 believed = rtctl.simulate("case", bundle)
@@ -58,7 +58,7 @@ believed
 # %% [markdown]
 # ## What is missing
 #
-# `diagnose` shows a bar while it works. What it can name is the library of `rtctl.physics()`.
+# `diagnose` shows its progress. `rtctl.physics()` lists the effects that it can name.
 
 # %%
 found = rtctl.diagnose(bundle)
@@ -68,7 +68,8 @@ found
 found.to_pandas()
 
 # %% [markdown]
-# `found.report()` shows the whole report in a cell, with its figures; `found.report("report.html")` writes it as well.
+# `found.report()` shows the whole report with its figures in a cell. `found.report("report.html")` also writes it to a
+# file.
 
 # %%
 found.report("report.html")
@@ -76,8 +77,8 @@ found.report("report.html")
 # %% [markdown]
 # ## With the effect in the model
 #
-# `save` writes what `rtctl diagnose` writes: the verdict, the report, and the model with what was found. The model runs
-# and simulates as any config does.
+# `save` writes the files of `rtctl diagnose`: the verdict, the report, and the model with the effect. The model is a
+# config that can run and be simulated.
 
 # %%
 found.save("diagnosis")

@@ -1,4 +1,7 @@
-"""docs/faults.md, made from a table run: no clock time in it, so that it comes out the same bit for bit."""
+"""Text of docs/faults.md from a run of the table of faults.
+
+It holds no time of the wall clock, so every run gives the same bytes.
+"""
 
 from rtctl.faults.cases import STANDS
 from rtctl.faults.notes import NOTES
@@ -10,33 +13,37 @@ from rtctl.tick.faults import KINDS
 
 HEAD = """# Faults
 
-Every fault that `rtctl` can inject, on every shipped machine, written by `rtctl fault table --markdown docs/faults.md`.
+This page has every fault that `rtctl` can inject, played on every shipped machine. The command
+`rtctl fault table --markdown docs/faults.md` wrote it.
 
 ```bash
-rtctl fault list                                  # what there is
+rtctl fault list                                  # all faults
 rtctl fault add encoder.freeze --at 3s --for 200ms
 rtctl fault clear
 ```
 
-or in a config:
+A config may hold faults too:
 
 ```yaml
 faults:
   - {fault: encoder.freeze, at: 3 s, lasts: 200 ms}
 ```
 
-The machine plays a move at constant speed, as processes of the daemon in lockstep, with the limits of its shipped
-config. Numbers are ticks. *Detected* counts from the fault to the trip, *zero written* from the fault to the first tick
-from which on nothing but zero is written; a trip writes zero in its own tick. *Reaches the machine* says whether those
-zeros were at the machine's outputs while the fault was still there. In every run all rows before the fault are bit
-for bit those of the undisturbed run, no row is lost, and the machine runs again after `reset`, `arm` and
-`play` once the fault has gone; a run that failed in that would say so in its last column.
+Each fault begins while the machine moves at constant speed. The processes of the daemon run in lockstep, with the
+limits of the shipped config.
+
+- *Detected*: ticks from the fault to the trip.
+- *Zero written*: ticks from the fault until only zeros are written. A trip writes zeros in its own tick.
+- *Reaches the machine*: whether the zeros were at the outputs of the machine while the fault lasted.
+- *Largest error*: largest following error from the fault to the trip, beside the limit of the config.
+- The last column is `ok` if all rows before the fault equal those of the undisturbed run to the bit, no row is lost,
+  and the machine runs again after the fault, with `reset`, `arm` and `play`. Otherwise it says what failed.
 """
-UNITS = {"rad": ("rad", 1.0), "m": ("mm", 1e3)}  # of errors, by the unit of position
+UNITS = {"rad": ("rad", 1.0), "m": ("mm", 1e3)}  # unit of a position: unit of its error, and the factor to it
 
 
 def text(table: Table) -> str:
-    """The page."""
+    """Text of the page for a run of the table, in Markdown."""
     parts = [HEAD]
     for name, stand in STANDS.items():
         outcomes = [o for o in table.outcomes if o.machine == name]
@@ -51,7 +58,7 @@ def text(table: Table) -> str:
         parts.append(f"\n## {name}: faults of processes\n\n")
         parts.append("| fault | mode | seen | outputs | what is lost | |\n|---|---|---|---|---|---|\n")
         parts += [_survived(s) for s in survived]
-    parts.append("\n## What each is, and what to do\n")
+    parts.append("\n## What each fault is, and what to do\n")
     parts += [_note(name) for name in KINDS]
     return "".join(parts)
 

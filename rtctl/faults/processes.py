@@ -87,7 +87,7 @@ def side_by_side(stand: Stand, folder: Path, truth: Any) -> list[Survived]:
         row("recorder.stall", "`status`: `rows.queued` grows", "nothing: 64 MB of rows wait for the disk", queued > 0),
         row("clock.step", "nowhere", "nothing: all runs on CLOCK_MONOTONIC", True),
         row("cpu.hog", "in real time: late ticks, at worst `missed_ticks`", "nothing", True),
-        row("disk.full", f"`status`: `rows.error` is \"{found['rows']['error']}\"", "what came after it, counted",
+        row("disk.full", f"`status`: `rows.error` is \"{found['rows']['error']}\"", "the rows after the fault, counted",
              exact and "space" in str(found["rows"]["error"])),
     ]  # fmt: skip
 

@@ -1,1 +1,1 @@
-"""The experiments and designs of the thesis done again on the emulated machines, its numbers beside ours."""
+"""Experiments and designs of the thesis, repeated on the emulated machines and compared with its numbers."""

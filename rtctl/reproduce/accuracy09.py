@@ -32,43 +32,49 @@ LAWS = {  # name -> words
 REDUCED = "where the controller gain depends on the reel radius, the error can be further reduced"
 MARGIN = "the position accuracy lies within the camera margin"
 ENOUGH = "Simulations have shown that a resolution of 500 increments per revolution is accurate enough"
-ASKED = "no number in the text; 0.03 mm is our own demand"
+ASKED = "no number in the text; 0.03 mm is chosen here"
 
 ACCURACY = under(
     Row("9.trips_printed", "of 25 pairs of radii, those where the law as printed trips, 10000 counts", "9", None, "",
         expected=0.0, quote="The closed loop system is stable for the complete range of reel radii",
         law=LAWS["printed"], filter="none", remark="no number in the text",
-        differs="a jump of a radian lets the tape of an empty pair go slack, and capstan and reels disagree"),
-    Row("9.largest_printed", "largest error of steps over the others, law as printed", "9", 0.5, "mm", bound="at most",
-        quote=MARGIN, law=LAWS["printed"], filter="none", remark="0.5 mm is the margin of the camera (3)"),
-    Row("9.largest_shipped", "the same over all pairs with the shipped law", "9", 0.5, "mm", bound="at most",
+        differs="after a jump of a radian the tape of an empty pair is slack, and capstan and reels disagree"),
+    Row("9.largest_printed", "largest error of steps over the other pairs of radii, law as printed", "9", 0.5, "mm",
+        bound="at most",
+        quote=MARGIN, law=LAWS["printed"], filter="none", remark="0.5 mm is the margin of the camera, chapter 3"),
+    Row("9.largest_shipped", "largest error of steps over all pairs of radii, shipped law", "9", 0.5, "mm",
+        bound="at most",
         quote=MARGIN, law=LAWS["shipped"]),
-    Row("9.worse_by_schedule", "pairs where gain_schedule: model is worse by a count than no schedule", "9", None, "",
+    Row("9.worse_by_schedule", "pairs of radii where gain_schedule: model is worse by a count than no schedule", "9",
+        None, "",
         bound="at most", expected=0.0, quote=REDUCED, law=LAWS["schedule"],
-        remark="no number in the text. A factor below 1, which would keep the loop gain at full reels, lets the error "
-        "by friction grow; so the schedule has a floor of 1. A count is 8 um"),
+        remark="no number in the text. The schedule has a lower limit of 1: a lower factor would keep the loop gain "
+        "at full reels, but increase the error by friction. A count is 8 um"),
     Row("9.largest_best", "largest error with the best law", "9", None, "mm", bound="at most", expected=0.03,
         quote=REDUCED, law=LAWS["best"], remark=ASKED),
-    Row("9.largest_best_off", "the same at the corners where the friction is 10 % more or less than believed", "9",
+    Row("9.largest_best_off", "largest error with the best law at the corners, friction 10 % above or below its "
+        "nominal value", "9",
         None, "mm", bound="at most", expected=0.062, quote=REDUCED, law=LAWS["best"],
         set="identified, tape.slack, 10000 counts, tau_F off by 10 %",
-        remark="no number in the text; held against the shipped law with the friction that it believes"),
+        remark="no number in the text; compared with the shipped law with its nominal friction"),
     Row("9.settling_best", "slowest settling within 0.2 mm with the best law over that with the shipped one", "9", None,
         "", 0.01, bound="at most", expected=1.0, quote=REDUCED, law=LAWS["best"], remark="no number in the text"),
     Row("9.tension_best", "least tension with the best law, tape that cannot push", "5.2", None, "N", bound="at least",
         expected=0.0, quote="because then the paper gets folded", law=LAWS["best"],
-        remark="no number in the text; an empty pair is slack for a moment, as with the shipped law"),
+        remark="no number in the text; the tape of an empty pair is slack for a moment, as with the shipped law"),
     set="identified, tape.slack, 10000 counts", filter="derivative 40 Hz",
 ) + under(
     Row("9.largest_shipped_500", "largest error with the shipped law, 500 counts", "9", 0.5, "mm", 0.1, bound="at most",
         quote=ENOUGH, law=LAWS["shipped"], filter="derivative 40 Hz",
-        remark="a count is 12.6 mrad, of which the derivative makes 12 V: the loop does not come to rest"),
-    Row("9.largest_coarse_500", "largest error with the law for it, 500 counts", "9", 0.5, "mm", bound="at most",
+        remark="a count is 12.6 mrad, which the derivative amplifies to 12 V: the loop does not come to rest"),
+    Row("9.largest_coarse_500", "largest error with the law for a coarse encoder, 500 counts", "9", 0.5, "mm",
+        bound="at most",
         quote=ENOUGH, law=LAWS["coarse"],
-        remark="a count is 0.157 mm; within it nothing tells where the capstan stands"),
-    Row("9.largest_demand_500", "the same against 0.03 mm", "9", None, "mm", bound="at most", expected=0.03,
+        remark="a count is 0.157 mm; the position of the capstan within a count is unknown"),
+    Row("9.largest_demand_500", "largest error with the law for a coarse encoder, compared with 0.03 mm", "9", None,
+        "mm", bound="at most", expected=0.03,
         quote=ENOUGH, law=LAWS["coarse"], remark=ASKED,
-        differs="half a count is 0.08 mm; the way since the last edge is that of the model alone"),
+        differs="half a count is 0.08 mm; the travel since the last edge comes from the model alone"),
     set="identified, tape.slack, 500 counts",
 )  # fmt: skip
 
@@ -178,10 +184,11 @@ def figure_9_1(short: bool) -> Picture:
         fig.legend(axes, ncols=2)
     value = accuracy(short)
     sentence = (
-        "Not in the text: largest final error of steps of a radian at each pair of radii, by the emulator, tape.slack. "
-        f"With 10000 counts the law as printed leaves up to {value['9.largest_printed']:.2f} mm, the shipped one "
-        f"{value['9.largest_shipped']:.3f} mm and the best one {value['9.largest_best']:.3f} mm; with 500 counts "
-        f"{value['9.largest_shipped_500']:.2f} mm, and {value['9.largest_coarse_500']:.2f} mm with the law for it."
+        "Not in the text: largest final error of steps of a radian at each pair of radii, by the emulator, "
+        f"tape.slack. With 10000 counts the law as printed leaves up to {value['9.largest_printed']:.2f} mm, the "
+        f"shipped one {value['9.largest_shipped']:.3f} mm and the best one {value['9.largest_best']:.3f} mm; with "
+        f"500 counts {value['9.largest_shipped_500']:.2f} mm, and {value['9.largest_coarse_500']:.2f} mm with the "
+        "law for a coarse encoder."
     )
     return Picture("9.1", sentence, figure)
 

@@ -23,21 +23,23 @@ SIMULATION = "simulation"
 ROWS = under(
     Row("4.inertia_change", "change of J of an empty reel in a move of 0.2 m", "4.1, figure 4.2", 2.5, "%", 0.03,
         quote="the maximum change in inertia is only 2.5%", expected=26.2,
-        erratum="26 % with the listed d_tape = 0.5 mm; 2.5 % is that of paper of 0.05 mm (next row)"),
-    Row("4.inertia_change_thin", "the same with paper of 0.05 mm", "4.1, figure 4.2", 2.5, "%", 0.03,
+        erratum="26 % with the listed d_tape = 0.5 mm; 2.5 % with paper of 0.05 mm (next row)"),
+    Row("4.inertia_change_thin", "change of J of an empty reel with paper of 0.05 mm", "4.1, figure 4.2", 2.5, "%",
+        0.03,
         quote="the maximum change in inertia is only 2.5%", set="simulation, d_tape = 0.05 mm",
-        chosen="d_tape = 0.05 mm, a tenth of the listed one"),
+        chosen="d_tape = 0.05 mm, a tenth of the listed value"),
     law="shipped PD, 0.02 m/s", set=SIMULATION, filter="derivative 40 Hz",
 ) + under(
     Row("4.mode_full", "damped mode of shaft and reel 1, R1 = 40 mm", "4.2, figure 4.3", 100.0, "Hz", 0.05,
         quote="this eigenfrequency shifts to  $f = 100$  [Hz]", remark="at 40/20 mm"),
     Row("4.mode_empty", "damped mode of shaft and reel 1, R1 = 20 mm", "4.2, figure 4.3", 250.0, "Hz", 0.02,
         quote="show an eigenfrequency at  $f = 250$  [Hz]",
-        erratum="445 Hz with the listed J_10 = 1e-5 kg m^2; 250 Hz takes 3.2e-5 (next row)", expected=445.0,
+        erratum="445 Hz with the listed J_10 = 1e-5 kg m^2; 250 Hz needs 3.2e-5 (next row)", expected=445.0,
         remark="at 20/20 mm"),
-    Row("4.mode_empty_heavy", "the same with J_10 = 3.2e-5 kg m^2", "4.2, figure 4.3", 250.0, "Hz", 0.03,
+    Row("4.mode_empty_heavy", "damped mode of shaft and reel 1, R1 = 20 mm, J_10 = 3.2e-5 kg m^2", "4.2, figure 4.3",
+        250.0, "Hz", 0.03,
         quote="show an eigenfrequency at  $f = 250$  [Hz]", set="simulation, J_10 = J_20 = 3.2e-5 kg m^2",
-        chosen="J_10 = J_20 = 3.2e-5 kg m^2, three times the listed one"),
+        chosen="J_10 = J_20 = 3.2e-5 kg m^2, three times the listed value"),
     Row("4.mode_tape", "damped mode of tape and both reels, 40/20 mm", "4.2", 1.0, "Hz", 0.5, relative=False,
         quote="Also the eigenfrequency at  $f = 1$  [Hz], introduced by the paper dynamics, is strongly damped",
         remark="whole hertz in the text; 1.1 Hz at 20/20 mm, 1.4 Hz at 40/20 mm, 1.6 Hz at 40/40 mm"),
@@ -152,9 +154,9 @@ def figure_4_3(short: bool) -> Picture:
     turn.set(ylabel="phase [deg]", xlabel="frequency [Hz]")
     fig.legend(above, ncols=2)
     sentence = (
-        "From the current of motor 1 to the capstan with the listed simulation set: the mode of shaft and reel is "
-        f"at {modes(0.04, 0.02)[1]:.0f} Hz where reel 1 is full and at {modes(0.02, 0.02)[1]:.0f} Hz where it is "
-        "empty."
+        "Response from the current of motor 1 to the capstan with the listed simulation set: the mode of shaft and "
+        f"reel is at {modes(0.04, 0.02)[1]:.0f} Hz with a full reel 1, and at {modes(0.02, 0.02)[1]:.0f} Hz with an "
+        "empty one."
     )
     return Picture("4.3", sentence, figure)
 

@@ -23,12 +23,12 @@ REELS = ((0.04, 0.02), (0.03, 0.03), (0.02, 0.04))  # m
 CORNERS = ((0.04, 0.02), (0.02, 0.04), (0.04, 0.04), (0.02, 0.02))  # m
 
 HEAVY_SET = "simulation, J_m = 1.5e-3 kg m^2"
-PLOT = "read from a plot in the text"
+PLOT = "read from a plot of the text"
 
 TENSION = under(
     Row("5.tension_torque", "torque for a tension of 0.1 N at R = 30 mm", "5.1, (5.1)", 3.0, "mNm", 0.02,
         quote=r"At  $R_{mean} = 30$  [mm] this gives  $F_t = 1.0 \cdot 10^{-1}$  [N]",
-        remark="what board and driver make of it: 12 bits of the output are 0.06 mNm"),
+        remark="as board and driver give it: a step of the 12 bits of the output is 0.06 mNm"),
     law="tension feedforward (5.1), friction feedforward off", set="identified", filter="derivative 40 Hz",
 )  # fmt: skip
 RADII = under(
@@ -36,17 +36,17 @@ RADII = under(
         quote="If we want to obtain an accuracy of 5% at the rotation of reel 1"),
     Row("5.travel", "paper moved for 5 % at the largest reel", "5.1, (5.3)", 24.0, "mm", 0.02,
         quote=r"$x = \varphi_1 R_{1max} = 24$  [mm]"),
-    Row("5.travel_capstan", "turn of the capstan for it", "5.1, (5.3)", 1.9, "rad", 0.02,
+    Row("5.travel_capstan", "turn of the capstan for this travel", "5.1, (5.3)", 1.9, "rad", 0.02,
         quote=r"$\varphi_c = 1.9$  [rad]"),
-    Row("5.accuracy_capstan", "accuracy of the capstan's 500 increments over that", "5.1, (5.3)", 0.7, "%", 0.06,
+    Row("5.accuracy_capstan", "accuracy of the capstan's 500 increments over this turn", "5.1, (5.3)", 0.7, "%", 0.06,
         quote=r"\cdot 100 = 0.7$  [%]", remark="the text rounds 0.66"),
 ) + under(
     Row("5.radius_error", "largest error of (5.2) over 1.9 rad, reels of 20 to 40 mm", "5.1, (5.2)", 5.0, "%",
         bound="at most", quote="The total accuracy is more than required",
-        remark="5 % is what the text asks for; 10000 counts of the capstan in place of 500"),
-    Row("5.radius_error_edges", "the same between edges of the reel sensors", "5.1, (5.2)", 5.0, "%",
+        remark="the text asks for 5 %; 10000 counts of the capstan in place of 500"),
+    Row("5.radius_error_edges", "largest error of (5.2) between edges of the reel sensors", "5.1, (5.2)", 5.0, "%",
         bound="at most", quote="The total accuracy is more than required",
-        remark="the method of the machine at arming, not of the text: two edges are known to a tick"),
+        remark="the method of the machine at arming, which is not in the text: two edges are known to a tick"),
     law="shipped PD, 0.5 rad/s", set="identified", filter="derivative 40 Hz",
 )  # fmt: skip
 DESIGN = under(
@@ -54,14 +54,15 @@ DESIGN = under(
         quote="With  $K_p = 31.6$  we have", expected=64.0,
         erratum="the listed set gives 64 here, and no pair of radii gives less than 36",
         remark="the text names no radii; 20/20 mm is chosen here. 36, 106 and 96 at 40/20, 20/40 and 40/40 mm"),
-    Row("5.process_gain_heavy", "the same with the identified J_m = 1.5e-3 kg m^2", "5.2", 31.6, "rad/s^2/A", 0.03,
+    Row("5.process_gain_heavy", "K_p of the simulation set with the identified J_m = 1.5e-3 kg m^2", "5.2", 31.6,
+        "rad/s^2/A", 0.03,
         quote="With  $K_p = 31.6$  we have", set=HEAVY_SET + ", d_tape = 0",
-        chosen="J_m of the identified set, twice the listed one, and 20/20 mm"),
+        chosen="J_m of the identified set, twice the listed value, and 20/20 mm"),
     law="law of the measurement (8.1), 5 V/rad", set="simulation, d_tape = 0", filter="derivative 40 Hz",
 ) + under(
     Row("5.gain", "G for K_p = 31.6, 2 pi rad/s, zeta = 1", "5.2, (5.4)", 1.25, "A/rad", 0.01,
         quote="With  $K_p = 31.6$  we have  $G = 1.25$"),
-    Row("5.tau_d", "derivative time for it", "5.2, (5.4)", 0.32, "s", 0.01, quote=r"$\tau_d = 0.32$"),
+    Row("5.tau_d", "derivative time for this gain", "5.2, (5.4)", 0.32, "s", 0.01, quote=r"$\tau_d = 0.32$"),
 ) + under(
     Row("5.bandwidth_low", "lowest bandwidth over the radii, |T| = 0 dB", "5.2, figure 5.2(a)", 1.0, "Hz", 0.5,
         relative=False, quote="It varies from 1 to 2 [Hz], depending on the reel radii",
@@ -77,8 +78,8 @@ DESIGN = under(
         erratum="the listed set gives 68 deg"),
     Row("5.stable", "least gain margin over the radii: robust and stable", "5.2", None, "dB", bound="at least",
         expected=0.0, quote="we obtain a robust and stable closed loop system for all reel radii",
-        remark="no number in the text. It is stable, but 1.7 dB are left at 40/40 mm: |L| rises above 1 at the mode of "
-        "101 Hz"),
+        remark="no number in the text. Stable, but with a margin of only 1.7 dB at 40/40 mm, since |L| rises towards "
+        "1 at the mode of 101 Hz"),
     law="PD (5.4), G = 1.25 A/rad, no delay", set="simulation",
 ) + under(
     Row("5.bandwidth_low_heavy", "lowest bandwidth over the radii with J_m = 1.5e-3", "5.2, figure 5.2(a)", 1.0, "Hz",
@@ -89,7 +90,7 @@ DESIGN = under(
         chosen="J_m of the identified set, for which K_p is 31.6 at 20/20 mm", remark="whole hertz in the text"),
     Row("5.phase_margin_empty_heavy", "phase margin at 20/40 mm with J_m = 1.5e-3", "5.2, figure 5.2(b)", 75.0, "deg",
         3.0, relative=False, quote="varies from 75 [deg] for the system with  $R_1 = 20$  [mm] and  $R_2 = 40$  [mm]",
-        differs="56 deg, and 68 deg as listed; the 76 deg of 20/20 mm are those of a plain mass", remark=PLOT),
+        differs="56 deg, and 68 deg as listed; 76 deg at 20/20 mm is the margin of a plain mass", remark=PLOT),
     law="PD (5.4), G = 1.25 A/rad, no delay", set=HEAVY_SET,
 )  # fmt: skip
 

@@ -37,18 +37,19 @@ OPEN = under(
 RADIUS = under(
     Row("6.radius_error", "largest error of the radii measured at arming", "6.2", 5.0, "%", bound="at most",
         quote="the system is triggered and the reel radii are estimated",
-        remark="5 % is what 5.1 asks for; 10000 counts of the capstan in place of 500"),
+        remark="section 5.1 asks for 5 %; 10000 counts of the capstan in place of 500"),
     law="arming: motor 2 pulls, motor 1 holds the tape", set="identified",
 )  # fmt: skip
 CLOSED = under(
     Row("6.overshoot", "overshoot of a move of 0.1 m, 500 increments, 20/40 mm", "6.3, figure 6.2", 0.0, "mm", WINDOW,
         relative=False, quote=OVERDAMPED, set="simulation, 500 increments",
         differs="friction of 1 mNm is compensated in full and does not damp; " + NOISY,
-        remark="the tolerance is the margin of the camera (3)"),
+        remark="the tolerance is the margin of the camera, chapter 3"),
     Row("6.overshoot_10000", "the same with 10000 counts", "6.3, figure 6.2", 0.0, "mm", WINDOW, relative=False,
         quote=OVERDAMPED, set="simulation, 10000 counts",
         differs="friction of 1 mNm is compensated in full and does not damp"),
-    Row("6.overshoot_uncompensated", "the same with 10000 counts, friction not compensated", "6.3, figure 6.2", 0.0,
+    Row("6.overshoot_uncompensated", "overshoot of a move of 0.1 m, 10000 counts, friction not compensated",
+        "6.3, figure 6.2", 0.0,
         "mm", WINDOW, relative=False, quote="is reduced by the Coulomb friction", set="simulation, 10000 counts",
         law="PD (5.4), no friction feedforward",
         chosen="no friction feedforward, and 10000 counts in place of 500"),
@@ -163,8 +164,8 @@ def figure_6_1(short: bool) -> Picture:
     fig.legend(force, ncols=2, loc="upper right")
     value = open_loop(short)
     sentence = (
-        "Both motors at 0.049 A, then motor 2 with more for a second and motor 1 likewise: the reels come to rest "
-        f"at {1e3 * value['6.deflection']:.0f} mrad, and the tape moves at constant velocity with "
+        "Both motors at 0.049 A, then more current for a second at motor 2, and then at motor 1: the reels come to "
+        f"rest at {1e3 * value['6.deflection']:.0f} mrad, and the tape moves at constant velocity with "
         f"{value['6.tension']:.3f} N. Simulation set without friction."
     )
     return Picture("6.1", sentence, figure)
@@ -190,10 +191,10 @@ def figure_6_2(short: bool) -> Picture:
     force.set_ylim(bottom=0.0)
     value = closed_loop(short)
     sentence = (
-        "A move of 0.1 m in closed loop at R1 = 20 and R2 = 40 mm, simulation set, PD of (5.4) with a filter of 20 Hz, "
-        f"10000 counts in place of the 500 of the text: {value['6.overshoot_10000']:.1f} mm of overshoot and "
-        f"{value['6.tension_moving_10000']:.3f} N at constant velocity. With 500 these are "
-        f"{value['6.overshoot']:.1f} mm and {value['6.tension_moving']:.2f} N."
+        "A move of 0.1 m in closed loop at R1 = 20 and R2 = 40 mm, simulation set, PD of (5.4) with a filter of 20 "
+        f"Hz, 10000 counts in place of the 500 of the text: {value['6.overshoot_10000']:.1f} mm of overshoot and "
+        f"{value['6.tension_moving_10000']:.3f} N at constant velocity. With 500 counts the overshoot is "
+        f"{value['6.overshoot']:.1f} mm and the tension {value['6.tension_moving']:.2f} N."
     )
     return Picture("6.2", sentence, figure)
 

@@ -38,27 +38,28 @@ DRIVER = under(
     set="components of 7.2 and appendix E",
 )  # fmt: skip
 MOTOR = under(
-    Row("7.friction_torque", "torque of 0.1 A that puts the fullest reel in motion", "7.3", 61.0, "mNm", 0.01,
+    Row("7.friction_torque", "torque of the 0.1 A that starts the fullest reel", "7.3", 61.0, "mNm", 0.01,
         quote=r"= 0.1 \cdot 61 \cdot 10^{-3} = 6.1 \cdot 10^{-2}$  [Nm]",
         erratum="0.1 A times 61e-3 Nm/A is 6.1e-3 Nm, a factor of 10", expected=6.1),
     Row("7.slip_torque", "torque of the slip couplings", "7.3", 2.5, "mNm",
         quote=r"the torque applied by the slip couplings, which is  $2.5 \cdot 10^{-3}$  [Nm]",
-        erratum="5.1 has 3.0e-3 Nm, at the mean radius", expected=3.0, set=NONE),
+        erratum="section 5.1 has 3.0e-3 Nm, at the mean radius", expected=3.0, set=NONE),
     Row("7.least_torque", "least torque, friction and the 2.5 mNm of the slip couplings", "7.3", 64.0, "mNm", 0.01,
         quote=r"The total minimum required torque is then  $T = 6.4 \cdot 10^{-2}$  [Nm]",
-        erratum="follows from the first row", expected=8.6,
-        remark="the motors of the old system, 25 mNm, would be enough; 9.1 mNm with the 3.0 mNm of 5.1"),
-    Row("7.motor_constant", "torque of the motor's shaft behind its gear, a current", "7.3, appendix E", 61.0, "mNm/A",
+        erratum="follows from `7.friction_torque`", expected=8.6,
+        remark="the motors of the old system, 25 mNm, would be enough; 9.1 mNm with the 3.0 mNm of section 5.1"),
+    Row("7.motor_constant", "torque constant of the motor's shaft behind its gear", "7.3, appendix E", 61.0, "mNm/A",
         0.01, quote="see appendix E, motor 9904 120 53 707",
-        erratum="61 mNm/A are those of the rotor; behind the gear of 150.4:1 it is 0.45 Nm at 118 mA, 24 mA of them "
-        "without load", expected=4787.0,
+        erratum="61 mNm/A is the constant of the rotor; behind the gear of 150.4:1 the torque is 0.45 Nm at 118 mA, "
+        "of which 24 mA flow without load", expected=4787.0,
         set="motor and gear of appendix E",
-        remark=f"all of part I takes 61 mNm/A at the reel. Without losses the gear gives {GEAR * 0.061:.1f} Nm/A"),
+        remark=f"all of part I uses 61 mNm/A at the reel. Without losses the gear gives {GEAR * 0.061:.1f} Nm/A"),
     set="61 mNm/A of appendix E",
 ) + under(
-    Row("7.motor_torque", "continuous torque of the motor that was chosen, enough for it", "7.3", 450.0, "mNm",
+    Row("7.motor_torque", "continuous torque of the chosen motor, which is enough", "7.3", 450.0, "mNm",
         bound="at most", quote="DC motor with a continuous torque of 0.45 [Nm], which is more than sufficient",
-        remark="what the emulated machine takes at most in its steps, by 61 mNm/A; 450 mNm are those behind the gear"),
+        remark="the largest torque of the emulated machine in its steps, by 61 mNm/A; 450 mNm is the torque behind "
+            "the gear"),
     law="shipped PD, steps of 1 rad", set="identified", filter="derivative 40 Hz",
 ) + under(
     Row("7.increments", "least increments of the encoder for 1 mm", "7.4", 80.0, "", 0.03,
@@ -113,7 +114,7 @@ def figure_7_4(short: bool) -> Picture:
     fig.legend(above)
     sentence = (
         "The motor driver from volts to amperes with the components of the text, R_4 and L_M chosen here: flat to "
-        f"{1e-3 * l292.cutoff(L292Settings()):.1f} kHz, far beyond the tape and the reels."
+        f"{0.001 * l292.cutoff(L292Settings()):.1f} kHz, far above the modes of the tape and the reels."
     )
     return Picture("7.4", sentence, figure)
 

@@ -84,7 +84,7 @@ NOISE = under(
     Row("8.bandwidth_fivefold", "bandwidth with five times that gain, |L| = 1", "8.1, figure 8.2", 1.0, "Hz", 0.15,
         quote="the closed loop bandwidth is approximately 1 [Hz]",
         chosen="5 V/rad and 0.5 Vs/rad, the printed numbers read as per ampere",
-        remark="|S| is 4 dB at 1 Hz, where the text has 0 dB"),
+        remark="|S| is 4 dB at 1 Hz; the text has 0 dB"),
     Row("8.process_gain_noise", "process gain at 1 Hz by the noise", "8.2", 25.4, "rad/s^2/A", 0.05,
         quote="the process gain  $K_p = 25.4$"),
     law=MEASURING, set="identified", filter="derivative 40 Hz",
@@ -92,8 +92,8 @@ NOISE = under(
 UNKNOWN = under(
     Row("8.unknown", "largest error of K_p, c, c_m, k_m, J_m on machines up to 30 % off", "8.1", None, "%",
         bound="at most", expected=5.0, quote="we try to fit the theoretical transfer function",
-        remark=f"{NO_NUMBER}; 5 % is our own demand"),
-    Row("8.unknown_inside", "share of these that lie in their 95 % interval", "8.1", None, "%", bound="at least",
+        remark=f"{NO_NUMBER}; 5 % is chosen here"),
+    Row("8.unknown_inside", "share of these errors inside their 95 % interval", "8.1", None, "%", bound="at least",
         expected=95.0, quote="we try to fit the theoretical transfer function", remark=NO_NUMBER),
     law=MEASURING, set="identified, each parameter 0.7 to 1.3 times", filter="derivative 40 Hz",
 )  # fmt: skip
@@ -105,39 +105,42 @@ FRICTION = under(
         chosen="tau_F2 = 2.6 mNm", remark=NO_NUMBER),
     Row("8.friction_speed", "change of friction from 0.15 to 4 rad/s: a very small dependence", "8.2", None,
         "%", bound="at most", expected=5.0, quote="the friction force shows a very small dependence on the velocity",
-        remark=f"{NO_NUMBER}; 5 % is taken for very small. The emulated friction does not depend on velocity"),
+        remark=f"{NO_NUMBER}; 5 % counts as very small. The emulated friction does not depend on velocity"),
     law="shipped PD, constant velocity", set="identified, three pairs of reels", filter="derivative 40 Hz",
 )  # fmt: skip
 LOOP = under(
     Row("8.gain", "G for 4 pi rad/s and zeta = 1 by the measured process gain", "8.2, (5.4)", 6.2, "A/rad", 0.03,
         quote=PD_GAIN),
-    Row("8.tau_d", "derivative time for it", "8.2, (5.4)", 0.16, "s", 0.01, quote=PD_GAIN),
+    Row("8.tau_d", "derivative time for this gain", "8.2, (5.4)", 0.16, "s", 0.01, quote=PD_GAIN),
     Row("8.gain_margin", "gain margin at 38/22 mm, by a multisine in the running loop", "8.2, figure 8.5", 6.0, "dB",
         0.75, relative=False, quote=MARGINS,
-        remark="whole decibels in the text; equal machines that round otherwise are read as 5.5 to 5.7 dB"),
+        remark="whole decibels in the text; 5.5 to 5.7 dB on processors that round differently"),
     Row("8.phase_margin", "phase margin at 38/22 mm, likewise", "8.2, figure 8.5", 70.0, "deg", 4.0, relative=False,
-        quote=MARGINS, remark="read from a plot in the text"),
+        quote=MARGINS, remark="read from a plot of the text"),
     law="PD (5.4) by the fitted K_p, 6.18 A/rad", set="identified",
 ) + under(
     Row("8.gain_margin_model", "gain margin at 38/22 mm by the equations, 3 ms", "8.2, figure 8.5", 6.0, "dB", 1.0,
         relative=False, quote=MARGINS, remark="5.2 dB; the text reads whole decibels of its own fit"),
     Row("8.phase_margin_model", "phase margin at 38/22 mm, likewise", "8.2, figure 8.5", 70.0, "deg", 4.0,
-        relative=False, quote=MARGINS, remark="72 deg; read from a plot in the text"),
+        relative=False, quote=MARGINS, remark="72 deg; read from a plot of the text"),
     law=PD_PRINTED, set="identified",
 )  # fmt: skip
 RADII = under(
     Row("8.stable", "least gain margin over the radii: stable for all", "8.3", None, "dB", bound="at least",
-        expected=0.0, quote=COMPLETE, remark=f"{NO_NUMBER}. Stable at all radii; 1.2 dB at 40/40 mm is not robust"),
+        expected=0.0, quote=COMPLETE, remark=f"{NO_NUMBER}. Stable at all radii, but a margin of 1.2 dB at 40/40 mm "
+            "is not robust"),
     *(
         Row(f"8.gain_margin_{name}", f"gain margin at {name.replace('_', '/')} mm", "8.3", None, "dB", off,
-            relative=False, quote=COMPLETE, expected=value, remark=f"{NO_NUMBER}; held against (8.2) computed apart")
+            relative=False, quote=COMPLETE, expected=value, remark=f"{NO_NUMBER}; compared with (8.2), computed "
+                "separately")
         for name, value, off in (("40_40", 1.2, 0.1), ("40_20", 3.7, 0.1), ("20_20", 20.9, 0.15))
     ),
     law=PD_PRINTED + ", 3 ms", set="identified",
 )  # fmt: skip
 OTHER_WAYS = (
-    "tape.slack is not in the text: without it the tape pushes by 0.3 N. 3.4 and 11.9 mrad (0.149 mm) where the tape "
-    "can push. With the shipped filter of 40 Hz 12.2 and 7.5 mrad, and 2.8 and 1.3 mrad where the tape can push"
+    "tape.slack is not in the text: without it the tape pushes by 0.3 N, and the errors are 3.4 and 11.9 mrad (0.149 "
+    "mm). With the shipped filter of 40 Hz the errors are 12.2 and 7.5 mrad, and 2.8 and 1.3 mrad where the tape can "
+    "push"
 )
 STICKS = "dry friction decides the error at rest, and the emulated friction does not depend on the angle"
 SECOND = "(in both experiments the second step), figure 8.6(a) shows a larger overshoot"
@@ -156,17 +159,18 @@ STEPS = under(
         bound="at most", quote="the resulting error is within the required margin"),
     Row("8.overshoot_full", "least overshoot of both steps with 2.4 mNm: there is some", "8.3, figure 8.6(a)", None,
         "%", bound="at least", expected=0.063, quote="Both step responses show an overshoot",
-        remark=f"{NO_NUMBER}; a count of the encoder is the least to be seen"),
+        remark=f"{NO_NUMBER}; a count of the encoder is the smallest visible overshoot"),
     Row("8.overshoot_second", "overshoot of the second step over that of the first: larger", "8.3, figure 8.6(a)", None,
         "", bound="at least", expected=1.0, quote=SECOND,
-        differs="smaller; larger, 3.5, only where the tape can push", remark=NO_NUMBER),
+        differs="smaller; larger (3.5) only where the tape can push", remark=NO_NUMBER),
     Row("8.error_second", "with 1.5 mNm, error after the second step over that after the first: smaller",
         "8.3, figure 8.6(b)", None, "", bound="at most", expected=1.0,
         quote="figure 8.6(b) shows a smaller steady state error", law=LESS,
-        differs="alike; 0.7 with the shipped filter where the tape can push", remark=NO_NUMBER),
+        differs="equal; 0.7 with the shipped filter where the tape can push", remark=NO_NUMBER),
     Row("8.overshoot_under", "overshoot with 1.5 mNm: none", "8.3, figure 8.6(b)", 0.0, "%", 0.1, relative=False,
         quote="the step responses do not have an overshoot and the system is overdamped", law=LESS,
-        differs="some, whether the tape can push or not; none with the shipped filter where it can",
+        differs="there is overshoot, whether the tape can push or not; none with the shipped filter where the tape "
+            "can push",
         remark="a count of the encoder is 0.06 %"),
     law=FULL, set="identified, tape.slack",
 )  # fmt: skip

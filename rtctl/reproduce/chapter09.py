@@ -20,21 +20,21 @@ REDUCED = "where the controller gain depends on the reel radius, the error can b
 SCHEDULE = under(
     Row("9.gain_margin_fixed", "least gain margin over the radii, fixed gain", "9", None, "dB", 0.1, relative=False,
         quote="The closed loop system is stable for the complete range of reel radii", expected=1.2, law=FIXED,
-        remark="no number in the text; held against (8.2) computed apart, at 40/40 mm"),
+        remark="no number in the text; compared with (8.2), computed separately, at 40/40 mm"),
     Row("9.gain_margin", "least gain margin over the radii, gain scheduled", "9", None, "dB", bound="at least",
-        quote=REDUCED, expected=6.0, law=SCHEDULED, remark="no number in the text; 6 dB are the demand of the design"),
+        quote=REDUCED, expected=6.0, law=SCHEDULED, remark="no number in the text; the design asks for 6 dB"),
     set="identified",
 ) + under(
     Row("9.accuracy_fixed", "largest error of steps over five pairs of radii, fixed gain", "9", 0.5, "mm",
         bound="at most", quote="the position accuracy lies within the camera margin", law=FIXED,
-        remark="0.5 mm is the margin of the camera (3)"),
+        remark="0.5 mm is the margin of the camera, chapter 3"),
     Row("9.accuracy", "the same with the schedule", "9", 0.5, "mm", bound="at most",
         quote="the position accuracy lies within the camera margin", law=SCHEDULED,
-        remark="0.5 mm is the margin of the camera (3)"),
+        remark="0.5 mm is the margin of the camera, chapter 3"),
     Row("9.error", "largest error with the schedule over that with a fixed gain: reduced", "9", None, "",
         bound="at most", expected=1.0, quote=REDUCED, law=SCHEDULED,
-        differs="the printed gain is designed at 38/22 mm; the schedule lowers it elsewhere to keep 6 dB, and the "
-        "error by friction grows",
+        differs="the printed gain is designed at 38/22 mm; elsewhere the schedule lowers the gain to keep 6 dB, and "
+        "the error by friction grows",
         remark="no number in the text. The loop gain is smaller where the larger reel of a pair pulls, as the text "
         "says, and largest where both are full"),
     set=SLACK_SET,

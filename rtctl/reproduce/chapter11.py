@@ -39,12 +39,14 @@ ORIGINS = under(
     Row("11.coupling", "error by a stator coupling that turns by 1 mrad", "11.1", 3.0, "um", 0.05,
         quote=r"causes a significant error in the position measurement of 3 [ $\mu\text{m}$ ]",
         set="figure_12_2, ripple.encoder"),
-    Row("11.worst_case", "amplitude of all three in the worst phases", "11.1, (11.8), figure 11.5(a)", 6.0, "um", 0.5,
+    Row("11.worst_case", "amplitude of all three errors in the worst phases", "11.1, (11.8), figure 11.5(a)", 6.0, "um",
+        0.5,
         relative=False, quote=r"The error  $e$  has now a maximum of  $6 \text{ } [\mu\text{m}]$",
         set="figure_12_2, all three", remark="one digit in the text; 2 + 0.8 + 3 um"),
-    Row("11.best_case", "the same in the best phases", "11.1, (11.8), figure 11.5(b)", 0.0, "um", 0.5, relative=False,
+    Row("11.best_case", "amplitude of all three errors in the best phases", "11.1, (11.8), figure 11.5(b)", 0.0, "um",
+        0.5, relative=False,
         quote="the resulting error  $e$  is nihil", set="figure_12_2, all three",
-        remark="nihil in the text; 2 + 0.8 - 3 um leave 0.2 um"),
+        remark="nihil in the text; 2 + 0.8 - 3 um give 0.2 um"),
     law=PRESENT_LAW, filter=VELOCITY,
 )  # fmt: skip
 SCALE = under(
@@ -56,13 +58,14 @@ SCALE = under(
     Row("11.peak_capstan", "peak of the error's spectrum at the turn of the capstan", "11.2, figure 11.7", 18.75, "mm",
         0.001, quote=r"The first one, at  $\lambda_k = 18.75$  [mm]"),
     Row("11.peak_150", "bin of the second wave that is fitted", "11.2, figure 11.7", 150.0, "mm", 0.001,
-        quote=OTHERS, chosen=GUIDE, remark="|E| itself has no maximum at 150 mm: 200 mm, between both, is higher"),
+        quote=OTHERS, chosen=GUIDE, remark="|E| has no maximum at 150 mm: it is higher at 200 mm, between both"),
     Row("11.peak_300", "bin of the third wave that is fitted", "11.2, figure 11.7", 300.0, "mm", 0.001,
         quote=OTHERS, chosen=GUIDE),
     Row("11.line_capstan", "wavelength of the first peak, fitted between the bins", "11.1, (11.4)", 18.85, "mm", 0.003,
         quote=r"we get  $\lambda_c = 18.85$  [mm]"),
-    Row("11.of_position", "waves that stay where the speed changes", "11.2", None, "", expected=3.0, quote=THREE,
-        remark="the text has one speed; the second one is our own check"),
+    Row("11.of_position", "waves that stay at their position when the speed changes", "11.2", None, "", expected=3.0,
+        quote=THREE,
+        remark="the text has one speed; the second speed is chosen here as a check"),
     law=PRESENT_LAW, set=PRINTER, filter=VELOCITY,
 )  # fmt: skip
 LUMINANCE = under(
@@ -70,16 +73,16 @@ LUMINANCE = under(
         0.001, quote=r"amplitudes at long wavelengths and a peak at  $\lambda_k = 18.75$  [mm]"),
     Row("11.peak_cross", "peak of the cross spectrum", "11.2, figure 11.9", 18.75, "mm", 0.001,
         quote="This figure clearly shows the effect of the mechanical errors",
-        remark="18.75 mm is that of both spectra; the text names none for this figure"),
+        remark="both spectra have 18.75 mm; the text gives no wavelength for this figure"),
     Row("11.band", "wavelength of the luminance between 17 and 20 mm", "11.3, figure 11.10", 18.75, "mm", 0.01,
         quote=r"The result is a relative constant amplitude wave with  $\lambda \approx 18.75$  [mm]"),
     law=PRESENT_LAW, set=PRINTER + ", luminance chosen here", filter=VELOCITY,
 )  # fmt: skip
 TABLE = under(
     *(
-        Row(f"11.table_{name}", f"share of the capstan's error that a table from {words} takes away",
+        Row(f"11.table_{name}", f"share of the capstan's error that a table from {words} removes",
             f"11.3, {equation}", None, "%", bound="at least", expected=90.0,
-            quote="these errors could be reduced", remark="no number in the text; 90 % is our own demand")
+            quote="these errors could be reduced", remark="no number in the text; 90 % is chosen here")
         for name, words, equation in (
             ("scale", "the linear scale", "(11.12)"), ("luminance", "the luminance", "(11.11), (11.12)"))
     ),

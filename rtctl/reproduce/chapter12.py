@@ -33,7 +33,7 @@ LISTS = {
     "resonance_2": "and a resonance at  $f = 286$  [Hz]",
     "resonance_3": r"thus this system introduces a resonance, at  $f = 2.1 \cdot 10^3$  [Hz]",
 }
-HEADS = "the text has several damped resonances from 50 to 220 Hz beside, as of its print heads; this set has one"
+HEADS = "the text has several damped resonances from 50 to 220 Hz, as of its print heads; this set has one"
 MEASURING = "PD 1e3 (1 + 0.1 s) V/m, 5 mm/s"
 RADII = (
     r"the capstan radius should be increased to  $R_c = 6.2 \cdot 10^{-3}$  [m] and the transmission wheel radius "
@@ -50,7 +50,8 @@ MODES = under(
     *(Row(f"12.{name}", f"{name.replace('_', ' ')} of the set `figure_12_2`", "12.1, figure 12.2", hertz, "Hz", 0.03,
           quote=LISTS[name], set="figure_12_2", chosen=DRAWN)
       for name, hertz, _ in LISTED),
-    *(Row(f"12.{name}_listed", f"{name.replace('_', ' ')} with what appendix F lists", "12.1, appendix F", hertz, "Hz",
+    *(Row(f"12.{name}_listed", f"{name.replace('_', ' ')} with the values of appendix F", "12.1, appendix F", hertz,
+          "Hz",
           0.01, quote=LISTS[name], set="appendix_f", expected=listed,
           erratum=f"the listed k_s, k_c and M give {listed:g} Hz")
       for name, hertz, listed in LISTED),
@@ -73,16 +74,16 @@ AMPLIFIER = under(
         quote=r"the current is  $4.2 \cdot 10^{-2}$  [A]"),
     Row("12.least_torque", "torque of that", "12.2", 0.88, "mNm", 0.01,
         quote=r"which is equal to  $\tau_m = 8.8 \cdot 10^{-4}$  [Nm]"),
-    Row("12.knee", "voltage at which the straight part begins", "12.2, (12.3)", 0.8, "V", 0.01,
+    Row("12.knee", "voltage at which the linear part begins", "12.2, (12.3)", 0.8, "V", 0.01,
         quote=r"For  $0.8 \leq V_i \leq 3.0$  [V], the relation could be approximated by a linear relation"),
-    Row("12.amplifier_gain", "slope of the straight part", "12.2, (12.3)", 0.1, "A/V", 0.01,
+    Row("12.amplifier_gain", "slope of the linear part", "12.2, (12.3)", 0.1, "A/V", 0.01,
         quote="0.042 + 0.1(V_i - 0.8)"),
     Row("12.current_at_3", "current at 3.0 V", "12.2", 230.0, "mA", 0.01,
         quote="At  $V_i = 3.0$  [V], the maximum current of 0.23 [A] is thus reached",
         erratum="(12.3) gives 262 mA", expected=262.0),
     Row("12.torque_at_3", "torque of that", "12.2", 4.8, "mNm", 0.01,
         quote=r"which corresponds to  $\tau_m = 4.8 \cdot 10^{-3}$  [Nm]",
-        erratum="follows from the row above", expected=5.5),
+        erratum="follows from `12.current_at_3`", expected=5.5),
     law="constant voltages, motor held", set="figure_12_2, amplifier (12.3)",
 )  # fmt: skip
 RESPONSE = under(
@@ -107,16 +108,16 @@ MECHANICS = under(
     Row("12.radii_optimum", "gain of the best radii", "12.4", 4.0, "dB", 0.5, relative=False,
         quote="The increase of the process gain at low frequencies is 4 [dB]", remark="likewise"),
     Row("12.optimum_R_c", "best radius of the capstan", "12.4", 6.2, "mm", 0.05, quote=RADII,
-        differs="5.7 mm; the optimum is flat, 0.05 dB from that of the text"),
+        differs="5.7 mm; the optimum is flat: 0.05 dB from the optimum of the text"),
     Row("12.optimum_R_t", "best radius of the wheel", "12.4", 23.0, "mm", 0.05, quote=RADII,
-        differs="19.2 mm; the optimum is flat, 0.05 dB from that of the text"),
-    Row("12.slip_wheel", "motor torque at which the motor slips on the wheel", "12.5", 14.0, "mNm", 0.05,
+        differs="19.2 mm; the optimum is flat: 0.05 dB from the optimum of the text"),
+    Row("12.slip_wheel", "motor torque at which the motor shaft slips on the wheel", "12.5", 14.0, "mNm", 0.05,
         quote=r"$\tau_{max} = 14$  [mNm]"),
     Row("12.slip_strip", "motor torque at which the capstan slips on the strip", "12.5", 2.5, "mNm", 0.05,
         quote=r"$\tau_{max} = 2.5$  [mNm]", remark="0.8 x 20 N x 3 mm / 20 is 2.4 mNm"),
     Row("12.normal_force", "normal force without slip, present radii", "12.5", 125.0, "N", 0.03,
         quote=r"For the present design this means that  $F_N \geq 125$  [N]", chosen=TORQUE,
-        remark="117 N at most with the 14 mNm that 12.5 calls more than the motor's continuous torque"),
+        remark="117 N at most with the 14 mNm that section 12.5 calls more than the continuous torque of the motor"),
     Row("12.normal_force_optimum", "normal force without slip, R_c = 6.2 and R_t = 23 mm", "12.5", 46.0, "N", 0.03,
         quote=r"the pressure force can be reduced to  $F_N \geq 46$  [N]", chosen=TORQUE),
     set="appendix_f",
@@ -141,7 +142,7 @@ FRICTION = under(
     law="slow ramp of the reference, soft proportional law", set="figure_12_2, the error chain of ldu_printer",
 )  # fmt: skip
 PRESENT = under(
-    Row("12.present_bandwidth", "bandwidth of the present loop while it runs", "12.7, figure 12.8", 8.0, "Hz", 0.06,
+    Row("12.present_bandwidth", "bandwidth of the running present loop", "12.7, figure 12.8", 8.0, "Hz", 0.06,
         quote="The system bandwidth is approximately 8 [Hz]", chosen=PRESENT_GAINS),
     Row("12.present_gain_margin", "its gain margin", "12.7, figure 12.8", 2.0, "dB", 0.3, relative=False,
         quote="The obtained gain margin is only 2 [dB]", chosen=PRESENT_GAINS, remark="whole decibels in the text"),
@@ -149,26 +150,29 @@ PRESENT = under(
 )  # fmt: skip
 SHAPED = under(
     Row("12.bandwidth", "bandwidth with lead-lag, notch and low-pass, on the measured response",
-        "12.7, figure 12.9", 52.0, "Hz", 0.05, quote=WITH_NOTCHES, remark=f"the largest with these margins; {HEADS}"),
+        "12.7, figure 12.9", 52.0, "Hz", 0.05, quote=WITH_NOTCHES,
+        remark=f"the largest bandwidth with these margins; {HEADS}"),
     Row("12.gain_margin", "its gain margin", "12.7, figure 12.9", 11.0, "dB", bound="at least", quote=WITH_NOTCHES,
         chosen=LIMITS),
     Row("12.phase_margin", "its phase margin", "12.7, figure 12.9", 60.0, "deg", bound="at least", quote=WITH_NOTCHES,
         chosen=LIMITS),
-    Row("12.notches", "notches of it that take away 3 dB or more", "12.7, figure 12.9", 2.0, "",
+    Row("12.notches", "notches that reduce the gain by 3 dB or more", "12.7, figure 12.9", 2.0, "",
         quote="a bode plot of a lead-lag controller with two notches",
-        differs="the second one, at 235 Hz, takes away 0.3 dB: " + HEADS),
-    Row("12.bandwidth_running", "bandwidth of that loop while it runs", "12.7", 50.0, "Hz", 0.03, bound="at least",
+        differs="the second notch, at 235 Hz, reduces the gain by 0.3 dB: " + HEADS),
+    Row("12.bandwidth_running", "bandwidth of the running loop with lead-lag, notch and low-pass", "12.7", 50.0, "Hz",
+        0.03, bound="at least",
         quote="a closed loop bandwidth of 50 [Hz] can be easily obtained",
-        remark="read where |T| first falls below -3 dB, so with lines up to 150 Hz only: more lines have less each, "
-        "and noise makes one fall too early; equal machines that round otherwise are read as 49.7 to 51.1 Hz"),
+        remark="read where |T| first falls below -3 dB, with lines up to 150 Hz: with more lines each is weaker, and "
+        "noise moves the first one below -3 dB to a lower frequency; 49.7 to 51.1 Hz on processors that round "
+        "differently"),
     Row("12.gain_margin_running", "its gain margin", "12.7, figure 12.9", 11.0, "dB", 0.5, relative=False,
         bound="at least", quote=WITH_NOTCHES, chosen=LIMITS,
-        remark="a count of the encoder is 0.3 dB at the frequency where it is read"),
+        remark="a count of the encoder is 0.3 dB at the frequency of the margin"),
     Row("12.phase_margin_running", "its phase margin", "12.7, figure 12.9", 60.0, "deg", 1.5, relative=False,
         bound="at least", quote=WITH_NOTCHES, chosen=LIMITS, remark="likewise"),
     law=SHAPED_LAW, set="figure_12_2", filter="low-pass 2 kHz",
 ) + under(
-    Row("12.feedforward", "tracking error of printing steps with feedforward over that without", "12.7, figure 12.10",
+    Row("12.feedforward", "tracking error of printing steps, with feedforward over without", "12.7, figure 12.10",
         None, "", bound="at most", expected=1.0,
         quote="To further optimize the performance, in addition to feedback a feedforward controller",
         remark="no number in the text"),

@@ -29,21 +29,25 @@ SET = f"{ch.PRINTER}, print heads, {INKS}"
 COLOR = under(
     Row("11.color_before", "colour difference dE of the grey image, root of the mean square", "10", None, "",
         bound="at least", expected=0.3, quote=DEVIATION,
-        remark="no number in the text; an eye just sees a dE of 1. Error of the measurement alone, as in 11.2"),
-    Row("11.color_table", "the same with an error table from the scale, over that before", "11.3, (11.12)", None, "",
+        remark="no number in the text; a dE of 1 is just visible. Error of the measurement alone, as in section 11.2"),
+    Row("11.color_table", "colour difference with an error table from the scale, over the difference without",
+        "11.3, (11.12)", None, "",
         bound="at most", expected=0.5, quote=REDUCED,
-        remark="no number in the text; the guide's waves and dirt are left"),
-    Row("11.color_direct", "the same with direct measurement, over that before", "11.3", None, "", bound="at most",
+        remark="no number in the text; the waves of the guide and dirt remain"),
+    Row("11.color_direct", "colour difference with direct measurement, over the difference without", "11.3", None, "",
+        bound="at most",
         expected=0.2, quote=NO_EFFECT, law=ch.PRESENT_LAW + ", feedback by the scale",
-        remark="no number in the text; what is left are the counts of the scale, 0.5 um"),
-    Row("11.turn_direct", "tracking error that comes back with the turn, with direct measurement", "11.3", None, "um",
+        remark="no number in the text; the counts of the scale, 0.5 um, remain"),
+    Row("11.turn_direct", "tracking error that repeats with the turn, with direct measurement", "11.3", None, "um",
         bound="at most", expected=1.0, quote=NO_EFFECT, law=ch.PRESENT_LAW + ", feedback by the scale, shaper 60 rad/s",
         remark="no number in the text; after 20 turns of the capstan"),
-    Row("11.turn_repetitive", "the same with repetitive control over the turn, over that without", "11.3", None, "",
+    Row("11.turn_repetitive", "tracking error that repeats with the turn, with repetitive control over without", "11.3",
+        None, "",
         bound="at most", expected=1.0, quote=REDUCED,
         law=ch.PRESENT_LAW + ", feedback by the scale, shaper 60 rad/s, repetitive control",
-        differs="nothing is left that comes back with the turn; what is learned at the start of the pass, while the "
-                "integral comes in, is in the way afterwards; on the encoder the loop sees no error of the turn",
+        differs="no error that repeats with the turn remains. The law learns errors at the start of the pass, while "
+                "the integral settles, and they disturb it afterwards. The loop on the encoder does not measure the "
+                "error of the turn",
         remark="no number in the text"),
     *(
         Row(f"11.coherence_{name}", f"coherence of error and luminance at {words} mm", "11.2, figure 11.9", None, "",
@@ -51,7 +55,8 @@ COLOR = under(
             remark=f"no number in the text; its abstract has a large coherence at three wavelengths. {PRINTS} prints")
         for name, words in NAMES.items()
     ),
-    Row("11.coherence_else", "median of it from 25 to 120 mm, where no line is", "11.2, figure 11.9", None, "",
+    Row("11.coherence_else", "median of the coherence from 25 to 120 mm, where no line is", "11.2, figure 11.9", None,
+        "",
         bound="at most", expected=0.3, quote=CLEARLY, remark="no number in the text; noise alone gives 1 / prints"),
     law=ch.PRESENT_LAW, set=SET, filter=ch.VELOCITY,
 )  # fmt: skip
@@ -163,9 +168,9 @@ def figure_11_11(short: bool) -> Picture:
     C.set(xlabel="wavelength [mm]", ylabel="coherence", ylim=(0, 1.05))
     got = colors(short)
     sentence = (
-        f"Not in the text: colour difference of CIE 1976 of a grey image, {INKS}: {got['11.color_before']:.2f} as the "
-        f"printer is, {got['11.color_table']:.2f} of it with an error table and {got['11.color_direct']:.2f} measured "
-        f"directly; below, the coherence of position error and luminance over {PRINTS} prints."
+        f"Not in the text: CIE 1976 colour difference of a grey image ({INKS}): {got['11.color_before']:.2f} for the "
+        f"printer as it is, {got['11.color_table']:.2f} of this with an error table and {got['11.color_direct']:.2f} "
+        f"with direct measurement. Below: the coherence of position error and luminance over {PRINTS} prints."
     )
     return Picture("11.11", sentence, figure)
 

@@ -49,7 +49,7 @@ def figure_8_3(short: bool) -> Picture:
     fig.legend(axes[0])
     sentence = (
         f"Measured and fitted response of the identified set at 38/22 mm: K_p = {found.K_p.value:.1f} rad/s^2/A at 1 "
-        f"Hz, and the phase is that of the model once {1e3 * found.tau.value:.2f} ms of delay are in it."
+        f"Hz, and the phase agrees with the model with {1e3 * found.tau.value:.2f} ms of delay."
     )
     return Picture("8.3", sentence, figure)
 
@@ -76,9 +76,9 @@ def figure_8_4(short: bool) -> Picture:
     axes.set(xlabel="speed of the capstan [rad/s]", ylabel="friction of a motor [mNm]")
     fig.legend(axes)
     sentence = (
-        "Friction over velocity by the motor that pulls, both motors, capstan and tape in it, points and fit of (8.3): "
-        f"{1e3 * said[0]:.2f} mNm at any speed on the shipped machine. The curve that falls has a Stribeck term of 4 "
-        "mNm and 0.3 rad/s added to motor 1, chosen here: the text prints none of its Stribeck parameters."
+        "Friction over velocity, measured by the pulling motor (both motors, capstan and tape together), points and "
+        f"fit of (8.3): {1e3 * said[0]:.2f} mNm at any speed on the shipped machine. The falling curve has a "
+        "Stribeck term of 4 mNm and 0.3 rad/s at motor 1, chosen here: the text prints no Stribeck parameters."
     )
     return Picture("8.4", sentence, figure)
 
@@ -99,8 +99,8 @@ def figure_8_5(short: bool) -> Picture:
     fig.legend(opened)
     sentence = (
         "Loop, closed loop, sensitivity and Nyquist plot of the identified set at 38/22 mm, without filter, with G = "
-        f"{ch.loop(short)['8.gain']:.2f} A/rad: "
-        f"{got.margins.GM:.1f} dB and {got.margins.PM:.0f} deg measured while it runs."
+        f"{ch.loop(short)['8.gain']:.2f} A/rad: {got.margins.GM:.1f} dB and {got.margins.PM:.0f} deg measured in the "
+        "running loop."
     )
     return Picture("8.5", sentence, figure)
 
@@ -126,10 +126,10 @@ def figure_8_6(short: bool) -> Picture:
     pushes = ch.radian(ch.TAU_C, slack=False)
     least = min(float(pushes[f"truth_tension{i}"].min()) for i in (1, 2))
     sentence = (
-        f"Steps of a radian at 25/35 mm, identified set, tape that cannot push: with 2.4 mNm compensated the errors "
+        "Steps of a radian at 25/35 mm, identified set, tape that cannot push: with 2.4 mNm compensated the errors "
         f"are {said[0]} mrad with the law as printed, and {said[2]} mrad with the shipped filter of 40 Hz on the "
-        f"derivative. Without tape.slack the tape pushes ({least:.1f} N), and they are {said[1]} mrad as printed and "
-        f"{said[3]} mrad with the filter. The text has 9.8 and 10.6 mrad."
+        f"derivative. Without tape.slack the tape pushes ({least:.1f} N), and the errors are {said[1]} mrad as "
+        f"printed and {said[3]} mrad with the filter. The text has 9.8 and 10.6 mrad."
     )
     return Picture("8.6", sentence, figure)
 

@@ -25,8 +25,8 @@ def figure_11_2(short: bool) -> Picture:
     above.set(ylabel="R_c - mean [um]")
     below.set(ylabel="error [um]", xlabel="rotation of the capstan [deg]", xlim=(0, 1080))
     sentence = (
-        "An oval capstan on the emulator: a radius that swings by 2 um makes an error of "
-        f"{1e6 * 2 * ch.amplitude(one):.1f} um from end to end."
+        "An oval capstan on the emulator: a radius that varies by 2 um gives an error of "
+        f"{1e6 * 2 * ch.amplitude(one):.1f} um peak to peak."
     )
     return Picture("11.2", sentence, figure)
 
@@ -63,8 +63,8 @@ def figure_11_4(short: bool) -> Picture:
     below.set(ylabel="error x - l [um]", xlabel="position [mm]")
     whole = -1e6 * mechanics.strip_error(STRIP, WAVE, 0.2)
     sentence = (
-        f"Path along a strip that waves by 0.1 mm over 100 mm, by (11.6): {whole:.1f} um over 200 mm, a small "
-        "error for so large a wave."
+        f"Path along a strip with a wave of 0.1 mm over 100 mm, by (11.6): {whole:.1f} um over 200 mm, a small error "
+        "for a wave of this size."
     )
     return Picture("11.4", sentence, figure)
 
@@ -83,8 +83,8 @@ def figure_11_5(short: bool) -> Picture:
         said.append(1e6 * ch.amplitude(run))
     axes[0].set_ylabel("error [um]")
     sentence = (
-        f"Capstan, bearing and coupling together on the emulator: {said[0]:.1f} um of amplitude where they add, "
-        f"{said[1]:.1f} um where they do not."
+        f"Capstan, bearing and coupling together on the emulator: {said[0]:.1f} um of amplitude where the errors "
+        f"add, {said[1]:.1f} um where they cancel."
     )
     return Picture("11.5", sentence, figure)
 
@@ -122,10 +122,9 @@ def figure_11_7(short: bool) -> Picture:
     size = {mm: 1e6 * float(np.abs(found.E[np.argmin(np.abs(found.wavelength - 1e-3 * mm))])) for mm in (150, 200, 300)}
     bins = ", ".join(f"{1e3 * peak.bin:.2f}" for peak in peaks)
     sentence = (
-        "Fourier transform (11.10) of that error on two scales. Waves fitted to it have "
-        f"{bins} mm. It does not show 150 and 300 mm as two peaks, as the text says of its own figure: the "
-        f"window merges both into one maximum, with {size[300]:.1f}, {size[200]:.1f} and {size[150]:.1f} um at 300, "
-        "200 and 150 mm."
+        f"Fourier transform (11.10) of the position error on two scales. The fitted waves have {bins} mm. The "
+        "transform does not show 150 and 300 mm as two peaks, as the text says of its own figure: the window merges "
+        f"both into one maximum, with {size[300]:.1f}, {size[200]:.1f} and {size[150]:.1f} um at 300, 200 and 150 mm."
     )
     return Picture("11.7", sentence, figure)
 
@@ -152,9 +151,9 @@ def figure_11_9(short: bool) -> Picture:
     share = [100 * float(np.abs(cross.S[np.argmin(np.abs(cross.wavelength - mm))]) / np.abs(cross.S).max())
              for mm in (0.15, 0.3)]  # fmt: skip
     sentence = (
-        "Cross power spectrum of position error and emulated luminance on two scales: they share "
+        "Cross power spectrum of position error and emulated luminance on two scales: both have "
         f"{ch.by_luminance(short)['11.peak_cross']:.2f} mm, the turn of the capstan. The long waves of the guide are "
-        f"weak in it, {share[0]:.0f} % of that at 150 mm and {share[1]:.0f} % at 300 mm: the emulated luminance "
+        f"weak, with {share[0]:.0f} % of this peak at 150 mm and {share[1]:.0f} % at 300 mm: the emulated luminance "
         "follows the slope of the error."
     )
     return Picture("11.9", sentence, figure)
@@ -167,7 +166,7 @@ def figure_11_10(short: bool) -> Picture:
     fig.line(axes, 1e3 * band.x, band.L)
     axes.set(xlim=(0, 600), xlabel="position [mm]", ylabel="L* in the band")
     sentence = (
-        f"Luminance between 17 and 20 mm: a wave of {1e3 * band.wavelength:.2f} mm whose size changes by "
+        f"Luminance between 17 and 20 mm: a wave of {1e3 * band.wavelength:.2f} mm whose amplitude changes by "
         f"{100 * band.ripple:.0f} %."
     )
     return Picture("11.10", sentence, figure)

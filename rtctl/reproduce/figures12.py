@@ -41,8 +41,8 @@ def figure_12_2(short: bool) -> Picture:
     first, zero, second, third = (value[f"12.{name}"] for name, _, _ in ch.LISTED)
     sentence = (
         f"Motor current to carriage without damping: modes at {first:.0f}, {second:.0f} and {third:.0f} Hz and an "
-        f"anti-resonance at {zero:.0f} Hz in the set figure_12_2, whose k_s, k_c and M are chosen here from the figure "
-        "of the text, and higher with what appendix F lists."
+        f"anti-resonance at {zero:.0f} Hz in the set figure_12_2, whose k_s, k_c and M are chosen here from the "
+        "figure of the text, and higher with the values of appendix F."
     )
     return Picture("12.2", sentence, figure)
 
@@ -59,7 +59,7 @@ def figure_12_3(short: bool) -> Picture:
     fig.legend(axes)
     sentence = (
         f"Current of the motor driver over its input, the motor held: {1e3 * found.I_0:.0f} mA up to "
-        f"{found.V_k:.2f} V and {found.gain:.3f} A/V from there on."
+        f"{found.V_k:.2f} V, and {found.gain:.3f} A/V above."
     )
     return Picture("12.3", sentence, figure)
 
@@ -77,9 +77,8 @@ def figure_12_4(short: bool) -> Picture:
     axes[2].set_xlabel("time [s]")
     most = ch.identification(short)["12.excitation"]
     sentence = (
-        "In place of the block diagram of the text, signals of the sensitivity measurement while it runs at 5 mm/s: "
-        "noise is added to the controller's output, and what is written stays below "
-        f"{most:.2f} V."
+        "In place of the block diagram of the text, signals of the sensitivity measurement in motion at 5 mm/s: "
+        f"noise is added to the output of the controller, and the written command stays below {most:.2f} V."
     )
     return Picture("12.4", sentence, figure)
 
@@ -130,7 +129,7 @@ def figure_12_6(short: bool) -> Picture:
     best = mechanics.optimum(mechanics.named())
     sentence = (
         "Effect of the radii of capstan and wheel on the response to the motor's current, drawn with the set "
-        f"figure_12_2. With appendix F the best pair, {1e3 * best.R_c:.1f} and {1e3 * best.R_t:.1f} mm, wins "
+        f"figure_12_2. With appendix F the best pair, {1e3 * best.R_c:.1f} and {1e3 * best.R_t:.1f} mm, gains "
         f"{best.gain:.1f} dB; the text has 6.2 and 23 mm."
     )
     return Picture("12.6", sentence, figure)
@@ -142,8 +141,8 @@ def figure_12_8(short: bool) -> Picture:
     figure = _loop(config("ldu"), "present")
     sentence = (
         "Closed loop and sensitivity with the present controller, its gains chosen here for 8 Hz and 2 dB, measured "
-        "while it runs and of the model, set figure_12_2: "
-        f"{reached.bandwidth:.1f} Hz, and {reached.GM:.1f} dB of gain margin."
+        f"in the running loop and computed by the model, set figure_12_2: {reached.bandwidth:.1f} Hz, and "
+        f"{reached.GM:.1f} dB of gain margin."
     )
     return Picture("12.8", sentence, figure)
 
@@ -155,9 +154,9 @@ def figure_12_9(short: bool) -> Picture:
     figure = _loop(shaping.applied(config("ldu"), ch.shaped().law), "shaped")
     sentence = (
         "Lead-lag, notches and low-pass, found by optimisation for 11 dB and 60 deg on the measured response: "
-        f"{reached.bandwidth:.0f} Hz, {reached.GM:.1f} dB and {reached.PM:.0f} deg measured while it runs. Of the two "
-        f"notches one acts, by {first:.0f} dB; the other takes away {second:.1f} dB, for this set has none of the "
-        "resonances of the print heads; figure 12.11 has them."
+        f"{reached.bandwidth:.0f} Hz, {reached.GM:.1f} dB and {reached.PM:.0f} deg measured in the running loop. One "
+        f"of the two notches reduces the gain by {first:.0f} dB, the other by {second:.1f} dB, since this set has "
+        "none of the resonances of the print heads; figure 12.11 has them."
     )
     return Picture("12.9", sentence, figure)
 

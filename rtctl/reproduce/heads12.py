@@ -26,23 +26,23 @@ HEADS = under(
     Row("12.heads_seen", "resonances from 50 to 220 Hz that the measured response shows", "12.3, figure 12.5", None, "",
         bound="at least", expected=3.0, quote=SEVERAL, law=ch.MEASURING, filter="derivative 1000 Hz", chosen=CHOSEN,
         remark="no number in the text: several"),
-    Row("12.heads_present_bandwidth", "bandwidth of the present loop while it runs", "12.7, figure 12.8", 8.0, "Hz",
+    Row("12.heads_present_bandwidth", "bandwidth of the running present loop", "12.7, figure 12.8", 8.0, "Hz",
         0.06, quote="The system bandwidth is approximately 8 [Hz]", law=ch.PRESENT_LAW, filter="velocity 200 Hz",
         chosen=ch.PRESENT_GAINS),
     Row("12.heads_present_margin", "its gain margin", "12.7, figure 12.8", 2.0, "dB", 0.5, relative=False,
         quote="The obtained gain margin is only 2 [dB]", law=ch.PRESENT_LAW, filter="velocity 200 Hz",
-        differs="8 dB: the heads take up the mode of the carriage at 114 Hz, which leaves 2 dB without them"),
-    Row("12.heads_kept_margin", "gain margin of the filters that were made without the heads", "12.7, figure 12.9",
+        differs="8 dB: the heads damp the mode of the carriage at 114 Hz, which leaves a margin of 2 dB without heads"),
+    Row("12.heads_kept_margin", "gain margin of filters designed without the heads", "12.7, figure 12.9",
         11.0, "dB", bound="at least", quote=ch.WITH_NOTCHES, law=KEPT,
-        differs="8 dB, and stable: the filters have to be made on a response of the machine that they are for"),
-    Row("12.heads_bandwidth", "bandwidth of filters made on the response with the heads", "12.7, figure 12.9", 50.0,
+        differs="8 dB, and stable: filters have to be designed on the response of their own machine"),
+    Row("12.heads_bandwidth", "bandwidth of filters designed on the response with the heads", "12.7, figure 12.9", 50.0,
         "Hz", bound="at least", quote="a closed loop bandwidth of 50 [Hz] can be easily obtained", law=MADE,
-        remark="the largest with 11 dB and 60 deg; the text has 52 Hz"),
+        remark="the largest bandwidth with 11 dB and 60 deg; the text has 52 Hz"),
     Row("12.heads_gain_margin", "their gain margin", "12.7, figure 12.9", 11.0, "dB", bound="at least",
         quote=ch.WITH_NOTCHES, law=MADE, chosen=ch.LIMITS),
     Row("12.heads_phase_margin", "their phase margin", "12.7, figure 12.9", 60.0, "deg", bound="at least",
         quote=ch.WITH_NOTCHES, law=MADE, chosen=ch.LIMITS),
-    Row("12.heads_notches", "notches of them that take away 3 dB or more", "12.7, figure 12.9", 2.0, "",
+    Row("12.heads_notches", "notches with the heads that reduce the gain by 3 dB or more", "12.7, figure 12.9", 2.0, "",
         quote="a bode plot of a lead-lag controller with two notches", law=MADE,
         differs="one notch, of 8 dB at 81 Hz, is enough with the heads chosen here"),
     set=SET, filter="low-pass 2 kHz",
@@ -126,8 +126,8 @@ def figure_12_11(short: bool) -> Picture:
     value = with_heads(short)
     sentence = (
         "Figures 12.5, 12.8 and 12.9 with the print heads of ldu_printer, chosen here: the response by a multisine, "
-        "and the loops while they run: the present controller, the filters made without the heads "
-        f"({value['12.heads_kept_margin']:.1f} dB of gain margin), and those made with them "
+        "and the running loops: the present controller, the filters designed without the heads "
+        f"({value['12.heads_kept_margin']:.1f} dB of gain margin), and the filters designed with the heads "
         f"({value['12.heads_bandwidth']:.0f} Hz at {value['12.heads_gain_margin']:.0f} dB and "
         f"{value['12.heads_phase_margin']:.0f} deg)."
     )

@@ -25,19 +25,24 @@ MOTORS = under(
     Row("9.stall_torque", "torque at standstill by K V / R, less that of 24 mA", "Appendix E", 23.0, "mNm", 0.05,
         quote=LINE),
     Row("9.no_load_speed", "speed without load by (V - R I_0) / K", "Appendix E", 3550.0, "rpm", 0.01, quote=LINE),
-    Row("9.gear_speed", "the same behind the gear of 150.4", "Appendix E", 24.4, "rpm", 0.05, quote=GEAR),
-    Row("9.gear_constant", "torque constant behind that gear over K_m of the identified set", "Appendix A", 1.0, "",
+    Row("9.gear_speed", "speed without load behind the gear of 150.4", "Appendix E", 24.4, "rpm", 0.05, quote=GEAR),
+    Row("9.gear_constant", "torque constant behind the gear of 150.4 over K_m of the identified set", "Appendix A", 1.0,
+        "",
         0.01, quote="$K_{m1} = K_{m2}$	6.1e-2	6.1e-2	Motor constant 1", expected=150.4,
-        erratum="61 mNm/A is that of the rotor; the reels stand behind a gear of 150.4, where it is 9.2 Nm/A"),
+        erratum="61 mNm/A is the constant of the rotor; the reels are behind a gear of 150.4, where the constant is "
+            "9.2 Nm/A"),
     Row("9.gear_friction", "friction behind the gear, of 24 mA, over the torque of 0.1 N at 30 mm", "9", None, "",
         bound="at least", expected=1.0, quote="This transmission also introduces large friction forces",
-        remark="no number in the text; the identified 2.4 mNm are 1.6 times that of the rotor, 1.5 mNm, and 1 % of "
-        "this: a paying reel behind this gear has to be driven, its tape cannot turn it"),
-    Row("9.motor_speed", "speed that 0.2 m in 2 s asks for, R = 20 mm, over that of the gear of 150.4", "9", None, "",
-        bound="at least", expected=1.0, quote=OTHER, remark="no number in the text: too slow, though 0.02 m/s is not"),
-    Row("9.motors_fit", "motors of appendix E, with a gear, that do every move and are turned back by 1 N", "9", None,
+        remark="no number in the text; the identified 2.4 mNm are 1.6 times the friction of the rotor, 1.5 mNm, and "
+        "1 % of the friction behind the gear. The motor has to drive a paying reel behind this gear; the tape cannot "
+        "turn it"),
+    Row("9.motor_speed", "speed for 0.2 m in 2 s, R = 20 mm, over the speed behind the gear of 150.4", "9", None, "",
+        bound="at least", expected=1.0, quote=OTHER, remark="no number in the text: 0.2 m in 2 s is too fast for the "
+            "gear; 0.02 m/s is not"),
+    Row("9.motors_fit", "motors of appendix E, with a gear, that can do every move and that 1 N turns back", "9", None,
         "", 0.0, expected=0.0, quote=OTHER, remark="no number in the text; 1 N is chosen here, ten times F_t"),
-    Row("9.brushless_fit", "moves that a brushless motor behind 4:1 does and is turned back by 1 N", "9", None, "", 0.0,
+    Row("9.brushless_fit", "moves that a brushless motor behind 4:1 can do, while 1 N turns it back", "9", None, "",
+        0.0,
         expected=3.0, quote=SAME, set="brushless motor chosen here: 24 V, 1.2 ohm, 33.5 mNm/A, 9.2e-6 kg m^2",
         remark="no number in the text"),
     set="appendix E, rotor of 6.6e-8 kg m^2 chosen from J_m = 1.5e-3 kg m^2",
@@ -110,9 +115,10 @@ def figure_9_2(short: bool) -> Picture:
     made.set_fontsize(7)
     made.scale(1.0, 1.6)
     sentence = (
-        "Not in the text: torque over speed of the 24 V motors of appendix E and a brushless one, with "
-        "what moves of 0.2 m at 0.02 m/s, of 0.2 m in 2 s and of 12.5 mm in 1 s ask for at 20 and 40 mm. A move counts "
-        "where torque is left at its speed and the tape turns the other reel's motor back with less than 1 N."
+        "Not in the text: torque over speed of the 24 V motors of appendix E and of a brushless motor, with the "
+        "torque and speed of three moves at 20 and 40 mm: 0.2 m at 0.02 m/s, 0.2 m in 2 s and 12.5 mm in 1 s. A move "
+        "counts as possible where the motor has torque left at the speed of the move, and the tape turns the motor "
+        "of the other reel back with less than 1 N."
     )
     return Picture("9.2", sentence, figure)
 

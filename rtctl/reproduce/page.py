@@ -1,4 +1,4 @@
-"""The page: one table a chapter, thesis beside measured, what is to be said of the rows, and the figures."""
+"""Text of docs/reproduction.md: tables by chapter with thesis and measurement, notes on rows, and figures."""
 
 import textwrap
 from collections import Counter
@@ -24,10 +24,10 @@ TITLES = {
     11: "Chapter 11: measurement error",
     12: "Chapter 12: performance",
 }
-HEAD = """# The thesis done again
+HEAD = """# The thesis reproduced
 
-The experiments and designs of *Motion Control of Industrial Printers*, played on the emulated machines and computed on
-their models by `rtctl reproduce`, which wrote this page.
+The command `rtctl reproduce` wrote this page. It repeats the experiments and designs of *Motion Control of Industrial
+Printers* on the emulated machines and on their models.
 
 {words}
 
@@ -37,47 +37,49 @@ rtctl reproduce --only 8         # one chapter, one row or one figure
 rtctl reproduce --json           # the rows for a program
 ```
 
-A row passes where the measured number is within the tolerance of the thesis's, or above or below it where it says so.
-A row without a number in the text is held against what the text claims, in parentheses.
+A row passes if the measured number is within the tolerance of the number of the thesis. With `at least` and `at most`
+it passes above or below that number. A row without a number in the text is compared with the claim of the text, which
+stands in parentheses.
 
-- **erratum**: the thesis contradicts its own equations. The row is held against the number that the equations give.
-- **chosen**: an input is not of the thesis. It was chosen here so that the number comes out.
-- **differs**: the emulated machine does not give the number. The note says why.
+- **erratum**: the thesis contradicts its own equations. The row is compared with the number that the equations give.
+- **chosen**: the thesis does not give an input. The input was chosen here so that the row agrees.
+- **differs**: the emulated machine does not give the number of the thesis. The note says why.
 
-The second table of a chapter says which law, which parameter set and which filter a row was computed with, and quotes
-the text. What follows the name of a parameter set was put in here.
+The second table of a chapter has the law, the parameter set and the filter of each row, and quotes the text. Words
+after the name of a parameter set are changes that were made here.
 
-- `simulation` is that column of appendix A.
-- `identified` is the other one, with R_c = 12.5 mm. Friction of 2.6 mNm at motor 2 and 0.1 mNm at the capstan is
+- `simulation` is the column *simulation* of appendix A.
+- `identified` is the other column, with R_c = 12.5 mm. Friction of 2.6 mNm at motor 2 and of 0.1 mNm at the capstan is
   chosen here.
-- `ivu-old` is the unit of chapter 2. Its torque, window, speed and radii are of the text; its motor, its camera and
-  the guides of its path are chosen here.
-- `appendix_f` is as listed, `figure_12_2` has k_s, k_c and M chosen here. The text has no damping; it is chosen here.
+- `ivu-old` is the unit of chapter 2. The text gives its torque, window, speed and radii; its motor, its camera and the
+  guides of its path are chosen here.
+- `appendix_f` is as listed. In `figure_12_2`, k_s, k_c and M are chosen here. The text has no damping; it is chosen
+  here.
 
-The emulated machines have these parameters. So a row that identifies one of them shows that the experiment finds what
-is there; it does not show again what the real machines had.
+The emulated machines have these parameters. A row that identifies a parameter therefore shows that the experiment finds
+the parameter. It does not confirm the parameter of the real machines.
 """
 COLUMNS = ("name", "quantity", "thesis", "measured", "tolerance", "", "source")
 WITH = ("name", "law", "parameter set", "filter", "text of the thesis")
 
-ERRATA = (  # errata of the thesis without a number: section, its words, what is right
-    ("12.1", r"-\frac{b_c + N^2b_m}{J_t}", "b_m is b_s, in appendix F too"),
+ERRATA = (  # errata of the thesis without a number: section, text, correction
+    ("12.1", r"-\frac{b_c + N^2b_m}{J_t}", "b_m has to be b_s, in appendix F too"),
     ("Appendix F", "0 & 1 & 0 & 0 & 0 & 0 & 0 & 0 & 0", "A, B and C have a ninth column for eight states"),
     ("Appendix A", "$c_{m1} = c_{m2}$	8.0e1	1.2e1	torsion spring constant motor shaft	[Nm]",
      "Nm/rad, and Nms/rad for the damping; in appendix F too"),
-    ("7.2", r"f_0 = \sqrt{\frac{G_{mo} R_S}{R_F R_4 C_F C}}", "that is the angular frequency, 2 pi f_0"),
+    ("7.2", r"f_0 = \sqrt{\frac{G_{mo} R_S}{R_F R_4 C_F C}}", "the formula is the angular frequency, 2 pi f_0"),
 )  # fmt: skip
 
 
 def write(results: Sequence[Result], out: Path) -> Path:
-    """Write the page into the folder `out` and return its path. Raises OSError where that cannot be."""
+    """Write the page into the folder `out`; returns its path. Raises OSError for a folder that cannot be written."""
     path = out / PAGE
     write_text(path, text(results))
     return path
 
 
 def text(results: Sequence[Result]) -> str:
-    """The page of these results."""
+    """Text of the page of results, in Markdown."""
     parts = [HEAD.format(words=_wrapped(summary([row for result in results for row in result.rows])))]
     for chapter, group in groupby(results, key=lambda result: result.chapter):
         parts.append(_chapter(chapter, list(group)))
@@ -85,7 +87,7 @@ def text(results: Sequence[Result]) -> str:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """How many rows have which verdict, in two sentences."""
+    """Number of rows by verdict, in sentences."""
     count = Counter(row.verdict for row in rows)
     bare, some = sum(row.thesis is None for row in rows), "row" if len(rows) == 1 else "rows"
     text = (
@@ -146,13 +148,13 @@ def _note(row: Row) -> str:
 
 
 def value(x: float, unit: str) -> str:
-    """A number with its unit, to four digits."""
+    """Number with its unit, to four digits."""
     number = f"{x:.4g}" if x == 0 or 1e-3 <= abs(x) < 1e5 else f"{x:.3g}"
     return f"{number} {unit}".rstrip()
 
 
 def tolerance(row: Row) -> str:
-    """The tolerance in words: 3 %, 0.5 Hz, at least, at most."""
+    """Tolerance in words: 3 %, 0.5 Hz, at least, at most."""
     size = ""
     if row.tolerance:
         size = f"{100 * row.tolerance:g} %" if row.relative else value(row.tolerance, row.unit)

@@ -23,15 +23,18 @@ FASTER = "the speed of positioning must be increased without losing accuracy"
 BEST = "lead-lag, notch, low-pass, computed torque, friction in full"
 
 STROKE = under(
-    Row("12.step_present", "time of a step of 1/12 mm until it stays within 10 um, present law", "11.3", None, "s",
+    Row("12.step_present", "settling time of a step of 1/12 mm to 10 um, present law", "11.3", None, "s",
         bound="at most", expected=0.5, quote=FASTER, law=ch.PRESENT_LAW, filter="velocity 200 Hz",
-        remark="no number in the text; the quickest shaper of 60 to 240 rad/s with which all steps arrive; 10 um "
-        "are chosen here: within 4 um not every step arrives with the best law, friction and counts leave up to 8 um"),
-    Row("12.step_best", "the same with the best law, over that", "11.3", None, "", bound="at most", expected=0.5,
+        remark="no number in the text; the fastest shaper of 60 to 240 rad/s with which all steps arrive. 10 um is "
+        "chosen here: with the best law not every step arrives within 4 um, since friction and counts leave errors "
+        "of up to 8 um"),
+    Row("12.step_best", "settling time of a step with the best law, over the present law", "11.3", None, "",
+        bound="at most", expected=0.5,
         quote=FASTER, law=BEST, filter="low-pass 2 kHz", remark="no number in the text"),
-    Row("12.stroke_present", "stroke of 600 mm in such steps, present law", "11.3", None, "min", bound="at most",
+    Row("12.stroke_present", "time of a stroke of 600 mm in steps of 1/12 mm, present law", "11.3", None, "min",
+        bound="at most",
         expected=60.0, quote=FASTER, law=ch.PRESENT_LAW, filter="velocity 200 Hz",
-        remark="no number in the text; 7200 steps, without the time in which they print"),
+        remark="no number in the text; 7200 steps, without the printing time"),
     Row("12.stroke_best", "the same with the best law", "11.3", None, "min", bound="at most", expected=30.0,
         quote=FASTER, law=BEST, filter="low-pass 2 kHz", remark="no number in the text"),
     set="figure_12_2",
@@ -95,8 +98,8 @@ def figure_12_12(short: bool) -> Picture:
     axes.set(xlabel="time [ms]", ylabel="to go [um]", xlim=(0, 1e3 * HOLD))
     fig.legend(axes)
     sentence = (
-        "Not in the text: what a printing step of 1/12 mm still has to go; the band is 10 um, "
-        f"chosen here. A step takes {words[0]} and {words[1]}."
+        "Not in the text: remaining error of a printing step of 1/12 mm; the band is 10 um, chosen here. A step "
+        f"takes {words[0]} and {words[1]}."
     )
     return Picture("12.12", sentence, figure)
 

@@ -50,21 +50,21 @@ KINDS: dict[str, Kind] = {
     "link.delay": Kind(LINK_DELAY, "frames arrive late, both ways", "how late", "s", 4e-3, 0.0, 2.0),
     "link.loss": Kind(LINK_LOSS, "frames are lost at random, both ways", "share lost", "", 0.3, 0.0, 1.0),
     "link.reorder": Kind(
-        LINK_REORDER, "frames are overtaken by the next; the newest wins", "share overtaken", "", 0.3, 0.0, 1.0
+        LINK_REORDER, "frames are overtaken by the next one; the newest wins", "share overtaken", "", 0.3, 0.0, 1.0
     ),
-    "link.silent": Kind(LINK_SILENT, "nothing comes and nothing arrives, as with the plant dead or the cable out"),
+    "link.silent": Kind(LINK_SILENT, "no frame arrives in either direction, as with a dead plant or a pulled cable"),
     "encoder.freeze": Kind(
-        ENCODER_FREEZE, "the counter stands still; what it did not count is lost", channels=frames.COUNTERS
+        ENCODER_FREEZE, "the counter stops; the counts of the meantime are lost", channels=frames.COUNTERS
     ),
     "encoder.missed": Kind(
-        ENCODER_MISSED, "a share of the counts is missed, for good", "share", "", 0.1, 0.0, 1.0, frames.COUNTERS
+        ENCODER_MISSED, "a share of the counts is missed, and stays missed", "share", "", 0.1, 0.0, 1.0, frames.COUNTERS
     ),
     "encoder.noise": Kind(
-        ENCODER_NOISE, "the count jumps about at random", "largest jump", "counts", 200.0, 1.0, 1e6, frames.COUNTERS
+        ENCODER_NOISE, "the count jumps at random", "largest jump", "counts", 200.0, 1.0, 1e6, frames.COUNTERS
     ),
-    "adc.open": Kind(ADC_OPEN, "an analog input hangs open and drifts to its rail", channels=frames.AI_CHANNELS),
+    "adc.open": Kind(ADC_OPEN, "an analog input is open and drifts to its top reading", channels=frames.AI_CHANNELS),
     "dac.stuck": Kind(
-        DAC_STUCK, "a bit of an analog output is stuck at one", "which bit", "", 9.0, 0.0, BITS - 2.0,
+        DAC_STUCK, "a bit of an analog output stays one", "which bit", "", 9.0, 0.0, BITS - 2.0,
         frames.AO_CHANNELS,
     ),
     "driver.hot": Kind(
@@ -74,14 +74,14 @@ KINDS: dict[str, Kind] = {
         SUPPLY_SAG, "the supply sags: no output gives more than a share of its full scale", "share left", "", 0.02,
         0.0, 1.0,
     ),
-    "loop.stall": Kind(LOOP_STALL, "the loop wakes late, as with a CPU hog or a machine asleep", "how late", "s",
+    "loop.stall": Kind(LOOP_STALL, "the loop wakes late, as on a busy or suspended computer", "how late", "s",
                        1e-3, 0.0, 10.0),
-    "plant.kill": Kind(NONE, "the emulator's process is killed; a new one comes when the fault has passed"),
+    "plant.kill": Kind(NONE, "the process of the emulator is killed; a new one starts when the fault ends"),
     "supervisor.kill": Kind(NONE, "the supervisor is killed"),
-    "recorder.stall": Kind(NONE, "the recorder stands still, as on a disk that does not answer"),
-    "disk.full": Kind(NONE, "the disk takes no more of the recording, for good"),
+    "recorder.stall": Kind(NONE, "the recorder stops, as on a disk that does not answer"),
+    "disk.full": Kind(NONE, "the disk is full: from then on no rows are recorded"),
     "clock.step": Kind(
-        NONE, "the wall clock is set to another time under the supervisor", "by how much", "s", 3600.0, -1e9, 1e9
+        NONE, "the wall clock of the supervisor is set to another time", "by how much", "s", 3600.0, -1e9, 1e9
     ),
     "cpu.hog": Kind(NONE, "busy processes of normal priority on all CPUs", "how many", "", 4.0, 1.0, 256.0),
 }  # fmt: skip

@@ -124,8 +124,8 @@ def test_captions_say_what_is_not_the_figure_of_the_thesis():
     said = {
         "5.2": "with the identified J_m", "6.2": "in place of the 500", "8.2": "five times the printed gains",
         "8.4": "chosen here", "8.6": "the law as printed", "11.7": "does not show 150 and 300 mm as two peaks",
-        "11.9": "weak in it", "12.2": "chosen here", "12.4": "In place of the block diagram",
-        "12.5": "are not in this set", "12.8": "chosen here", "12.9": "one acts",
+        "11.9": "are weak", "12.2": "chosen here", "12.4": "In place of the block diagram",
+        "12.5": "are not in this set", "12.8": "chosen here", "12.9": "One of the two notches",
     }  # fmt: skip
     for i, number in FIGURES:
         if number in said:
