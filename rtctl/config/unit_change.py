@@ -88,7 +88,7 @@ def _annotation(annotation: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
         return annotation
     if get_origin(annotation) is list:
         return list[parts[0]]  # type: ignore[valid-type]
-    return Union[parts]  # noqa: UP007  of classes that are made here
+    return Union[parts]  # noqa: UP007  classes are made at run time
 
 
 def _field(field: FieldInfo, symbols: tuple[tuple[str, str], ...]) -> FieldInfo:
