@@ -5,8 +5,8 @@ The names of a function's arguments select its signals:
     step(p, s, e)             position error; gives the command in V
     step(p, s, e, v, v_ref)   position error, measured speed, and speed of the reference
 
-The command of a law passes bumpless transfer, limits and the safety checks, as that of any law does. A law that raises
-an exception, or returns NaN, trips the machine with its outputs at zero.
+The command of a user's law passes gains, limits and the safety checks, as that of any law does. A law that raises an
+exception, or returns NaN, trips the machine with its outputs at zero.
 """
 
 from typing import Any, NamedTuple
