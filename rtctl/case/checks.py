@@ -1,4 +1,4 @@
-"""Checks of the values in a case: numbers, objects, and keys that nobody knows."""
+"""Checks of the values in a case: numbers, objects, and unknown keys."""
 
 import math
 from pathlib import Path
@@ -14,13 +14,13 @@ FROM_ELSEWHERE = ("config", "seed", "versions", "run", "timing", "changes", "row
 
 
 class Part(BaseModel):
-    """An object of a case; keys that it does not know are left out."""
+    """Object of a case; unknown keys are left out."""
 
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
 
 def part(where: Path, name: str, model: type, given: Any, warnings: list[str]) -> Any:
-    """The checked object under a key. Raises UserError that names the key."""
+    """Checked object under a key. Raises UserError that names the key."""
     if given is None:
         given = {}
     if not isinstance(given, dict):
@@ -36,7 +36,7 @@ def part(where: Path, name: str, model: type, given: Any, warnings: list[str]) -
 
 
 def number(where: Path, key: str, value: Any) -> float | None:
-    """A finite number under a key, None where there is none. Raises UserError."""
+    """Finite number under a key; None where there is none. Raises UserError."""
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -67,12 +67,12 @@ def delay_samples(where: Path, case: dict[str, Any]) -> float | None:
 
 
 def strange(where: Path, name: str, before: str, known: Any) -> str:
-    """Warning of a key that nobody knows."""
+    """Warning text for an unknown key."""
     return f"{where}: {before}{name} is not a key that this program knows; it is left out" + perhaps(
         nearest(name, known)
     )
 
 
 def perhaps(hint: str | None) -> str:
-    """The hint at what may have been meant."""
+    """Text with the key that may have been meant; empty without a hint."""
     return f" (is it '{hint}'?)" if hint else ""

@@ -1,6 +1,6 @@
-"""The law of our own recordings, by the config in case.json: `controller` of the exchange format says a part of it.
+"""Law of recordings by rtctl, from the config in case.json; `controller` of the exchange format holds a part of it.
 
-Code that came with the recording is never run, so the law of an own file is not known here.
+Code that came with a recording is never run, so a law in a file of the user is unknown here.
 """
 
 from typing import Any, NamedTuple
@@ -12,22 +12,22 @@ from rtctl.own.files import OwnError
 
 
 class ConfigLaw(NamedTuple):
-    """A law that the config says completely."""
+    """Law that the config defines completely."""
 
     kind: str  # of the position law
     config: Any  # checked settings of the machine
 
 
 class UnsaidLaw(NamedTuple):
-    """A law of a config that no LawParams can hold."""
+    """Law of a config that LawParams cannot hold."""
 
     kind: str
-    parts: tuple[str, ...]  # what there is no place for, in words
+    parts: tuple[str, ...]  # names of the parts that LawParams has no place for
 
 
 def config_law(config: Any) -> ConfigLaw | UnsaidLaw | None:
-    """The law of a bundle's `config`; None where there is no config or this version of rtctl cannot read it."""
-    from rtctl import machines  # slow to import, and of no use to what reads a case without a config
+    """Law of a bundle's `config`; None where there is no config or this version of rtctl cannot read it."""
+    from rtctl import machines  # slow to import, and needed only with a config
     from rtctl.own.model import without_code
 
     if not isinstance(config, dict) or config.get("machine") not in machines.CONFIGS:

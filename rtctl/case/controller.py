@@ -1,7 +1,7 @@
 """The law of a described machine: `controller` of exchange format 2, checked.
 
 The law reads one sensor and commands one drive, both by their names in the description. Its steps are those of exchange
-format 1. What the case says too little of is no error: the recorded command is the input then, and a warning says why.
+format 1. An incomplete law is no error: the recorded command is then the input, and a warning says why.
 
 Source: docs/bring_your_own_machine.md.
 """
@@ -15,12 +15,12 @@ from rtctl.case.laws import INPUT, CascadeLaw, NoLaw, PdLaw, SectionsLaw, Unknow
 from rtctl.config.errors import UserError, nearest
 from rtctl.plants.graph.description import Description
 
-READ = ("position", "speed")  # what a law can read of a body, in the order in which it is looked for
+READ = ("position", "speed")  # quantities of a body that a law can read, in order of preference
 COLUMN = "column"  # units of reference and gains
 
 
 class Wired(Part):
-    """What a law reads and commands."""
+    """Sensor and drive of a law."""
 
     sensor: str | None = None
     drive: str | None = None
@@ -46,9 +46,9 @@ KINDS: dict[str, type[GraphLaw]] = {"pd": WiredPd, "sections": WiredSections, "c
 def controller(
     where: Path, case: Mapping[str, Any], machine: Description, problem: str, warnings: list[str]
 ) -> GraphLaw | NoLaw | UnknownLaw:
-    """The law of a case with its sensor and drive, NoLaw where none wrote the command, UnknownLaw for any other.
+    """Law of a case with its sensor and drive, NoLaw for an open-loop command, UnknownLaw for any other.
 
-    Raises UserError that names the key and what would be right. `warnings` gets a sentence on a law that is of no use.
+    Raises UserError that names the key and what would be right. A law that cannot be used adds to `warnings`.
     """
     known, given = case.get("controller_known"), case.get("controller")
     if known is not None and not isinstance(known, bool):
@@ -77,7 +77,7 @@ def controller(
 
 
 def _sensor(where: Path, machine: Description, law: Wired) -> tuple[str, str]:
-    """Sensor that a law reads, or why none is."""
+    """Sensor that a law reads and "", or "" and the reason why there is none."""
     can = {n: s.measures for n, s in machine.sensors.items() if s.body and s.direction and s.measures in READ}
     if isinstance(law, CascadeLaw):
         can = {name: measures for name, measures in can.items() if measures == READ[0]}
@@ -96,7 +96,7 @@ def _unread(law: Wired) -> str:
 
 
 def _drive(where: Path, machine: Description, law: Wired) -> tuple[str, str]:
-    """Drive that a law commands, or why none is."""
+    """Drive that a law commands and "", or "" and the reason why there is none."""
     if law.drive is not None:
         _known(where, "drive", law.drive, machine.drives)
         return law.drive, ""
@@ -116,6 +116,6 @@ def _known(where: Path, key: str, name: str, names: Mapping[str, Any]) -> None:
 
 
 def _listed(names: Any) -> str:
-    """Words of a choice: "a, b or c"."""
+    """Text of a choice: "a, b or c"."""
     *most, last = names
     return f"{', '.join(most)} or {last}" if most else last

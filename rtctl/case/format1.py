@@ -1,7 +1,7 @@
-"""Case of exchange format 1: what the owner of a two-reel unit, a linear drive or an axis believes of it, checked.
+"""Case of exchange format 1: nominal model of a two-reel unit, a linear drive or an axis, checked.
 
-A value that cannot be is an error that names its key. A key or a name that this program does not know is a warning:
-case.json is written by many hands. Terms that the owner's model does not have are absent or 0.
+An impossible value is an error that names its key. An unknown key or name is a warning, because many programs write
+case.json. Terms that the nominal model lacks are absent or 0.
 
 Source: docs/bundle.md.
 """
@@ -45,13 +45,13 @@ class Case(NamedTuple):
     notes: str
     warnings: tuple[str, ...]
     file: Path = Path("case.json")
-    unsaid: str = ""  # why a law that the owner knows cannot be recomputed from `controller`; "" where it can
+    unsaid: str = ""  # why a known law cannot be recomputed from `controller`; "" where it can
 
     @property
     def estimated(self) -> tuple[str, ...]:
-        """Parameters of an axis that the recording gives, since case.json does not: M with F_v and k, and K beside M.
+        """Parameters of an axis that case.json lacks and the recording gives: M with F_v and k, or K where M is given.
 
-        An estimate is a start of the fit and no belief: it has no tolerance.
+        An estimate is an initial value of the fit, no nominal value, and has no tolerance.
         """
         if not profile_of(self.plant).has(FREE_UNITS):
             return ()
@@ -60,7 +60,7 @@ class Case(NamedTuple):
         return () if "K" in believed(self) else ("K",)
 
     def tolerance(self, name: str) -> float:
-        """Share by which a nominal value may be wrong; inf where it may be anything, as an estimated one may."""
+        """Relative tolerance of a nominal value; inf where it is unlimited or the value is estimated."""
         if name in self.estimated:
             return math.inf
         r = self.reaches
@@ -72,7 +72,7 @@ class Case(NamedTuple):
 
 
 def read_case(case: dict[str, Any], folder: Path | str) -> Case:
-    """The checked case of the bundle in `folder`. Raises UserError that names the key and what would be right."""
+    """Checked case of the bundle in `folder`. Raises UserError that names the key and what would be right."""
     where = Path(folder) / "case.json"
     plant = case.get("plant")
     kinds = [kind for kind, profile in PROFILES.items() if profile.exchange is not None]
@@ -112,7 +112,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
     reaches = part(where, "reaches", Reaches, case.get("reaches"), warnings)
     if case.get("parameters") and "parameter_tolerance" not in reaches.model_fields_set:
         share = reaches.parameter_tolerance
-        warnings.append(f"{where}: reaches.parameter_tolerance is missing; {share} is taken for what parameters say")
+        warnings.append(f"{where}: reaches.parameter_tolerance is missing; {share} is taken for the parameters")
     return Case(
         plant=plant,
         sample_rate=rate,
@@ -131,7 +131,7 @@ def read_case(case: dict[str, Any], folder: Path | str) -> Case:
 
 
 def exchange_of(plant: str) -> Exchange:
-    """What the format says of a kind of machine. Raises KeyError for one that it does not know."""
+    """Exchange format of a kind of machine. Raises KeyError for an unknown kind."""
     found = profile_of(plant).exchange
     if found is None:
         raise KeyError(plant)
@@ -139,14 +139,14 @@ def exchange_of(plant: str) -> Exchange:
 
 
 def machine_of(plant: str) -> Description:
-    """The description of a kind of machine that the format knows."""
+    """Description of a kind of machine that the format knows."""
     return PLANTS[plant].described().layout.machine
 
 
 def believed(case: Case) -> dict[str, float]:
-    """Every symbol of the machine, SI, as the owner believes it; a term that the owner does not have is 0.
+    """Nominal value of every symbol of the machine, SI; 0 for a term that the nominal model lacks.
 
-    Of an axis what nobody knows, mass or gain, is missing from the answer.
+    An unknown mass or gain of an axis is missing from the dict.
     """
     return exchange_of(case.plant).believed(case.parameters, case.drive)
 
@@ -161,7 +161,7 @@ def _parameters(where: Path, profile: Profile, given: Any, units: Quantities, wa
     model = settings_in(exchange.parameters, units) if profile.has(FREE_UNITS) else exchange.parameters
     known = (*model.model_fields, *exchange.derived, *exchange.aliases)
     values: dict[str, float] = {}
-    written: dict[str, Any] = {}  # own name -> as the owner writes it
+    written: dict[str, Any] = {}  # name in the model -> name in the case
     for name, said in given.items():
         if name not in known:
             warnings.append(strange(where, name, "parameters.", known))

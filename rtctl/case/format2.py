@@ -27,7 +27,7 @@ KEYS = (
 
 
 def read_case(case: dict[str, Any], folder: Path | str) -> GraphCase:
-    """The checked case of the bundle in `folder`. Raises UserError that names the key and what would be right."""
+    """Checked case of the bundle in `folder`. Raises UserError that names the key and what would be right."""
     where = Path(folder) / "case.json"
     given = case.get("machine")
     if not isinstance(given, dict):

@@ -1,4 +1,4 @@
-"""Case of a described machine: what its owner believes, with the tolerance of each number and which a fit may move."""
+"""Case of a described machine: nominal values, their tolerances, and which of them a fit may change."""
 
 import math
 from pathlib import Path
@@ -12,7 +12,7 @@ from rtctl.plants.graph.layout import Layout
 FORMAT = 2
 PROBLEMS = ("driven", "free", "kinematic", "static")
 EXACT = ("limit", "output_limit", "dac_range", "per_unit", "counts_per_unit", "resolution", "noise")
-START_TOLERANCE = 0.05  # where nobody says: a machine that hangs still stands a little off, by friction and drive
+START_TOLERANCE = 0.05  # relative tolerance of an initial state if none is given; friction and drive shift the rest
 NEVER = (
     "dac_range",
     "resolution",
@@ -21,18 +21,18 @@ NEVER = (
     "counts_per_unit",
     "limit",
     "output_limit",
-)  # no parameter of the motion
+)  # keys that are no parameters of the motion
 
 
 class GraphCase(NamedTuple):
-    """What the owner believes of a described machine."""
+    """Nominal model of a described machine."""
 
     machine: Description
     layout: Layout
     values: dict[str, float]  # every number of the description by dotted path, SI
-    tolerances: dict[str, float | None]  # by dotted path; None: the value says nothing
+    tolerances: dict[str, float | None]  # relative, by dotted path; None: unlimited
     default_tolerance: float | None
-    physics: tuple[dict[str, Any], ...]  # terms that the owner knows
+    physics: tuple[dict[str, Any], ...]  # known terms
     inputs: dict[str, Input]
     problem: str
     delay_samples: float
@@ -42,16 +42,16 @@ class GraphCase(NamedTuple):
     notes: str
     warnings: tuple[str, ...]
     file: Path
-    made: tuple[str, ...] = ()  # paths of values that the program took, where nobody gave any
-    format: int = FORMAT  # whose names of effects may be given
-    plant: str = ""  # kind of plant by which the owner calls the machine: effects stand at its nodes alone
-    called: dict[str, str] = {}  # noqa: RUF012  # path -> symbol by which the owner calls it
-    config: dict[str, Any] | None = None  # of a recording by our own daemon: plain data of the machine's config
+    made: tuple[str, ...] = ()  # paths of default values that the case does not give
+    format: int = FORMAT  # exchange format with the names of effects that may be given
+    plant: str = ""  # kind of plant in the case; effects then stand at its nodes only
+    called: dict[str, str] = {}  # noqa: RUF012  # path -> symbol in the case
+    config: dict[str, Any] | None = None  # plain data of the machine's config, in a recording by rtctl
     open_loop: bool = False  # no controller wrote the commands
-    controller: GraphLaw | None = None  # that wrote the command of one drive; None: the recorded command is the input
+    controller: GraphLaw | None = None  # law that wrote one drive's command; None: the recorded command is the input
 
     def tolerance(self, path: str) -> float:
-        """Share by which a value may be wrong; inf where it may be anything."""
+        """Relative tolerance of a value; inf where it is unlimited."""
         if is_start(path) and path not in self.tolerances:
             rung = path in (FIRST_POSITION, FIRST_SPEED) or path.startswith(OWN_START)
             return math.inf if rung or self.problem == "free" else START_TOLERANCE
@@ -65,9 +65,9 @@ class GraphCase(NamedTuple):
 
     @property
     def fitted(self) -> tuple[str, ...]:
-        """Paths of the values that a fit may move, in the order of the description."""
+        """Paths of the values that a fit may change, in the order of the description."""
         out = []
-        behind = {path for paths in self.machine.symbols.values() for path in paths[1:]}  # they move with the first
+        behind = {path for paths in self.machine.symbols.values() for path in paths[1:]}  # they follow the first path
         for path, value in self.values.items():
             key = path.rsplit(".", 1)[-1]
             if path in behind or path in self.made:
@@ -78,13 +78,13 @@ class GraphCase(NamedTuple):
         return tuple(out)
 
     def _acts(self, path: str) -> bool:
-        """Whether a number has a part in the motion: the damping of a drive without a bandwidth has none."""
+        """Whether a number affects the motion; the damping of a drive without a bandwidth does not."""
         if is_start(path) or path.startswith("physics."):
             return True
         group, name, *rest = path.split(".")
         if group == "drives" and rest == ["damping"]:
             return self.machine.drives[name].bandwidth_hz is not None
-        if group == "bodies" and rest[0] == "reel":  # paper that does not land changes nothing
+        if group == "bodies" and rest[0] == "reel":  # without paper thickness the reel has no effect
             return bool(self.values.get(f"bodies.{name}.reel.thickness"))
         if group == "drives" and rest == ["inductance"]:
             return self.machine.drives[name].kind == "voltage"

@@ -1,4 +1,4 @@
-"""What the owner of a described machine knows beside its description: terms of physics and measured inputs."""
+"""Known terms of physics and measured inputs of a described machine, beside its description."""
 
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,7 @@ def physics(where: Path, placed: Layout, given: Any) -> tuple[dict[str, Any], ..
 
 
 def numbers(entries: tuple[dict[str, Any], ...]) -> dict[str, float]:
-    """Every number that the owner gives of a known term, by dotted path; zeros and whole numbers by choice are none."""
+    """Numbers of the known terms, by dotted path, without zeros and without the term's `counted` parameters."""
     out = {}
     for i, entry in enumerate(entries):
         settings = TERMS[str(entry["term"])].settings.model_validate(entry)

@@ -1,4 +1,4 @@
-"""Laws that a case says under `controller`, and how one of exchange format 1 is read."""
+"""Laws under the key `controller` of a case, and the reader for exchange format 1."""
 
 import math
 from pathlib import Path
@@ -33,7 +33,7 @@ class TapeLaw(PdLaw):
 
 
 class SectionsLaw(Part):
-    """u = sections(e) + w; each section is (b0, b1, b2, a1, a2). `kind` is what the owner calls it."""
+    """u = sections(e) + w; each section is (b0, b1, b2, a1, a2). `kind` is the name in the case."""
 
     kind: str
     sections: tuple[tuple[float, float, float, float, float], ...] = Field(min_length=1, max_length=MAX_SECTIONS)
@@ -58,11 +58,11 @@ class UnknownLaw(Part):
 
 
 Law = PdLaw | TapeLaw | SectionsLaw | CascadeLaw | ConfigLaw | NoLaw | UnknownLaw
-KNOWN_LAWS = (PdLaw, SectionsLaw, CascadeLaw, ConfigLaw)  # that can be computed
+KNOWN_LAWS = (PdLaw, SectionsLaw, CascadeLaw, ConfigLaw)  # laws that can be recomputed
 
 
 def controller(where: Path, profile: Profile, given: Any, rate: float | None, warnings: list[str]) -> Law:
-    """The law under the key `controller`, of a machine with this profile. Raises UserError."""
+    """Law under the key `controller`, of a machine with this profile. Raises UserError."""
     if given is None:
         warnings.append(f"{where}: controller is missing; {INPUT}")
         return UnknownLaw()
@@ -83,7 +83,7 @@ def controller(where: Path, profile: Profile, given: Any, rate: float | None, wa
 
 
 def kind_of(where: Path, given: Any) -> str:
-    """Kind of the law under the key `controller`. Raises UserError where that is no object with a word for it."""
+    """Kind of the law under the key `controller`. Raises UserError for no object, or a kind that is no text."""
     if not isinstance(given, dict):
         raise UserError(f"{where}: controller is a {type(given).__name__}; it should be an object with a 'kind'")
     kind = given.get("kind", "unknown")

@@ -9,7 +9,7 @@ from rtctl.case.graph_case import GraphCase
 
 
 def read_case(case: dict[str, Any], folder: Path | str) -> Case | GraphCase:
-    """The checked case of the bundle in `folder`: of format 1 where it names a plant, else of format 2.
+    """Checked case of the bundle in `folder`: of format 1 where it names a plant, else of format 2.
 
     Raises UserError that names the key and what would be right."""
     return format1.read_case(case, folder) if case.get("plant") is not None else format2.read_case(case, folder)

@@ -1,4 +1,4 @@
-"""Sensors, drive and tolerances that a case of exchange format 1 says."""
+"""Sensors, drive and tolerances in a case of exchange format 1."""
 
 import math
 from typing import Literal
@@ -17,7 +17,7 @@ class Sensors(Part):
     x_counts_per_rev: float | None = Field(None, gt=0)
     x_resolution_m: float | None = Field(None, ge=0)
     unit: Literal["m", "rad", "V"] | None = None  # of x
-    column: str | None = None  # that holds x
+    column: str | None = None  # column of x
 
 
 class Drive(Part):
@@ -31,13 +31,12 @@ class Drive(Part):
     newton_per_volt: float | None = Field(None, gt=0)
     newton_metre_per_ampere: float | None = Field(None, gt=0)
     newton_metre_per_volt: float | None = Field(None, gt=0)
-    column: str | None = None  # what the recorded command is called at its origin
+    column: str | None = None  # original name of the recorded command
     unit: Literal["V", "A", "N", "Nm"] = "V"  # of the command
 
     @property
     def late(self) -> float:
-        """Delay in s by which a second-order low pass of this bandwidth holds back what is slow; 0 where the owner says
-        nothing of it."""
+        """Low-frequency delay of the drive's second-order low pass, in s; 0 without a bandwidth."""
         if self.bandwidth_hz is None:
             return 0.0
         return 2 * (self.damping or DAMPING) / (2 * math.pi * self.bandwidth_hz)
@@ -49,5 +48,5 @@ class Drive(Part):
 
 
 class Reaches(Part):
-    parameter_tolerance: float | None = Field(0.15, ge=0)  # None: the values say nothing
+    parameter_tolerance: float | None = Field(0.15, ge=0)  # relative; None: unlimited
     radius_tolerance: float | None = Field(None, ge=0)  # None: as the other parameters

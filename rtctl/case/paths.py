@@ -1,4 +1,4 @@
-"""Numbers of a described machine that a case names by dotted path: tolerances, and what differs between recordings."""
+"""Numbers of a described machine by dotted path in a case: tolerances, and values that differ between recordings."""
 
 from pathlib import Path
 from typing import Any
@@ -6,13 +6,13 @@ from typing import Any
 from rtctl.case.checks import number
 from rtctl.config.errors import UserError, nearest
 
-DEFAULT_TOLERANCE = 0.15  # share of a value, where the case does not say it
+DEFAULT_TOLERANCE = 0.15  # relative tolerance of a value, where the case gives none
 
 
 def tolerances(
     where: Path, given: Any, values: dict[str, float], warnings: list[str]
 ) -> tuple[dict[str, float | None], float | None]:
-    """Shares under the key `tolerance` by dotted path, and that of all other values; None lets a value be anything.
+    """Relative tolerances by dotted path, and the tolerance of all other values; None is unlimited.
 
     Raises UserError where a share is no number of 0 or more. A path without a value is a warning.
     """
@@ -31,12 +31,12 @@ def tolerances(
         if path != "default" and not known and not path.startswith("physics."):
             hint = nearest(path, values)
             near = f" (is it '{hint}'?)" if hint else ""
-            warnings.append(f"{where}: tolerance.{path} speaks of no value of the machine; it is left out{near}")
+            warnings.append(f"{where}: tolerance.{path} names no value of the machine; it is left out{near}")
     return out, out.pop("default", DEFAULT_TOLERANCE)
 
 
 def per_recording(where: Path, given: Any, values: dict[str, float]) -> tuple[str, ...]:
-    """Paths under the key `per_recording`, whose values each recording has for itself. Raises UserError."""
+    """Paths under the key `per_recording`, whose values differ between recordings. Raises UserError."""
     if given is None:
         return ()
     if not isinstance(given, list) or not all(isinstance(path, str) for path in given):

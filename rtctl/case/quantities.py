@@ -1,4 +1,4 @@
-"""Units and nouns of what moves: what turns has Nm, rad and kg m^2, what slides N, m and kg.
+"""Units and nouns of an axis: Nm, rad and kg m^2 for a rotary axis, N, m and kg for a sliding axis.
 
 They follow from the units of two columns, `sensors.unit` of x and `drive.unit` of u. Nothing else decides whether an
 axis is rotary, and every text, table, figure and file takes its units from here.
@@ -15,9 +15,9 @@ from rtctl.config.units import ANGLES
 from rtctl.idiom import Settings
 from rtctl.plants.physics.dimensions import DIMENSIONS
 
-VOLT = "V"  # unit of a command, where nothing else is said
+VOLT = "V"  # unit of a command, where none is given
 TURNED = {slides: turns for turns, slides in DIMENSIONS.values()}  # unit on a sliding axis -> on a rotary one
-NAMES = {"V": "volt", "A": "ampere", "N": "newton", "Nm": "newton metre"}  # of a command's unit
+NAMES = {"V": "volt", "A": "ampere", "N": "newton", "Nm": "newton metre"}  # unit of a command -> its noun
 
 
 class Quantities(NamedTuple):
@@ -29,21 +29,21 @@ class Quantities(NamedTuple):
     inertia: str
     stiffness: str
     drag: str  # viscous, as the plant's settings write it
-    gain: str  # force by command
-    body: str  # noun of what moves
+    gain: str  # force per command
+    body: str  # noun of the moving body
 
     def of(self, parameter: str) -> str | None:
-        """Unit of a parameter of the axis; None where it has none of these."""
+        """Unit of a parameter of the axis: M, K, F_v, F_c or k; None for any other."""
         units = {"M": self.inertia, "K": self.gain, "F_v": self.drag, "F_c": self.force, "k": self.stiffness}
         return units.get(parameter)
 
     def needed(self) -> dict[str, str]:
-        """What a model of the axis cannot do without: parameter -> noun with its unit."""
+        """Required parameters of a model of the axis: parameter -> noun with its unit."""
         noun, push = ("moment of inertia", "torque") if self.rotary else ("moving mass", "force")
         return {"M": f"the {noun} ({self.inertia})", "K": f"the {push} for one {self.command_name}"}
 
     def said(self, unit: str) -> str:
-        """The unit of a setting, written for a sliding axis and a command in V, as it is on this axis."""
+        """Unit of a setting on this axis, from its unit on a sliding axis with a command in V."""
         unit = TURNED.get(unit, unit) if self.rotary else unit
         return re.sub(r"\bV\b", self.command, unit)
 
@@ -54,7 +54,7 @@ class Quantities(NamedTuple):
 
 
 def quantities(x_unit: str | None, u_unit: str | None = VOLT) -> Quantities:
-    """Of an axis whose position is in `x_unit` (None: m) and whose command is in `u_unit`."""
+    """Units and nouns of an axis with its position in `x_unit` (None: m) and its command in `u_unit`."""
     u, rotary = u_unit or VOLT, x_unit in ANGLES
     unit = {name: pair[not rotary] for name, pair in DIMENSIONS.items()}
     force = unit["force"]
@@ -85,5 +85,5 @@ def settings_in(model: type[Settings], units: Quantities) -> type[Settings]:
 
 
 def of_case(case: Any) -> Quantities:
-    """Of a case of exchange format 1 (rtctl.case.format1.Case)."""
+    """Units and nouns of a case of exchange format 1 (rtctl.case.format1.Case)."""
     return quantities(case.sensors.unit, case.drive.unit)

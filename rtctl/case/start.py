@@ -1,23 +1,23 @@
-"""First state of a described machine: dotted paths of the values that each recording has for itself."""
+"""Initial state of a described machine: dotted paths of values that differ between recordings."""
 
 from rtctl.plants.graph.coupled import felt
 from rtctl.plants.graph.description import Description
 from rtctl.plants.graph.layout import NOWHERE, Layout
 
-START = "start.angle"  # e to the angle, rad, by which the zero of a position is off before the weight of a body
-FIRST_POSITION, FIRST_SPEED = "start.position", "start.speed"  # of a free response, as START, in units of the record
-OWN_START = "start.bodies."  # head of the first position and speed of a body that a spring joins to the others
-BEGINS = "start"  # start.BODY: the same of each body of mechanics from a file, whose position its motion depends on
-HELD_PROBLEMS = ("static", "kinematic")  # the main sensor's motion is given
+START = "start.angle"  # exp of the zero offset of an angle, rad, where the weight of a body acts
+FIRST_POSITION, FIRST_SPEED = "start.position", "start.speed"  # exp of a free response's first values, in its units
+OWN_START = "start.bodies."  # prefix of the first position and speed of a body that a spring joins to the others
+BEGINS = "start"  # start.BODY: exp of the zero offset of a body in a mechanics file, if its position affects the motion
+HELD_PROBLEMS = ("static", "kinematic")  # problems in which the main sensor's motion is given
 
 
 def is_start(path: str) -> bool:
-    """Whether a path is of the state at the first row, which each recording has for itself."""
+    """Whether a path belongs to the initial state, which differs between recordings."""
     return path.startswith("start.")
 
 
 def zeros(machine: Description, placed: Layout, values: dict[str, float]) -> list[str]:
-    """Paths of the angles by which the zero of a position may be off, where the motion depends on that zero."""
+    """Paths of the zero offsets of positions, where the motion depends on the zero."""
     out = []
     angles = any(s.measures == "position" for s in machine.sensors.values())
     if angles and any(w.incline is None for body in machine.bodies.values() for w in body.weights):
@@ -29,10 +29,10 @@ def zeros(machine: Description, placed: Layout, values: dict[str, float]) -> lis
 
 
 def first_states(machine: Description, placed: Layout, problem: str) -> list[str]:
-    """Paths of first positions and speeds that are unknown in a problem, those of the followed sensor first.
+    """Paths of unknown initial positions and speeds in a problem, those of the followed sensor first.
 
-    The tracking correction sets the followed coordinate, but for a free response, which nothing tracks. A machine that
-    rings as the recording begins is not at rest.
+    The tracking correction sets the followed coordinate, except in a free response, which has no tracking. A machine
+    may oscillate at the start of the recording.
     """
     out = [FIRST_POSITION, FIRST_SPEED] if problem == "free" else []
     if problem in HELD_PROBLEMS or not placed.links:

@@ -1,4 +1,4 @@
-"""Parts of the law of our own configs that a simulation of the diagnosis cannot compute."""
+"""Parts of a config's law that the simulation of a diagnosis cannot compute."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from rtctl.own.files import is_own
 
 
 def unsaid(settings: Any, kind: str, config: dict[str, Any]) -> tuple[str, ...]:
-    """What LawParams has no place for, in words; `settings` are those of the machine, `config` its plain data."""
+    """Names of law parts that LawParams cannot hold; `settings` are the machine's settings, `config` its plain data."""
     has = []
     if is_own(kind):
         has.append(f"a position law of an own file, {kind}")
@@ -21,7 +21,7 @@ def unsaid(settings: Any, kind: str, config: dict[str, Any]) -> tuple[str, ...]:
 
 
 def measured_amplifier(config: dict) -> bool:
-    """Whether the plant of our own `config` has the amplifier of 12.3."""
+    """Whether the plant of a `config` has the amplifier with the measured curve (12.3)."""
     plant = config.get("plant")
     amplifier = plant.get("amplifier") if isinstance(plant, dict) else None
     return isinstance(amplifier, dict) and amplifier.get("kind") == "measured"

@@ -20,7 +20,7 @@ def build(
 ) -> None:
     """Write and compile the tick of a machine; nothing moves.
 
-    The tick is cached: only another structure of the config (or another version) compiles anew, another gain does not.
+    The tick is cached: another structure of the config or another version compiles again, another gain does not.
 
     Examples:
 
@@ -59,7 +59,7 @@ def _entries(settings: Any) -> tuple[str, ...]:
 
 
 def _compile(machine: Any, link: str) -> None:
-    """Compile what the loop's and the plant's process would, on the same arrays as theirs."""
+    """Compile the functions of the loop's and the plant's process, for the array types of a run."""
     import tempfile
     from pathlib import Path
 
@@ -82,7 +82,7 @@ def _compile(machine: Any, link: str) -> None:
 
 
 def _show(text: str) -> None:
-    """A module for reading: in colour at a terminal, as it is into a pipe."""
+    """Print a module, in colour on a terminal."""
     from rich.console import Console
 
     console = Console()

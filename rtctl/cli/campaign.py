@@ -1,4 +1,4 @@
-"""`rtctl campaign`: one config run many times over a matrix of settings, and what came of it."""
+"""`rtctl campaign`: one config run many times over a matrix of settings, and its results."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,7 +14,7 @@ app = typer.Typer(add_completion=False, no_args_is_help=True)
 
 @app.callback()
 def _campaign() -> None:
-    """Run a config many times over a matrix of settings, and judge what came of it."""
+    """Run a config many times over a matrix of settings, and judge the results."""
 
 
 @app.command()
@@ -36,7 +36,9 @@ def run(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Results; runs/NAME-... if absent. A campaign in it goes on."),
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Results; runs/NAME-... if absent. A campaign in it is continued."
+        ),
     ] = None,
     for_: Annotated[
         str | None, typer.Option("--for", metavar="TIME", help="Length of a run, instead of `seconds`; e.g. 12s.")
@@ -54,8 +56,8 @@ def run(
 ) -> None:
     """Run every cell of a campaign's matrix on virtual time: one table (results.parquet) and a report of all.
 
-    Exit code 1 with runs that failed and where a --fail-on holds. Ctrl-C keeps what is done; the same command with
-    --out goes on there.
+    Exit code 1 where runs failed or a --fail-on holds. Ctrl-C keeps the finished runs; the same command with --out
+    continues there.
 
     Examples:
 
@@ -105,7 +107,8 @@ def list_(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a campaign that was run.")],
     worst: Annotated[int, typer.Option("--worst", metavar="K", min=0, help="How many of the worst runs.")] = 10,
     by: Annotated[
-        str | None, typer.Option("--by", metavar="METRIC", help="What they are the worst in; as in the file if absent.")
+        str | None,
+        typer.Option("--by", metavar="METRIC", help="Metric that ranks the runs; that of the campaign if absent."),
     ] = None,
     json: JsonOption = False,
 ) -> None:

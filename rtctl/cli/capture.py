@@ -15,9 +15,9 @@ POLL = 0.05  # s
 
 @app.command()
 def capture(
-    duration: Annotated[str, typer.Option("--for", metavar="T", help="How long, all in all, e.g. 5s.")],
+    duration: Annotated[str, typer.Option("--for", metavar="T", help="Total length, e.g. 5s.")],
     pre: Annotated[
-        str | None, typer.Option(metavar="T", help="How much of it lies before the trigger (or before now).")
+        str | None, typer.Option(metavar="T", help="Part of the length before the trigger (or before now).")
     ] = None,
     trigger: Annotated[
         str | None,
@@ -55,7 +55,7 @@ def capture(
 
 
 def _wait(client: Any, state: dict[str, Any]) -> dict[str, Any]:
-    """The state of the capture when it is done, or ended by Ctrl-C."""
+    """State of the capture when it is done, or ended by Ctrl-C."""
     from rtctl.config.errors import UserError
     from rtctl.daemon.client import listens
 
@@ -73,7 +73,7 @@ def _wait(client: Any, state: dict[str, Any]) -> dict[str, Any]:
 
 
 def _judge(state: dict[str, Any]) -> None:
-    """Raise where the bundle is not what was asked for."""
+    """Raise UserError where the capture failed, NoAnswer where the trigger never came."""
     from rtctl.config.errors import NoAnswer, UserError
 
     if state.get("error"):

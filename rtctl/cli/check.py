@@ -20,17 +20,17 @@ def check(
     link: LinkOption = None,
     set_: SetOption = None,
     svg: Annotated[
-        Path | None, typer.Option("--svg", metavar="FILE.svg", help="Drawing of a described machine, as a picture.")
+        Path | None, typer.Option("--svg", metavar="FILE.svg", help="Draw a described machine into this file.")
     ] = None,
 ) -> None:
-    """Check a config and say what it would run. Exit code 2 with every mistake, where it is wrong.
+    """Check a config and print what it would run. Exit code 2 with a list of all mistakes, where it is wrong.
 
-    Of a machine that the config describes it also says what was described, in words and as a drawing, the modes that
-    follow, and which parameters a recording by these sensors could tell apart. A file with the description alone, as
-    `rtctl import --machine` takes it, is checked without what a run would be.
+    For a described machine it also prints the description in words and as a drawing, the modes, and which parameters a
+    recording by these sensors can tell apart. A file with the description alone, as for `rtctl import --machine`, is
+    checked without the settings of a run.
 
-    A law or plant of your own, `kind: ./my_law.py:MyLaw`, is compiled by itself, looked through for what allocates, and
-    timed on this machine.
+    A law or plant of your own, `kind: ./my_law.py:MyLaw`, is compiled alone, searched for memory allocations, and timed
+    on this computer.
 
     Examples:
 
@@ -70,7 +70,7 @@ def check(
 
 
 def _description(path: str) -> bool:
-    """Whether a file holds a description alone."""
+    """Whether a file holds only the description of a machine."""
     from rtctl.config.yaml_file import find, load_yaml
     from rtctl.plants.graph.file import is_bare
 
@@ -78,7 +78,7 @@ def _description(path: str) -> bool:
 
 
 def _alone(path: str, svg: Path | None) -> None:
-    """What a file with the description alone says."""
+    """Check and print a file that holds only a description."""
     from rtctl.own.mechanics import give_machine
     from rtctl.plants.graph.file import read_machine
 
@@ -94,7 +94,7 @@ def _alone(path: str, svg: Path | None) -> None:
 
 
 def _report(machine: Any, name: str, tells: list[str], svg: Path | None) -> None:
-    """What a description says; `tells` are sentences on the parameters that its sensors tell apart."""
+    """Print a description; `tells` are sentences on the parameters that its sensors tell apart."""
     from rtctl.config.files import write_text
     from rtctl.machine_report import modes, terminal, words
     from rtctl.machine_report.svg import svg as picture
@@ -116,7 +116,7 @@ def _report(machine: Any, name: str, tells: list[str], svg: Path | None) -> None
 
 
 def _own(machine: Any) -> list[tuple[str, str]]:
-    """What a check of the user's own files has found. Raises UserError where one may not go into the tick."""
+    """Rows with the check results of the user's files. Raises UserError where a file must not go into the tick."""
     if not machine.config.own:
         return []
     from rtctl.machines.own_check import verdicts
@@ -132,7 +132,7 @@ def _own(machine: Any) -> list[tuple[str, str]]:
 
 
 def _summary(machine: Any) -> list[tuple[str, str]]:
-    """What a run of this machine would be."""
+    """Rows of name and text that describe a run of this machine."""
     from rtctl.daemon.server import default_endpoint, runtime_dir
 
     config = machine.config
@@ -157,7 +157,7 @@ def _summary(machine: Any) -> list[tuple[str, str]]:
 
 
 def _stands(config: Any) -> str:
-    """What stands at the plant's end of the link."""
+    """Text for the plant's end of the link: emulator, FMU or driver."""
     from rtctl.machines import fmu_of
 
     if fmu_of(config) is not None:

@@ -77,7 +77,7 @@ class SignedCommand(TyperCommand):
 
 
 def load_config(path: str, overrides: list[str] | None) -> Any:
-    """Settings of a machine, of whichever kind its `machine` key says."""
+    """Validated settings of a config file; its `machine` key selects the settings class."""
     from rtctl import machines
     from rtctl.config.load import load_settings
     from rtctl.config.yaml_file import find, load_yaml
@@ -98,7 +98,7 @@ def load_config(path: str, overrides: list[str] | None) -> Any:
 
 
 def with_reference(config: Any, path: str | None) -> Any:
-    """The config with the reference of another file, in the machine's own units."""
+    """Copy of the config with the reference from the file `path`, in the machine's own units."""
     if path is None:
         return config
     from rtctl.config.load import load_settings
@@ -110,7 +110,7 @@ def with_reference(config: Any, path: str | None) -> Any:
 
 
 def with_loop(config: Any, mode: str | None, link: str | None) -> Any:
-    """The config with another time mode or link."""
+    """Copy of the config with another time mode or link."""
     update: dict[str, Any] = {}
     if mode is not None:
         if mode not in ("real", "lockstep", "fused"):
@@ -124,7 +124,7 @@ def with_loop(config: Any, mode: str | None, link: str | None) -> Any:
 
 
 def machine_of(config: Any) -> Any:
-    """The machine of a config, not compiled. Raises UserError where its settings contradict each other."""
+    """Machine of a config, not compiled. Raises UserError where settings contradict each other."""
     from rtctl import machines
     from rtctl.own.files import OwnError
 
@@ -137,7 +137,7 @@ def machine_of(config: Any) -> Any:
 
 
 def seconds(text: str | None, option: str) -> float | None:
-    """A duration such as 12s, 200ms or 1.5h; a bare number is seconds."""
+    """Duration in s of a text such as 12s, 200ms or 1.5h; a bare number is in s."""
     if text is None:
         return None
     match = DURATION.fullmatch(text)
@@ -148,12 +148,12 @@ def seconds(text: str | None, option: str) -> float | None:
     except ValueError:
         raise UserError(f"{option} {text}: not a duration; write e.g. 12s, 200ms or 1h") from None
     if value <= 0 or not math.isfinite(value):
-        raise UserError(f"{option} {text}: must be more than nothing, and have an end")
+        raise UserError(f"{option} {text}: must be above 0 and finite")
     return value
 
 
 def quantity_of(text: str, option: str, example: str = "20mm/s") -> tuple[float, str | None]:
-    """A number with its unit, written together or apart: 20mm/s, 1.5 rad."""
+    """Value and unit (None if absent) of a text such as 20mm/s or 1.5 rad."""
     match = QUANTITY.fullmatch(text)
     try:
         if match is None:
@@ -164,7 +164,7 @@ def quantity_of(text: str, option: str, example: str = "20mm/s") -> tuple[float,
 
 
 def client(name: str | None) -> Any:
-    """A client of the machine that runs: the only one, or the one named."""
+    """Client of a running machine: the only one, or the machine or endpoint `name`."""
     from rtctl.daemon import keys
     from rtctl.daemon.client import Client
     from rtctl.daemon.server import find_endpoint
@@ -189,9 +189,9 @@ def client(name: str | None) -> Any:
 
 
 def first_status(client: Any) -> dict[str, Any]:
-    """The first status of a daemon of this computer; one that still starts is waited for, and that is said once.
+    """First status of a daemon; waits while a daemon on this computer starts, and says once that it waits.
 
-    Raises UserError where no daemon listens, and for one far away that does not answer.
+    Raises UserError where no daemon listens, or where a daemon on another computer does not answer.
     """
     from rtctl.daemon.client import CommandError, listens
 
@@ -210,7 +210,7 @@ def first_status(client: Any) -> dict[str, Any]:
 
 
 def running() -> list[str]:
-    """Names of the machines whose command socket somebody listens on."""
+    """Names of the machines with a daemon that listens on the command socket."""
     from rtctl.daemon.client import listens
     from rtctl.daemon.server import SYSTEM_DIR, runtime_dir
 
@@ -219,7 +219,7 @@ def running() -> list[str]:
 
 
 def print_json(value: Any) -> None:
-    """One JSON object on standard output. What was not measured (NaN) becomes null, which JSON can hold."""
+    """Print one JSON object on standard output; NaN (not measured) and infinity become null."""
     import json
 
     typer.echo(json.dumps(_finite(value)))
@@ -234,7 +234,7 @@ def _finite(value: Any) -> Any:
 
 
 def default_folder(name: str) -> Path:
-    """Where a run's bundle goes when nobody says: runs/NAME-DATE-TIME, never one that exists."""
+    """Folder of a run's bundle if none is given: runs/NAME-DATE-TIME, numbered where that exists."""
     from datetime import datetime
 
     base = Path("runs") / f"{name}-{datetime.now().strftime('%Y%m%d-%H%M%S')}"

@@ -1,4 +1,4 @@
-"""What the shell offers at TAB: configs, references, keys, faults, terms, and the machines that run."""
+"""Shell completion: configs, references, keys, faults, terms, and running machines."""
 
 import contextlib
 import json
@@ -13,29 +13,29 @@ SOURCES = ("config", "machines", "laws", "loop", "drivers", "plants")  # package
 
 
 def configs(incomplete: str) -> list[str]:
-    """Configs that come with rtctl, and YAML files from here on."""
+    """Shipped configs, and YAML files and folders by path."""
     return [*_shipped("", incomplete), *_files(incomplete)]
 
 
 def references(incomplete: str) -> list[str]:
-    """References that come with rtctl, and YAML files from here on."""
+    """Shipped references, and YAML files and folders by path."""
     return [*_shipped("references", incomplete), *_files(incomplete)]
 
 
 def campaigns(incomplete: str) -> list[str]:
-    """Campaigns that come with rtctl, and YAML files from here on."""
+    """Shipped campaigns, and YAML files and folders by path."""
     return [*_shipped("campaigns", incomplete), *_files(incomplete)]
 
 
 def machines(incomplete: str) -> list[str]:
-    """Machines that run here."""
+    """Machines that run on this computer."""
     from rtctl.cli.common import running
 
     return [name for name in running() if name.startswith(incomplete)]
 
 
 def keys(incomplete: str) -> list[str]:
-    """Keys of every machine's config, those of items of a list left out."""
+    """Config keys of all machines, without the keys of list items."""
     return _starting("keys", incomplete)
 
 
@@ -55,7 +55,7 @@ def _shipped(folder: str, incomplete: str) -> list[str]:
 
 
 def _files(incomplete: str) -> list[str]:
-    """YAML files and folders whose path starts so."""
+    """YAML files and folders whose path starts with `incomplete`."""
     head, _, start = incomplete.rpartition("/")
     folder = Path(head or ("/" if incomplete.startswith("/") else "."))
     found: list[str] = []
@@ -72,7 +72,7 @@ def _starting(kind: str, incomplete: str) -> list[str]:
 
 
 def words() -> dict[str, list[str]]:
-    """Keys, faults and terms, from a file in the cache: the settings take half a second to import."""
+    """Keys, faults and terms, cached in a file because importing the settings takes half a second."""
     from rtctl import __version__
     from rtctl.config.cache import cache_folder
     from rtctl.config.errors import UserError
@@ -81,7 +81,7 @@ def words() -> dict[str, list[str]]:
 
     try:
         file = cache_folder() / f"completion-{__version__}.json"
-    except UserError:  # the shell completes; the next command tells it
+    except UserError:  # no error while the shell completes; the next command reports it
         return _collect()
     with contextlib.suppress(OSError, ValueError):
         if file.stat().st_mtime > max(_written()):
@@ -93,7 +93,7 @@ def words() -> dict[str, list[str]]:
 
 
 def _written() -> Iterator[float]:
-    """When each source that the words come from was written."""
+    """Modification times of the source files that the words come from, in s."""
     for package in SOURCES:
         found = find_spec(f"rtctl.{package}")  # without importing it
         for folder in (found.submodule_search_locations or []) if found else []:
@@ -113,7 +113,7 @@ def _collect() -> dict[str, Any]:
 
 
 def _plain(path: str) -> str:
-    """law.position[pd].gain as it is written: law.position.gain."""
+    """Key as written in a config: law.position[pd].gain becomes law.position.gain."""
     while "[" in path:
         head, _, tail = path.partition("[")
         path = head + tail.partition("]")[2]

@@ -1,4 +1,4 @@
-"""What `rtctl run` shows: a panel while it runs, lines where there is no terminal, and a short report after."""
+"""Terminal output of `rtctl run`: a panel during the run (lines where there is no terminal), then a short report."""
 
 import contextlib
 import sys
@@ -16,12 +16,12 @@ from rtctl.terminal.screen import Screen, takes_pictures
 from rtctl.terminal.traces import Traces
 from rtctl.terminal.view import plain
 
-REFRESH = 0.25  # s between two pictures
+REFRESH = 0.25  # s between two frames of the panel
 LINE = 2.0  # s between two lines where there is no terminal
 
 
 class RunConsole:
-    """Everything goes to standard error, so that standard output is the JSON's alone."""
+    """Console that writes to standard error only, so that standard output holds only JSON."""
 
     def __init__(self, quiet: bool):
         self.outlet = Outlet(sys.stderr)
@@ -46,7 +46,7 @@ class RunConsole:
 
     @contextlib.contextmanager
     def live(self) -> Iterator[None]:
-        """A panel that is drawn anew in place, where there is a terminal."""
+        """Context with a panel that is redrawn in place, on a terminal only."""
         if self.quiet or not takes_pictures(self.console):
             yield
             return
@@ -58,7 +58,7 @@ class RunConsole:
                 self._screen = None
 
     def update(self, supervisor: Any) -> None:
-        """Called at every turn of the supervisor."""
+        """Redraw the panel or print a line, if it is time; called in every cycle of the supervisor."""
         if self.outlet.gone:
             supervisor.terminal_gone = supervisor.interrupted = True
         now = time.monotonic()
@@ -77,7 +77,7 @@ class RunConsole:
             self.console.print(plain(status, self._traces.units, left), highlight=False, markup=False, soft_wrap=True)
 
     def report(self, result: dict[str, Any]) -> None:
-        """What came of the run."""
+        """Print the result of a run."""
         console, late = self.console, result["lateness_us"]
         link = "" if result["mode"] == "fused" else f" over {result['link']}"
         told = Text().append(result["name"], "bold")
@@ -108,7 +108,7 @@ class RunConsole:
                 console.print(f"{what:7}{result[what]}", highlight=False, markup=False, soft_wrap=True)
 
 
-STEP_COLUMNS = {  # heading -> how much it matters; the least goes first where there is little room
+STEP_COLUMNS = {  # heading -> rank; on a narrow terminal the column of the highest rank is dropped first
     "t \\[s]": 0, "size": 3, "final error \\[rad]": 4, "\\[mm]": 1, "overshoot \\[%]": 5, "settling \\[s]": 2,
 }  # fmt: skip
 
@@ -118,7 +118,7 @@ def _number(value: float | None, form: str) -> str:
 
 
 def steps_table(steps: list[dict[str, Any]], width: int) -> Table:
-    """One row a step, in columns that fit into `width` cells."""
+    """Table with one row for each step, in columns that fit into `width` cells."""
     kept = sorted(STEP_COLUMNS, key=STEP_COLUMNS.__getitem__)
     while sum(max(len(name) - name.count("\\"), 7) + 2 for name in kept) > width + 2 and len(kept) > 1:
         kept.pop()

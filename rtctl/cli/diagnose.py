@@ -21,8 +21,8 @@ def diagnose(
         list[str],
         typer.Argument(
             metavar="BUNDLE...",
-            help="Folder with recording.parquet and case.json, or a folder of such; several of one machine; "
-            "with --closed-loop a CONFIG.",
+            help="Folder with recording.parquet and case.json, or a folder of such folders; several are recordings of "
+            "one machine; with --closed-loop a CONFIG.",
         ),
     ],
     heldout: Annotated[
@@ -36,16 +36,16 @@ def diagnose(
     json: JsonOption = False,
     report: Annotated[bool, typer.Option(help="Write report.html.")] = True,
     jobs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Of a folder: processes side by side; one a core if absent.")
+        int | None, typer.Option(metavar="N", min=1, help="With a folder: parallel processes; one a core if absent.")
     ] = None,
     limit: Annotated[
-        str, typer.Option("--limit", metavar="T", help="Of a folder: longest time for a bundle, e.g. 600s.")
+        str, typer.Option("--limit", metavar="T", help="With a folder: time limit for a bundle, e.g. 600s.")
     ] = "600s",
     scheduler: Annotated[
         str | None,
-        typer.Option("--scheduler", metavar="tcp://...", help="Of a folder: on the workers of a Dask scheduler."),
+        typer.Option("--scheduler", metavar="tcp://...", help="With a folder: use the workers of a Dask scheduler."),
     ] = None,
-    again: Annotated[bool, typer.Option("--again", help="Of a folder: also those that are diagnosed already.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="With a folder: repeat finished diagnoses.")] = False,
     together: Annotated[
         bool,
         typer.Option(
@@ -61,12 +61,12 @@ def diagnose(
     ] = None,
     mechanics: Annotated[
         str | None,
-        typer.Option("--mechanics", metavar="FILE", help="Your file of the machine's M(q) and h(q, v), ./furuta.py."),
+        typer.Option("--mechanics", metavar="FILE", help="Your file with the machine's M(q) and h(q, v): ./furuta.py."),
     ] = None,
     machine: Annotated[
         Path | None,
         typer.Option(
-            "--machine", metavar="YAML", help="Your config that names such a file; nothing else is taken of it."
+            "--machine", metavar="YAML", help="Your config that names a file for --mechanics; only that key is used."
         ),
     ] = None,
     closed_loop: Annotated[
@@ -79,19 +79,19 @@ def diagnose(
     mode: ModeOption = None,
     set_: SetOption = None,
 ) -> None:
-    """Diagnose a recording: what physics does its owner's model lack, where, and how large is it?
+    """Diagnose a recording: which physics does the nominal model lack, where, and how large is it?
 
-    Writes diagnosis.json, model.yaml (for `rtctl run`, `rtctl plant` and `rtctl simulate`), report.html and, where two
-    answers are left, experiment.yaml, which tells them apart. Of a folder of bundles, those that are diagnosed already
-    are left alone, and NAME-heldout is the second recording of NAME.
+    Writes diagnosis.json, model.yaml (for `rtctl run`, `rtctl plant` and `rtctl simulate`) and report.html. Where two
+    answers remain, it also writes experiment.yaml, an experiment that tells them apart. In a folder of bundles,
+    finished diagnoses are skipped, and NAME-heldout is the second recording of NAME.
 
-    Several bundles are one machine where their cases name one `group`, or with --together: one verdict for all of them,
-    written into the first. Numbers and effects are shared, each recording has its own start and its own noise.
+    Several bundles count as one machine where their cases name one `group`, or with --together. They get one verdict,
+    written into the first bundle. Parameters and effects are shared; initial state and noise belong to each recording.
 
-    With --closed-loop the machine is recorded first, and where two answers are left the experiment is run and diagnosed
-    as well. An emulated machine runs on virtual time.
+    With --closed-loop the machine is recorded first. Where two answers remain, the experiment is run and diagnosed as
+    well. An emulated machine runs on virtual time.
 
-    Exit code 0 for any verdict, 2 for a bundle that is not right, 3 for one that supports no verdict.
+    Exit code 0 for any verdict, 2 for an invalid bundle, 3 for a bundle that supports no verdict.
 
     Examples:
 
@@ -155,7 +155,7 @@ def diagnose(
 
 
 def _register(terms: list[str]) -> None:
-    """Terms in files of the user's own are terms of the library from here on."""
+    """Add the terms in the user's files to the library."""
     from rtctl.config.errors import UserError
     from rtctl.own.files import OwnError
     from rtctl.own.term import register_file
@@ -168,7 +168,7 @@ def _register(terms: list[str]) -> None:
 
 
 def _couple(mechanics: str | None, machine: Path | None) -> None:
-    """The mechanics of a file that the user names are known from here on; none is taken from a bundle."""
+    """Load the mechanics file that the user names; a file that a bundle names is not loaded."""
     if mechanics is not None or machine is not None:
         from rtctl.own.mechanics import give, give_machine
 

@@ -1,4 +1,4 @@
-"""What `rtctl diagnose` shows: a bar while it works, then the verdict; of a folder one line a bundle and a table."""
+"""Terminal output of `rtctl diagnose`: a bar, then the verdict; with a folder a line for each bundle and a table."""
 
 import contextlib
 import time
@@ -12,19 +12,18 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 from rich.text import Text
 
-STAGES = {  # how a stage's sentence begins -> share of the whole that is then done
+STAGES = {  # first words of a stage's text -> share of the work done when the stage begins
     "recording": 0.0, "preflight": 0.02, "fitting the nominal": 0.04, "screening": 0.15, "fitting": 0.25,
     "look-alikes": 0.6, "predicting": 0.9, "writing": 0.95,
 }  # fmt: skip
-FIRST = "first look"  # rtctl/diagnose/search/first_look.py, which takes seconds to import
-ONWARD = 0.12  # of what is left, when a stage comes once more
+FIRST = "first look"  # first words of a text of rtctl/diagnose/search/first_look.py, whose import takes seconds
+ONWARD = 0.12  # share of the remaining work, for a stage that repeats or is not in STAGES
 COLOUR = {"named": "green", "ambiguous": "yellow", "unnamed": "magenta", "nothing": "cyan"}
-MOST_EFFECTS = 8  # in the table of a folder
+MOST_EFFECTS = 8  # effects in the table of a folder, at most
 
 
 class DiagnoseConsole:
-    """Results go to standard output. What is said on the way goes to standard error, and so does all where standard
-    output is the JSON's alone."""
+    """Console with results on standard output and progress on standard error; with `json` all on standard error."""
 
     def __init__(self, json: bool):
         self.json = json
@@ -33,7 +32,7 @@ class DiagnoseConsole:
 
     @contextlib.contextmanager
     def stages(self) -> Iterator[Callable[[str], None]]:
-        """A function to call with each stage: a bar on a terminal, a line with the seconds elsewhere."""
+        """Context with a function to call at each stage: a bar on a terminal, else a line with the elapsed time."""
         began = time.monotonic()
         if not self.err.is_terminal:
 
@@ -52,7 +51,7 @@ class DiagnoseConsole:
 
             def show(text: str) -> None:
                 nonlocal done
-                if text.startswith(FIRST):  # it stays on the screen while names are looked for
+                if text.startswith(FIRST):  # the first look stays on the screen during the search
                     bar.console.print(f"{time.monotonic() - began:.1f} s  {text}", highlight=False, markup=False)
                     return
                 done = onward(done, text)
@@ -62,7 +61,7 @@ class DiagnoseConsole:
 
     @contextlib.contextmanager
     def many(self, count: int) -> Iterator[Callable[[Any], None]]:
-        """A function to call with each outcome of a folder of `count` bundles."""
+        """Context with a function to call with each outcome of a folder of `count` bundles."""
         if not self.err.is_terminal:
             yield lambda outcome: self.out.print(line(outcome), soft_wrap=True)
             return
@@ -77,19 +76,19 @@ class DiagnoseConsole:
             yield show
 
     def notes(self, sentences: list[str]) -> None:
-        """What the recording's owner should know beside the verdict."""
+        """Print the warnings beside the verdict, one line each."""
         for sentence in sentences:
             self.err.print(f"note: {sentence}", style="dim", highlight=False, markup=False, soft_wrap=True)
 
     def result(self, d: Any, folder: Path) -> None:
-        """Verdict, effects, look-alikes, and where the rest is."""
+        """Print verdict, effects, look-alikes, and the paths of the written files."""
         from rtctl.diagnose.answer.report import terminal
 
         self.out.print(terminal(d), soft_wrap=not self.out.is_terminal)
         self.files(folder)
 
     def files(self, folder: Path) -> None:
-        """What was written."""
+        """Print the paths of the written files."""
         from rtctl.diagnose.answer.results import EXPERIMENT, MODEL, REPORT
 
         for word, name in (("report", REPORT), ("model", MODEL), ("experiment", EXPERIMENT)):
@@ -97,7 +96,7 @@ class DiagnoseConsole:
                 self.out.print(f"{word:11}{folder / name}", highlight=False, markup=False, soft_wrap=True)
 
     def repaired(self, made: Any, folder: Path, rows: list[tuple[str, str, str]]) -> None:
-        """The last verdict and what the model has that the owner's had not: `rows` of key, was and is."""
+        """Print the last verdict and the changes to the nominal model: `rows` of key, old value and new value."""
         for bundle, trip in zip(made.bundles, made.trips, strict=True):
             self.out.print(f"{'recorded':11}{bundle}" + (f", tripped: {trip}" if trip else ""), highlight=False)
         self.result(made.last, folder)
@@ -113,7 +112,7 @@ class DiagnoseConsole:
         self.out.print(table)
 
     def summary(self, outcomes: list[Any], seconds: float) -> None:
-        """Verdicts and effects of all bundles, counted."""
+        """Print the counts of verdicts and effects over all bundles."""
         table = Table(box=None, pad_edge=False, header_style="dim")
         table.add_column(f"{len(outcomes)} bundles, {seconds:.0f} s")
         table.add_column("bundles", justify="right")
@@ -127,11 +126,11 @@ class DiagnoseConsole:
         self.out.print(table)
 
 
-FAULTS = {1: "failed", 2: "not a right bundle", 3: "supports no verdict"}
+FAULTS = {1: "failed", 2: "invalid bundle", 3: "supports no verdict"}
 
 
 def onward(done: float, text: str) -> float:
-    """Share of the work that is done when a stage begins. It falls only where another recording begins."""
+    """Share of the work done when a stage begins, 0 to 1; it falls only where another recording begins."""
     share = next((share for start, share in STAGES.items() if text.startswith(start)), None)
     if text.startswith("recording"):
         return 0.0
@@ -141,7 +140,7 @@ def onward(done: float, text: str) -> float:
 
 
 def line(outcome: Any) -> Text:
-    """Name, verdict, effects with node and confidence, seconds."""
+    """Line for one bundle: name, verdict, effects with node and confidence, duration in s."""
     text = Text(f"{outcome.name:20} ")
     d = outcome.diagnosis
     if d is None:

@@ -1,4 +1,4 @@
-"""`rtctl doctor`: what this machine can promise, and what to change."""
+"""`rtctl doctor`: which real-time rates this computer can hold, and what to change."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,13 +11,14 @@ from rtctl.cli.common import JsonOption, SetOption
 app = typer.Typer(add_completion=False)
 RATES = (500.0, 10_000.0)
 SLOWEST, FASTEST = 10.0, 50_000.0  # Hz
-PRIORITY = 80  # of a loop whose config says none
+PRIORITY = 80  # real-time priority of a loop whose config says none
 
 
 @app.command()
 def doctor(
     seconds: Annotated[
-        int, typer.Option("--seconds", metavar="S", min=1, help="How long to measure at each rate, by each of the two.")
+        int,
+        typer.Option("--seconds", metavar="S", min=1, help="Duration at each rate, by the loop and by cyclictest."),
     ] = 5,
     rate: Annotated[
         list[float] | None,
@@ -46,8 +47,8 @@ def doctor(
     set_: SetOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Look at kernel, rights and CPUs, measure how late an empty loop wakes, beside cyclictest where that is
-    installed, and say what to change. A bad machine is no error: exit code 0, unless --need asks for a rate.
+    """Check kernel, rights and CPUs, measure how late an empty loop wakes, and say what to change. cyclictest is run as
+    well, where it is installed. A bad computer is no error: exit code 0, unless --need asks for a rate.
 
     Examples:
 
@@ -60,7 +61,7 @@ def doctor(
       rtctl doctor --board ivu --set 'driver={kind: comedi, device: /dev/comedi0}'
 
     With --board it asks you to turn and push things by hand, with all outputs off, and exits with 1 where something is
-    wired wrong. Without a terminal, or with --json, it only reads what needs nobody.
+    wired wrong. Without a terminal, or with --json, it makes only the checks that need no person.
     """
     from rich.console import Console
 
@@ -112,7 +113,7 @@ def doctor(
 
 
 def check(rates: list[float] | None, need: float | None, measure: bool, plot: Path | None) -> list[float]:
-    """The rates to measure at, slowest first. Raises UserError where the options contradict each other."""
+    """Rates to measure at, in Hz, lowest first. Raises UserError where the options contradict each other."""
     from rtctl.config.errors import UserError
 
     for option, value in (*(("--rate", hz) for hz in rates or ()), *((("--need", need),) if need is not None else ())):
@@ -129,7 +130,7 @@ def check(rates: list[float] | None, need: float | None, measure: bool, plot: Pa
 
 
 def check_wires(path: str, overrides: list[str] | None, json: bool) -> None:
-    """Walk through the wiring checks of a config's board; exit code 1 where one is bad."""
+    """Run the wiring checks of a config's board; exit code 1 where one is bad."""
     import sys
 
     from rich.console import Console

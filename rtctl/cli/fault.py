@@ -1,4 +1,4 @@
-"""`rtctl fault`: make something go wrong on purpose, and see what the machine makes of it."""
+"""`rtctl fault`: inject faults into a machine, and test which faults are detected."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -61,11 +61,11 @@ def add(
 
 @app.command("list")
 def list_(
-    catalogue: Annotated[bool, typer.Option("--catalogue", help="What there is, though a machine runs.")] = False,
+    catalogue: Annotated[bool, typer.Option("--catalogue", help="All faults, even if a machine runs.")] = False,
     json: JsonOption = False,
     name: NameOption = None,
 ) -> None:
-    """List the faults there are; of a running machine those that it has.
+    """List all faults, or the faults that a running machine has.
 
     Examples:
 
@@ -84,12 +84,12 @@ def list_(
     for found in result["faults"]:
         typer.echo(_line(found))
     if not result["faults"]:
-        typer.echo("no faults; `rtctl fault list --catalogue` has those that there are")
+        typer.echo("no faults; `rtctl fault list --catalogue` lists all kinds")
 
 
 @app.command()
 def clear(json: JsonOption = False, name: NameOption = None) -> None:
-    """Take all faults of a running machine away. What they have cost stays: missed counts are not found again.
+    """Remove all faults of a running machine. Their losses remain: missed counts are not recovered.
 
     Examples:
 
@@ -131,7 +131,7 @@ def table(
         raise UserError(f"--machine {machine}: it is {', '.join(STANDS)} or all")
     if markdown is not None and not markdown.parent.is_dir():
         raise UserError(f"--markdown {markdown}: there is no folder {markdown.parent}")
-    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(40))  # the faults are meant
+    structlog.configure(wrapper_class=structlog.make_filtering_bound_logger(40))  # no warnings on intended faults
     found = run(list(STANDS) if machine == "all" else [machine], lambda line: typer.echo(line, err=True))
     if markdown is not None:
         write_text(markdown, page.text(found))
@@ -145,7 +145,7 @@ def table(
 
 
 def _size(text: str, unit: str) -> float:
-    """A number, in seconds where the size is a time."""
+    """Size of a fault in `unit`; a bare number is taken as it is."""
     from rtctl.config.errors import UserError
     from rtctl.config.units import convert
 

@@ -16,14 +16,14 @@ def foxglove(
     ] = None,
     port: Annotated[int, typer.Option(metavar="N", min=0, max=65535, help="Port; 0 chooses a free one.")] = 8765,
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="Address to listen at.")] = "127.0.0.1",
-    rate: Annotated[float, typer.Option(metavar="HZ", min=1, help="Most rows a second; the others as extremes.")] = 500,
+    rate: Annotated[float, typer.Option(metavar="HZ", min=1, help="Most rows a second; others as min and max.")] = 500,
     whole: Annotated[bool, typer.Option("--whole", help="Every row, however many.")] = False,
     control: Annotated[bool, typer.Option("--control", help="Let viewers change settings and the setpoint.")] = False,
 ) -> None:
     """Serve a running machine to Foxglove: rows, status and events as channels, settings as parameters.
 
-    There is no password: whoever reaches the port can look, and with --control can set gains. So --control is for
-    127.0.0.1 alone; from elsewhere, take the port to you with ssh -L 8765:127.0.0.1:8765 BENCH.
+    There is no password: anyone who reaches the port can read, and with --control can set gains. So --control works on
+    127.0.0.1 only. From another computer, forward the port: ssh -L 8765:127.0.0.1:8765 BENCH.
 
     Examples:
 

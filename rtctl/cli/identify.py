@@ -1,4 +1,4 @@
-"""`rtctl identify`: experiments on a machine that runs, an emulated one, or a recording. Each has a file of its own."""
+"""`rtctl identify`: experiments on a running machine, an emulated machine, or a recording."""
 
 import typer
 

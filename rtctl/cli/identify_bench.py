@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rtctl.identify.stribeck import Stribeck
 
 app = typer.Typer(add_completion=False)
-MARGIN = 6e-3  # m, that a printed image is longer than what is analysed
+MARGIN = 6e-3  # m, length of a printed image beyond the analysed length
 
 
 @app.command()
@@ -23,7 +23,10 @@ def friction(
     set_: SetOption = None,
     turns: Annotated[float, typer.Option(metavar="N", min=1, help="Turns of the capstan to average over.")] = 12,
     speeds: Annotated[
-        str | None, typer.Option("--speeds", metavar="LIST", help="rad/s of the capstan, e.g. 0.2,1,4; the usual ones.")
+        str | None,
+        typer.Option(
+            "--speeds", metavar="LIST", help="Capstan speeds in rad/s, e.g. 0.2,1,4; the usual ones if absent."
+        ),
     ] = None,
     out: OutOption = None,
     json: JsonOption = False,
@@ -81,7 +84,7 @@ def radius(
     source: SourceArgument,
     set_: SetOption = None,
     travel: Annotated[
-        float, typer.Option(metavar="RAD", min=0.2, help="rad of the capstan that a way takes at least.")
+        float, typer.Option(metavar="RAD", min=0.2, help="Least travel of one pass, in rad of the capstan.")
     ] = 1.9,
     out: OutOption = None,
     json: JsonOption = False,
@@ -123,7 +126,7 @@ def driver(
 ) -> None:
     """Curve of the linear drive's amplifier, 0 to 3 V in steps of 0.1 V, with the motor held fast (12.3).
 
-    On a bench clamp the carriage first: nothing but the clamp keeps it from running away.
+    On a bench, clamp the carriage first: only the clamp holds it.
 
     Examples:
 
@@ -156,9 +159,11 @@ def scale(
     travel: Annotated[str, typer.Option("--travel", metavar="X", help="Length that is analysed.")] = "600mm",
     speed: Annotated[
         list[str] | None,
-        typer.Option("--speed", metavar="V", help="Of a CONFIG; give two to tell position from time: 20 and 50 mm/s."),
+        typer.Option(
+            "--speed", metavar="V", help="With a CONFIG; two speeds separate errors of position from errors of time."
+        ),
     ] = None,
-    luminance: Annotated[bool, typer.Option("--luminance", help="Print a grey image with this error, too.")] = False,
+    luminance: Annotated[bool, typer.Option("--luminance", help="Emulate a grey print with this error, too.")] = False,
     out: OutOption = None,
     json: JsonOption = False,
     plot: PlotOption = None,
@@ -260,7 +265,7 @@ def steps(
 
 
 def _records(source: list[str], set_: list[str] | None, out: Path | None, json: bool, plan: Any) -> list[Any]:
-    """Records of bundles, or of the configs that `plan` makes of one, played. Raises NoAnswer where one tripped."""
+    """Records of bundles, or of runs of the configs that `plan` makes. Raises NoAnswer where a run tripped."""
     from rtctl.identify.bench import seconds, whole
 
     found = sources.records(source, set_, out, json, lambda config: [(one, seconds(one)) for one in plan(config)])
@@ -306,7 +311,7 @@ def _stribeck(fit: "Stribeck | None", scale: float, unit: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Named tuples as objects, all the way down."""
+    """Value for JSON: named tuples become dicts, recursively."""
     if hasattr(value, "_asdict"):
         return {key: _plain(item) for key, item in value._asdict().items()}
     if isinstance(value, (list, tuple)):
@@ -324,7 +329,7 @@ def _list(text: str | None, option: str) -> list[float] | None:
     except ValueError:
         raise UserError(f"{option} {text}: write numbers with commas, e.g. 0.2,1,4") from None
     if min(values) <= 0:
-        raise UserError(f"{option} {text}: every speed must be more than nothing")
+        raise UserError(f"{option} {text}: every speed must be above 0")
     return values
 
 

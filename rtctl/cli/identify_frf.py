@@ -25,10 +25,10 @@ RmsOption = Annotated[str | None, typer.Option("--rms", metavar="V", help="Size 
 SpeedOption = Annotated[str | None, typer.Option("--speed", metavar="V", help="Constant speed, e.g. 2rad/s or 5mm/s.")]
 BandOption = Annotated[
     str | None,
-    typer.Option("--band", metavar="LOW:HIGH", help="Hz; exit code 3 where the data do not carry all of it."),
+    typer.Option("--band", metavar="LOW:HIGH", help="Band in Hz; exit code 3 where the data do not support all of it."),
 ]
-AmpereOption = Annotated[bool, typer.Option("--per-ampere", help="Divide the known drive out.")]
-KeepOption = Annotated[bool, typer.Option("--keep-law", help="Play with the config's own gains.")]
+AmpereOption = Annotated[bool, typer.Option("--per-ampere", help="Divide by the known drive.")]
+KeepOption = Annotated[bool, typer.Option("--keep-law", help="Run with the config's own gains.")]
 
 
 @app.command()
@@ -46,7 +46,7 @@ def frf(
     json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
-    """Sensitivity by band-limited noise at constant speed, and from it the process (thesis 8.1).
+    """Sensitivity from band-limited noise at constant speed, and the process derived from it (thesis 8.1).
 
     Exit code 3 where the record is too short, the coherence too low, a drive saturates or the loop is not stable.
 
@@ -99,7 +99,7 @@ def multisine(
 ) -> None:
     """Best linear approximation by an odd random-phase multisine, with its noise and its odd and even distortion.
 
-    Of recordings: one bundle a realisation.
+    With recordings: one bundle for each realisation.
 
     Examples:
 
@@ -139,9 +139,11 @@ def fit(
     ] = None,
     free: Annotated[
         list[str] | None,
-        typer.Option("--free", metavar="NAME", help="Parameter to fit, e.g. J_m or c1. Repeatable; the usual ones."),
+        typer.Option(
+            "--free", metavar="NAME", help="Parameter to fit, e.g. J_m or c1; the usual ones if absent. Repeatable."
+        ),
     ] = None,
-    both: Annotated[bool, typer.Option("--both", help="Reel unit, of a CONFIG: excite either motor.")] = False,
+    both: Annotated[bool, typer.Option("--both", help="Reel unit, with a CONFIG: excite each motor in turn.")] = False,
     realisations: Annotated[int, typer.Option(metavar="N", min=2, help="Runs, each with other phases.")] = 4,
     motor: MotorOption = 1,
     rms: RmsOption = None,
@@ -150,9 +152,9 @@ def fit(
     json: JsonOption = False,
     plot: PlotOption = None,
 ) -> None:
-    """Fit the machine's model to its response, magnitude and phase weighted by their confidence, with the delay (8.2).
+    """Fit the machine's model and its delay to the frequency response, weighted by its confidence (8.2).
 
-    Of recordings: those of `frf` or of `multisine`, told apart by their excitation, motor and radii.
+    With recordings: those of `frf` or `multisine`, grouped by excitation, motor and radii.
 
     Examples:
 
@@ -186,7 +188,7 @@ def _config(records: list[Any]) -> Any:
 
 
 def _responses(records: list[Any]) -> list["Frf"]:
-    """One response for each motor and pair of radii among the records."""
+    """Frequency responses, one for each excitation, motor and pair of radii among the records."""
     from rtctl.config.errors import UserError
     from rtctl.identify import best_linear, sensitivity
     from rtctl.identify.frf import motor_of
@@ -231,7 +233,7 @@ def _speed(config: Any, text: str | None) -> float | None:
 
 
 def _pick(f: Any) -> Any:
-    """Indices of about ROWS lines, evenly spread in the logarithm of the frequency."""
+    """Indices of about ROWS lines, evenly spaced in the logarithm of the frequency."""
     import numpy as np
 
     return np.unique([int(np.argmin(np.abs(np.log(f / x)))) for x in np.geomspace(f[0], f[-1], ROWS)])

@@ -1,4 +1,4 @@
-"""What an experiment reads: bundles as they are, or the machine of a config that plays it first."""
+"""Records for an experiment: from bundles, or from playing the experiment on the machine of a config."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,11 +10,13 @@ from rtctl.cli import common
 
 SourceArgument = Annotated[
     list[str],
-    typer.Argument(metavar="BUNDLE...|CONFIG", help="Recordings of this experiment, or a config that plays it first."),
+    typer.Argument(metavar="BUNDLE...|CONFIG", help="Recordings of this experiment, or a config that runs it first."),
 ]
 OutOption = Annotated[
     Path | None,
-    typer.Option("--out", "-o", metavar="DIR", help="Of a CONFIG: keep the recordings here; a real machine's always."),
+    typer.Option(
+        "--out", "-o", metavar="DIR", help="With a CONFIG: keep the recordings here; a real machine's are always kept."
+    ),
 ]
 PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE", help="Draw the result into a PNG.")]
 
@@ -33,17 +35,18 @@ def are_bundles(words: list[str]) -> bool:
 
 
 def load(words: list[str]) -> list[Any]:
-    """The bundles."""
+    """Bundles of the folders `words`."""
     from rtctl.trace.bundle import load_bundle
 
     return [load_bundle(word) for word in words]
 
 
 def play(config: Any, experiments: list[Any], out: Path | None, say: Callable[[str], None]) -> list[Any]:
-    """Play experiments: (config, seconds) each. Emulated machines on virtual time, in this process; with `out`, and on
-    a machine that is not ours always, as a daemon does, each into a bundle of its own.
+    """Records of `experiments`, pairs of config and duration in s, played one after another.
 
-    Raises UserError where the machine cannot be run. What went wrong in a run is for its reader to find.
+    Emulated machines run on virtual time in this process. With `out`, and always with an external plant, a daemon
+    session plays each experiment into its own bundle. Raises UserError where the machine cannot be run; the caller
+    checks each record for trips.
     """
     from rtctl.config.errors import UserError
     from rtctl.config.load import set_path
@@ -74,7 +77,7 @@ def play(config: Any, experiments: list[Any], out: Path | None, say: Callable[[s
 
 
 def say_on_stderr(json: bool) -> Callable[[str], None]:
-    """Progress for a person; silence for a program."""
+    """Function that prints progress on standard error; silent with `json`."""
     return (lambda text: None) if json else (lambda text: typer.echo(text, err=True))
 
 
@@ -101,7 +104,7 @@ def records(
 
 
 def positive_si(text: str, option: str, unit: str, example: str) -> float:
-    """A quantity above 0 with its unit, in SI. Raises UserError with the option and an example of what is right."""
+    """Positive quantity in SI. Raises UserError with the option and an example."""
     from rtctl.config.errors import UserError
     from rtctl.config.units import to_si
 
@@ -111,5 +114,5 @@ def positive_si(text: str, option: str, unit: str, example: str) -> float:
     except ValueError as error:
         raise UserError(f"{option} {text}: {error}") from None
     if si <= 0:
-        raise UserError(f"{option} {text}: must be more than nothing")
+        raise UserError(f"{option} {text}: must be above 0")
     return si

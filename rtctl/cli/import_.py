@@ -22,7 +22,7 @@ def import_(
         typer.Option("--map", metavar="OURS=THEIRS,...", help="Which column is which, e.g. u=vir,x=qm. Repeatable."),
     ] = None,
     map_file: Annotated[
-        Path | None, typer.Option("--map-file", metavar="YAML", help="All of this in a file; see docs/traces.md.")
+        Path | None, typer.Option("--map-file", metavar="YAML", help="These options in a file; see docs/traces.md.")
     ] = None,
     unit: Annotated[
         list[str] | None, typer.Option("--unit", metavar="OURS=UNIT", help="Unit in the file, e.g. x=mm. Repeatable.")
@@ -43,31 +43,29 @@ def import_(
         list[str] | None,
         typer.Option("--case", metavar="KEY=VALUE", help="Further key of case.json, e.g. drive.newton_per_volt=35.15."),
     ] = None,
-    uneven: Annotated[bool, typer.Option("--uneven", help="The rows are at uneven times, and stay so.")] = False,
+    uneven: Annotated[bool, typer.Option("--uneven", help="The rows are at uneven times; keep them so.")] = False,
     names_line: Annotated[
         int | None, typer.Option("--names-line", metavar="N", help="Text: line of the names, 1 the first; 0 for none.")
     ] = None,
     units_line: Annotated[
         int | None, typer.Option("--units-line", metavar="N", help="Text: line of the units; 0 for none.")
     ] = None,
-    skip: Annotated[
-        int | None, typer.Option("--skip", metavar="N", help="Text: lines at the top to pass over.")
-    ] = None,
+    skip: Annotated[int | None, typer.Option("--skip", metavar="N", help="Text: lines at the top to skip.")] = None,
     separator: Annotated[
-        str | None, typer.Option("--separator", metavar="SIGN", help="Text: between two cells; tab and space too.")
+        str | None, typer.Option("--separator", metavar="SIGN", help="Text: sign between two cells, or tab or space.")
     ] = None,
     decimal: Annotated[str | None, typer.Option("--decimal", metavar="SIGN", help="Text: decimal sign, . or ,")] = None,
     encoding: Annotated[
-        str | None, typer.Option("--encoding", metavar="NAME", help="Text: of its characters, e.g. utf-16 or cp1252.")
+        str | None, typer.Option("--encoding", metavar="NAME", help="Text: character encoding, e.g. utf-16 or cp1252.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Make a bundle of a recording from elsewhere, in SI units, so that plot, compare and diagnose work on it.
+    """Make a bundle of another program's recording, in SI units, so that plot, compare and diagnose work on it.
 
-    Units are those of --unit, else those that the file names, else SI. Without --map, columns that have our names
-    already are taken. With --machine, OURS are the columns of the description's drives and sensors, or their names, and
-    the description, its tolerance and known physics go into the bundle. Of a file of text the names, units, separator
-    and decimal sign are seen from the file.
+    Units are those of --unit, else those that the file names, else SI. Without --map, columns that already have the
+    names of rtctl are taken. With --machine, OURS are the columns of the description's drives and sensors, or their
+    names; the description, its tolerance and known physics go into the bundle. In a text file the names, units,
+    separator and decimal sign are detected.
 
     Examples:
 
@@ -113,7 +111,7 @@ def import_(
 
 
 def _diagnosable(folder: Path) -> Any:
-    """What `rtctl diagnose` would refuse it for; None where it would not."""
+    """Reason for which `rtctl diagnose` would refuse the bundle; None where it would accept it."""
     from rtctl.config.errors import NoAnswer, UserError
     from rtctl.diagnose.answer.load import load
 

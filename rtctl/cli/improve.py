@@ -1,4 +1,4 @@
-"""`rtctl improve`: what is put against what a diagnosis found, proved on the emulated machine."""
+"""`rtctl improve`: remedies for the effects that a diagnosis found, tested on the emulated machine."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,7 +21,7 @@ def improve(
     ],
     config: Annotated[
         str | None,
-        typer.Option("--config", metavar="YAML", help="Config that has law and loop, where the model has none."),
+        typer.Option("--config", metavar="YAML", help="Config with law and loop, for a model that has none."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -31,7 +31,9 @@ def improve(
     body: Annotated[
         str | None,
         typer.Option(
-            "--body", metavar="BODY", help="Body that shall follow; the last one that no drive acts on if absent."
+            "--body",
+            metavar="BODY",
+            help="Body that must follow the reference; the last one that no drive acts on if absent.",
         ),
     ] = None,
     closed_loop: Annotated[
@@ -43,21 +45,22 @@ def improve(
         ),
     ] = None,
     learn: Annotated[
-        int, typer.Option("--learn", metavar="N", min=0, max=50, help="With --closed-loop: runs that learn the move.")
+        int,
+        typer.Option("--learn", metavar="N", min=0, max=50, help="With --closed-loop: runs of iterative learning."),
     ] = 0,
     report: Annotated[bool, typer.Option(help="Write FILE.html beside the config.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """Propose a remedy for each effect that a diagnosis found, try it on the emulated fitted model, and keep it where
-    the machine follows its reference better, at both ends of the interval of the effect's size and with 6 dB and 45
-    degrees of margin. Writes the improved config, which `rtctl run` takes as it is, and a report of before and after,
-    of what was given up, and of what was left out and why.
+    """Propose a remedy for each effect that a diagnosis found, and test it on the emulated fitted model. A remedy is
+    kept where the machine follows its reference better, at both ends of the interval of the effect's size and with 6 dB
+    and 45 degrees of margin. Writes the improved config, which `rtctl run` takes unchanged, and a report: before and
+    after, what was given up, and what was left out and why.
 
-    With --closed-loop the machine that runs is tried as well, by its own sensor: the law that it had, the improved one,
-    and with --learn N as many runs more, each learning the move from the one before.
+    With --closed-loop the machine of CONFIG is tested as well, by its own sensor: with its former law, with the
+    improved law, and with --learn N in N more runs, each of which learns from the run before.
 
-    Exit code 3 where there is nothing to compare with: the emulated machine trips with the law that it has.
+    Exit code 3 where no comparison is possible: the emulated machine trips with its former law.
 
     Examples:
 
@@ -117,7 +120,7 @@ def improve(
 
 
 def text(r: Any) -> str:
-    """YAML of the improved config under a head that says what was put in and what has to hold."""
+    """YAML of the improved config, after comments with the remedies and the conditions that must hold."""
     from rtctl.config.load import set_path, to_yaml
     from rtctl.improve import words
 

@@ -1,4 +1,4 @@
-"""A group of commands each of which is a module, imported when it is used."""
+"""Command group that imports the module of a command when the command is used."""
 
 import importlib
 from typing import Any
@@ -10,7 +10,7 @@ from rtctl.config.errors import UserError, nearest
 
 
 class LazyGroup(TyperGroup):
-    """Loads a command's module when that command is asked for. Subclasses say which there are."""
+    """Command group with lazy imports; a subclass lists its commands in `modules`."""
 
     modules: dict[str, str] = {}  # noqa: RUF012  name of each command, in the order of the help, and its module here
     what = "command"
@@ -21,7 +21,7 @@ class LazyGroup(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         if cmd_name not in self.modules:
-            if ctx.resilient_parsing:  # the shell completes what is not yet a command
+            if ctx.resilient_parsing:  # the shell completes a partial command
                 return None
             near = nearest(cmd_name, self.modules)
             hint = f"did you mean '{near}'?" if near else self.otherwise

@@ -52,7 +52,7 @@ COMMANDS = {
     "doctor": "doctor",
     "keys": "keys",
 }
-USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]  # typer's own, which it does not export
+USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]  # typer's usage error, which typer does not export
 
 
 class Commands(LazyGroup):
@@ -83,15 +83,16 @@ def _root(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point; `arguments` are those of the command line if not given. Returns the exit code.
+    """Exit code of one call of `rtctl`; `arguments` default to those of the command line.
 
-    2 for the user's mistake, 3 for data that carry no answer, 1 for a run that tripped and for ours, 130 for Ctrl-C.
+    1 for a run that tripped or an internal error, 2 for a mistake of the user or a refusal of the computer, 3 for data
+    that support no answer, 130 for Ctrl-C.
     """
-    if arguments is None:  # this process is the program; whoever calls with arguments keeps their own path
+    if arguments is None:  # called as the program; a caller with arguments keeps its own sys.path
         isolate()
     try:
         code = app(arguments, prog_name="rtctl", standalone_mode=False) or 0
-        sys.stdout.flush()  # here, where a full disk has words; at the end of the interpreter it has none
+        sys.stdout.flush()  # a full disk is reported here; the interpreter's flush at exit has no message for it
         return code
     except (UserError, NoAnswer, RunFailed) as error:
         return _fail(str(error), error.exit_code)
@@ -110,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _forget_output() -> None:
-    """What waits for a standard output that takes nothing more goes nowhere."""
+    """Discard buffered output where standard output accepts no more."""
     try:
         sys.stdout.flush()
     except (OSError, ValueError):
@@ -119,7 +120,7 @@ def _forget_output() -> None:
 
 
 def _usage(error: Any) -> str:
-    """A mistake on the command line, in one line that says where the right words are."""
+    """Message for a mistake on the command line, in one line that names the help to read."""
     message = " ".join(error.format_message().split()).rstrip(".")
     context = getattr(error, "ctx", None)
     return f"{message[:1].lower()}{message[1:]}; see {context.command_path if context else 'rtctl'} --help"

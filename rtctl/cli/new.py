@@ -1,4 +1,4 @@
-"""`rtctl new law|plant|term|machine|config NAME`: the beginning of a file of your own, with what makes it run."""
+"""`rtctl new law|plant|term|machine|config NAME`: a first version of a file of your own that runs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -25,15 +25,15 @@ def new(
             "ldu_printer; ivu if not given.",
         ),
     ] = None,
-    into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder; made where it is missing.")] = Path(),
+    into: Annotated[Path, typer.Option("--into", metavar="DIR", help="Folder; made if it is missing.")] = Path(),
 ) -> None:
     """Write a law, a plant or a term of physics to start from: NAME.py, its test, and NAME.yaml, which uses it.
 
-    Of a machine it writes NAME.yaml: bodies, joints, drives and sensors with their units, a law and a reference, which
-    runs as it is; docs/bring_your_own_machine.md goes on from there. Of a config it writes NAME.yaml with every key of
-    the unit that it is like.
+    For a machine it writes NAME.yaml, which runs unchanged: bodies, joints, drives and sensors with their units, a law
+    and a reference; see docs/bring_your_own_machine.md. For a config it writes NAME.yaml with every key of the unit in
+    --like.
 
-    Nothing is ever overwritten. docs/tutorial_own_law.md goes on from here.
+    Nothing is ever overwritten. docs/tutorial_own_law.md shows the next steps.
 
     Examples:
 

@@ -11,7 +11,7 @@ from rtctl.cli import complete
 
 app = typer.Typer(add_completion=False)
 WIDTH = 100
-SCALES = {  # what a typical size is a multiple of
+SCALES = {  # scale of a term's parameter -> its text; a typical size is a multiple of it
     "dry": "the base model's dry friction",
     "force": "the force of the drive",
     "speed": "the usual speed",
@@ -71,7 +71,7 @@ def physics(
 
 
 def speaks_braille() -> bool:
-    """Whether the terminal, or what stands in its place, takes the characters that dots are drawn with."""
+    """Whether standard output can encode the braille characters of a curve."""
     try:
         "\u28ff".encode(sys.stdout.encoding or "ascii")
     except (UnicodeEncodeError, LookupError):
@@ -80,7 +80,7 @@ def speaks_braille() -> bool:
 
 
 def explain(term: Any) -> list[str]:
-    """Lines about one term."""
+    """Lines of text that explain one term."""
     from rtctl.plants.element import GENERAL
     from rtctl.plants.physics import by_kind
 
@@ -115,7 +115,7 @@ def explain(term: Any) -> list[str]:
 
 
 def _parameter(field: Any, typical: tuple[float, float] | None, scale: str | None) -> str:
-    """Help, unit, default and the range met in practice of one parameter, as a multiple of its scale."""
+    """Text on one parameter: help, unit, typical range as a multiple of its scale, and default."""
     from typing import get_args
 
     unit = (field.json_schema_extra or {}).get("unit", "")

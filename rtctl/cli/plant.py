@@ -34,11 +34,11 @@ def plant(
         typer.Option(metavar="SEED", min=0, help="Hide an effect in the machine, drawn by this seed; needs --seal."),
     ] = None,
     seal: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Where the hidden effect is written, and nowhere else.")
+        Path | None, typer.Option(metavar="FILE", help="The only file into which the hidden effect is written.")
     ] = None,
     after: Annotated[
         str | None,
-        typer.Option("--after", metavar="T", help="With --conceal: the effect begins so long after the plant does."),
+        typer.Option("--after", metavar="T", help="With --conceal: time from the plant's start to the effect's onset."),
     ] = None,
     open_seal: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Check a seal, print what was hidden, and stop.")
@@ -46,8 +46,8 @@ def plant(
 ) -> None:
     """Emulate a machine until Ctrl-C, or serve the real board or the FMU that the config names.
 
-    The loop that drives it has `link: {plant: external, endpoint: ...}` in its config. With --conceal the machine has
-    one more effect than its config says; the loop and its recording do not learn which.
+    The config of its loop needs `link: {plant: external, endpoint: ...}`. With --conceal the machine has one effect
+    more than its config says; the loop and its recording do not contain which.
 
     Examples:
 
@@ -112,7 +112,7 @@ def plant(
 
 
 def _hide(settings: Any, seed: int, seal: Path) -> Any:
-    """The machine with an effect that only the seal knows of."""
+    """Machine with a hidden effect, which is written into the file `seal` only."""
     from rtctl import machines
     from rtctl.diagnose.conceal import conceal
     from rtctl.diagnose.seal import close_seal

@@ -1,4 +1,4 @@
-"""A term's curve on the terminal, in dots of braille, and as a picture."""
+"""Curve of a physics term, as braille dots on the terminal and as a PNG."""
 
 import math
 from pathlib import Path
@@ -8,11 +8,11 @@ import numpy as np
 
 COLUMNS, LINES = 56, 12
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # of a braille cell, row by row (Unicode 6.0, 2800)
-SPARSE = 6  # every which dot of the curve without the term is drawn
+SPARSE = 6  # columns between two dots of the curve without the term
 
 
 def lines(curve: Any, braille: bool = True) -> list[str]:
-    """The curve as lines of text, and in sparse dots how it is without the term; `braille` or plain characters."""
+    """Lines of text with the curve, and in sparse dots the curve without the term; `braille` or plain characters."""
     (left, right), (low, high) = ends(curve.x), ends(np.concatenate([curve.y, curve.without]))
     wide, tall = 2 * COLUMNS, 4 * LINES
     dots = np.zeros((tall, wide), bool)
@@ -28,7 +28,7 @@ def lines(curve: Any, braille: bool = True) -> list[str]:
     sparse = columns % SPARSE == 0
     dots[plain[sparse], columns[sparse]] = True
     dots[rows, columns] = True
-    for k in np.flatnonzero((np.abs(np.diff(rows)) > 1) & (np.abs(np.diff(columns)) <= 1)):  # steep parts hang together
+    for k in np.flatnonzero((np.abs(np.diff(rows)) > 1) & (np.abs(np.diff(columns)) <= 1)):  # connect steep parts
         dots[min(rows[k : k + 2]) : max(rows[k : k + 2]) + 1, columns[k + 1]] = True
     ticks = {0: number(high, high - low), LINES - 1: number(low, high - low)}
     zero = int(row(np.zeros(1))[0]) // 4
@@ -45,32 +45,32 @@ def lines(curve: Any, braille: bool = True) -> list[str]:
 
 
 def character(cell: np.ndarray, braille: bool) -> str:
-    """Four rows of two dots as one character."""
+    """Character of four rows of two dots."""
     if not cell.any():
         return " "
     return chr(0x2800 + sum(DOTS[r][c] for r, c in np.argwhere(cell))) if braille else "*"
 
 
 def number(value: float, span: float) -> str:
-    """An end of a scale of this span: as many figures as tell it from the other end."""
+    """Text of one end of an axis, with enough digits for its `span`."""
     return f"{round(value, 1 - math.floor(math.log10(span))) + 0.0:.6g}"
 
 
 def ends(values: np.ndarray) -> tuple[float, float]:
-    """Lowest and highest of the values, apart in any case."""
+    """Lowest and highest value; 1 apart where all values are equal."""
     low, high = float(values.min()), float(values.max())
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
 def sizes(curve: Any) -> str:
-    """At which sizes it was drawn."""
+    """Text with the node and the parameter values of a drawn curve."""
     given = curve.settings.model_dump(exclude_unset=True)
     values = [f"{k} {v:g}" for k, v in given.items() if isinstance(v, int | float) and not isinstance(v, bool)]
     return f"drawn at {given['node']} of the {curve.kind}" + (f" with {', '.join(values)}" if values else "")
 
 
 def picture(curve: Any, path: Path) -> None:
-    """The same as a PNG. Raises UserError where it cannot be written."""
+    """Draw the curve into a PNG. Raises UserError where the file cannot be written."""
     from matplotlib.figure import Figure
 
     from rtctl.config.errors import UserError

@@ -1,4 +1,4 @@
-"""A bar with the time left, where a person is watching."""
+"""Progress bar with the time left, on a terminal only."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 @contextlib.contextmanager
 def progress(name: str, wrong: str) -> Iterator[Callable[[int, int, int], None]]:
-    """Gives `update(done, total, count)`; a count of what is `wrong` stands beside the name. A pipe sees nothing."""
+    """Context with `update(done, total, count)`; `count` and the word `wrong` follow the name. A pipe gets nothing."""
     from rich.console import Console
 
     console = Console(stderr=True)

@@ -22,20 +22,19 @@ def prove(
     topologies: Annotated[
         str | None, typer.Option(metavar="LIST", help="With --machines: which, separated by commas. All if not given.")
     ] = None,
-    jobs: Annotated[int, typer.Option(metavar="N", min=1, help="Processes side by side.")] = 1,
+    jobs: Annotated[int, typer.Option(metavar="N", min=1, help="Parallel processes.")] = 1,
     limit: Annotated[str, typer.Option("--limit", metavar="T", help="Longest time for a case, e.g. 600s.")] = "600s",
     generate_only: Annotated[bool, typer.Option("--generate-only", help="Write and seal the cases; stop.")] = False,
     heldout: Annotated[bool, typer.Option("--heldout", help="Record each machine a second time as well.")] = False,
     against: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="The same cases as an earlier program answered them: what differs."),
+        typer.Option(metavar="DIR", help="Answers of an earlier version to these cases; the differences are printed."),
     ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the scores as JSON.")] = False,
 ) -> None:
     """Prove the diagnosis on machines whose missing physics is concealed from it.
 
-    Cases that are in DIR already, of the same seed and number, are not generated again, and those diagnosed already
-    not diagnosed again.
+    Cases of the same seed and number that are in DIR already are not generated again. Finished diagnoses are kept.
 
     Examples:
 
@@ -82,7 +81,7 @@ def prove(
 
 
 def _listed(given: str | None, every: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of a list with commas; all where none is given."""
+    """Names of a comma-separated list; all names where no list is given."""
     return every if given is None else tuple(name.strip() for name in given.split(",") if name.strip())
 
 

@@ -1,4 +1,4 @@
-"""`rtctl replay BUNDLE`: give a recording to its law once more, and compare what it writes with what was written."""
+"""`rtctl replay BUNDLE`: run a recording through its law again, and compare the outputs with the recorded ones."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rtctl.trace.replay import Replayed
 
 app = typer.Typer(add_completion=False)
-MOST = 6  # signals told of
+MOST = 6  # signals listed, at most
 PEN = {"recorded": "#222222", "replayed": "#0b62a8", "difference": "#b3262e"}
 
 
@@ -21,11 +21,13 @@ def replay(
     bundle: Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder of a run, with orders.jsonl.")],
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Another setting, to see what it would have written."),
+        typer.Option("--set", metavar="KEY=VALUE", help="Another setting, to see the outputs that it gives."),
     ] = None,
     own: Annotated[
         list[Path] | None,
-        typer.Option("--own", metavar="FILE", help="Own file of the recording, by path; its text has to be the same."),
+        typer.Option(
+            "--own", metavar="FILE", help="Your file that the recording used, by path; its text must be unchanged."
+        ),
     ] = None,
     json: JsonOption = False,
     plot: Annotated[
@@ -34,8 +36,8 @@ def replay(
 ) -> None:
     """Replay a recording through its own law and compare to the bit. Exit code 1 where it differs.
 
-    With --set the machine's answer stays as it was recorded: what another gain would have written at first, not where
-    it would have led.
+    With --set the measurements stay as recorded. The outputs show the first reaction of another gain, not the motion
+    that would follow.
 
     Examples:
 
@@ -98,7 +100,7 @@ def _say(r: "Replayed") -> list[str]:
     ahead = sorted(r.differences, key=lambda d: (d.column not in r.written, d.tick))
     lines += [f"  {d.column:20}{d.ticks} ticks differ, by {d.largest:.3g} at most" for d in ahead[:MOST]]
     if r.changed:
-        lines.append(f"with {_set(r)}; what the machine answered is as it was recorded")
+        lines.append(f"with {_set(r)}; the measurements are as recorded")
     elif not r.same_program:
         lines.append("it was recorded by other sources or on another machine: see `versions` in case.json")
     return lines

@@ -1,4 +1,4 @@
-"""`rtctl reproduce`: the experiments and designs of the thesis, done again on the emulated machines."""
+"""`rtctl reproduce`: the experiments and designs of the thesis, repeated on the emulated machines."""
 
 import os
 from pathlib import Path
@@ -30,7 +30,7 @@ def reproduce(
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes side by side; all cores if absent."),
+        typer.Option("--jobs", "-j", metavar="N", min=1, help="Parallel processes; all cores if absent."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
@@ -70,7 +70,7 @@ def reproduce(
 
 
 def check_folder(folder: Path | None, given: bool) -> None:
-    """Make the folder, before the work. Raises UserError where there is no docs to write into, or it cannot be made."""
+    """Make the output folder. Raises UserError where there is no folder docs here, or the folder cannot be made."""
     from rtctl.config.errors import UserError
 
     if folder is None:
@@ -84,7 +84,7 @@ def check_folder(folder: Path | None, given: bool) -> None:
 
 
 def words(row: Any) -> str:
-    """A row in one line."""
+    """Line of text for one row."""
     from rtctl.reproduce import page
 
     said = "thesis" if row.thesis is not None and not row.erratum else "equations" if row.erratum else "claim"

@@ -35,8 +35,8 @@ def run(
 ) -> None:
     """Run a machine under control, on a bench or against its emulated twin.
 
-    Exit code 1 where it tripped, its loop died, or its recording stopped or was moved, 129 where its terminal was
-    closed: outputs are zero and the recording is whole then.
+    Exit code 1 where the machine tripped, its loop died, or its recording stopped or was moved. Exit code 129 where the
+    terminal was closed: outputs are zero and the recording is complete.
 
     Examples:
 
@@ -60,7 +60,7 @@ def run(
     length = common.seconds(duration, "--for")
     folder = out if out is not None else common.default_folder(settings.name)
     console = _console(json)
-    structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # standard output is the JSON's
+    structlog.configure(logger_factory=lambda *_: structlog.PrintLogger(console.log))  # stdout is for JSON
     console.say(told(config))
     session = Session(settings, folder, length, arm=arm, say=console.say, reread=read)
     failure = None

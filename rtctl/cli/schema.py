@@ -1,4 +1,4 @@
-"""`rtctl schema`: what may stand in a config, for editors and for people."""
+"""`rtctl schema`: JSON Schema of a config, for editors and for people."""
 
 from typing import Annotated
 

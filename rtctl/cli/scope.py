@@ -24,7 +24,7 @@ def scope(
 ) -> None:
     """Serve a page with live traces, trigger, spectrum and state of a running machine, until Ctrl-C.
 
-    The machine may be started before the scope or after it, and again. The page is served on 127.0.0.1 only, and can
+    The machine may start before or after the scope, and may restart. The page is served on 127.0.0.1 only, and can
     change nothing unless --control is given. From another computer: ssh -L 8642:127.0.0.1:8642 HOST.
 
     Examples:
@@ -49,9 +49,10 @@ def scope(
 
 
 def _name(machine: str | None) -> str:
-    """The machine to look at. A name need not run yet; without one, whichever starts first is taken.
+    """Name of the machine to show, which need not run yet; without a name the machine that starts first.
 
-    Raises UserError for what is no name, for several to choose from, and for one that this account may not command.
+    Raises UserError for an endpoint or a file, for several running machines and no name, and for a machine that this
+    account may not command.
     """
     from rtctl.config.errors import UserError, nearest
 
@@ -65,7 +66,7 @@ def _name(machine: str | None) -> str:
         while not (names := common.running()):
             time.sleep(LOOK)
     if machine is None or machine in names:
-        with common.client(machine):  # refuses what could not be asked
+        with common.client(machine):  # raises UserError where this account may not command it
             return machine or names[0]
     near = nearest(machine, names)
     if names:

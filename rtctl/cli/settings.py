@@ -43,15 +43,13 @@ def get(path: PathArgument, json: JsonOption = False, name: NameOption = None) -
 @app.command("set", cls=SignedCommand)
 def set_(
     path: PathArgument,
-    value: Annotated[
-        str, typer.Argument(metavar="VALUE", help="As it would stand in the config: 31, '160 ms', model.")
-    ],
+    value: Annotated[str, typer.Argument(metavar="VALUE", help="Written as in the config: 31, '160 ms', model.")],
     json: JsonOption = False,
     name: NameOption = None,
 ) -> None:
-    """Change a setting of a running machine, in force at the start of a tick.
+    """Change a setting of a running machine, from the start of a tick on.
 
-    The bundle notes the change. What changes the structure of the tick needs a new start.
+    The bundle records the change. A setting that changes the structure of the tick needs a restart.
 
     Examples:
 

@@ -1,4 +1,4 @@
-"""`rtctl simulate MODEL BUNDLE`: run any model against any recording and say how far apart they are."""
+"""`rtctl simulate MODEL BUNDLE`: simulate any recording with any model and print the errors."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from rtctl.diagnose.answer.comparison import Comparison
 
 app = typer.Typer(add_completion=False)
-OWNER = "case"
+OWNER = "case"  # the MODEL that means the recording's nominal model
 PEN = {"recorded": "#222222", "simulated": "#0b62a8", "error": "#b3262e"}
-MOST_POINTS = 6000  # of a line in the picture
+MOST_POINTS = 6000  # points of a line in the plot, about
 
 
 @app.command()
@@ -25,7 +25,7 @@ def simulate(
         str,
         typer.Argument(
             metavar="MODEL",
-            help="Config file, the name of one that comes with rtctl, or `case`: what its owner believes.",
+            help="Config file, the name of one that comes with rtctl, or `case`: the recording's nominal model.",
         ),
     ],
     bundle: Annotated[Path, typer.Argument(metavar="BUNDLE", help="Folder with recording.parquet and case.json.")],
@@ -33,23 +33,26 @@ def simulate(
         bool | None,
         typer.Option(
             "--closed-loop/--open-loop",
-            help="From the reference with its own law, or from the recorded command; closed where the law is known.",
+            help="Input: the reference through the recording's law, or the recorded command; closed where the law is "
+            "known.",
         ),
     ] = None,
     skip: Annotated[int, typer.Option("--skip", metavar="N", min=0, help="Rows at the start that do not count.")] = 0,
     own: Annotated[
         list[Path] | None,
-        typer.Option("--own", metavar="FILE", help="Own file of the recording, by path; its text has to be the same."),
+        typer.Option(
+            "--own", metavar="FILE", help="Your file that the recording used, by path; its text must be unchanged."
+        ),
     ] = None,
     json: JsonOption = False,
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Draw recorded, simulated and error into a PNG.")
     ] = None,
 ) -> None:
-    """Simulate a recording freely by a model: the `plant` section of any config, with its `physics` list.
+    """Free run of a model on a recording: the `plant` section of any config, with its `physics` list.
 
-    A recording of rtctl closes the loop by the tick of its own config. Where the law is an own file, give the file with
-    --own; without it the recorded command is the input. Exit code 3 where the model runs away.
+    For a recording of rtctl the tick of its own config closes the loop. Where the law is a file of your own, give it
+    with --own; without it the recorded command is the input. Exit code 3 where the model diverges.
 
     Examples:
 
@@ -95,7 +98,7 @@ def _table(result: "Comparison") -> list[str]:
 
 
 def figure(result: "Comparison") -> "Figure":
-    """Recorded, simulated and error of every channel."""
+    """Figure with the recorded values, simulated values and error of every channel."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -20,17 +20,20 @@ def soak(
     config: ConfigArgument,
     hours: Annotated[float, typer.Option("--hours", metavar="H", help="Hours of the machine's own time.")],
     seed: Annotated[
-        int, typer.Option("--seed", metavar="S", min=0, help="The day: same seed, same day to the bit.")
+        int,
+        typer.Option(
+            "--seed", metavar="S", min=0, help="Seed of the day; the same seed gives the same day to the bit."
+        ),
     ] = 1,
     mode: Annotated[
-        str, typer.Option("--mode", metavar="MODE", help="fused, lockstep or real; the last two by a daemon.")
+        str, typer.Option("--mode", metavar="MODE", help="fused, lockstep or real; the last two run a daemon.")
     ] = "fused",
-    faults: Annotated[bool, typer.Option("--faults/--no-faults", help="Break things at random, too.")] = True,
+    faults: Annotated[bool, typer.Option("--faults/--no-faults", help="Inject random faults as well.")] = True,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Summary, progress and bundles; runs/soak-NAME-... if absent."),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the soak in --out.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the soak in --out.")] = False,
     junit: Annotated[
         Path | None, typer.Option("--junit", metavar="FILE.xml", help="Write JUnit XML, a test case an invariant.")
     ] = None,
@@ -41,7 +44,7 @@ def soak(
     """Play a random day: references, bursts of setpoints, gain changes, captures, outputs off and on, and faults, all
     drawn from the seed, with invariants checked on every tick. Each violation leaves a bundle of the rows around it.
 
-    Exit code 1 with violations. Ctrl-C ends it between two events, and --resume goes on there.
+    Exit code 1 with violations. Ctrl-C ends it between two events, and --resume continues there.
 
     Examples:
 
@@ -83,7 +86,7 @@ def soak(
 
 @contextlib.contextmanager
 def _stopped() -> Iterator[Callable[[], bool]]:
-    """Ctrl-C and SIGTERM end the soak between two events; a second one at once."""
+    """Context with a function that is true after Ctrl-C or SIGTERM; a second signal raises KeyboardInterrupt."""
     import signal
     import threading
 

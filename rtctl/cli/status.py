@@ -9,9 +9,9 @@ from rtctl.cli import common
 from rtctl.cli.common import JsonOption, NameOption
 
 app = typer.Typer(add_completion=False)
-EVERY = 0.25  # s between two pictures or JSON lines
+EVERY = 0.25  # s between two frames or JSON lines
 EVERY_LINE = 1.0  # s between two lines where there is no terminal
-SIGNALS = (  # those that the machine has are shown
+SIGNALS = (  # signals in the table, where the machine has them
     *("ref", "capstan", "capstan_error", "position", "x", "position_error"),
     *("tension1_estimate", "tension2_estimate"),
 )
@@ -22,14 +22,14 @@ def status(
     json: JsonOption = False,
     watch: Annotated[bool, typer.Option("--watch", "-w", help="Keep showing it until Ctrl-C.")] = False,
     every: Annotated[
-        str | None, typer.Option(metavar="T", help="Time between two looks with --watch; 250ms, to a pipe 1s.")
+        str | None, typer.Option(metavar="T", help="Interval with --watch; 250ms if absent, to a pipe 1s.")
     ] = None,
     name: NameOption = None,
 ) -> None:
     """Show state, timing, link and signals of a running machine.
 
-    With --watch it goes on while the daemon is stopped and started again. A terminal gets a panel with
-    sparklines of the last 30 s, a pipe gets a line each time.
+    With --watch it continues across a restart of the daemon. A terminal gets a panel with sparklines of the last 30 s,
+    a pipe gets a line each time.
 
     Examples:
 
@@ -66,7 +66,7 @@ def status(
 
 
 def _json_lines(client: Any, found: dict[str, Any], every: float) -> None:
-    """One JSON object a line; ends with Ctrl-C or the daemon."""
+    """Print one JSON object a line, until Ctrl-C or the end of the daemon."""
     from rtctl.config.errors import UserError
     from rtctl.daemon.client import listens
 
@@ -84,7 +84,7 @@ def _json_lines(client: Any, found: dict[str, Any], every: float) -> None:
 
 
 def table(found: dict[str, Any], units: dict[str, str]) -> Any:
-    """A status reply as a table; `units` of the signals by name."""
+    """Table of a status reply; `units` are the units of the signals by name."""
     from rich.table import Table
     from rich.text import Text
 
@@ -130,5 +130,5 @@ def table(found: dict[str, Any], units: dict[str, str]) -> Any:
 
 
 def _times(percentiles: dict[str, float]) -> str:
-    """Percentiles in us."""
+    """Text of percentiles in us."""
     return "p50 {p50:.0f}, p99 {p99:.0f}, p99.9 {p999:.0f}, max {max:.0f} us".format(**percentiles)

@@ -1,4 +1,4 @@
-"""`rtctl arm`, `disarm`, `reset`, `play`, `stop`: what has no arguments."""
+"""`rtctl arm`, `disarm`, `reset`, `play`, `stop`: commands to a running machine without arguments."""
 
 import time
 from typing import Annotated, Any
@@ -68,7 +68,7 @@ def stop(
     ] = "60s",
     name: NameOption = None,
 ) -> None:
-    """Outputs off, then end the daemon; returns when it is gone and its recording is closed.
+    """Switch the outputs off, end the daemon, and wait until its recording is closed.
 
     Examples:
 
@@ -95,7 +95,7 @@ def stop(
 
 
 def _do(op: str, json: bool, name: str | None) -> dict[str, Any]:
-    """Ask for `op` and say what state it led to."""
+    """Status after the command `op`, which is also printed."""
     with common.client(name) as client:
         tick = client.call(op)["tick"]
         found = client.call("status")

@@ -1,4 +1,4 @@
-"""`rtctl trace`: look at a bundle, draw it, compare two, hand one to another program, make one whole."""
+"""`rtctl trace`: inspect, draw, compare, export and repair bundles."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,12 +20,12 @@ ColumnsOption = Annotated[
 
 @app.callback()
 def _trace() -> None:
-    """Look at a recorded bundle, draw it, compare two, export one, or make one whole."""
+    """Inspect, draw, compare, export and repair recorded bundles."""
 
 
 @app.command()
 def info(bundle: BundleArgument, json: JsonOption = False) -> None:
-    """Say what a bundle holds: length, rate, signals, losses, orders, parts, and where the time of its ticks went.
+    """Print what a bundle holds: length, rate, signals, losses, orders, parts, and the timing of its ticks.
 
     Examples:
 
@@ -81,7 +81,7 @@ def _stage(account: dict[str, Any]) -> dict[str, Any]:
 
 
 def _account(found: dict[str, Any]) -> list[str]:
-    """Orders, parts and the timing of a recording, in lines."""
+    """Lines with orders, parts and timing of a recording."""
     lines = []
     if found["orders"]:
         keys = found["settings_changed"]
@@ -124,7 +124,7 @@ def plot(
 
 @app.command()
 def repair(bundle: BundleArgument) -> None:
-    """Make a bundle of what a killed recording left behind. Doing it again changes nothing.
+    """Make a complete bundle from the files of a killed recording. A second repair changes nothing.
 
     Examples:
 
@@ -149,15 +149,15 @@ def recover(
             "--out",
             "-o",
             metavar="FOLDER",
-            help="Where the recording lies now, if it was moved; else a new folder for rows without a recording, "
+            help="Present folder of the recording, if it was moved. For rows without a recording a new folder, "
             "NAME-recovered-DATE-TIME if not given.",
         ),
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Join the rows that a killed daemon left in shared memory to its recording, which is repaired first.
+    """Append the rows that a killed daemon left in shared memory to its recording, after a repair of the recording.
 
-    Shared memory is of one user and is lost when the computer restarts. What is recovered is removed from there.
+    Shared memory belongs to one user and is lost when the computer restarts. Recovered rows are removed from it.
 
     Examples:
 
@@ -192,7 +192,7 @@ def export(
     start: Annotated[str | None, typer.Option("--from", metavar="TIME", help="From this time of column t on.")] = None,
     end: Annotated[str | None, typer.Option("--to-time", metavar="TIME", help="Until this time of column t.")] = None,
     every: Annotated[
-        int, typer.Option("--every", metavar="N", min=1, help="One row of so many; there is no filter in front.")
+        int, typer.Option("--every", metavar="N", min=1, help="Keep one row in N, without an anti-aliasing filter.")
     ] = 1,
     json: JsonOption = False,
 ) -> None:
@@ -200,7 +200,7 @@ def export(
 
     mcap opens in Foxglove, PlotJuggler and Rerun; layouts are in docs/plotjuggler. rrd, mf4 and tdms need the extra of
     that name.
-    The column t always comes along.
+    The column t is always written.
 
     Examples:
 
@@ -268,7 +268,7 @@ def _words(columns: str | None) -> tuple[str, ...]:
 
 
 def _moment(text: str | None, option: str, otherwise: float) -> float:
-    """A time of the column t, which may be 0 or below: it is the controller's clock."""
+    """Time of the column t, the controller's clock, in s; it may be 0 or negative."""
     if text is None:
         return otherwise
     try:

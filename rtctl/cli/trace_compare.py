@@ -7,11 +7,20 @@ if TYPE_CHECKING:
     from rtctl.trace.compare import Comparison
 
 PEN = {"a": "#222222", "b": "#0b62a8", "difference": "#b3262e"}
-DRAWN = ("capstan", "position", "x", "capstan_error", "position_error", "u1", "u2", "u")  # where nobody says which
+DRAWN = (
+    "capstan",
+    "position",
+    "x",
+    "capstan_error",
+    "position_error",
+    "u1",
+    "u2",
+    "u",
+)  # drawn if none are chosen
 
 
 def say(found: "Comparison") -> list[str]:
-    """The comparison in lines."""
+    """Lines of text for a comparison."""
     how = f"aligned by {found.aligned}" + (f", B is {found.offset:+d} ticks" if found.offset else "")
     lines = [f"A {found.a.folder}", f"B {found.b.folder}", f"{how}, {len(found.rows_a)} ticks in common"]
     if found.different:
@@ -53,7 +62,7 @@ def _cell(value: float | None) -> str:
 
 
 def draw(found: "Comparison", path: Path, chosen: bool) -> None:
-    """Draw A, B and B - A into a PNG: all that were compared where they were `chosen`, else motion and outputs."""
+    """Draw A, B and B - A into a PNG: all compared signals if `chosen`, else motion and outputs."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

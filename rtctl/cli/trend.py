@@ -9,7 +9,7 @@ from rtctl.cli import common
 from rtctl.cli.common import JsonOption
 from rtctl.cli.progress import progress
 
-ALARM = 4  # exit code where something changed: 1 is a fault of ours, and no change
+ALARM = 4  # exit code where a parameter changed; 1 is an internal error
 LISTED = 20
 
 app = typer.Typer(add_completion=False)
@@ -26,14 +26,14 @@ def trend(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="Table and page; FOLDER/trend if absent. A trend in it goes on."
+            "--out", "-o", metavar="DIR", help="Table and page; FOLDER/trend if absent. A trend in it is continued."
         ),
     ] = None,
     window: Annotated[
         str, typer.Option("--window", metavar="T", help="Length of a piece of a long recording, e.g. 30s.")
     ] = "60s",
     least: Annotated[
-        float, typer.Option("--least", metavar="PERCENT", min=0.0, help="Change from which on it is an alarm.")
+        float, typer.Option("--least", metavar="PERCENT", min=0.0, help="Smallest change that is an alarm.")
     ] = 2.0,
     jobs: Annotated[
         int | None, typer.Option("--jobs", "-j", metavar="N", min=1, max=256, help="Processes; one a CPU if absent.")
@@ -41,16 +41,16 @@ def trend(
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", metavar="tcp://...", help="Compute on a Dask cluster instead.")
     ] = None,
-    again: Annotated[bool, typer.Option("--again", help="Fit also what is fitted already.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Fit finished recordings again.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """Fit the description to every recording, and tell which of its numbers changed, when, and by how much.
+    """Fit the machine's parameters to every recording, and report which changed, when, and by how much.
 
     Writes trend.parquet (every estimate with its interval) and trend.html (pictures by machine, changes marked). Only
     recordings that are new or changed are fitted. Long recordings are fitted piece by piece.
 
-    Exit code 0 without a change, 4 with an alarm: a number changed by --least or more. 2 for what is no bundle, 3 where
-    no recording gives an estimate.
+    Exit code 0 without an alarm, 4 with an alarm: a parameter changed by --least or more. 2 for a path that is no
+    bundle, 3 where no recording gives an estimate.
 
     Examples:
 
@@ -68,7 +68,7 @@ def trend(
     assert length is not None
     folder = out if out is not None else what[0] / "trend"
     if out is None and len(what) > 1:
-        raise UserError("--out DIR is missing: with several folders nobody knows where table and page go")
+        raise UserError("--out DIR is missing: with several folders, say where table and page go")
     try:
         with progress(folder.name, "without an estimate") as update:
             found = trends.run(what, folder, jobs or workers.cpus(), scheduler, length, least / 100.0, again, update)

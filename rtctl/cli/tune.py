@@ -47,12 +47,12 @@ def tune(
     json: JsonOption = False,
 ) -> None:
     """Tune the law of a config on the model in its `plant`: PD with a gain schedule over the reel radii (ivu), lead-lag
-    with notches and a low-pass (ldu), PD (axis), and a first law for a machine that the config describes: PD or PI,
-    or with --method lq a state feedback from an observer of the whole machine, with an integral.
+    with notches and a low-pass (ldu), or PD (axis). A described machine gets PD or PI; with --method lq it gets state
+    feedback with integral action from an observer of the whole machine.
     Writes the tuned config with the reasons as comments, and a picture of Bode plot, Nyquist plot and step response
     before and after.
 
-    Exit code 3 where the loop to start from is unstable or the margins cannot be kept.
+    Exit code 3 where the initial loop is unstable or the margins cannot be kept.
 
     Examples:
 
@@ -93,7 +93,7 @@ def tune(
 
 
 def check_files(file: Path, pictures: list[Path], force: bool) -> None:
-    """Raise UserError before the work where a file could not be written after it."""
+    """Raise UserError, before the tuning, where an output file cannot be written."""
     from rtctl.config.errors import UserError
 
     if file.suffix not in (".yaml", ".yml"):
@@ -119,7 +119,7 @@ def write(file: Path, text: str) -> None:
 
 
 def draw(settings: Any, found: Any, pictures: list[Path]) -> None:
-    """Loops before and after, and beside it the maps over the radii where there are any."""
+    """Draw the loops before and after, and the maps over the radii where there are any."""
     from rtctl.design import figures
     from rtctl.trace.plot import save
 
@@ -129,7 +129,7 @@ def draw(settings: Any, found: Any, pictures: list[Path]) -> None:
 
 
 def as_json(found: Any, file: Path, pictures: list[Path]) -> dict[str, Any]:
-    """What was found, for a program."""
+    """JSON object of a result."""
     return {
         "config": str(file),
         "plots": [str(picture) for picture in pictures],

@@ -1,4 +1,4 @@
-"""`rtctl watch`: the model beside a running machine."""
+"""`rtctl watch`: run the model beside a running machine and report departures."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -38,14 +38,14 @@ def watch(
     ] = None,
     diagnose: Annotated[bool, typer.Option(help="Diagnose the capture of an alarm, at the lowest priority.")] = True,
 ) -> None:
-    """Run the model beside a running machine and tell when the machine departs from it, until Ctrl-C.
+    """Run the model beside a running machine and report when the machine departs from it, until Ctrl-C.
 
-    First it learns how far the healthy machine is from its model. From then on a test with no more than one false alarm
-    in eight hours of motion judges each second. An alarm is captured with the ten seconds before it and diagnosed in
-    the background; it is told here, in `rtctl status`, on the scope, in the daemon's log and to Prometheus.
+    First the watch learns the residual of the healthy machine. Then a test with at most one false alarm in eight hours
+    of motion judges each second. An alarm is captured with the ten seconds before it and diagnosed in the background.
+    Alarms appear here, in `rtctl status`, on the scope, in the daemon's log and in Prometheus.
 
-    It reads the rows of a machine of this computer and this user, and cannot hold up the loop. Of a recording it judges
-    all rows, in bounded memory; exit code 1 where the machine departs from its model.
+    The watch reads the rows of a machine on this computer and of this user, and cannot delay the loop. For a recording
+    it judges all rows, in bounded memory; exit code 1 where the machine departs from its model.
 
     Examples:
 
@@ -94,7 +94,7 @@ def _name(machine: str | None) -> str | None:
 
 
 def _compare(file: str, case: dict[str, Any], say: Any) -> None:
-    """Say where the running machine has another model than a config file."""
+    """Report the sections in which the running machine's config differs from a config file."""
     mine = common.load_config(file, None).model_dump(mode="json", exclude_unset=True)
     theirs = case.get("config") or {}
     for key in ("plant", "machine", "loop", "law"):

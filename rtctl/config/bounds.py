@@ -1,8 +1,8 @@
-"""Bounds that no change of a running machine may cross, in the direction that is less safe.
+"""Bounds on the changes of a running machine's settings, in the less safe direction.
 
-A setting declares with its field which direction is safer: `quantity(..., safer="smaller", off=0.0)`. What the config
-says at the start is the bound, unless its section `live` says another value for that path. Towards the safe side, and
-back to the bound, everything may change.
+A setting declares with its field which direction is safer: `quantity(..., safer="smaller", off=0.0)`. The value in the
+config at the start is the bound, unless the section `live` gives another value for that path. Changes towards the safe
+side, and back to the bound, are allowed.
 """
 
 import math
@@ -14,13 +14,13 @@ from rtctl.config.load import set_paths
 
 
 class Guarded(NamedTuple):
-    """A setting that declares which direction is safer, as it stands."""
+    """Setting with a declared safer direction, and its present value."""
 
     path: str
     value: Any
     unit: str
     safer: str  # "smaller" or "larger"
-    risk: float  # rises towards the side that is less safe; infinite where the limit is switched off
+    risk: float  # rises towards the less safe side; infinite where the limit is switched off
 
 
 def guarded(settings: Any, at: str = "") -> Iterable[Guarded]:
@@ -36,7 +36,7 @@ def guarded(settings: Any, at: str = "") -> Iterable[Guarded]:
 
 
 def _risk(extra: dict[str, Any], value: Any, parent: Any) -> float:
-    if value is None and "absent" in extra:  # the name of the sibling whose negative it is
+    if value is None and "absent" in extra:  # None means the negative of the sibling with this name
         value = -getattr(parent, str(extra["absent"]))
     if value is None or ("off" in extra and value == extra["off"]):
         return math.inf
@@ -44,7 +44,7 @@ def _risk(extra: dict[str, Any], value: Any, parent: Any) -> float:
 
 
 class Bounds:
-    """The bounds of a run. Raises UserError where `live` of the config names a setting that is none of them."""
+    """Bounds of a run. Raises UserError where `live` of the config names a setting without a bound."""
 
     def __init__(self, config: Any):
         self._most = {g.path: g for g in guarded(config)}
@@ -54,15 +54,15 @@ class Bounds:
                     f"live: {path} has no bound that could be widened; there is {', '.join(sorted(self._most))}"
                 )
         for given in guarded(set_paths(config, config.live) if config.live else config):
-            if given.path in config.live or given.value is None:  # it may mean a sibling that is in it
+            if given.path in config.live or given.value is None:  # None may mean a sibling in `live`
                 self._most[given.path] = given
 
     def crossed(self, config: Any) -> dict[str, str]:
-        """Settings of `config` that are beyond their bound: path -> sentence that says the bound and the way out."""
+        """Settings of `config` beyond their bound: path -> message with the bound and how to allow the value."""
         out = {}
         for new in guarded(config):
             most = self._most.get(new.path)
-            if most is not None and not new.risk <= most.risk:  # not a number is beyond any bound
+            if most is not None and not new.risk <= most.risk:  # NaN is beyond any bound
                 side = "more" if new.safer == "smaller" else "less"
                 off = " and 0 switches it off" if new.risk == math.inf and new.value is not None else ""
                 out[new.path] = (

@@ -1,7 +1,7 @@
-"""Where rtctl keeps what it can make again: compiled ticks, and the words that the shell completes.
+"""Cache folder of rtctl: compiled ticks, and the words that the shell completes.
 
-Compiled steps are pickles and generated ticks are modules: who can write to the folder decides what rtctl runs. So the
-folder has to be of this user, or of root to read from, and closed to others.
+Compiled steps are pickles and generated ticks are modules: whoever can write to the folder decides what rtctl runs. So
+the folder must belong to this user, or to root for reading, and others must not write to it.
 """
 
 import os
@@ -15,31 +15,31 @@ from rtctl.config.errors import UserError
 from rtctl.config.private import COMPILED, check, made
 
 NUMBA = "NUMBA_CACHE_DIR"
-SETTINGS = ".numba_config.yaml"  # numba takes it from the current folder
+SETTINGS = ".numba_config.yaml"  # numba reads this file from the current folder
 
 
 def cache_folder() -> Path:
-    """$RTCTL_CACHE_DIR, or the user's cache folder. Never the folder of the program, which may be read-only.
+    """Cache folder: $RTCTL_CACHE_DIR, or the user's cache folder; never the program's folder, which may be read-only.
 
-    Raises UserError for a folder that is not ours or that others may write, and for a home that does not exist.
+    Raises UserError for a folder of another user, a folder that others may write, and a home that does not exist.
     """
     given = os.environ.get("RTCTL_CACHE_DIR")
     return _checked(Path(given) if given else Path(platformdirs.user_cache_dir("rtctl")), os.geteuid())
 
 
 def check_compiled(folder: Path) -> None:
-    """Before numba loads machine code of the modules in `folder`. Raises UserError where others may have written it.
+    """Check the machine code of the modules in `folder`. Raises UserError where others may have written it.
 
-    numba makes its folders with the umask of the user, hence the folder of machine code is made here.
+    Called before numba loads the code. numba makes folders with the user's umask, so the folder is made here.
     """
-    with suppress(OSError):  # read-only: shared by its owner
+    with suppress(OSError):  # a read-only folder that its owner shares
         made(folder / "__pycache__")
     check(folder / "__pycache__")
     check_numba()
 
 
 def check_numba() -> None:
-    """Where numba is told to take its settings and machine code from. Raises UserError where others may write there."""
+    """Check where numba reads settings and machine code from. Raises UserError where others may write there."""
     if Path(SETTINGS).is_file():
         raise UserError(
             f"{Path(SETTINGS).absolute()} would say how numba compiles and whose machine code is run; run rtctl in "

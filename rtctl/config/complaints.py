@@ -1,4 +1,4 @@
-"""pydantic's validation errors as sentences for people, one line each, with the value as the person wrote it."""
+"""Messages for pydantic's validation errors, one line each, with the value as the person wrote it."""
 
 import re
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from rtctl.config.fields import Shape, child, literals, unknown
 from rtctl.config.units import example
 
-MOST = 20
+MOST = 20  # lines of a message
 BOUNDS = {
     "greater_than": ("gt", "more than"),
     "greater_than_equal": ("ge", "at least"),
@@ -30,9 +30,9 @@ def sentences(
     where: Callable[[tuple], str] | None = None,
     texts: dict[tuple, str] | None = None,
 ) -> str:
-    """One line for each mistake, at most 20, with `where(path)` in front.
+    """Message with one line for each mistake, at most 20, with `where(path)` in front.
 
-    `data` is what was validated, `texts` has its numbers as they were written.
+    `data` are the validated data, `texts` the numbers as they were written.
     """
     lines = []
     for entry in error.errors(include_url=False):
@@ -43,7 +43,7 @@ def sentences(
         name = ".".join(str(part) for part in at)
         prefix = where(path) if where else ""
         if prefix.startswith(f"--set {name}="):
-            name = ""  # it is there already
+            name = ""  # the prefix has it already
         lines.append(": ".join(part for part in (prefix, name, what) if part))
     lines = list(dict.fromkeys(lines))
     more = [f"and {len(lines) - MOST} more"] if len(lines) > MOST else []
@@ -51,7 +51,7 @@ def sentences(
 
 
 def _walk(model: Any, loc: tuple) -> tuple[tuple, Shape, Shape]:
-    """Path in the data for pydantic's location, less the chosen words of unions; its place and the one above."""
+    """Path in the data for pydantic's location, without the chosen words of unions; its shape and the one above."""
     place = owner = Shape(model, model=model)
     path: list = []
     for part in loc:
@@ -59,14 +59,14 @@ def _walk(model: Any, loc: tuple) -> tuple[tuple, Shape, Shape]:
             place = owner = Shape(place.choices[part], model=place.choices[part])
             continue
         if place.model is None and place.item is None and place.each is None and not isinstance(part, int):
-            continue  # the name of a union's member
+            continue  # pydantic's name of a union's member
         owner, place = place, child(place, part) or Shape(None)
         path.append(part)
     return tuple(path), place, owner
 
 
 def _inner(path: tuple, sentence: str, data: Any) -> tuple[tuple, str]:
-    """A check of a group may begin with the key that it is about, as in "physics.0.node: no such node"."""
+    """Path and sentence of a check of a group, which may begin with a key: "physics.0.node: no such node"."""
     match = re.match(r"([\w-]+(?:\.[\w-]+){0,9})(: (?=.)| is missing)", sentence[:200], re.ASCII)
     if match is None:
         return path, sentence
@@ -74,14 +74,14 @@ def _inner(path: tuple, sentence: str, data: Any) -> tuple[tuple, str]:
     absent = object()
     if match[2] == ": " and _raw(data, (*path, *parts), absent) is not absent:
         return (*path, *parts), sentence[match.end() :]
-    known = len(parts) - 1  # of a key that is missing, the nearest above it
+    known = len(parts) - 1  # for a missing key the nearest key above
     while known and _raw(data, (*path, *parts[:known]), absent) is absent:
         known -= 1
     return (*path, *parts[:known]), sentence[len(".".join(match[1].split(".")[:known])) + (known > 0) :]
 
 
 def _what(entry: Any, path: tuple, place: Shape, owner: Shape, data: Any, texts: dict[tuple, str]) -> tuple[tuple, str]:
-    """Path to name, and the sentence."""
+    """Path that the message names, and the message."""
     kind, context = entry["type"], entry.get("ctx", {})
     value = short(texts[path]) if path in texts else show(_raw(data, path, entry["input"]))
     unit = place.unit or ""
@@ -128,7 +128,7 @@ def _what(entry: Any, path: tuple, place: Shape, owner: Shape, data: Any, texts:
 
 
 def show(value: Any) -> str:
-    """A value as a person wrote it, short."""
+    """Text of a value as a person wrote it, shortened."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -141,7 +141,7 @@ def show(value: Any) -> str:
 
 
 def short(text: str) -> str:
-    """At most 60 characters of it."""
+    """The text, cut to 60 characters."""
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
@@ -161,7 +161,7 @@ def _not_one_of(value: Any, words: Any) -> str:
 
 
 def _raw(data: Any, path: tuple, otherwise: Any) -> Any:
-    """What the data say at a path, before any conversion."""
+    """Data at a path, before any conversion; `otherwise` where there are none."""
     for part in path:
         try:
             data = data[part]

@@ -11,19 +11,19 @@ class UserError(Exception):
 
 
 class NoAnswer(Exception):  # noqa: N818
-    """The data carry no answer. Exit code 3."""
+    """The data support no answer. Exit code 3."""
 
     exit_code = 3
 
 
 class RunFailed(Exception):  # noqa: N818
-    """A run that ended by itself; its recording is whole. Exit code 1."""
+    """A run that ended by itself; its recording is complete. Exit code 1."""
 
     exit_code = 1
 
 
 def nearest(word: str, choices: Iterable[str]) -> str | None:
-    """The choice that `word` was probably meant to be, or None. Upper and lower case count as nearly the same."""
+    """Choice that is closest to `word`, or None. Upper and lower case count as nearly equal."""
     names = list(choices)
     found = difflib.get_close_matches(word, names, n=1)
     if found:

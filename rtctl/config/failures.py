@@ -1,7 +1,6 @@
-"""Words for what a computer refuses: a full disk, a right that is missing, a process that was killed.
+"""Messages for refusals of the computer: a full disk, a missing right, a killed process.
 
-These are no mistakes of the program. `words` gives a sentence and what to do, or None for anything else, which is an
-internal error.
+A refusal is no mistake of the program. `words` returns a message with what to do, or None for an internal error.
 """
 
 import errno
@@ -42,7 +41,7 @@ NUMBA_SETTINGS = ".numba_config.yaml"
 
 
 def told(error: BaseException) -> tuple[int, str]:
-    """Exit code and sentence of any exception: 2 for what the computer refuses, 1 for our mistake."""
+    """Exit code and message of any exception: 2 for a refusal of the computer, 1 for an internal error."""
     if (said := words(error)) is not None:
         return 2, said
     if os.environ.get("RTCTL_TRACEBACK"):
@@ -51,7 +50,7 @@ def told(error: BaseException) -> tuple[int, str]:
 
 
 def words(error: BaseException) -> str | None:
-    """Sentence for an error that the computer gave, looked for along the causes of `error`; None for our mistake."""
+    """Message for a refusal of the computer, in `error` or one of its causes; None for an internal error."""
     seen: set[int] = set()
     cause: BaseException | None = error
     while cause is not None and id(cause) not in seen:

@@ -1,4 +1,4 @@
-"""What a settings class holds at a path: nested settings, a choice among several, a list, or a value with its unit."""
+"""Shape of a settings class at a path: nested settings, a choice among several, a list, or a value with its unit."""
 
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
@@ -11,8 +11,7 @@ DEEPEST = 30  # keys in a dotted path
 
 
 class Shape(NamedTuple):
-    """One place in a config. At most one of `model`, `choices`, `item` and `each` is there; none of them is a plain
-    value."""
+    """One place in a config. At most one of `model`, `choices`, `item` and `each` is set; a plain value has none."""
 
     annotation: Any
     field: FieldInfo | None = None
@@ -20,19 +19,19 @@ class Shape(NamedTuple):
     tag: str = ""  # key that chooses among `choices`
     choices: dict[str, Any] = {}  # noqa: RUF012  word -> settings class; never written to
     item: Any = None  # annotation of a list's items
-    each: Any = None  # annotation of the values under names that the person chooses
+    each: Any = None  # annotation of the values under names that the user chooses
     optional: bool = False
 
     @property
     def unit(self) -> str | None:
-        """Unit of a quantity; None where it is something else."""
+        """Unit of a quantity; None for any other value."""
         extra = self.field.json_schema_extra if self.field else None
         unit = extra.get("unit") if isinstance(extra, dict) else None
         return unit if isinstance(unit, str) else None
 
 
 def shape(annotation: Any, field: FieldInfo | None = None) -> Shape:
-    """The shape of an annotation; `field` carries unit, help and the key that chooses."""
+    """Shape of an annotation; `field` has the unit, the help and the key that chooses."""
     if get_origin(annotation) is Annotated:
         inner, *extras = get_args(annotation)
         return shape(inner, next((extra for extra in extras if isinstance(extra, FieldInfo)), field))
@@ -53,7 +52,7 @@ def shape(annotation: Any, field: FieldInfo | None = None) -> Shape:
 
 
 def child(place: Shape, part: Any) -> Shape | None:
-    """The place one key or index further on; None where there is none."""
+    """Shape one key or index below `place`; None where there is none."""
     if place.model is not None and part in place.model.model_fields:
         field = place.model.model_fields[part]
         return shape(field.annotation, field)
@@ -63,12 +62,12 @@ def child(place: Shape, part: Any) -> Shape | None:
 
 
 def literals(annotation: Any) -> list[Any]:
-    """The words that a Literal allows, else nothing."""
+    """Words that a Literal allows; empty for any other annotation."""
     return list(get_args(annotation)) if get_origin(annotation) is Literal else []
 
 
 def fill(place: Shape, data: Any) -> Any:
-    """The data with what a default says beside it: `limit: {slew: 5}` keeps the `high` of `limit = Limit(high=3)`."""
+    """Data completed from the default of a group: `limit: {slew: 5}` keeps the `high` of `limit = Limit(high=3)`."""
     if isinstance(data, list) and place.item is not None:
         return [fill(shape(place.item), item) for item in data]
     if not isinstance(data, dict):
@@ -87,7 +86,7 @@ def fill(place: Shape, data: Any) -> Any:
 
 
 def written(value: Any) -> Any:
-    """Plain data of settings: what was written, not what defaults added, and always the key that chooses."""
+    """Plain data of settings: the written keys, without added defaults, and always the key that chooses."""
     if hasattr(type(value), "model_fields"):
         fields = type(value).model_fields
         return {
@@ -101,9 +100,9 @@ def written(value: Any) -> Any:
 
 
 def put(data: Any, place: Shape, path: str, value: Any, said: str = "") -> list[tuple]:
-    """Set `value` in plain `data` at a dotted path. Returns the paths it made; raises UserError, `said` in front.
+    """Set `value` in plain `data` at a dotted path. Returns the new paths; raises UserError with `said` in front.
 
-    A list takes an index, or the one after its last. Keys on the way that were not written start from their defaults.
+    A list takes an index, or the index after its last. Missing keys on the way start from their defaults.
     """
     said = said or path
     node, at, made = data, place, []
@@ -147,7 +146,7 @@ def put(data: Any, place: Shape, path: str, value: Any, said: str = "") -> list[
 
 
 def unknown(name: str, known: Any) -> str:
-    """The end of a sentence about a name that is none of the known: the nearest, else all of them."""
+    """End of a message about an unknown name: the nearest known name, else the known names (at most 30)."""
     words = [str(word) for word in known]
     near = nearest(name, words)
     if near is not None:

@@ -1,7 +1,7 @@
-"""Files in folders that may be somebody else's: written under a random name and renamed, read only where they lie.
+"""Files in folders that others may write to: written under a random name and renamed, read only inside the folder.
 
-A writer never writes through a link, a FIFO or a device, and never into a file that was there before: the new file
-replaces the name. A reader takes plain files inside the folder that it was given.
+A writer never writes through a link, a FIFO or a device, and never into an existing file: the new file replaces the
+name. A reader takes plain files inside the folder that it was given.
 """
 
 import errno
@@ -17,7 +17,7 @@ from typing import IO, Any
 
 from rtctl.config.errors import UserError
 
-MODE = 0o666  # of a new file, before the umask
+MODE = 0o666  # mode of a new file, before the umask
 
 
 @contextmanager
@@ -52,9 +52,10 @@ def replaced(path: Path | str, mode: str = "w", sync: bool = False) -> Iterator[
 
 @contextmanager
 def replaced_path(path: Path | str, suffix: str | None = None) -> Iterator[Path]:
-    """As `replaced`, for packages that open a file by its name: a path with this ending, in a folder of mode 0700.
+    """Path of a draft that becomes `path` at the end, for packages that open a file by its name; see `replaced`.
 
-    Raises OSError, FileNotFoundError where nothing was written.
+    The draft has the ending `suffix` and lies in a folder of mode 0700. Raises OSError, FileNotFoundError where nothing
+    was written.
     """
     path = Path(path)
     _replaceable(path)
@@ -77,7 +78,7 @@ def write_text(path: Path | str, text: str, sync: bool = False) -> None:
 
 
 def open_stream(path: Path | str, flags: int = 0) -> int:
-    """File descriptor for writing into a file that is read while it grows; a plain file that exists is opened as it is.
+    """File descriptor for writing into a file that is read while it grows; an existing plain file is not truncated.
 
     `flags` are further flags of os.open. Raises OSError for a link, a FIFO, and a file that has a second name.
     """
@@ -96,9 +97,9 @@ def open_stream(path: Path | str, flags: int = 0) -> int:
 
 
 def inside(path: Path, folder: Path) -> Path:
-    """`path`, in `folder`, for reading. Raises UserError where it leads out of the folder or is no plain file.
+    """The path, if it may be read: a file or folder inside `folder`. Raises UserError for any other existing path.
 
-    A file that does not exist is for the caller to tell.
+    The caller reports a path that does not exist.
     """
     try:
         real, base = path.resolve(strict=True), folder.resolve()
@@ -118,7 +119,7 @@ def inside(path: Path, folder: Path) -> Path:
 
 
 def made_in(base: Path, *names: str) -> Path:
-    """The folder base/name/..., made where it is missing.
+    """The folder base/name/..., made if it is missing.
 
     Raises OSError, and UserError where a link leads out of `base`.
     """
@@ -138,7 +139,7 @@ def _created(folder: int, name: str) -> tuple[str, int]:
 
 
 def _name(error: BaseException, path: Path) -> None:
-    """Let an error of a write, which knows a descriptor only, tell the file."""
+    """Add the path to an error of a write by descriptor."""
     if isinstance(error, OSError) and error.errno is not None and error.filename is None:
         error.filename = str(path)
 

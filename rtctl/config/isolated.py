@@ -1,7 +1,7 @@
-"""Python processes of rtctl that import nothing from the current folder, whatever lies there.
+"""Python processes of rtctl that import nothing from the current folder.
 
-The flag -P leaves the current folder out of the path of imports. A folder in PYTHONPATH, a user's site and an editable
-installation still count, which -I would leave out. This module imports what the interpreter has loaded already.
+The flag -P leaves the current folder out of the import path. A folder in PYTHONPATH, a user's site and an editable
+installation still count; -I would leave them out. This module imports only modules that the interpreter has loaded.
 """
 
 import os
@@ -14,7 +14,7 @@ def python(*words: str) -> list[str]:
 
 
 def isolate() -> None:
-    """Let processes that multiprocessing starts leave the current folder out too, and this one from here on.
+    """Remove the current folder from the import path of this process and of those that multiprocessing starts.
 
     `python -m` and `python -c` put the current folder first; a folder that PYTHONPATH or an installation names stays.
     """

@@ -15,9 +15,9 @@ from rtctl.idiom import Settings
 
 
 class Widen(NamedTuple):
-    """How a config may name files of the user's own; see rtctl.own.model."""
+    """Functions for a config that names files of the user; see rtctl.own.model."""
 
-    long_form: Callable[[Any], Any]  # of data with short forms in it
+    long_form: Callable[[Any], Any]  # data with short forms -> data in the long form
     widened: Callable[[Any, Any, Path], tuple[Any, Any]]  # class, data, its folder -> class, and the data complete
 
 
@@ -26,7 +26,7 @@ def load_settings(
 ) -> Any:
     """Settings of a file, with `key.path=value` overrides. Raises UserError with one line for each mistake.
 
-    With `widen` the class may be another than `model`, where own files are named.
+    With `widen`, a config that names files of the user has another class than `model`.
     """
     file = find(path)
     document = load_yaml(file)
@@ -85,7 +85,7 @@ def set_path(settings: Any, path: str, value: Any) -> Any:
 
 
 def set_paths(settings: Any, values: Mapping[str, Any]) -> Any:
-    """As `set_path`, several at once: they have to fit together, and need not one by one."""
+    """New settings with several values at dotted paths; only all of them together must be valid."""
     model = type(settings)
     data = written(settings)
     for path, value in values.items():
@@ -114,7 +114,7 @@ def _where(document: Document, said: dict[tuple, str], path: tuple) -> str:
 
 
 class Dumper(yaml.SafeDumper):
-    """Quotes what either YAML 1.1 or 1.2 would not read as text, and leaves the lines of an own file as they are."""
+    """YAML dumper that quotes text which YAML 1.1 or 1.2 would read as another type, and keeps line breaks."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True

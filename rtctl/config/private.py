@@ -1,6 +1,6 @@
-"""Private folder: of this user or of root, and closed to others, so that what lies there may be loaded or trusted.
+"""Private folders: owned by this user or root and not writable by others, so that their files can be trusted.
 
-A group that holds nobody but this user (Debian, Fedora: `umask 002`) counts as the user.
+A group with this user as its only member (Debian, Fedora: `umask 002`) counts as the user.
 """
 
 import grp
@@ -15,11 +15,11 @@ from rtctl.config.errors import UserError
 
 
 class Use(NamedTuple):
-    """What a folder is for, as messages say it."""
+    """Purpose of a folder, for messages."""
 
     what: str  # "cache folder"
-    danger: str  # what somebody else could do, "what lies there would be run"
-    variable: str  # that names another folder
+    danger: str  # what another user could do, "what lies there would be run"
+    variable: str  # environment variable that names another folder
 
 
 CACHE = Use("cache folder", "what lies there would be run", "RTCTL_CACHE_DIR")
@@ -28,10 +28,10 @@ SOCKETS = Use("folder for sockets", "whoever writes there could answer for a mac
 
 
 def check(folder: Path, use: Use = CACHE) -> None:
-    """Raise UserError where somebody else could put files into a folder.
+    """Raise UserError where another user could put files into a folder.
 
-    Root may own it, and any folder above it. A folder above that others may write needs the sticky bit. A folder of
-    this user that only the user's private group may write is closed to the group.
+    Root may own the folder and any folder above it. A folder above that others may write needs the sticky bit. Where
+    the user's private group may write to a folder of this user, that right is removed.
     """
     folder = folder.absolute()
     for path in (folder, *folder.parents):
@@ -61,7 +61,7 @@ def check(folder: Path, use: Use = CACHE) -> None:
 
 
 def made(folder: Path, use: Use = CACHE) -> Path:
-    """The folder, made where it is missing, of mode 0700 whatever the umask. Raises OSError, UserError as `check`."""
+    """The folder, made with mode 0700 if it is missing, whatever the umask. Raises OSError, UserError as `check`."""
     missing = [p for p in (folder, *folder.parents) if not p.exists()]
     for path in reversed(missing):
         path.mkdir(mode=0o700, exist_ok=True)
@@ -77,7 +77,7 @@ def _open(found: os.stat_result) -> bool:
 
 
 def _close(folder: Path) -> None:
-    """Take the right to write from the private group of a folder of this user."""
+    """Remove the group's right to write from a folder of this user."""
     with suppress(OSError):  # not there yet, or a file system without modes
         found = folder.lstat()
         if stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and found.st_mode & stat.S_IWGRP:
@@ -85,7 +85,7 @@ def _close(folder: Path) -> None:
 
 
 def _is_private(number: int) -> bool:
-    """Whether a group is that of this user alone: the user's name, and no other member or primary group of another."""
+    """Whether a group is of this user alone: it has the user's name and no other member, also by primary group."""
     try:
         group, user = grp.getgrgid(number), pwd.getpwuid(os.geteuid())
     except KeyError:

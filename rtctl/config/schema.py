@@ -1,4 +1,4 @@
-"""What may stand in a config: JSON Schema for editors, and rows for the documentation."""
+"""Keys of a config: JSON Schema for editors, and rows for the documentation."""
 
 import sys
 from collections.abc import Iterator
@@ -60,7 +60,7 @@ def _with_units(node: Any) -> Any:
         for key, value in node.items()
         if key != "title"
     }
-    if isinstance(result.get("discriminator"), dict):  # its branches have a default, but a file must say which it is
+    if isinstance(result.get("discriminator"), dict):  # the branches have a default, but a file must name one
         result["required"] = [result["discriminator"]["propertyName"]]
     return _quantity(result) if isinstance(result.get("unit"), str) else result
 
@@ -101,7 +101,7 @@ def _below(place: Shape, here: str, default: Any = None) -> Iterator[Row]:
 
 
 def about(model: type[Settings]) -> str:
-    """What a part of a config is for: first sentence of its class, or of the module that is about nothing else."""
+    """Purpose of a part of a config: first paragraph of the docstring of its class, else of its module."""
     text = model.__doc__ or sys.modules[model.__module__].__doc__ or ""
     return " ".join(text.strip().split("\n\n")[0].split())
 
@@ -115,7 +115,7 @@ def _about(place: Shape) -> str:
 
 
 def _type(place: Shape) -> str:
-    """A word or two for the kind of value."""
+    """Words for the type of a value."""
     words = literals(place.annotation)
     if words:
         return " | ".join(str(word) for word in words)

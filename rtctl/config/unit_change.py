@@ -1,7 +1,7 @@
-"""Settings in other units: a class whose quantities are per rad or per m of a position becomes one for any machine.
+"""Settings classes in other units: from quantities per rad or per m of a position to those of any machine.
 
 A law is written once, with its gain in V/rad or V/m. Where a loop closes on a speed in rad/s and commands a torque in
-Nm, the same gain is in Nm*s/rad.
+Nm, the gain is in Nm*s/rad.
 """
 
 import re
@@ -27,14 +27,14 @@ def powers(unit: str) -> Powers:
 
 
 def text(unit: Powers) -> str:
-    """The unit of these powers as people write it: V*s^2/rad."""
+    """Text of a unit from its powers: V*s^2/rad."""
     over = "*".join(_power(s, n) for s, n in unit.items() if n > 0)
     under = "".join(f"/{_power(s, -n)}" for s, n in unit.items() if n < 0)
     return (over or ("1" if under else "")) + under
 
 
 def changed(unit: str, symbols: Mapping[str, str]) -> str:
-    """A unit with other units in the place of some of its symbols."""
+    """A unit with some of its symbols replaced by other units."""
     found: Powers = {}
     for symbol, power in powers(unit).items():
         for inner, n in powers(symbols.get(symbol, symbol)).items():
@@ -47,7 +47,7 @@ def _power(symbol: str, power: int) -> str:
 
 
 def with_units(model: Any, symbols: Mapping[str, str]) -> Any:
-    """The settings class with `symbols` of its units replaced, also in the settings below it. Kept once made."""
+    """Settings class with `symbols` of its units replaced, also in nested settings. Cached."""
     return _made(model, tuple(sorted(symbols.items())))
 
 
@@ -69,14 +69,14 @@ def _made(model: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
 
 
 def _moved(settings: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
-    """The same numbers in the class with other units."""
+    """Settings with unchanged numbers, of the class with other units."""
     given = {name: getattr(settings, name) for name in settings.model_fields_set}
     kind: Any = type(settings)
     return _made(kind, symbols).model_validate(given)
 
 
 def _annotation(annotation: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
-    """The annotation with every settings class in it in other units; the same object where none is."""
+    """Annotation with every settings class in other units; the same object where it has none."""
     if hasattr(annotation, "model_fields"):
         return _made(annotation, symbols)
     inner = get_args(annotation)
@@ -88,7 +88,7 @@ def _annotation(annotation: Any, symbols: tuple[tuple[str, str], ...]) -> Any:
         return annotation
     if get_origin(annotation) is list:
         return list[parts[0]]  # type: ignore[valid-type]
-    return Union[parts]  # noqa: UP007  of classes that are made here
+    return Union[parts]  # noqa: UP007  classes are made at run time
 
 
 def _field(field: FieldInfo, symbols: tuple[tuple[str, str], ...]) -> FieldInfo:

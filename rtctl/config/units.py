@@ -12,10 +12,10 @@ from typing import Any
 QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 NUMBER = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"  # how a quantity starts, for JSON Schema
 
-# Factors and small powers only: what converts a unit would also evaluate "m**9**9**9", for a very long time.
+# Factors and small powers only: pint would also evaluate "m**9**9**9", for a very long time.
 NAME = r"[A-Za-z%\u00b0\u00b5\u03bc\u03a9\u2126]+"
 UNIT = re.compile(rf"(?:1(?=/))?(?:(?:^|[*/ \u00b7])\s*{NAME}(?:(?:\^|\*\*)-?\d(?!\d))?\s*){{0,8}}")
-ANGLES = ("rad",)  # SI units of a position that turns
+ANGLES = ("rad",)  # SI units of an angular position
 LONGEST = 64  # characters of a unit
 
 SPELLINGS = {
@@ -74,7 +74,7 @@ count = one = _ = counts
 
 @lru_cache(maxsize=1)
 def registry() -> Any:
-    """The units above, as pint's registry."""
+    """pint's registry of the units in DEFINITIONS."""
     import pint
 
     return pint.UnitRegistry(DEFINITIONS.strip().splitlines(), cache_folder=None)
@@ -112,7 +112,7 @@ def to_si(value: Any, unit: str) -> Any:
 
 
 def example(unit: str) -> str:
-    """How a quantity in `unit` may look."""
+    """Example of a quantity in `unit`."""
     return f"1.5 {unit}".strip()
 
 

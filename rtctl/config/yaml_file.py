@@ -63,10 +63,10 @@ def told(path: str | Path) -> str:
 
 
 def find(path: str | Path) -> Path:
-    """File of a config: the one at the path, else that path with .yaml, else for a name the one that comes with rtctl.
+    """File of a config: at the path, else at the path with .yaml, else for a name the file that comes with rtctl.
 
-    A name has no folder of the caller's in it: `ivu`, `ivu.yaml`, `boards/ldu_nidaqmx`. What has one, such as
-    `./ivu.yaml`, is that file or none. Raises UserError with the nearest name.
+    A name is a path below the configs of rtctl: `ivu`, `ivu.yaml`, `boards/ldu_nidaqmx`. A path such as `./ivu.yaml`
+    never means a file of rtctl. Raises UserError with the nearest name.
     """
     text = str(path)
     folder = Path(str(resources.files("rtctl.configs")))
@@ -119,7 +119,7 @@ def parse(text: str, name: str) -> Document:
 
 
 def scalar_tag(text: str) -> str:
-    """What a plain scalar is by YAML 1.2: null, bool, int, float or str."""
+    """Type of a plain scalar by YAML 1.2: null, bool, int, float or str."""
     return next((kind for kind, (pattern, _) in CORE.items() if pattern.fullmatch(text)), "str")
 
 
@@ -147,7 +147,7 @@ def _read(path: Path) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """Composes nodes, no more of them and no deeper than a config has."""
+    """YAML loader with a limit on the number and the depth of nodes."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -178,7 +178,7 @@ class _Plain:
         self.count = 0
 
     def data(self, node: yaml.Node, path: tuple, depth: int) -> Any:
-        self.count += 1  # anew for each alias: what counts is the size unfolded
+        self.count += 1  # again for each alias: the limit is on the unfolded size
         _check_size(self.count, depth, node.start_mark)
         if path:
             self.lines.setdefault(path, node.start_mark.line + 1)
@@ -228,7 +228,7 @@ class _Plain:
 
 
 def _integer(text: str) -> int | float:
-    if len(text) > 300:  # no setting; as a float it is at least refused as infinite
+    if len(text) > 300:  # too long for a setting; infinity is refused later
         return float("inf")
     return int(text, 0) if text[:2] in ("0x", "0o") else int(text)
 

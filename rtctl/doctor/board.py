@@ -1,6 +1,6 @@
-"""Wiring checks of a real board, by hand and with the outputs off: what to do, what is read, what would be right.
+"""Wiring checks of a real board, by hand and with the outputs off: instruction, reading and right result of each.
 
-Nothing here writes anything but zero to the card.
+This module writes only zeros to the card.
 """
 
 import math
@@ -20,11 +20,11 @@ from rtctl.machines.profiles import profile_of
 from rtctl.machines.wiring import wiring
 from rtctl.tick import frames
 
-REST_READS = 200
-REST_CODES = 4  # peak to peak; the thesis's board has 0.5 LSB of dither
-TURN = 0.05  # a turn by hand is a turn within this share
-STROKE = 0.1  # m
-BACK = 0.02  # of the way, that may be missing after the way back
+REST_READS = 200  # readings at rest
+REST_CODES = 4  # ADC codes, peak to peak, at rest; the thesis's board has 0.5 LSB of dither
+TURN = 0.05  # relative tolerance of a turn by hand
+STROKE = 0.1  # m, travel by hand
+BACK = 0.02  # relative tolerance of the return, beside that of the way there
 SILENT = "nobody was asked: no terminal, or --json"
 
 
@@ -36,28 +36,28 @@ class Sample(NamedTuple):
 
 
 class Person(Protocol):
-    """Who does what a step asks for. Both return whether anybody was there to do it."""
+    """Person who carries out the steps at the machine."""
 
     def act(self, step: "Step", read: Callable[[], Sample]) -> bool:
-        """Have it done, while `read` is called over and over."""
+        """Whether the step was done; `read` is called repeatedly meanwhile."""
 
     def confirm(self, step: "Step") -> bool | None:
-        """Whether it is so; None where it was left out."""
+        """Whether the right result was found; None where the step was left out."""
 
 
 class Step(NamedTuple):
     """One check."""
 
     name: str
-    do: str  # by hand; "" for nothing
-    right: str  # what is right
+    do: str  # instruction for a person; "" for none
+    right: str  # right result
     judge: (
         Callable[[list[Sample]], tuple[str, bool]] | None
-    )  # what was found, and whether it is right; None: a person says
+    )  # text of the result, and whether it is right; None: a person judges
 
 
 class Wires:
-    """An open card, read as the loop would."""
+    """Open card, read as the loop reads it."""
 
     def __init__(self, card: Board) -> None:
         self.card = card
@@ -66,7 +66,7 @@ class Wires:
         self.start()
 
     def start(self) -> None:
-        """Outputs to zero once more; counts begin here."""
+        """Set the outputs to zero and the counts to 0."""
         self.card.zero()
         self._from = self._codes()
         self._counts = [0] * len(self._from)
@@ -76,7 +76,7 @@ class Wires:
         return [int(c) for c in self._frame["counter_codes"][: self.card.wiring.counters]]
 
     def read(self) -> Sample:
-        """What the card reads now."""
+        """Present reading of the card."""
         codes = self._codes()
         for n, (code, before) in enumerate(zip(codes, self._from, strict=True)):
             self._counts[n] += int(daq_stc.difference.py_func(code, before))
@@ -86,7 +86,7 @@ class Wires:
 
 
 def run(config: Any, card: Board, person: Person | None, tell: Callable[[Finding], None]) -> list[Finding]:
-    """Go through all steps with an open card; without a person those by hand are left out. `tell` hears each finding.
+    """Findings of all steps with an open card, each passed to `tell`; without a person the steps by hand are left out.
 
     Raises BoardError where the card fails.
     """
@@ -138,7 +138,7 @@ OUTPUTS = Step(
 
 
 def steps(config: Any) -> list[Step]:
-    """The checks of a machine, in the order in which they are safe."""
+    """Checks of a machine, in a safe order."""
     described = config.kind == DESCRIBED
     common = [
         Step("emergency stop", "Push the emergency stop. The motors must turn freely by hand.",
@@ -185,7 +185,7 @@ def _axis(config: Any) -> list[Step]:
 
 
 def _named(config: Any) -> list[Step]:
-    """Each sensor of a described machine, moved by hand: that it shows a way, and goes the right way."""
+    """Checks of a described machine's position sensors, moved by hand: each changes, in the right direction."""
     wires = wiring(config)
     found = []
     for n, name in enumerate(wires.sensors):
@@ -217,7 +217,7 @@ def _upwards(counter: int | None, number: int | None) -> Callable[[list[Sample]]
 
 
 def _way(name: str, counter: int, do: str, counts: int, way: str, within: float) -> list[Step]:
-    """There and back: sign, size, and that nothing is lost."""
+    """Checks of a motion there and back: sign, size, and lost counts."""
     back = "Go back to where you began."
 
     def there(samples: list[Sample]) -> tuple[str, bool]:
@@ -286,7 +286,7 @@ def _rest(config: Any) -> Callable[[list[Sample]], tuple[str, bool]]:
 
 
 def card_of(config: Any) -> Board:
-    """The card of a config, not open yet. Raises UserError where it has none."""
+    """Card of a config, not open yet. Raises UserError for an emulated board."""
     from rtctl.drivers.boards import make
 
     if config.driver.kind == "emulated":

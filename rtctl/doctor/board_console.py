@@ -1,4 +1,4 @@
-"""The wiring checks at a terminal: what to do, what the card reads meanwhile, and Enter when it is done."""
+"""Wiring checks at a terminal: the instruction, the card's readings meanwhile, and Enter when it is done."""
 
 import select
 import sys
@@ -13,18 +13,18 @@ from rtctl.doctor.board import Sample, Step
 from rtctl.doctor.finding import Finding
 
 COLOURS = {"good": "green", "fair": "yellow", "bad": "red", "unknown": "dim"}
-EVERY = 0.005  # s between two readings: a reel turned in ten seconds is seen
+EVERY = 0.005  # s between two readings; resolves a reel that turns in ten seconds
 
 
 class Terminal:
-    """A person at a terminal."""
+    """Person at a terminal."""
 
     def __init__(self, console: Console, lines: Any = None) -> None:
         self._console = console
         self._lines = lines or sys.stdin
 
     def act(self, step: Step, read: Callable[[], Sample]) -> bool:
-        """Show what is read until Enter; `s` and Enter leave the step out."""
+        """Show readings until Enter; `s` and Enter leave the step out."""
         self._ask(step, "Enter when it is done, s to leave it out")
         with Live(console=self._console, refresh_per_second=10, transient=True) as live:
             while True:
@@ -46,18 +46,18 @@ class Terminal:
 
     def _answer(self) -> str:
         line = self._lines.readline()
-        return line.strip().lower() if line else "s"  # nobody is there any more
+        return line.strip().lower() if line else "s"  # the input was closed
 
 
 def shown(sample: Sample) -> Text:
-    """A reading as one line."""
+    """Line of text for a reading."""
     counts = "  ".join(f"counter {n} {c:+d}" for n, c in enumerate(sample.counts))
     volts = "  ".join(f"input {n} {v:.3f} V" for n, v in enumerate(sample.volts))
     return Text(f"  {counts}  {volts}".rstrip(), style="cyan")
 
 
 def tell(console: Console, finding: Finding) -> None:
-    """One finding, as soon as it is known."""
+    """Print one finding."""
     colour = COLOURS[finding.verdict]
     console.print(f"  [{colour}]{finding.verdict:8}[/{colour}]{finding.name}: {finding.found}", highlight=False)
     if finding.change and finding.verdict == "bad":

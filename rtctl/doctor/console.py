@@ -1,4 +1,4 @@
-"""What `rtctl doctor` shows: a bar while it measures, then checks, histograms, sentences and what to change."""
+"""Terminal output of `rtctl doctor`: a bar, then checks, histograms, sentences and what to change."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ COLOUR = {"good": "green", "fair": "yellow", "bad": "bold red", "unknown": "dim"
 
 @contextlib.contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[float, str], None]]:
-    """A function to call with the share that is done and a word: a bar on a terminal, nothing elsewhere."""
+    """Context with a function to call with the share done and a word: a bar on a terminal, nothing elsewhere."""
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
         yield lambda share, word: None
@@ -32,7 +32,7 @@ def progress(quiet: bool) -> Iterator[Callable[[float, str], None]]:
 
 
 def show(console: Console, title: str, findings: list[Finding], measured: Measured | None) -> None:
-    """The whole report."""
+    """Print the whole report."""
     console.print(Text(title, "bold"))
     console.print(checks(findings))
     if measured is not None:
@@ -43,7 +43,7 @@ def show(console: Console, title: str, findings: list[Finding], measured: Measur
 
 
 def checks(findings: list[Finding]) -> Table:
-    """A row for each check."""
+    """Table with a row for each check."""
     table = Table(box=None, pad_edge=False, header_style="dim")
     table.add_column("check")
     table.add_column("verdict")
@@ -93,4 +93,4 @@ def _changes(console: Console, wanted: list[Finding]) -> None:
         table.add_row(f"{number:2}", Text.assemble((f.name, COLOUR[f.verdict]), f": {f.cost}"))
         table.add_row("", Text(f.change))
         console.print(table)
-        console.print(Text(f"     {f.command}", "dim"), soft_wrap=True)  # whole, to be copied
+        console.print(Text(f"     {f.command}", "dim"), soft_wrap=True)  # not wrapped, to be copied

@@ -1,4 +1,4 @@
-"""Which CPUs there are for a loop, and who else is on them.
+"""CPUs available to a loop, and other users of those CPUs.
 
 Source: kernel documentation, admin-guide/kernel-parameters (isolcpus=, nohz_full=, irqaffinity=) and cgroup-v2.
 """
@@ -16,23 +16,23 @@ def allowed_cpus(tree: Tree) -> list[int]:
 
 
 def online(tree: Tree) -> list[int]:
-    """CPUs that run; empty where that is hidden."""
+    """CPUs that are online; empty where that is hidden."""
     return cpu_list(tree.read(f"{CPU}/online") or "")
 
 
 def isolated_cpus(tree: Tree) -> list[int]:
-    """CPUs that the scheduler leaves alone, by isolcpus= or by an isolated cpuset."""
+    """CPUs that the scheduler does not use, by isolcpus= or by an isolated cpuset."""
     files = (f"{CPU}/isolated", "sys/fs/cgroup/cpuset.cpus.isolated")
     return sorted({cpu for file in files for cpu in cpu_list(tree.read(file) or "")})
 
 
 def loop_cpu(tree: Tree) -> int | None:
-    """Where a loop belongs: the last isolated CPU, else the last allowed one, None where there is no telling."""
+    """CPU for a loop: the last isolated CPU, else the last allowed one, None where both lists are hidden."""
     return max(isolated_cpus(tree) or allowed_cpus(tree), default=None)
 
 
 def count(tree: Tree) -> Finding:
-    """How many CPUs plant, supervisor and loop have between them."""
+    """Check of the number of CPUs for plant, supervisor and loop."""
     name, mine = "CPUs", allowed_cpus(tree)
     if not mine:
         return Finding(name, "/proc/self/status is hidden", "unknown")
@@ -55,7 +55,7 @@ def count(tree: Tree) -> Finding:
 
 
 def isolation(tree: Tree) -> Finding:
-    """Whether a CPU is kept free for the loop: of tasks, of the scheduler's tick, of interrupts."""
+    """Check that a CPU is free of other tasks, of the scheduler's tick and of interrupts."""
     name, isolated, mine = "isolated CPUs", isolated_cpus(tree), allowed_cpus(tree)
     if tree.read("proc/cmdline") is None and tree.read(f"{CPU}/isolated") is None:
         return Finding(name, "/proc/cmdline is hidden", "unknown")
@@ -80,7 +80,7 @@ def isolation(tree: Tree) -> Finding:
 
 
 def threads(tree: Tree) -> Finding:
-    """Whether two of the CPUs are one core."""
+    """Check whether two CPUs share a core (SMT)."""
     name, active = "SMT", tree.number(f"{CPU}/smt/active")
     if active is None:
         return Finding(name, f"/{CPU}/smt is hidden", "unknown")

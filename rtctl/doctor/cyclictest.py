@@ -1,4 +1,4 @@
-"""cyclictest of rt-tests: how it is called, and how its histogram is read.
+"""cyclictest of rt-tests: its call, and the reader of its histogram.
 
 Source: cyclictest(8), rt-tests 2.0 and newer (--json).
 """
@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 SHARES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
-LONGEST_NS = 1_000_000  # buckets of cyclictest, its most; what is later is counted as this late
+LONGEST_NS = 1_000_000  # ns, longest lateness in cyclictest's buckets; later wake-ups are counted here
 
 
 class Window(NamedTuple):
-    """What cyclictest counted: wake-ups by lateness, in buckets of 1 ns that are not empty."""
+    """Histogram of cyclictest: wake-ups by lateness, in the buckets of 1 ns that are not empty."""
 
-    ns: np.ndarray  # int, in order; LONGEST_NS stands for all that was later
+    ns: np.ndarray  # int, in order; LONGEST_NS stands for all later wake-ups
     hits: np.ndarray  # int, of the same length
     max_ns: int
 
@@ -39,19 +39,19 @@ class Window(NamedTuple):
         return {**out, "max": round(self.max_ns / 1000, 3)}
 
     def later_than(self, ns: int) -> int | None:
-        """Wake-ups later than this; None where some were, but so late that the buckets do not tell how many."""
+        """Number of wake-ups later than `ns`; None where it is beyond the buckets and not 0."""
         if ns > LONGEST_NS:
             return None if self.max_ns > ns else 0
         return int(self.hits[self.ns > min(ns, LONGEST_NS - 1)].sum())
 
 
 def missing() -> str | None:
-    """Why cyclictest cannot be asked, in a sentence; None where it can."""
+    """Sentence on why cyclictest cannot be run; None where it can."""
     return None if shutil.which("cyclictest") else "cyclictest is not installed here; it comes with rt-tests"
 
 
 def run(rate: float, seconds: float, cpu: int, priority: int, folder: Path, lock: bool = True) -> Window:
-    """One window of cyclictest on `cpu`: whole seconds, one at least. `lock` is its memory.
+    """One window of cyclictest on `cpu`, of at least one whole second; `lock` locks its memory.
 
     Raises subprocess.CalledProcessError with its `stderr` where cyclictest refuses.
     """
@@ -66,13 +66,13 @@ def run(rate: float, seconds: float, cpu: int, priority: int, folder: Path, lock
 
 
 def read(report: Mapping) -> Window:
-    """The first thread of a report. Raises ValueError where it never woke, KeyError where this is no report."""
+    """Window of a report's first thread. Raises ValueError where it never woke, KeyError for no report."""
     thread = report["thread"]["0"]
     return counted(thread["histogram"], int(thread["cycles"]), int(thread["max"]))
 
 
 def counted(histogram: Mapping[str, int], cycles: int, max_ns: int = LONGEST_NS) -> Window:
-    """A window from wake-ups by ns; of `cycles` wake-ups those that are in no bucket were later than all of them.
+    """Window from wake-ups by ns; of `cycles` wake-ups those in no bucket count as later than all buckets.
 
     Raises ValueError where there was no wake-up.
     """
@@ -87,7 +87,7 @@ def counted(histogram: Mapping[str, int], cycles: int, max_ns: int = LONGEST_NS)
 
 
 def together(windows: Sequence[Window]) -> Window:
-    """Several windows as one."""
+    """Sum of several windows."""
     ns, where = np.unique(np.concatenate([w.ns for w in windows]), return_inverse=True)
     hits = np.zeros(len(ns), np.int64)
     np.add.at(hits, where, np.concatenate([w.hits for w in windows]))

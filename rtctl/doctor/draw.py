@@ -21,13 +21,13 @@ class Axis(NamedTuple):
     columns: int
 
     def column(self, ns: float) -> int:
-        """The character in which a lateness falls."""
+        """Index of the character for a lateness in ns."""
         share = (math.log10(max(ns, 1.0)) - self.low) / (self.high - self.low)
         return min(max(int(share * self.columns), 0), self.columns - 1)
 
 
 def axis(histograms: list[Lateness], width: int) -> Axis:
-    """One axis for all of them, as wide as a terminal of `width` characters allows."""
+    """Common axis of the histograms, as wide as a terminal of `width` characters allows."""
     first = min(float(edges()[np.flatnonzero(h.record["bucket"])[0]]) for h in histograms)
     last = max(float(h.record["max"]) for h in histograms)
     low, high = math.floor(math.log10(max(first, 100.0))), math.floor(math.log10(max(last, 1000.0))) + 1
@@ -35,7 +35,7 @@ def axis(histograms: list[Lateness], width: int) -> Axis:
 
 
 def lines(h: Lateness, axis: Axis, blocks: bool = True) -> list[str]:
-    """The histogram with lines at p50, p99, p99.9 and max, each named above; with blocks or plain characters."""
+    """Lines of the histogram with labelled marks at p50, p99, p99.9 and max; with blocks or plain characters."""
     count = per_column(h, axis)
     decades = max(math.ceil(math.log10(count.max() + 1)), 1)
     tall = np.where(count > 0, np.maximum(np.log10(np.maximum(count, 1)) / decades * 8 * HEIGHT, 1), 0).astype(int)
@@ -53,7 +53,7 @@ def lines(h: Lateness, axis: Axis, blocks: bool = True) -> list[str]:
 
 
 def foot(axis: Axis) -> list[str]:
-    """The axis with its decades."""
+    """Lines of the axis with its decades."""
     rule, words = ["-"] * axis.columns, [" "] * axis.columns
     for decade in range(axis.low, axis.high + 1):
         column = round((decade - axis.low) / (axis.high - axis.low) * axis.columns)
@@ -67,7 +67,7 @@ def foot(axis: Axis) -> list[str]:
 
 
 def unit(ns: float) -> str:
-    """A time as short as it goes."""
+    """Text of a time in the largest unit that fits."""
     for size, word in ((1e9, "s"), (1e6, "ms"), (1e3, "us")):
         if ns >= size:
             return f"{ns / size:g} {word}"
@@ -75,19 +75,19 @@ def unit(ns: float) -> str:
 
 
 def per_column(h: Lateness, axis: Axis) -> np.ndarray:
-    """Wake-ups in each character of the axis."""
+    """Number of wake-ups in each character of the axis, (columns,)."""
     buckets, starts = h.record["bucket"], edges()
     count = np.zeros(axis.columns, np.int64)
     for i in np.flatnonzero(buckets):
         end = starts[i + 1] if i + 1 < len(starts) else starts[i] + 1
         low, high = axis.column(float(starts[i])), axis.column(min(float(end) - 1, float(h.record["max"])))
-        share = np.diff(np.linspace(0, int(buckets[i]), max(high - low, 0) + 2).astype(int))  # wide bucket, no gaps
+        share = np.diff(np.linspace(0, int(buckets[i]), max(high - low, 0) + 2).astype(int))  # spread wide buckets
         count[low : low + len(share)] += share
     return count
 
 
 def labels(at: dict[int, str]) -> list[str]:
-    """Names above the columns where they belong: in one row, or in more where they would touch."""
+    """Rows of labels above their columns: one row, or more where labels would touch."""
     rows: list[str] = []
     for column, label in sorted(at.items()):
         row = next((r for r, text in enumerate(rows) if len(text) < column), len(rows))

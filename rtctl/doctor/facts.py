@@ -1,4 +1,4 @@
-"""All checks, in the order of what each usually costs a loop, most first."""
+"""All checks, in the order of their usual cost to a loop, largest first."""
 
 from collections.abc import Callable
 
@@ -23,11 +23,11 @@ RANK = {"bad": 0, "fair": 1}
 
 
 def facts(tree: Tree, priority: int, may_fifo: bool, stolen: Finding) -> list[Finding]:
-    """All findings: the right to SCHED_FIFO first, then what was stolen, then what the files say."""
+    """All findings: the right to SCHED_FIFO, the stolen time, then the checks of files."""
     return [rights.fifo(tree, priority, may_fifo), stolen, *(check(tree) for check in CHECKS)]
 
 
 def changes(findings: list[Finding]) -> list[Finding]:
-    """What to change, in the order of gain: what is bad before what is fair, each in the order of the checks."""
+    """Findings with a change, in the order of gain: bad before fair, each in the order of the checks."""
     wanted = [f for f in findings if f.verdict in RANK and f.change]
     return sorted(wanted, key=lambda f: RANK[f.verdict])

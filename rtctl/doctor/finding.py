@@ -1,4 +1,4 @@
-"""What a check says, and the files that it reads. A file that is hidden is something unknown, never an error."""
+"""Result of a check, and the files that checks read. A hidden file gives the verdict unknown, never an error."""
 
 import gzip
 import os
@@ -10,18 +10,18 @@ Verdict = Literal["good", "fair", "bad", "unknown"]
 
 
 class Finding(NamedTuple):
-    """One check. `change` and `command` are empty where there is nothing to change."""
+    """Result of one check; `change` and `command` are empty where nothing is to be changed."""
 
     name: str
     found: str
     verdict: Verdict
-    cost: str = ""  # what it costs a loop
+    cost: str = ""  # effect on a loop
     change: str = ""  # what to change, in words
     command: str = ""  # how: a command, or a file and what to write into it
 
 
 class Tree:
-    """The files of a machine beneath `root`, which a test puts elsewhere."""
+    """Files of a computer below `root`, which a test replaces."""
 
     def __init__(self, root: Path | str = "/"):
         self.root = Path(root)
@@ -42,7 +42,7 @@ class Tree:
             return None
 
     def glob(self, pattern: str) -> list[str]:
-        """Paths beneath the root that match, in order of their numbers."""
+        """Matching paths below the root, in order of their numbers."""
         try:
             found = [str(path.relative_to(self.root)) for path in self.root.glob(pattern)]
         except OSError:
@@ -50,7 +50,7 @@ class Tree:
         return sorted(found, key=lambda path: [int(word) for word in re.findall(r"\d+", path)])
 
     def opens(self, path: str) -> bool | None:
-        """Whether we may open a file for writing; None where it is missing. Nothing is written."""
+        """Whether a file can be opened for writing; None where it is missing. Nothing is written."""
         try:
             os.close(os.open(self.root / path, os.O_WRONLY))
         except FileNotFoundError:
@@ -66,7 +66,7 @@ class Tree:
         return values[-1] if values else None
 
     def limit(self, title: str) -> float | None:
-        """Soft limit of this process by its title in /proc/self/limits; inf where there is none, None where hidden."""
+        """Soft limit of this process by its title in /proc/self/limits; inf for unlimited, None where hidden."""
         for line in (self.read("proc/self/limits") or "").splitlines():
             if line.startswith(title):
                 value = line[len(title) :].split()[0]
@@ -74,7 +74,7 @@ class Tree:
         return None
 
     def status(self, key: str) -> str | None:
-        """A line of /proc/self/status by its key."""
+        """Value of a key in /proc/self/status; None where it is missing or hidden."""
         for line in (self.read("proc/self/status") or "").splitlines():
             if line.startswith(f"{key}:"):
                 return line.partition(":")[2].strip()
@@ -86,7 +86,7 @@ class Tree:
 
 
 def cpu_list(text: str) -> list[int]:
-    """The CPUs of a kernel's list: "0-2,5" is 0, 1, 2, 5. Words that are no numbers are left out."""
+    """CPU numbers of a kernel's list: "0-2,5" is 0, 1, 2, 5. Other words are left out."""
     found: set[int] = set()
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)

@@ -1,4 +1,4 @@
-"""What the kernel is: how it preempts, and what its clock reads.
+"""Checks of the kernel: preemption model, clock source, real-time throttling.
 
 Source: kernel documentation, admin-guide/kernel-parameters (preempt=, clocksource=); PREEMPT_RT is mainline since 6.12.
 """
@@ -11,11 +11,11 @@ RT_KERNEL = (
     "apt install linux-image-rt-$(dpkg --print-architecture)   (Debian); elsewhere a kernel with CONFIG_PREEMPT_RT=y"
 )
 CLOCKS = ("tsc", "arch_sys_counter", "riscv_clocksource")  # read without a system call, and cheap
-SHARED_CLOCKS = ("kvm-clock", "hyperv_clocksource_tsc_page")  # so too, by way of a page of the host
+SHARED_CLOCKS = ("kvm-clock", "hyperv_clocksource_tsc_page")  # also without a system call, by a page of the host
 
 
 def preemption(tree: Tree) -> Finding:
-    """How long a call into the kernel can keep a woken loop waiting."""
+    """Check of the preemption model, which decides how long a call into the kernel delays a woken loop."""
     name = "kernel preemption"
     version = tree.read("proc/sys/kernel/version")
     if tree.number("sys/kernel/realtime") == 1 or (version and re.search(r"PREEMPT[_ ]RT\b", version)):
@@ -45,7 +45,7 @@ def preemption(tree: Tree) -> Finding:
 
 
 def _model(tree: Tree, version: str) -> tuple[str | None, str]:
-    """The model of a kernel that is not PREEMPT_RT, None where it cannot be told, and who says so."""
+    """Preemption model of a kernel without PREEMPT_RT (None where it is hidden), and its source."""
     if "PREEMPT_DYNAMIC" not in version:
         if re.search(r"\bPREEMPT\b", version):
             return "full", "uname -v"
@@ -65,7 +65,7 @@ def _model(tree: Tree, version: str) -> tuple[str | None, str]:
 
 
 def clock_source(tree: Tree) -> Finding:
-    """What it takes to read the time."""
+    """Check of the clock source, which decides what reading the time costs."""
     name, folder = "clock source", "sys/devices/system/clocksource/clocksource0"
     current = tree.read(f"{folder}/current_clocksource")
     if not current:
@@ -81,7 +81,7 @@ def clock_source(tree: Tree) -> Finding:
 
 
 def throttling(tree: Tree) -> Finding:
-    """How much of a CPU the real-time class may have."""
+    """Check of the CPU share that the real-time class may have."""
     name = "real-time throttling"
     runtime = tree.number("proc/sys/kernel/sched_rt_runtime_us")
     period = tree.number("proc/sys/kernel/sched_rt_period_us")
@@ -90,7 +90,7 @@ def throttling(tree: Tree) -> Finding:
     if runtime < 0:
         return Finding(name, "off", "good")
     found = f"{runtime / 1000:g} ms of {period / 1000:g} ms"
-    change = "give it back 95 %", "sudo sysctl -w kernel.sched_rt_period_us=1000000 kernel.sched_rt_runtime_us=950000"
+    change = "allow it 95 %", "sudo sysctl -w kernel.sched_rt_period_us=1000000 kernel.sched_rt_runtime_us=950000"
     if runtime == 0:
         return Finding(name, found, "bad", "no SCHED_FIFO thread may run at all", *change)
     if runtime < 0.9 * period:

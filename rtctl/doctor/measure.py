@@ -1,4 +1,4 @@
-"""Our empty loop and cyclictest in alternating windows, so that what the machine does meanwhile falls on both."""
+"""Empty loop of rtctl and cyclictest in alternating windows, so that other load of the computer affects both."""
 
 import subprocess
 import tempfile
@@ -14,21 +14,21 @@ from rtctl.loop import histogram
 from rtctl.tick.clock import SECOND
 
 ROUNDS = 5
-MOST_LATE = 1e-3  # share of late ticks with which a rate still counts as held
+MOST_LATE = 1e-3  # largest share of late ticks of a rate that is held
 
 
 class Lateness(NamedTuple):
-    """How late a thread woke, over all windows of a rate."""
+    """Lateness of a thread's wake-ups, over all windows of a rate."""
 
-    ticks: int  # that were due, as far as it counts them
-    late: int | None  # woken later than half a period; None where its histogram does not reach so far
-    skipped: int | None  # not woken for at all, since the one before was late; None where it does not count them
+    ticks: int  # ticks due; for cyclictest its wake-ups
+    late: int | None  # ticks later than half a period; None where the histogram ends before
+    skipped: int | None  # ticks without a wake-up, after a late one; None where they are not counted
     us: dict[str, float]  # p50, p99, p999, max
     record: Any  # rtctl.loop.histogram.HISTOGRAM
 
 
 class Rate(NamedTuple):
-    """What was measured at one rate, in Hz."""
+    """Lateness at one rate, in Hz."""
 
     hz: float
     ours: Lateness
@@ -36,7 +36,7 @@ class Rate(NamedTuple):
 
     @property
     def late(self) -> int:
-        """Ticks of ours that came later than half a period, or not at all."""
+        """Ticks of rtctl's loop that came later than half a period, or not at all."""
         return (self.ours.late or 0) + (self.ours.skipped or 0)
 
     @property
@@ -50,8 +50,8 @@ class Measured(NamedTuple):
     priority: int
     window_s: int
     rounds: int
-    lacks: list[str]  # what the machine refused our loop
-    without: str | None  # why there is no cyclictest beside it
+    lacks: list[str]  # refusals of the computer to rtctl's loop
+    without: str | None  # why cyclictest was not run
 
 
 def measure(
@@ -63,9 +63,10 @@ def measure(
     lock: bool,
     say: Callable[[float, str], None],
 ) -> Measured:
-    """Measure each rate for about `seconds` with each of the two; `say` gets the share that is done and a word.
+    """Lateness at each rate, measured for about `seconds` by rtctl's loop and by cyclictest each.
 
-    Without the right to lock memory cyclictest is not asked to; without SCHED_FIFO it does not run at all.
+    `say` gets the share done and a word. Without the right `lock` cyclictest does not lock memory; without SCHED_FIFO
+    it does not run.
     """
     window = max(1, round(seconds / ROUNDS))
     rounds = max(1, round(seconds / window))
@@ -92,7 +93,7 @@ def measure(
 
 
 def words(hz: float) -> str:
-    """A rate as people say it: 10 kHz, 500 Hz."""
+    """Text of a rate: 10 kHz, 500 Hz."""
     return f"{hz / 1000:g} kHz" if hz >= 1000 else f"{hz:g} Hz"
 
 
@@ -118,7 +119,7 @@ def _theirs(windows: list[cyclictest.Window], hz: float) -> Lateness:
 
 
 def edges() -> np.ndarray:
-    """Where the buckets of `rtctl.loop.histogram` begin, in ns; each but the last ends where the next begins."""
+    """Lower edges of the buckets of `rtctl.loop.histogram`, in ns, (BUCKETS,)."""
     index = np.arange(histogram.BUCKETS)
     octave = np.maximum(index // histogram.SUB - 1, 0)
     return np.where(index < histogram.SUB, index, (index - histogram.SUB * octave) << octave)

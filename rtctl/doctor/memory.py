@@ -1,4 +1,4 @@
-"""What the kernel does with memory behind a program's back: swap, and huge pages.
+"""Checks of the kernel's memory management: swap, and huge pages.
 
 Source: kernel documentation, admin-guide/mm/transhuge; swapoff(8).
 """
@@ -11,7 +11,7 @@ THP = "sys/kernel/mm/transparent_hugepage/enabled"
 
 
 def swap(tree: Tree) -> Finding:
-    """Whether memory can go to a disk."""
+    """Check whether memory can be swapped to a disk."""
     text = tree.read("proc/swaps")
     if text is None:
         return Finding("swap", "/proc/swaps is hidden", "unknown")
@@ -25,7 +25,7 @@ def swap(tree: Tree) -> Finding:
 
 
 def huge_pages(tree: Tree) -> Finding:
-    """Whether the kernel joins pages of programs that did not ask for it."""
+    """Check whether the kernel joins pages of programs that did not ask for it."""
     name, chosen = "transparent huge pages", re.search(r"\[(\w+)\]", tree.read(THP) or "")
     if not chosen:
         return Finding(name, f"/{THP} is hidden", "unknown")

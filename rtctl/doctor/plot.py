@@ -1,4 +1,4 @@
-"""The latency histograms as a picture: a panel for each rate, our loop and cyclictest over the same axes."""
+"""Plot of the latency histograms: a panel for each rate, rtctl's loop and cyclictest on common axes."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,12 +12,12 @@ from rtctl.doctor.measure import Lateness, Measured, Rate, edges, words
 from rtctl.doctor.report import figures
 from rtctl.trace.plot import BLUE, GREY, ORANGE, RED, save
 
-COARSE = 4  # buckets of the histogram drawn as one
+COARSE = 4  # buckets of the histogram that are drawn as one
 LINES = {"p50": ":", "p99": "-.", "p999": "--", "max": "-"}
 
 
 def plot(measured: Measured, path: Path, title: str) -> None:
-    """Draw into a PNG. Raises UserError where it cannot be written."""
+    """Draw the histograms into a PNG. Raises UserError where it cannot be written."""
     figure = Figure(figsize=(11, 1.0 + 3.4 * len(measured.rates)), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(len(measured.rates), 1, sharex=True, squeeze=False)[:, 0]
@@ -55,7 +55,7 @@ def _panel(axes: Axes, rate: Rate) -> None:
 
 
 def _ends(rates: Sequence[Rate]) -> tuple[float, float]:
-    """Ends of the common axis in us: all that was counted, and half of each period."""
+    """Ends of the common axis in us: they enclose all counts and half of each period."""
     every = [h for rate in rates for h in (rate.ours, rate.cyclictest) if h is not None]
     first = min(float(edges()[np.flatnonzero(h.record["bucket"])[0]]) for h in every)
     last = max(*(h.us["max"] for h in every), *(5e5 / rate.hz for rate in rates))
@@ -63,7 +63,7 @@ def _ends(rates: Sequence[Rate]) -> tuple[float, float]:
 
 
 def coarse(h: Lateness) -> tuple[np.ndarray, np.ndarray]:
-    """Edges in ns, one more than counts, of buckets joined by `COARSE`."""
+    """Edges in ns, (n + 1,), and counts, (n,), of buckets joined by `COARSE`."""
     count = h.record["bucket"].reshape(-1, COARSE).sum(axis=1)
     starts = edges()[::COARSE].astype(float)
     return np.append(starts, 2 * starts[-1]), count

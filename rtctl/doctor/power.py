@@ -1,4 +1,4 @@
-"""What saves power and costs time: frequency governor and idle states of the CPUs.
+"""Checks of power saving that delays a loop: frequency governor and idle states of the CPUs.
 
 Source: kernel documentation, admin-guide/pm/cpufreq and admin-guide/pm/cpuidle.
 """
@@ -7,12 +7,12 @@ from collections import Counter
 
 from rtctl.doctor.finding import Finding, Tree
 
-DEEP_US = 10  # an exit latency beyond this shows in a wake-up
+DEEP_US = 10  # us, exit latency beyond which an idle state delays a wake-up
 UDEV = "/etc/udev/rules.d/90-cpu-dma-latency.rules"
 
 
 def governor(tree: Tree) -> Finding:
-    """Who chooses the frequency of the CPUs."""
+    """Check of the CPUs' frequency governor."""
     name = "frequency governor"
     files = tree.glob("sys/devices/system/cpu/cpu[0-9]*/cpufreq/scaling_governor")
     kinds = Counter(kind for kind in map(tree.read, files) if kind)
@@ -28,7 +28,7 @@ def governor(tree: Tree) -> Finding:
 
 
 def idle_states(tree: Tree) -> Finding:
-    """How deep a CPU sleeps, how long it takes to wake, and whether we may keep it from it."""
+    """Check of the CPU's idle states, their exit latency, and the right to limit them."""
     name = "idle states"
     states = [
         (tree.read(f"{folder}/name") or "?", latency)

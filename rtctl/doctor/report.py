@@ -1,4 +1,4 @@
-"""All that was found, as sentences and as one object for JSON."""
+"""Report of all findings, as sentences and as one JSON object."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,7 +12,7 @@ from rtctl.doctor.spin import advice
 
 
 def sentence(rate: Rate) -> str:
-    """Whether this machine can hold a rate, and by what."""
+    """Sentence on whether this computer can hold a rate, with the count of late ticks."""
     share = f" ({100 * rate.late / rate.ours.ticks:.2g} %)" if rate.late else ""
     return (
         f"This machine {'can' if rate.held else 'cannot'} hold {words(rate.hz)}: a wake-up later than half a period "
@@ -21,7 +21,7 @@ def sentence(rate: Rate) -> str:
 
 
 def figures(h: Lateness) -> str:
-    """Percentiles in us, and how many ticks were late."""
+    """Text with percentiles in us and the number of late ticks."""
     digits = {name: f"{us:.1f}" if us < 100 else f"{us:.0f}" for name, us in h.us.items()}
     late = "" if h.late is None else f"; {h.late} of {h.ticks} late"
     late += f", {h.skipped} skipped" if h.skipped else ""
@@ -29,13 +29,13 @@ def figures(h: Lateness) -> str:
 
 
 def title(tree: Tree) -> str:
-    """Host and kernel in one line."""
+    """Line with host and kernel."""
     release, version = tree.read("proc/sys/kernel/osrelease"), tree.read("proc/sys/kernel/version")
     return f"{tree.read('proc/sys/kernel/hostname') or 'this machine'}: Linux {release or '?'} {version or ''}".rstrip()
 
 
 def as_json(tree: Tree, findings: Sequence[Finding], measured: Measured | None, need: float | None) -> dict[str, Any]:
-    """Everything: checks, histograms, sentences, what to change in the order of gain, and whether `need` (Hz) held."""
+    """JSON object of checks, histograms, sentences, changes in the order of gain, and whether `need` (Hz) held."""
     out: dict[str, Any] = {
         "host": tree.read("proc/sys/kernel/hostname"),
         "kernel": tree.read("proc/sys/kernel/osrelease"),

@@ -1,4 +1,4 @@
-"""What this account may ask of the kernel: SCHED_FIFO, locked memory, no deep sleep of the CPUs.
+"""Checks of this account's rights: SCHED_FIFO and locked memory.
 
 Source: sched(7), mlock(2), capabilities(7), limits.conf(5).
 """
@@ -13,7 +13,7 @@ LIMITS = "/etc/security/limits.d/rtctl.conf"
 
 
 def may_fifo(priority: int) -> bool:
-    """Whether a thread of ours gets SCHED_FIFO at this priority: one asks for it, and ends."""
+    """Whether a thread gets SCHED_FIFO at this priority; a short thread asks for it."""
     allowed = False
 
     def ask() -> None:
@@ -31,7 +31,7 @@ def may_fifo(priority: int) -> bool:
 
 
 def fifo(tree: Tree, priority: int, allowed: bool) -> Finding:
-    """The right to SCHED_FIFO; `allowed` is what `may_fifo` found."""
+    """Check of the right to SCHED_FIFO; `allowed` is the result of `may_fifo`."""
     limit = tree.limit("Max realtime priority")
     words = "RLIMIT_RTPRIO is hidden" if limit is None else f"RLIMIT_RTPRIO {limit:g}"
     if tree.capable(CAP_SYS_NICE):
@@ -47,7 +47,7 @@ def fifo(tree: Tree, priority: int, allowed: bool) -> Finding:
 
 
 def memory_lock(tree: Tree) -> Finding:
-    """The right to lock memory."""
+    """Check of the right to lock memory."""
     name, limit = "memory lock", tree.limit("Max locked memory")
     if tree.capable(CAP_IPC_LOCK):
         return Finding(name, "allowed by CAP_IPC_LOCK", "good")

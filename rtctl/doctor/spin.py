@@ -1,7 +1,7 @@
-"""What `loop.spin` would bring: the end of each sleep spent polling the clock, where a CPU can be spared for it.
+"""Advice on `loop.spin`: to poll the clock at the end of each sleep, where a CPU can be spared for it.
 
-A loop that sleeps wakes as late as the kernel wakes it. One that is woken earlier by `loop.spin` and polls the clock is
-late only where it was woken later than that. The price is that share of its CPU.
+A sleeping loop is as late as its wake-up by the kernel. With `loop.spin` the loop is woken earlier by that time and
+polls the clock; it is late only where its wake-up is later than that. The polling takes a share of its CPU.
 """
 
 import math
@@ -10,23 +10,23 @@ from typing import NamedTuple
 from rtctl.doctor.finding import Finding
 from rtctl.doctor.measure import Rate, words
 
-STEP = 10e-6  # s: spin is advised in steps of this
-LEAST = 5e-6  # s of lateness at p99, below which it brings nothing
-MOST_SHARE = 0.8  # of a CPU: a loop that polls more has no time for its tick
-LIMIT = 1e-3  # s, of the setting
+STEP = 10e-6  # s, step of the advised spin
+LEAST = 5e-6  # s, lateness at p99 below which no spin is advised
+MOST_SHARE = 0.8  # largest share of a CPU for polling; the tick needs the other part
+LIMIT = 1e-3  # s, upper bound of the setting loop.spin
 
 
 class Spin(NamedTuple):
-    """An advice for one rate."""
+    """Advice for one rate."""
 
     hz: float
     seconds: float  # loop.spin
-    share: float  # of a CPU that it takes
+    share: float  # of a CPU, for polling
     sentence: str
 
 
 def advice(findings: list[Finding], rates: list[Rate]) -> Spin | None:
-    """For the fastest rate that was measured: None where no CPU can be spared, or where wake-ups are early enough."""
+    """Advice for the highest measured rate; None where no CPU can be spared, or where wake-ups are early enough."""
     spare = next((f.verdict == "good" for f in findings if f.name == "CPUs"), False)
     rate = max(rates, key=lambda r: r.hz, default=None)
     if rate is None or not spare or rate.ours.us["p99"] * 1e-6 < LEAST:

@@ -1,4 +1,4 @@
-"""Whether this is a virtual machine, and how much of its CPUs' time the host took.
+"""Checks of a virtual machine: its hypervisor, and the share of CPU time that the host took (steal).
 
 Source: proc_stat(5) for steal; the flag `hypervisor` is CPUID.1:ECX bit 31.
 """
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rtctl.doctor.finding import Finding, Tree
 
-MOST = 1e-3  # share of stolen time that is still fair
+MOST = 1e-3  # largest share of stolen time with the verdict fair
 
 
 class Times(NamedTuple):
@@ -18,7 +18,7 @@ class Times(NamedTuple):
 
 
 def hypervisor(tree: Tree) -> str | None:
-    """Name of the hypervisor, "yes" where it has none, None on hardware or where nothing tells."""
+    """Name of the hypervisor, "yes" for one without a name, None on hardware or where it is hidden."""
     kind = tree.read("sys/hypervisor/type")
     if kind:
         return kind
@@ -29,7 +29,7 @@ def hypervisor(tree: Tree) -> str | None:
 
 
 def machine(tree: Tree) -> Finding:
-    """Virtual or not."""
+    """Check whether this is a virtual machine."""
     name, kind = "virtual machine", hypervisor(tree)
     if kind is not None:
         return Finding(
@@ -37,22 +37,22 @@ def machine(tree: Tree) -> Finding:
             "run the loop on hardware; else give this machine CPUs of its own on the host",
             "virsh vcpupin DOMAIN VCPU CPU, with that CPU isolated on the host   (libvirt)",
         )  # fmt: skip
-    if "flags" not in (tree.read("proc/cpuinfo") or ""):  # of x86 alone; elsewhere silence says nothing
+    if "flags" not in (tree.read("proc/cpuinfo") or ""):  # only x86 has flags; without them the result is unknown
         return Finding(name, "/proc/cpuinfo does not tell", "unknown")
     return Finding(name, "no", "good")
 
 
 def times(tree: Tree, cpu: int | None) -> Times | None:
-    """Time of a CPU, of all of them for None; None where it is hidden."""
+    """Time of a CPU, or of all CPUs for None; None where it is hidden."""
     for line in (tree.read("proc/stat") or "").splitlines():
         name, *numbers = line.split()
         if name == ("cpu" if cpu is None else f"cpu{cpu}") and len(numbers) >= 8:
-            return Times(sum(map(int, numbers[:8])), int(numbers[7]))  # what follows is counted in these already
+            return Times(sum(map(int, numbers[:8])), int(numbers[7]))  # later numbers are included in these
     return None
 
 
 def steal(before: Times | None, after: Times | None, over: str) -> Finding:
-    """Share of time that the host took between two looks; `over` says over what."""
+    """Check of the share of time that the host took between two readings; `over` names the interval."""
     name = "stolen time"
     if before is None or after is None:
         return Finding(name, "/proc/stat is hidden", "unknown")

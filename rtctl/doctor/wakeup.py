@@ -1,9 +1,9 @@
-"""The empty loop: our wake-up with nothing behind it, in a process of its own that may turn real-time.
+"""Empty loop: the wake-up of rtctl's loop without its work, in a process of its own that may become real-time.
 
     python -m rtctl.doctor.wakeup CPU PRIORITY
 
-It answers with one JSON object a line: first what this machine refused, then, for each line "PERIOD_NS SECONDS" on
-standard input, the window that it measured. It ends with its standard input.
+It prints one JSON object a line: first the refusals of this computer, then a measured window for each line
+"PERIOD_NS SECONDS" on standard input. It ends at the end of standard input.
 """
 
 import json
@@ -25,7 +25,7 @@ WINDOW = state(late=int, skipped=int, lateness=histogram.HISTOGRAM)
 
 @tick
 def empty_loop(window, period, ticks):
-    """Sleep, wake, count; as `rtctl.loop.runner.run_real` does, without link, law and ring. `ticks` are those due."""
+    """Sleep, wake and count for `ticks` due ticks, as `rtctl.loop.runner.run_real` without link, law and ring."""
     window = borrowed(window)
     w = window[0]
     wake = clock.now() + period
@@ -33,7 +33,7 @@ def empty_loop(window, period, ticks):
     while due < ticks:
         clock.sleep_until(wake)
         woke = clock.now()
-        while woke < wake:  # sleeps cut short by a signal
+        while woke < wake:  # a signal cut the sleep short
             woke = clock.now()
         lateness = woke - wake
         skipped = lateness // period  # a late tick is counted and never made up for
@@ -46,7 +46,7 @@ def empty_loop(window, period, ticks):
 
 def main(argv: list[str]) -> int:
     cpu, priority = int(argv[1]), int(argv[2])
-    empty_loop(np.zeros(1, WINDOW), 1000, 0)  # compile before we are in anybody's way
+    empty_loop(np.zeros(1, WINDOW), 1000, 0)  # compile before becoming real-time
     realtime = RealTime(priority, cpu)
     print(json.dumps({"lacks": [str(lack) for lack in realtime.lacks]}), flush=True)
     for line in sys.stdin:
@@ -71,9 +71,10 @@ def _answer(w: np.void) -> dict[str, Any]:
 
 
 class Sleeper:
-    """The process above, from outside: `with Sleeper(cpu, priority) as s: s.window(100_000, 1)`.
+    """Client of the empty loop's process: `with Sleeper(cpu, priority) as s: s.window(100_000, 1)`.
 
-    `lacks` is what the machine refused it. Raises RuntimeError where it ended, with what it said last.
+    `lacks` are the computer's refusals. Raises RuntimeError with the last line of standard error where the process
+    ended.
     """
 
     def __init__(self, cpu: int, priority: int):
@@ -91,7 +92,7 @@ class Sleeper:
         return self
 
     def __exit__(self, *_: Any) -> None:
-        self._process.kill()  # nothing of it outlives it
+        self._process.kill()  # the process has no results to save
         self._process.communicate()
 
     def window(self, period_ns: int, seconds: int) -> dict[str, Any]:

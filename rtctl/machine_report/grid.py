@@ -1,4 +1,4 @@
-"""Places of bodies in a drawing: a column for each joint away from what is driven, a row for each branch."""
+"""Places of bodies in a drawing: the column is the number of joints from a driven body, the row is the branch."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from rtctl.plants.graph.mechanics import bodies_of, code_of
 
 
 class Grid(NamedTuple):
-    """Column and row of every body, the frame included where a joint ends at it."""
+    """Column and row of every body, and of the frame where a joint ends at it."""
 
     places: dict[str, tuple[int, int]]
     columns: int
@@ -15,7 +15,7 @@ class Grid(NamedTuple):
 
 
 def grid(machine: Description) -> Grid:
-    """Places of the bodies. A body that nothing connects begins a row of its own."""
+    """Places of the bodies; an unconnected body begins a row of its own."""
     near: dict[str, list[str]] = {name: [] for name in machine.bodies}
     if any(FRAME in ends(joint) for joint in machine.joints.values()):
         near.setdefault(FRAME, [])
@@ -52,7 +52,7 @@ def ends(joint: object) -> tuple[str, str]:
 
 
 def above(machine: Description, name: str) -> list[str]:
-    """What drives a body: names of drives and their columns, and what is seen of them."""
+    """Texts of the drives of a body: name, column, and sensors of the drive."""
     return [_drive(machine, n) for n, d in machine.drives.items() if d.body == name]
 
 
@@ -62,18 +62,18 @@ def _drive(machine: Description, name: str) -> str:
 
 
 def below(machine: Description, name: str) -> list[str]:
-    """What looks at a body: names of sensors and what they show."""
+    """Texts of the sensors of a body: name and measured quantity."""
     return [f"{n} ({s.measures})" for n, s in machine.sensors.items() if s.body == name]
 
 
 def on_joint(machine: Description, name: str) -> list[str]:
-    """What acts on a joint or looks at it."""
+    """Texts of the drives and sensors of a joint."""
     drives = [_drive(machine, n) for n, d in machine.drives.items() if d.joint == name]
     return drives + [f"{n} ({s.measures})" for n, s in machine.sensors.items() if s.joint == name]
 
 
 def marks(machine: Description, name: str) -> str:
-    """What a body has beside its inertia: weight, friction."""
+    """Text with the properties of a body beside its inertia: weight, friction, a mechanics file."""
     body = machine.bodies.get(name)
     if body is None or machine.is_frame(name):
         return ""

@@ -6,7 +6,7 @@ from rtctl.plants.graph.linearised import Mode, modes
 
 
 def modes_of(machine: Description) -> list[Mode]:
-    """Modes by rising frequency, without those of drives that nobody sees."""
+    """Modes by rising frequency, with the bodies that move; a mode of a drive has none."""
     layout, _, p = graph_of(machine, 1e-3)
     moving = [name for name in machine.bodies if not machine.is_frame(name)]
     return modes(machine, p, moving, [layout.coordinate(name) for name in moving])

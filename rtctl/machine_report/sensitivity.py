@@ -1,10 +1,10 @@
-"""Sensitivity of a machine's sensors to its parameters: which of them a recording can tell apart, and which not.
+"""Sensitivity of a machine's sensors to its parameters: identifiable parameters and unidentifiable combinations.
 
     J[:, j] = (y(theta_j (1 + d)) - y(theta_j (1 - d))) / (2 d sigma)       J / |J_j| = U S V^T
 
-Every drive gets a multisine of its own, every parameter is changed by a small share of itself, and what the sensors
-show is divided by one step of theirs. A singular value near zero is a combination of parameters that no sensor sees:
-such as all inertias, frictions and the drive's gain together, where nothing measures a force.
+Every drive gets its own multisine, every parameter is changed by a small share of itself, and each sensor's output is
+divided by the sensor's step. A singular value near zero is a combination of parameters without effect on any sensor.
+Without a force sensor, all inertias, frictions and the drive's gain together are such a combination.
 
 Source: Walter & Pronzato, Identification of Parametric Models from Experimental Data (1997), ch. 6.
 """
@@ -21,26 +21,26 @@ from rtctl.plants.graph.layout import layout as layout_of
 from rtctl.plants.graph.played import played
 
 SECONDS, MOST_ROWS = 5.0, 5000
-WINDOW = 0.05  # s, over which a position's change is looked at: where it started, and slow drift, tell little
-SHARE = 0.35  # of a drive's limit, rms of its multisine
-CHANGE = 0.01  # of a parameter, for the finite difference
-TOLERANCE = 0.15  # share by which an owner's value is usually wrong
-SURE = 5.0  # steps of all sensors together that a change by TOLERANCE has to make
-SAME = 8e-3  # singular value of the normed sensitivities below which parameters move alike
-TWINS = 1e-5  # of 1 less their correlation, parameters whose effects are one: factors of a product
-PART = 0.2  # share of the largest that makes a parameter part of a combination
+WINDOW = 0.05  # s, interval of a position's change; initial position and slow drift carry little information
+SHARE = 0.35  # rms of a drive's multisine, relative to the drive's limit
+CHANGE = 0.01  # relative change of a parameter, for the finite difference
+TOLERANCE = 0.15  # usual relative error of a nominal value
+SURE = 5.0  # least effect of a change by TOLERANCE, in steps of all sensors together
+SAME = 8e-3  # singular value of the normalised sensitivities below which a combination is not identifiable
+TWINS = 1e-5  # 1 - |correlation| below which two parameters have one effect: factors of a product
+PART = 0.2  # least share of a parameter in a combination, relative to the largest
 LEFT_OUT = ("limit", "output_limit", "dac_range", "counts_per_unit", "per_unit", "resolution", "noise")
 
 
 class Group(NamedTuple):
-    """Parameters that can only be told together, and how each changes where no sensor shows it."""
+    """Parameters that are identifiable only together, and their changes that no sensor shows."""
 
     names: tuple[str, ...]
     changes: tuple[float, ...]  # relative, the largest is 1
 
 
 class Sensitivity(NamedTuple):
-    """What the sensors of a machine can tell of its parameters."""
+    """Identifiability of a machine's parameters by its sensors."""
 
     names: tuple[str, ...]
     rank: int
@@ -50,7 +50,7 @@ class Sensitivity(NamedTuple):
 
 
 def parameters(machine: Description) -> list[str]:
-    """Dotted paths of the numbers that a recording could tell: those that act on the motion and are not 0."""
+    """Dotted paths of the parameters to judge: numbers that affect the motion and are not 0."""
     return [
         path
         for path, value in machine.paths()
@@ -66,7 +66,7 @@ def _has_filter(machine: Description, path: str) -> bool:
 
 
 def commands(config: Any, n: int, dt: float) -> np.ndarray:
-    """A multisine for each drive, (n, drives), in its units."""
+    """Multisine for each drive, (n, drives), in the drive's unit."""
     rng = np.random.default_rng(1)
     t = np.arange(n) * dt
     f = np.geomspace(2.0 / (n * dt), 0.2 / dt, 40)
@@ -78,7 +78,7 @@ def commands(config: Any, n: int, dt: float) -> np.ndarray:
 
 
 def sensitivity(config: Any) -> Sensitivity:
-    """What the sensors of a described machine can tell, from a simulated multisine of some seconds."""
+    """Identifiability of a described machine's parameters, from a simulated multisine of SECONDS at most."""
     machine: Description = config.machine
     dt = 1.0 / config.loop.rate
     n = min(round(SECONDS / dt), MOST_ROWS)
@@ -101,7 +101,7 @@ def sensitivity(config: Any) -> Sensitivity:
 
 
 def judged(names: list[str], J: np.ndarray) -> Sensitivity:
-    """Groups of parameters by their whitened sensitivities J (rows, parameters)."""
+    """Identifiability from the whitened sensitivities J, (rows, parameters)."""
     norms: np.ndarray = np.sqrt((J * J).sum(axis=0))
     unseen = tuple(name for name, norm in zip(names, norms, strict=True) if norm * TOLERANCE < SURE)
     seen: list[int] = [i for i, norm in enumerate(norms) if norm * TOLERANCE >= SURE]
@@ -128,7 +128,7 @@ def judged(names: list[str], J: np.ndarray) -> Sensitivity:
 
 
 def _twins(R: np.ndarray) -> list[list[int]]:
-    """Columns of unit length, those of one direction together: factors of a product, parts of a sum."""
+    """Indices of the unit columns of R, grouped by direction: factors of a product, parts of a sum."""
     found: list[list[int]] = []
     alike = np.abs(R.T @ R) > 1.0 - TWINS
     for i in range(R.shape[1]):
@@ -141,7 +141,7 @@ def _twins(R: np.ndarray) -> list[list[int]]:
 
 
 def _sparse(directions: np.ndarray) -> np.ndarray:
-    """The same space by vectors with as many zeros as elimination makes; the largest entry of each is 1."""
+    """Basis of the space of `directions` with zeros by elimination; the largest entry of each vector is 1."""
     N = directions / np.abs(directions).max(axis=1, keepdims=True) if len(directions) else directions
     N = N.copy()
     for k in range(len(N)):
@@ -155,7 +155,7 @@ def _sparse(directions: np.ndarray) -> np.ndarray:
 
 
 def sentences(found: Sensitivity) -> list[str]:
-    """What was found, a line each."""
+    """Lines of text for a result."""
     lines = [f"{found.rank} of {len(found.names)} parameters, from a multisine of {SECONDS:g} s"]
     if found.told:
         by = sorted(found.told.items(), key=lambda item: item[1])

@@ -15,7 +15,7 @@ HEAD = (
 
 
 def svg(machine: Description, title: str) -> str:
-    """Text of the picture."""
+    """SVG text of the drawing."""
     g = grid(machine)
     heads, feet = [0] * g.rows, [0] * g.rows
     for name, (_, row) in g.places.items():
@@ -85,7 +85,7 @@ def _arrow(x: float, y: float, end: float, color: str) -> str:
 def _joint(
     left: list[int], top: list[int], a: tuple[int, int], b: tuple[int, int], words: list[str], spring: bool
 ) -> list[str]:
-    """A joint between two places, with its words above and below it."""
+    """SVG elements of a joint between two places, with its label above and below."""
     if a[0] == b[0]:
         x, y1, y2 = left[a[0]] + WIDE - 30, top[a[1]] + HIGH, top[b[1]]
         out = [_link([(x, y1), (x, y2)], spring, upright=True)]
@@ -110,7 +110,7 @@ def _joint(
 
 
 def _link(points: list[tuple[float, float]], spring: bool, upright: bool = False) -> str:
-    """A zigzag, or two lines for a rigid joint."""
+    """SVG element of a joint: a zigzag for a spring, two lines for a rigid joint."""
     (x1, y1), (x2, y2) = points
     if not spring:
         dx, dy = (3, 0) if upright else (0, 3)

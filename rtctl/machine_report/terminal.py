@@ -8,7 +8,7 @@ GAP = 12  # cells between two columns, at least
 
 
 class Canvas:
-    """Cells of text."""
+    """Grid of characters to draw into."""
 
     def __init__(self, width: int, height: int):
         self.cells = [[" "] * width for _ in range(height)]
@@ -26,7 +26,7 @@ class Canvas:
 
 
 def drawing(machine: Description) -> list[str]:
-    """Lines of the drawing."""
+    """Lines of a machine's drawing."""
     g = grid(machine)
     label = {name: [name, *([f"({marks(machine, name)})"] if marks(machine, name) else [])] for name in g.places}
     widths, heads, feet = [0] * g.columns, [0] * g.rows, [0] * g.rows

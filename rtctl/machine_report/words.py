@@ -1,4 +1,4 @@
-"""Sentences on a described machine: bodies, joints, drives and sensors, a line each, in the units people read."""
+"""Lines of text on a described machine: bodies, joints, drives and sensors, in readable units."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ Line = tuple[str, str]
 
 
 def si(value: float | None, unit: str) -> str:
-    """A number with its unit and three digits, with the prefix that leaves no zeros: 21 mN, 1.2 kN/m; None is 0."""
+    """Text of a number with unit and SI prefix, up to four digits: 21 mN, 1.2 kN/m; None is 0."""
     value = value or 0.0
     plain = unit in ("", "percent") or unit.startswith("kg") or "/" in unit.replace("/m", "").replace("/rad", "")
     if value == 0 or not math.isfinite(value) or plain:
@@ -23,7 +23,7 @@ def si(value: float | None, unit: str) -> str:
 
 
 def sentences(machine: Description) -> list[Line]:
-    """Name of the group, in the first line of each, and a line for each element."""
+    """Pairs of group name and line, one for each element; the name is empty after the first line of a group."""
     groups = (
         ("bodies", _bodies),
         ("mechanics", _mechanics),

@@ -1,4 +1,4 @@
-"""One file a machine: the settings of its loop and its block diagram, from which the tick is generated."""
+"""Machines, one file each: settings of the loop, and the block diagram from which the tick is generated."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -21,7 +21,7 @@ EVERY: dict[str, type[MachineSettings]] = {**CONFIGS, DESCRIBED: described.Descr
 
 
 def module_of(kind: str) -> Any:
-    """Module of a kind of machine: its columns, units and diagrams."""
+    """Module of a kind of machine, with columns, units and diagrams."""
     return described if kind == DESCRIBED else MODULES[kind]
 
 
@@ -34,7 +34,7 @@ def class_of(data: Any) -> type[MachineSettings] | None:
 
 
 class Machine(NamedTuple):
-    """A config made ready: diagrams with their params, and what the supervisor needs to know of the machine."""
+    """Machine built from a config: diagrams with their params, and data for the supervisor."""
 
     kind: str
     config: Any
@@ -48,24 +48,24 @@ class Machine(NamedTuple):
     excitation: excitation.ExcitationParams
     faults: tuple[faults.Fault, ...]
     truth: tuple[Column, ...]
-    unit: str  # of position and reference: rad or m, or of a speed
+    unit: str  # of position and reference, rad or m, or of a speed
     metres_per_unit: float | None  # None where nothing moves along a line
-    radius: float | None  # m, turns metres into radians; None where nobody knows one
+    radius: float | None  # m, turns metres into radians; None if unknown
     signals: Signals
 
 
 def _widened(base: Any, data: Any, folder: Any = None, law: bool = True) -> tuple[Any, Any]:
-    """As `rtctl.own.model.widened`, from the class in the units of the machine that the data describe."""
+    """Settings class and data as of `rtctl.own.model.widened`, in the units of the machine that the data describe."""
     return model.widened(class_of(data) or base, data, folder, law)
 
 
 OWN = Widen(model.long_form, _widened)  # for load_settings
-OWN_PLANT = Widen(model.long_form, partial(_widened, law=False))  # where nobody asks for the law
+OWN_PLANT = Widen(model.long_form, partial(_widened, law=False))  # for callers without need of the law
 
 
 def widened(data: Any) -> tuple[Any, Any]:
-    """Settings class for plain data of a known machine that is complete, with the keys of the own files that it names,
-    and the data; see `rtctl.own.model.widened`. Raises OwnError."""
+    """Settings class for complete plain data of a machine, with the keys of the user files that the data name, and the
+    data; see `rtctl.own.model.widened`. Raises OwnError."""
     kind = class_of(data)
     if kind is None:
         raise OwnError(f"machine: {str(data.get('machine'))[:40]!r} is not one of {', '.join(CONFIGS)}")
@@ -73,7 +73,7 @@ def widened(data: Any) -> tuple[Any, Any]:
 
 
 def settings(data: Any) -> Any:
-    """Settings of plain data that is complete, as `written` gives it. Raises ValidationError, or OwnError."""
+    """Settings of complete plain data, as `written` returns them. Raises ValidationError, or OwnError."""
     kind, data = widened(data)
     return kind.model_validate(data)
 
@@ -121,7 +121,7 @@ def _build(config: Any) -> Machine:
 
 
 def fmu_of(config: Any) -> Any:
-    """Settings of the FMU that stands in the plant's place; None for equations, ours or of an own file."""
+    """Settings of the FMU that replaces the plant's equations; None without an FMU."""
     return getattr(config.plant, "fmu", None)
 
 
@@ -131,7 +131,7 @@ def emulated(config: Any) -> bool:
 
 
 def check_plant(config: Any) -> None:
-    """Raise ValueError where the board or the plant of a config cannot run in its time, UserError where a bus lacks a
+    """Raise ValueError where the board or the plant of a config cannot run in its mode, UserError where a bus lacks a
     drive or a sensor of the machine."""
     real, fmu, mode = config.driver.kind != "emulated", fmu_of(config) is not None, config.loop.mode
     if real and fmu:

@@ -41,8 +41,8 @@ from rtctl.tick import safety
 __all__ = ["play", "prepare"]  # called by the generated tick as machine.play and machine.prepare
 
 UNIT = "m"
-SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
-PLANT_RATE = 1000.0
+SETTLE_FLOOR = 0.0  # m, least settling band; 0: two percent of the step
+PLANT_RATE = 1000.0  # Hz, of the free-running emulator
 
 
 class AxisLawSettings(Settings):
@@ -96,7 +96,7 @@ def unit(config: Any) -> str:
 
 
 def metres_per_unit(config: AxisConfig) -> float:
-    """The loop works in metres."""
+    """Metres in one unit of the reference."""
     return 1.0
 
 
@@ -115,7 +115,7 @@ AXIS_STATE = state(k_run=int, gains=int, play=int, u_fb=float)
 
 @tick
 def switch_on(p, s, x):
-    """The tick in which outputs come on: every law starts from where the carriage stands."""
+    """Reset all laws to the carriage's position `x` in m, in the tick in which outputs come on."""
     reference.hold(0, s.reference, x)
     shaper.reset(p.shaper, s.shaper, x)
     velocity.reset(p.velocity, s.velocity)

@@ -1,6 +1,6 @@
-"""Ordinary use of the axis, from the parameters of its config: no recording is needed.
+"""Nominal duty of the axis, from the parameters of its config, without a recording.
 
-Speeds of nodes follow from radii and gears. Forces accelerate the machine in time and overcome dry friction.
+Speeds of nodes follow from radii and gears. Forces accelerate the machine to nominal speed and overcome dry friction.
 """
 
 from math import inf
@@ -11,19 +11,19 @@ import numpy as np
 from rtctl.machines.duty import Duty, Use
 
 SPEED, TRAVEL = 0.09, 0.25  # m/s and m
-QUICK = 5.0  # 1/s, to reach that speed
-RECORDING = 25.0  # s
+QUICK = 5.0  # 1/s, acceleration divided by that speed
+RECORDING = 25.0  # s, length of a recording
 
 
 def use(node: str, config: Any) -> Use:
-    """How a node moves."""
+    """Nominal duty of a node."""
     p = config.plant.parameters
     force = float(np.sqrt((p.M * SPEED * QUICK) ** 2 + (p.F_v * SPEED) ** 2 + p.F_c**2 + (0.3 * p.k * TRAVEL) ** 2))
     return Use(SPEED, TRAVEL, force, p.F_c, p.M, p.k, inf, True)
 
 
 def volts(config: Any) -> float:
-    """Command that ordinary use takes, rms."""
+    """Command of the nominal duty, V rms."""
     return float(use("carriage", config).force / config.plant.parameters.K)
 
 

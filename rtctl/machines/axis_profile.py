@@ -14,13 +14,13 @@ from rtctl.plants import axis as plant
 
 
 def model(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    """Volts to the encoder."""
+    """Model from the voltage to the encoder."""
     A, B = plant.state_space(p)
     return Model(A, B[:, 0], unit_row(len(A), 0))
 
 
 def case(config: Any) -> dict[str, Any]:
-    """Keys of case.json: the model that the config believes in."""
+    """Keys of case.json: the nominal model of the config."""
     p = plant.AxisParameters(**config.plant.parameters.model_dump())
     return {
         "parameters": given(p),
@@ -31,7 +31,7 @@ def case(config: Any) -> dict[str, Any]:
 
 
 def own(config: Any, h: float, seed: int) -> OwnBlocks:
-    """Converter, encoder and counter around an own plant."""
+    """Converter, encoder and counter around a user's plant."""
     return OwnBlocks(
         (
             Block("output", at_mio_16de.build_output(config.output, h), at_mio_16de.ANALOG_OUTPUT_STATE),

@@ -1,4 +1,4 @@
-"""What every machine's config shares, and the block diagram from which its tick is generated."""
+"""Settings that all machines share, and the block diagram from which a tick is generated."""
 
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
@@ -32,7 +32,7 @@ class Block(NamedTuple):
 
 
 class Diagram(NamedTuple):
-    """A machine's tick: what it uses, what it holds, what it traces, and its lines in order, each stage with a name."""
+    """Block diagram of a machine's tick: modules, blocks, recorded columns, and lines by named stage, in order."""
 
     uses: tuple[str, ...]  # modules, e.g. "rtctl.laws.pd"
     blocks: tuple[Block, ...]
@@ -45,7 +45,7 @@ class PlantDiagram(NamedTuple):
 
     uses: tuple[str, ...]
     blocks: tuple[Block, ...]
-    truth: tuple[Column, ...]  # what the emulator tells beside the sensors, in the order of the frame's truth
+    truth: tuple[Column, ...]  # true signals of the emulator, in the order of the frame's truth
     start: tuple[str, ...]
     advance: tuple[tuple[str, tuple[str, ...]], ...]
     sample: tuple[tuple[str, tuple[str, ...]], ...]
@@ -54,14 +54,14 @@ class PlantDiagram(NamedTuple):
 class Signals(NamedTuple):
     """Columns by which a run is judged."""
 
-    position: str  # what follows the reference, as it is measured
+    position: str  # measured signal that follows the reference
     error: str
     outputs: tuple[str, ...]  # to the drives
     truth: str  # the position in the emulator
 
 
 class LinkSettings(Settings):
-    """How the loop reaches its plant or board."""
+    """Link between the loop and its plant or board."""
 
     kind: Literal["zmq", "shm"] = Field(default="zmq", description="ZeroMQ (also across machines) or shared memory")
     endpoint: str | None = Field(
@@ -90,8 +90,8 @@ class LoopSettings(Settings):
     )
     write: Literal["next_tick", "same_tick"] = Field(
         default="next_tick",
-        description="next_tick: outputs leave at the start of the next tick, one period after they were due but always "
-        "by the same time; same_tick: they leave as soon as they are computed",
+        description="next_tick: outputs leave at the start of the next tick, with a constant delay of one period; "
+        "same_tick: they leave as soon as they are computed",
     )
     realtime: Literal["required", "preferred", "off"] = Field(
         default="preferred", description="required: refuse to start without SCHED_FIFO and locked memory"
@@ -104,15 +104,17 @@ class LoopSettings(Settings):
 
 
 class RecordSettings(Settings):
-    """What is recorded, and how it comes to disk."""
+    """Recorded signals, and how they are written to disk."""
 
     seconds: float = quantity(20.0, unit="s", gt=0, help="length of the ring between loop and supervisor")
     batch: float = quantity(0.1, unit="s", gt=0, le=10, help="longest time until a row is on disk")
     rotate_mb: float | None = Field(
         default=None, gt=0, description="MB of rows, before compression, that fill a part of a long recording"
     )
-    rotate_minutes: float | None = Field(default=None, gt=0, description="minutes that do; one piece without either")
-    truth: bool = Field(default=True, description="record what the emulator knows beside what sensors say")
+    rotate_minutes: float | None = Field(
+        default=None, gt=0, description="minutes that fill a part; one part without either"
+    )
+    truth: bool = Field(default=True, description="record the true signals of the emulator beside the sensors")
     trace: list[str] = Field(default=[], description="state fields to record besides, e.g. position.d")
 
 
@@ -127,10 +129,10 @@ class CommandSettings(Settings):
 
 
 class MetricsSettings(Settings):
-    """Numbers for Prometheus."""
+    """Metrics for Prometheus."""
 
     port: int | None = Field(
-        default=None, ge=1, le=65535, description="where Prometheus may ask, on 127.0.0.1 alone; nowhere if absent"
+        default=None, ge=1, le=65535, description="port for Prometheus, on 127.0.0.1 only; none if absent"
     )
 
 
@@ -158,7 +160,7 @@ class MachineSettings(Settings):
     @property
     def kind(self) -> str:
         """Name of the kind of machine; `described` where the config holds a description."""
-        machine = getattr(self, "machine")  # noqa: B009  of the classes below this one
+        machine = getattr(self, "machine")  # noqa: B009  a field of the subclasses
         return machine if isinstance(machine, str) else DESCRIBED
 
 
@@ -186,18 +188,18 @@ TRACE_LINES = (
 
 
 class PhysicsLines(NamedTuple):
-    """What the terms of a plant's `physics:` list bring into its diagram."""
+    """Modules, blocks and lines of the terms in a plant's `physics:` list."""
 
     uses: tuple[str, ...]
     blocks: tuple[Block, ...]
     command: tuple[str, ...]  # lines by site, see plants/physics/term.py
     force: tuple[str, ...]
     reading: tuple[str, ...]
-    moves: tuple[str, ...]  # those of the reading lines that say where the carriage stands
+    moves: tuple[str, ...]  # those of the reading lines that give the carriage's position
 
 
 class RatioParams(NamedTuple):
-    ratio: float  # what a node moves for one unit of its coordinate
+    ratio: float  # motion of a node for one unit of its coordinate
 
 
 def physics_lines(

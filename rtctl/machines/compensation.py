@@ -1,10 +1,10 @@
-"""Compensation around the position law: settings, and the blocks and lines that they bring into a machine's tick.
+"""Compensation around the position law: settings, and their blocks and lines in a machine's tick.
 
-    error     e = ref + shift - feedback                           shift: what springs and late sensors take
+    error     e = ref + shift - feedback                           shift: deflection of springs, delay of sensors
     law       u = law(e) + integral + feedforward + observer + learned + repeated
     limit     u -> inverse of the drive's curve -> limit
 
-A setting that is absent brings no line: the tick of a config without compensation is what it was.
+An absent setting adds no line, so the tick of a config without compensation is unchanged.
 """
 
 from typing import Any, NamedTuple
@@ -39,11 +39,11 @@ from rtctl.machines.physics import PhysicsTerm
 from rtctl.machines.reference_motion import Mechanics, params
 from rtctl.plants.physics import TERMS
 
-ACTS = ("command", "force", "last")  # sites of what a feedforward can act against
+ACTS = ("command", "force", "last")  # sites of effects that a feedforward can compensate
 
 
 class EffectSettings(Settings):
-    """An effect that is fed forward."""
+    """Effect that the feedforward compensates."""
 
     effect: PhysicsTerm = Field(description="the effect as in plant.physics; `rtctl physics` lists them")
     share: float = quantity(1.0, unit="", ge=0, le=1.5, help="part of it that is compensated; 0 switches it off")
@@ -56,14 +56,16 @@ class ModelFeedforwardSettings(Settings):
     friction: float = quantity(
         0.9, unit="", ge=0, le=1, help="share of the description's dry friction, below breakaway"
     )
-    viscous: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of its viscous friction and of its springs")
+    viscous: float = quantity(1.0, unit="", ge=0, le=1.5, help="share of the viscous friction and of the springs")
     velocity: float = quantity(
-        1.0, unit="", ge=0, le=1, help="share of the velocity feedback that the reference takes off"
+        1.0, unit="", ge=0, le=1, help="share of the velocity feedback that the reference's speed cancels"
     )
-    lead: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time until a command acts; the reference is taken then")
-    behind: float = quantity(0.0, unit="s", ge=0, le=0.1, help="time by which the sensor shows the position late")
+    lead: float = quantity(
+        0.0, unit="s", ge=0, le=0.1, help="time until a command acts; the reference is read ahead by it"
+    )
+    behind: float = quantity(0.0, unit="s", ge=0, le=0.1, help="delay of the sensor")
     through: str | None = Field(
-        default=None, description="body behind springs that shall follow the reference, the feedback running ahead"
+        default=None, description="body behind springs that must follow the reference, in place of the feedback"
     )
     effects: list[EffectSettings] = Field(default=[], max_length=12, description="effects that are compensated")
 
@@ -72,16 +74,18 @@ class ModelFeedforwardSettings(Settings):
         for i, entry in enumerate(self.effects):
             if not any(site.partition(":")[0] in ACTS for site in TERMS[entry.effect.term].act):
                 raise ValueError(
-                    f"effects.{i}.effect: {entry.effect.term} neither pushes nor changes a command; a feedforward does "
-                    "nothing against it"
+                    f"effects.{i}.effect: {entry.effect.term} neither adds a force nor changes a command; no "
+                    "feedforward can compensate it"
                 )
         return self
 
 
 class CompensationSettings(Settings):
-    """What is put against the machine's known and unknown errors; `rtctl improve` proposes it from a diagnosis."""
+    """Compensation of the machine's known and unknown errors; `rtctl improve` proposes it from a diagnosis."""
 
-    feedforward: ModelFeedforwardSettings | None = Field(default=None, description="by the model; none if absent")
+    feedforward: ModelFeedforwardSettings | None = Field(
+        default=None, description="feedforward by the model; none if absent"
+    )
     integral: IntegralSettings | None = Field(default=None, description="integral with dead zone; none if absent")
     observer: DisturbanceObserverSettings | None = Field(
         default=None, description="disturbance observer; none if absent"
@@ -96,19 +100,21 @@ class CompensationSettings(Settings):
         default=None, description="command over the time of the move, learned run by run; none if absent"
     )
     repetitive: RepetitiveSettings | None = Field(
-        default=None, description="learns while it moves what comes back with every turn; none if absent"
+        default=None, description="learns during motion the error that repeats with every turn; none if absent"
     )
     predictor: PredictorSettings | None = Field(
-        default=None, description="the law closes on the position after the delay; none if absent"
+        default=None, description="predicts the position after the delay, as the law's feedback; none if absent"
     )
     correction: ErrorTableSettings | None = Field(
-        default=None, description="table of what is to be added to the feedback, by the feedback; none if absent"
+        default=None, description="table over the feedback that is added to the feedback; none if absent"
     )
-    inverse: InverseCurveSettings | None = Field(default=None, description="of the drive's curve; none if absent")
+    inverse: InverseCurveSettings | None = Field(
+        default=None, description="inverse of the drive's curve; none if absent"
+    )
 
 
 def in_units(symbols: dict[str, str]) -> Any:
-    """The settings class with other units; effects keep those of `plant.physics`."""
+    """Settings class with other units; effects keep those of `plant.physics`."""
     own = CompensationSettings.model_fields["feedforward"]
     base = with_units(CompensationSettings, symbols)
     return create_model(
@@ -118,7 +124,7 @@ def in_units(symbols: dict[str, str]) -> Any:
 
 
 class Lines(NamedTuple):
-    """What compensation brings into a tick."""
+    """Modules, blocks and lines of compensation in a tick."""
 
     uses: tuple[str, ...] = ()
     blocks: tuple[Block, ...] = ()
@@ -140,16 +146,16 @@ NONE = Lines()
 class Signals(NamedTuple):
     """Names of the signals in a machine's tick."""
 
-    law: str  # what the position law gives
+    law: str  # output of the position law
     error: str
     feedback: str
-    speed: str  # measured, of the tick before where the machine has it later
+    speed: str  # measured; of the tick before where the machine computes it later
     wanted: str  # command before the limit, and before the inverse of the drive's curve
-    asked: str  # what the limit is asked for
-    written: str  # what it lets through
-    known: str  # V of the command that the machine's own feedforward puts against friction
-    channel: dict[int, float]  # of each drive: share of the command; none where drives are shared out otherwise
-    beside: str = "0.0"  # V of a positive command that accelerate alike, and are no part of the command
+    asked: str  # input of the limit
+    written: str  # output of the limit
+    known: str  # V, friction compensation by the machine's own feedforward
+    channel: dict[int, float]  # drive -> share of the command; empty where an allocation distributes the command
+    beside: str = "0.0"  # V of a positive command that accelerates like voltages outside the command
 
 
 def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: Any, dt: float) -> Lines:
@@ -212,7 +218,7 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
         law.append(f"u_learned = iterative_learning.step(p.learning, {now})")
         extra.append("u_learned")
     if settings.repetitive is not None:
-        if settings.repetitive.gain > 0.0 and not mechanics().shaped:  # else it would learn nothing, and say nothing
+        if settings.repetitive.gain > 0.0 and not mechanics().shaped:  # else it would learn nothing, silently
             raise ValueError(
                 "law.compensation.repetitive learns while the shaped reference moves; law.shaper.bandwidth is missing"
             )
@@ -256,7 +262,7 @@ def lines(settings: CompensationSettings, names: Signals, kind: str, mechanics: 
 def _feedforward(
     settings: ModelFeedforwardSettings, names: Signals, kind: str, mechanics: Mechanics, dt: float
 ) -> Lines:
-    """The model's record moved along the reference, with the effects' own lines acting on it."""
+    """Feedforward lines: the model's record is moved along the reference, and the effects' lines act on the record."""
     made = params(mechanics, settings, dt)
     uses = ["rtctl.laws.model_feedforward"]
     blocks = [Block("model_feedforward", made, model_feedforward.MODEL_FEEDFORWARD_STATE)]

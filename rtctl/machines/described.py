@@ -35,14 +35,14 @@ __all__ = [
     "unit",
 ]  # fmt: skip
 
-SETTLE_FLOOR = 0.0  # two percent of the step say it all
-PLANT_RATE = 1000.0
+SETTLE_FLOOR = 0.0  # least settling band; 0: two percent of the step
+PLANT_RATE = 1000.0  # Hz, of the free-running emulator
 
 
 class DescribedParams(NamedTuple):
     settle: int  # ticks
     per_column: float  # rad or m (or per s) of the feedback for one unit of its column
-    ampere: float  # A for one unit of command, 0 where nobody knows
+    ampere: float  # A for one unit of command, 0 if unknown
     shares: np.ndarray  # (MOST_DRIVES,) of the command, with the sign that moves the feedback forwards
 
 
@@ -51,7 +51,7 @@ DESCRIBED_STATE = state(k_run=int, gains=int, play=int, u_fb=float)
 
 @tick
 def settle(p, s, guard, k):
-    """Armed leads to running once the law has held the machine for a moment."""
+    """Change from armed to running after `p.settle` ticks."""
     if guard.state == safety.ARMED and guard.armed_for > p.settle:
         guard.state = safety.RUNNING
         s.k_run = k
@@ -59,7 +59,7 @@ def settle(p, s, guard, k):
 
 @tick
 def play(t, s, guard, c, made, k):
-    """Start the table when it is asked for, once the machine runs; what was asked for while it was off is forgotten."""
+    """Start the reference table on request while the machine runs; a request while it is off is dropped."""
     if guard.state == safety.IDLE or guard.state == safety.TRIPPED:
         s.play = c.play
     elif guard.state == safety.RUNNING and c.play != s.play:
@@ -197,7 +197,7 @@ def diagram(config: Any, dt: float) -> Diagram:
     return Diagram((*USES, *more.uses, position.uses), blocks, columns(config), stages)
 
 
-SWITCH_ON = (  # the tick in which outputs come on: every law starts from where the machine stands
+SWITCH_ON = (  # in the tick in which outputs come on, all laws are reset to the present position
     "reference.hold(0, s.reference, y.feedback)",
     "shaper.reset(p.shaper, s.shaper, y.feedback)",
     "velocity.reset(p.velocity, s.velocity)",

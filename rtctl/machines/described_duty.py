@@ -1,4 +1,4 @@
-"""Ordinary use of a described machine, by the reference of its config: how far and how fast each node moves."""
+"""Nominal duty of a described machine, by the reference of its config: travel and speed of each node."""
 
 from math import inf
 from typing import Any
@@ -12,23 +12,23 @@ from rtctl.machines.duty import Duty, Use
 from rtctl.machines.reference_motion import Motion, motion
 from rtctl.plants.graph.description import Description
 
-QUICK = 5.0  # 1/s, to reach the nominal speed
+QUICK = 5.0  # 1/s, acceleration divided by the nominal speed
 
 
 def duty(config: Any) -> Duty:
-    """Ordinary use. Raises ValueError where the config has no reference, or no feedforward along it can be made."""
+    """Nominal duty. Raises ValueError where the reference does not move."""
     table = reference.build(config.reference, 1.0 / config.loop.rate)
     t, r = table.t[: table.n], table.r[: table.n]
     travel = float(np.ptp(r))
     if travel == 0.0:
-        raise ValueError("reference: it does not move; ordinary use is what the reference does")
+        raise ValueError("reference: it does not move, and the nominal duty follows from its motion")
     slope = np.abs(np.diff(r)[np.diff(t) > 0] / np.diff(t)[np.diff(t) > 0])
     speed = float(slope.max()) if slope.size and slope.max() > 0.0 else travel
     return Duty(speed, travel, float(t[-1]) + 1.0, _use, _volts)
 
 
 def _use(node: str, config: Any) -> Use:
-    """How a node moves, in its own unit."""
+    """Nominal duty of a node, in the node's unit."""
     found, made = duty(config), mechanics(config, 1.0 / config.loop.rate)
     moved, machine = motion(made), parts_of(config).machine
     body = _body(machine, node, parts_of(config).feedback)
@@ -49,7 +49,7 @@ def _use(node: str, config: Any) -> Use:
 
 
 def _volts(config: Any) -> float:
-    """Command that ordinary use takes, rms."""
+    """Command of the nominal duty, rms."""
     made = mechanics(config, 1.0 / config.loop.rate)
     moved = motion(made)
     force = np.hypot(_inertia(moved) * duty(config).speed * QUICK, _dry(moved, made))
@@ -57,7 +57,7 @@ def _volts(config: Any) -> float:
 
 
 def _body(machine: Description, node: str, feedback: str) -> str:
-    """Body that moves a node: the far end of a joint, that of a drive or sensor, or what the loop closes on."""
+    """Body of a node: the far end of a joint, the body of a drive or sensor, else the body of the feedback."""
     if node in machine.bodies:
         return node
     for group in (machine.drives, machine.sensors):

@@ -15,9 +15,9 @@ from rtctl.plants.graph.plant import state_space
 
 
 def mechanics(config: Any, dt: float) -> Mechanics:
-    """Linear model of a described machine by its parts, with the joints that its effects make springs.
+    """Linear model of a described machine, with a spring in each joint that its effects make elastic.
 
-    Raises ValueError where the loop closes on a speed, or where a file says how bodies move each other.
+    Raises ValueError where the loop closes on a speed, or where the mechanics are in a file.
     """
     parts = parts_of(config)
     if parts.is_speed:

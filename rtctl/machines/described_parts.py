@@ -1,4 +1,4 @@
-"""What the loop of a described machine closes: which sensor and drive, their units, and the signals of its trace."""
+"""Sensor and drive of a described machine's loop, their units, and the signals of its trace."""
 
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from rtctl.plants.graph.units import measured_unit
 
 
 class Parts(NamedTuple):
-    """What the loop closes, by names and units."""
+    """Sensor and drive of the loop, by names and units."""
 
     machine: Description
     feedback: str  # sensor
@@ -29,7 +29,7 @@ class Parts(NamedTuple):
 
     @property
     def number(self) -> int:
-        """Number of the drive."""
+        """Index of the drive in the description."""
         return list(self.machine.drives).index(self.drive)
 
 
@@ -54,7 +54,7 @@ def metres_per_unit(config: Any) -> float | None:
 
 
 def radius(config: Any) -> None:
-    """Metres per radian: a description has one for every joint, and none for the whole machine."""
+    """Metres per radian; None, because each joint of a description has its own."""
     return None
 
 
@@ -68,7 +68,7 @@ def signals(config: Any) -> Signals:
 
 
 def columns(config: Any) -> tuple[Column, ...]:
-    """Signals of the trace, in the words of the description."""
+    """Signals of the trace, with the names in the description."""
     parts = parts_of(config)
     unit, command = parts.unit, parts.command
     rate = unit if parts.is_speed else f"{unit}/s"
@@ -93,7 +93,7 @@ def columns(config: Any) -> tuple[Column, ...]:
 
 
 def _column_unit(machine: Description, sensor: Any) -> str:
-    """Counts, or the SI unit of a column of numbers; "" where the column is in another one."""
+    """Unit of a sensor's column: counts, or the SI unit; "" where the column is in another unit."""
     if sensor.counts_per_unit is not None:
         return "counts"
     if sensor.per_unit != 1.0:
@@ -102,7 +102,7 @@ def _column_unit(machine: Description, sensor: Any) -> str:
 
 
 def forwards(config: Any) -> float:
-    """1, or -1 where a positive command moves the feedback backwards: sign of the response to a short push."""
+    """Sign of the feedback's first response to a positive command: 1 or -1."""
     parts = parts_of(config)
     _, _, p = graph_of(parts.machine, 1.0)
     A, B = linearised(p)
@@ -117,7 +117,7 @@ def forwards(config: Any) -> float:
 
 
 def shares_of(config: Any) -> np.ndarray:
-    """Command of each drive (drives,) for one of the law, with the sign that moves the feedback forwards."""
+    """Command of each drive for one unit of the law's, (drives,), with the sign that moves the feedback forwards."""
     parts, law = parts_of(config), config.law
     shares = np.array([law.shares.get(name, 0.0) for name in parts.machine.drives])
     shares[parts.number] = law.shares.get(parts.drive, 1.0)

@@ -1,6 +1,6 @@
-"""The emulated machine of a description: one compiled kernel for all machines, driven by arrays, and its board.
+"""Emulated machine of a description: one compiled kernel for all machines, with arrays as params, and its board.
 
-Only the lines below are generated: one converter a drive, one counter or number a sensor.
+Only the lines below are generated: a converter for each drive, a counter or a number for each sensor.
 """
 
 from collections.abc import Iterable
@@ -25,15 +25,15 @@ from rtctl.plants.graph.units import WAY
 from rtctl.plants.linear import MOST_BODIES
 from rtctl.plants.physics import TERMS
 
-BITS = 16  # of a drive whose converter nobody knows
-FINE = 1e-6  # column units, resolution of a number whose resolution nobody knows
+BITS = 16  # of a drive's converter, if unknown
+FINE = 1e-6  # column units, resolution of a number, if unknown
 WRITE, SETTLING = at_mio_16de.WRITE, at_mio_16de.SETTLING
 
 
 class TruthParams(NamedTuple):
     n: int
     i: np.ndarray  # (MOST_BODIES,) coordinate of each body
-    a: np.ndarray  # (MOST_BODIES,) what the body moves for one unit of it
+    a: np.ndarray  # (MOST_BODIES,) motion of the body for one unit of its coordinate
 
 
 def is_counter(sensor: Sensor) -> bool:
@@ -42,7 +42,7 @@ def is_counter(sensor: Sensor) -> bool:
 
 
 def converter(config: Any, number: int) -> AnalogOutputParams:
-    """The converter of a drive; 16 bits over the range of its commands where the description has none."""
+    """Converter of a drive; 16 bits over the range of its commands where the description has none."""
     drive = list(config.machine.drives.values())[number]
     bits = drive.dac_bits or BITS
     full = drive.dac_range if drive.dac_bits else max(drive.limit or 0.0, config.law.limit.high)
@@ -69,7 +69,7 @@ def wires(machine: Description) -> dict[str, str]:
 
 
 def truth_columns(machine: Description) -> tuple[Column, ...]:
-    """Position and speed of every body that moves, as the emulator knows them."""
+    """Columns of the true position and speed of every moving body."""
     columns: list[Column] = []
     for name, body in machine.bodies.items():
         if not machine.is_frame(name):
@@ -92,7 +92,7 @@ def truth_params(layout: graph_layout.Layout, values: dict[str, float]) -> Truth
 
 @tick
 def tell(p, m, truth):
-    """Position and speed of each body into `truth`, one after the other."""
+    """Write position and speed of each body into `truth`, one after the other."""
     for n in range(p.n):
         truth[2 * n] = p.a[n] * m.x[p.i[n]]
         truth[2 * n + 1] = p.a[n] * m.x[m.nq + p.i[n]]

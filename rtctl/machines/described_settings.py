@@ -34,8 +34,8 @@ from rtctl.plants.graph.units import measured_unit
 from rtctl.tick.safety import SafetySettings
 
 SIGNALS = ("target", "ref", "w", "feedback", "position_error", "speed", "u_c")  # of the loop, in the trace
-FEEDBACK = ("position", "speed")  # what a loop can close on, in the order in which it is looked for
-FULL = 10.0  # command units, where neither limit nor converter says more
+FEEDBACK = ("position", "speed")  # quantities that a loop can close on, in order of preference
+FULL = 10.0  # command units, range of the command where neither limit nor converter gives it
 
 
 class StateFeedbackLawSettings(StateFeedbackSettings):
@@ -60,7 +60,7 @@ class DescribedLawSettings(Settings):
         default={}, description="share of the command that other drives get, by name; 0 if absent"
     )
     shaper: ShaperSettings = ShaperSettings()
-    position: PositionSettings = PdLawSettings(gain=0.0)  # moves nothing; `rtctl tune` finds one
+    position: PositionSettings = PdLawSettings(gain=0.0)  # no motion; `rtctl tune` designs a law
     limit: LimitSettings = LimitSettings()
     bumpless: BumplessSettings = BumplessSettings()
     velocity: VelocitySettings = VelocitySettings()
@@ -109,7 +109,7 @@ class DescribedConfig(MachineSettings):
 
 
 def feedback_name(machine: Description, wanted: str | None) -> str | None:
-    """Sensor that the loop closes on; None where none will do."""
+    """Sensor that the loop closes on; None where no sensor is suitable."""
     names = _closable(machine)
     return wanted if wanted is not None else names[0] if names else None
 
@@ -138,7 +138,7 @@ def units_of(data: Any) -> tuple[str, str, float]:
     for key in ("dac_range", "limit"):
         try:
             full = abs(float(to_si(drive.get(key, full), command))) or full
-        except (TypeError, ValueError):  # told when it is read
+        except (TypeError, ValueError):  # reported when the config is validated
             continue
     return way, command, full
 
@@ -152,7 +152,7 @@ def config_class(data: Any) -> type[DescribedConfig]:
 def _config_class(way: str, command: str, full: float) -> type[DescribedConfig]:
     symbols = {"V": command, "rad": way, "m": way}
     limits, laws = with_units(LimitSettings, symbols), with_units(DescribedLawSettings, symbols)
-    shaper = DescribedLawSettings.model_fields["shaper"]  # its bandwidth is in rad/s, of whatever machine
+    shaper = DescribedLawSettings.model_fields["shaper"]  # its bandwidth is in rad/s for every machine
     fields: dict[str, Any] = {"limit": (limits, limits(high=full)), "shaper": (ShaperSettings, shaper)}
     around = in_units(symbols)
     fields["compensation"] = (around, around())

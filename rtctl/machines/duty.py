@@ -1,11 +1,11 @@
-"""What a machine does in ordinary use: how far and how fast it moves, and what that takes at each node."""
+"""Nominal duty of a machine: travel and speed, and the force at each node."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 
 class Use(NamedTuple):
-    """A node in ordinary use, in its own unit."""
+    """Nominal duty of a node, in the node's unit."""
 
     speed: float
     travel: float
@@ -18,10 +18,10 @@ class Use(NamedTuple):
 
 
 class Duty(NamedTuple):
-    """Ordinary use of a kind of machine: the main node moves at a nominal speed over a nominal travel."""
+    """Nominal duty of a kind of machine: the main node moves at a nominal speed over a nominal travel."""
 
     speed: float  # rad/s or m/s
     travel: float  # rad or m
-    recording: float  # s, length of a recording that shows it all
-    use: Callable[[str, Any], Use]  # node, config -> its use; a drive, or the loop, as the node that moves first
+    recording: float  # s, length of a recording that shows the duty
+    use: Callable[[str, Any], Use]  # node, config -> duty of the node; a drive or the loop counts as the first node
     volts: Callable[[Any], float]  # config -> command, rms

@@ -1,4 +1,4 @@
-"""What exchange format 1 says of a kind of machine: symbols, columns, laws, and its config made of a case.
+"""Exchange format 1 of a kind of machine: symbols, columns, laws, and the config made of a case.
 
 Each machine declares one `Exchange` (ivu_exchange.py, ldu_exchange.py, axis_exchange.py) in its profile.
 """
@@ -10,43 +10,43 @@ from typing import Any, NamedTuple
 from rtctl.idiom import Settings
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
-DAMPING = 0.5**0.5  # of a drive of which the owner says nothing
-DIRECT = 20e3  # Hz, bandwidth of the same
+DAMPING = 0.5**0.5  # damping ratio of a drive, if none is given
+DIRECT = 20e3  # Hz, bandwidth of a drive, if none is given
 Numbers = dict[str, float]
-Changes = tuple[dict[str, Any], list[str]]  # keys of a config, and a sentence on each thing that it has no place for
+Changes = tuple[dict[str, Any], list[str]]  # keys of a config, and a sentence on each value that it cannot hold
 
 
 class Scale(NamedTuple):
-    """How a case says the counts of a column."""
+    """Counts of a column in a case."""
 
-    key: str  # of `sensors`
+    key: str  # key of `sensors`
     per_turn: bool = True  # counts a turn; False: metres a count
     optional: bool = False  # whether a recording may lack the column
 
 
 class Exchange(NamedTuple):
-    """What exchange format 1 says of a kind of machine."""
+    """Exchange format 1 of a kind of machine."""
 
     parameters: type[Settings]  # by symbol
     terms: tuple[str, ...]  # symbols of effects: absent means 0
-    believed: Callable[[Mapping[str, float], Any], Numbers]  # symbols that are given, drive -> every symbol, SI
+    believed: Callable[[Mapping[str, float], Any], Numbers]  # given symbols, drive -> nominal value of every symbol, SI
     symbols: Callable[[Any], Numbers]  # settings of a config's plant -> symbols
-    carried: Callable[[Mapping[str, float], Numbers, Any], Changes]  # model, symbols as believed, case
-    derived: tuple[str, ...] = ()  # symbols that follow from others; taken where they are given
+    carried: Callable[[Mapping[str, float], Numbers, Any], Changes]  # fitted model, nominal values, case -> changes
+    derived: tuple[str, ...] = ()  # symbols that follow from others; used where they are given
     aliases: Mapping[str, str] = NOTHING  # other name -> symbol
-    silent: tuple[str, ...] = ()  # symbols that nobody is warned about where the case does not say them
-    exact: tuple[str, ...] = ()  # symbols that the owner knows without error
-    scales: Mapping[str, Scale] = NOTHING  # column of a counter -> how the case says its counts
-    gains: int = 0  # number of values in drive.amp_per_volt; 0: none is asked for
-    delay: float | None = None  # samples, where the case says none; None: 1, with a warning
+    silent: tuple[str, ...] = ()  # symbols whose absence from the case gives no warning
+    exact: tuple[str, ...] = ()  # symbols with exact nominal values
+    scales: Mapping[str, Scale] = NOTHING  # column of a counter -> its counts in the case
+    gains: int = 0  # number of values in drive.amp_per_volt; 0: none is required
+    delay: float | None = None  # samples, if the case gives none; None: 1, with a warning
     radius: str = ""  # symbol, m, that takes the main sensor's angle to the reference; "" where they have one unit
     settings: Callable[[Mapping[str, float]], Numbers] = dict  # symbols -> parameters of a config's plant
     stand_in: Callable[[Mapping[str, float], float], tuple[dict[str, Any], float]] | None = None
-    # model and tick in s -> `law.position` of a slow loop for a machine whose law nobody knows, and its bandwidth in Hz
+    # model and tick in s -> `law.position` of a slow loop that replaces an unknown law, and its bandwidth in Hz
 
 
 def lines(counts: float | None, what: str, path: str, left: list[str]) -> dict[str, Any]:
-    """Lines of an encoder, at the path of a config, that counts each of them four times, or once."""
+    """Settings of an encoder with `counts` a turn, at the path of a config: x4 counting, or x1."""
     if counts is None:
         return {}
     whole = round(counts)
@@ -56,10 +56,10 @@ def lines(counts: float | None, what: str, path: str, left: list[str]) -> dict[s
 
 
 def digits(value: float) -> float:
-    """Six significant digits."""
+    """Value rounded to six significant digits."""
     return float(f"{value:.6g}")
 
 
 def numbers(parameters: Settings) -> Numbers:
-    """Every parameter by its name."""
+    """Values of all parameters by name."""
     return {name: float(value) for name, value in parameters.model_dump().items()}

@@ -45,11 +45,11 @@ from rtctl.tick import safety
 
 __all__ = ["IvuConfig", "diagram", "mechanics", "plant_diagram", "substeps"]
 
-PLANT_RATE = 2000.0  # Hz, of the free-running emulator: a sample is at most half a millisecond old
+PLANT_RATE = 2000.0  # Hz, of the free-running emulator; a sample is at most half a millisecond old
 UNIT = "rad"
-SLOW = 0.3  # rad/s of the capstan, below which the reels may swing to and fro: they count either way
-STRETCH = 0.05  # m, after which tape by capstan and by reels is compared anew: radii are not known to the last percent
-SETTLE_FLOOR = 0.0  # in that unit: two percent of the step say it all
+SLOW = 0.3  # rad/s of the capstan, below which the reels may oscillate; their sensors count up in either direction
+STRETCH = 0.05  # m of tape, after which the comparison of capstan and reels restarts; the radii are not exact
+SETTLE_FLOOR = 0.0  # rad, least settling band; 0: two percent of the step
 
 
 def radius(config: IvuConfig) -> float:
@@ -68,7 +68,7 @@ def unit(config: Any) -> str:
 
 
 def metres_per_unit(config: IvuConfig) -> float:
-    """Tape moved per radian of capstan."""
+    """Metres of tape per radian of the capstan."""
     return config.R_c
 
 
@@ -88,14 +88,14 @@ class IvuParams(NamedTuple):
 IVU_STATE = state(
     k_run=int, gains=int, play=int, prepared=int, u_fb=float,
     R1=float, R2=float, R1_0=float, R2_0=float, phi_0=float,  # as in REEL_GROWTH_STATE
-    direction=int, phi_1=float, n1=int, n2=int,  # where the stretch in one direction began
-    R1_given=float, R2_given=float,  # radii that these go back to
+    direction=int, phi_1=float, n1=int, n2=int,  # start of the motion in one direction
+    R1_given=float, R2_given=float,  # given radii at the last start
 )  # fmt: skip
 
 
 @tick
 def switch_on(p, s, phi):
-    """The tick in which outputs come on: every law starts from where the machine stands."""
+    """Reset all laws to the capstan's angle `phi` in rad, in the tick in which outputs come on."""
     reference.hold(0, s.reference, phi)
     shaper.reset(p.shaper, s.shaper, phi)
     velocity.reset(p.velocity, s.velocity)
@@ -110,16 +110,16 @@ def switch_on(p, s, phi):
     limit.reset(p.limit, s.limit1, 0.0)
     limit.reset(p.limit, s.limit2, 0.0)
     s.machine.prepared = 0
-    s.machine.u_fb = 0.0  # it may not be a number, where that was the trip
+    s.machine.u_fb = 0.0  # it may be NaN after such a trip
     m = s.machine
-    if m.R1_given != p.machine.R1 or m.R2_given != p.machine.R2:  # else they have been followed since
+    if m.R1_given != p.machine.R1 or m.R2_given != p.machine.R2:  # else the radii have been tracked since
         m.R1_given, m.R2_given = p.machine.R1, p.machine.R2
         reel_growth.start(m, p.machine.R1, p.machine.R2, phi)
 
 
 @tick
 def prepare(p, s, phi, n1_counts, n2_counts, k):
-    """While armed: measure the radii if asked to, tighten the tape, then run from where the capstan stands."""
+    """While armed: measure the radii on request, tighten the tape, then run from the capstan's position."""
     if p.machine.measure != 0 and s.machine.prepared == 0:
         if reel_radius.step(p.reel_radius, s.reel_radius, phi, n1_counts, n2_counts, s.safety.passed) == 0:
             reference.hold(0, s.reference, phi)
@@ -140,7 +140,7 @@ def prepare(p, s, phi, n1_counts, n2_counts, k):
 
 @tick
 def play(t, s, c, k):
-    """Start the table when it is asked for, once the machine runs; what was asked for while it was off is forgotten."""
+    """Start the reference table on request while the machine runs; a request while it is off is dropped."""
     if s.safety.state == safety.IDLE or s.safety.state == safety.TRIPPED:
         s.machine.play = c.play
     elif s.safety.state == safety.RUNNING and c.play != s.machine.play:
@@ -150,11 +150,10 @@ def play(t, s, c, k):
 
 @tick
 def tape_apart(p, s, phi, speed, n1_counts, n2_counts, R1, R2):
-    """How far, in m, the tape by the reels' sensors is from the tape by the capstan, over a stretch in one direction.
+    """Difference in m between the tape by the reels' sensors and by the capstan, over a motion in one direction.
 
-    One reel winds what the other pays out, so tape that stretches moves one ahead of the capstan and the other behind
-    it by as much: of two differences with opposite signs only their sum is no stretch. What one sensor missed, or both,
-    is in full in what is returned.
+    Elastic stretch of the tape moves one reel ahead of the capstan and the other behind it by an equal length: the sum
+    of two differences with opposite signs is free of it. Counts that one sensor or both missed are returned in full.
     """
     m = s.machine
     tape = abs(phi - m.phi_1) * p.machine.R_c

@@ -7,24 +7,24 @@ from rtctl.machines.exchange import Changes, Exchange, Numbers, Scale, digits, l
 from rtctl.plants import ivu as plant
 
 TERMS = ("d_tape", "tau_F1", "tau_F2", "tau_Fc")
-SENSING_OHM = 0.24  # of the driver, whose gain is ratio / R_S
+SENSING_OHM = 0.24  # ohm, R_S of the driver, whose gain is ratio / R_S
 MOST_BRIDGE_AMPERE = 2.5
 
 
 def believed(given: Mapping[str, float], drive: Any) -> Numbers:
-    """Every symbol; J_1 and J_2 follow from the radii (4.1, 4.2)."""
+    """Nominal value of every symbol, SI; J_1 and J_2 follow from the radii (4.1, 4.2)."""
     absent = {name: 0.0 for name in TERMS if name not in given}
     return numbers(plant.parameters(plant.IvuSettings(parameters=plant.IvuParameters(**{**absent, **given}))))
 
 
 def symbols(settings: Any) -> Numbers:
-    """Every symbol of a config's plant; without thickness where its radii stay."""
+    """Every symbol of a config's plant, SI; d_tape is 0 where the radii are constant."""
     found = numbers(plant.parameters(settings))
     return found if settings.follow_tape else {**found, "d_tape": 0.0}
 
 
 def carried(model: Mapping[str, float], own: Numbers, case: Any) -> Changes:
-    """Sensors, radii and drivers."""
+    """Changes of a config: sensors, radii and drivers."""
     left: list[str] = []
     drive = case.drive
     gain = drive.amp_per_volt[0]

@@ -12,16 +12,16 @@ from rtctl.plants import ivu as plant
 
 
 def model(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    """Volts to the angle of the capstan, `motor` (1 or 2) pulling where one pulls at a time."""
+    """Model from the command to the angle of the capstan; `motor` (1 or 2) pulls where one pulls at a time."""
     A, B = plant.state_space(p)
-    one, two = B[:, 0], -B[:, 1]  # what a positive command does through either motor
+    one, two = B[:, 0], -B[:, 1]  # input of a positive command through either motor
     pulls = {allocation.DIFFERENTIAL: (one + two) / 2, allocation.MOTOR1: one, allocation.MOTOR2: two}
     b = pulls.get(blocks["allocation"].kind, one if motor == 1 else two)
     return Model(A, b, unit_row(len(A), plant.CAPSTAN))
 
 
 def mechanics(config: Any, dt: float) -> Mechanics:
-    """Linear model by its parts: motor 1 pulls at a positive command, motor 2 at a negative one."""
+    """Mechanics for a feedforward: motor 1 pulls at a positive command, motor 2 at a negative one."""
     driver = (*l292.second_order(config.plant.driver), config.plant.driver.R_F * config.plant.driver.C_F)
     p = plant.build(config.plant, dt, [driver, driver], config.plant.follow_tape)
     blocks = {"allocation": allocation.build(config.law.allocation, dt)}

@@ -7,7 +7,7 @@ from rtctl.machines.base import Block, Column, PlantDiagram, physics_lines
 from rtctl.machines.ivu_settings import IvuConfig
 from rtctl.plants import ivu as plant_ivu
 
-RIPPLE = (  # 22 kHz, averaged over each substep: what is left of it aliases, as it would on the machine
+RIPPLE = (  # 22 kHz, averaged over each substep; the remainder aliases, as on the machine
     "s.plant.m.f[ivu.MOTOR1] += p.plant.K_m1 * l292.ripple_step(p.driver, s.ripple1, p.plant.h)",
     "s.plant.m.f[ivu.MOTOR2] += p.plant.K_m2 * l292.ripple_step(p.driver, s.ripple2, p.plant.h)",
 )

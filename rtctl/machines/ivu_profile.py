@@ -38,8 +38,8 @@ def drive(config: Any, f: np.ndarray) -> np.ndarray:
 
 
 def params(settings: Any, R1: float, R2: float) -> Any:
-    """Params of the plant at these radii in m; inertias that were given belong to the starting radii and move with
-    them (4.1, 4.2)."""
+    """Params of the plant at these radii in m; given inertias belong to the initial radii and change with the radii
+    (4.1, 4.2)."""
     p = plant.parameters(settings)
     moved: dict[str, float | None] = {"R1": R1, "R2": R2}
     for J, R, was in (("J_1", R1, p.R1), ("J_2", R2, p.R2)):
@@ -61,7 +61,7 @@ def wiring(config: Any) -> Wiring:
 
 
 def case(config: Any) -> dict[str, Any]:
-    """Keys of case.json: the model that the config believes in."""
+    """Keys of case.json: the nominal model of the config."""
     law = config.law
     w, zeta = l292.second_order(config.plant.driver)[1:3]
     parameters = given(plant.parameters(config.plant))
@@ -90,7 +90,7 @@ def case(config: Any) -> dict[str, Any]:
 
 
 def own(config: Any, h: float, seed: int) -> OwnBlocks:
-    """Converters, encoder and optical sensors around an own plant."""
+    """Converters, encoder and optical sensors around a user's plant."""
     board = config.board
     return OwnBlocks(
         (
@@ -124,7 +124,7 @@ def own(config: Any, h: float, seed: int) -> OwnBlocks:
     )
 
 
-SOFT = 0.8  # V/rad, of the law under which friction breaks away
+SOFT = 0.8  # V/rad, gain of the law in the break-away test
 PROFILE = Profile(
     kind=plant.NAME,
     title="Image verification unit",

@@ -1,4 +1,4 @@
-"""What a person writes in the config of an Image Verification Unit."""
+"""Settings of the Image Verification Unit's config."""
 
 from typing import Literal
 
@@ -58,12 +58,12 @@ class RadiusSettings(Settings):
     )
     R1: float = quantity(0.038, unit="m", gt=0.005, le=0.2, help="radius of reel 1")
     R2: float = quantity(0.022, unit="m", gt=0.005, le=0.2, help="radius of reel 2")
-    d_tape: float = quantity(0.5e-3, unit="m", ge=0, help="thickness of the tape, by which the radii follow it")
+    d_tape: float = quantity(0.5e-3, unit="m", ge=0, help="thickness of the tape, for tracking the radii")
     measure: ReelRadiusSettings = ReelRadiusSettings()
 
 
 class FrictionSettings(Settings):
-    """Friction compensation: of the motor that winds, always; of the one that pays out, while it turns."""
+    """Friction compensation: of the winding motor always, of the paying motor while it turns."""
 
     motor1: FrictionFeedforwardSettings = FrictionFeedforwardSettings(tau_C=2.4e-3)
     motor2: FrictionFeedforwardSettings = FrictionFeedforwardSettings(tau_C=2.4e-3)

@@ -1,4 +1,4 @@
-"""Lines of the tick of the reel unit, stage by stage, and where those stand that depend on its config."""
+"""Lines of the reel unit's tick by stage, with placeholders for the lines that depend on the config."""
 
 from rtctl.machines import compensation
 from rtctl.machines.base import STATE_LINES, TRACE_LINES
@@ -127,7 +127,7 @@ STAGES = (
 def stages(
     position: own_law.LawLines, more: compensation.Lines = compensation.NONE
 ) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """Lines of the tick, with those of its position law and of the compensation around it."""
+    """Lines of the tick by stage, with the lines of the position law and of the compensation in place."""
     command = "s.machine.u_fb + y.w + s.hand_over.u" + more.extra
     put = {
         STEP: (*position.step, *more.filter),

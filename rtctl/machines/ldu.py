@@ -56,7 +56,7 @@ from rtctl.tick import safety
 __all__ = ["LduConfig", "diagram", "mechanics", "plant_diagram", "substeps"]
 
 UNIT = "m"
-SETTLE_FLOOR = 4e-6  # in that unit: 4 um are "more than allowed" (11.1); smaller steps need not settle closer
+SETTLE_FLOOR = 4e-6  # m, least settling band: 4 um are "more than allowed" (11.1)
 PLANT_RATE = 10_000.0  # Hz, of the free-running emulator
 
 
@@ -114,7 +114,7 @@ class ComputedTorqueSettings(Settings):
         0.0,
         unit="V*s^2/m",
         ge=0,
-        help="what the shaped reference's acceleration takes (12.10); the shaper has to be on",
+        help="command per acceleration of the shaped reference (12.10); the shaper has to be on",
     )
 
 
@@ -179,7 +179,7 @@ def unit(config: Any) -> str:
 
 
 def metres_per_unit(config: LduConfig) -> float:
-    """The loop works in metres."""
+    """Metres in one unit of the reference."""
     return 1.0
 
 
@@ -200,7 +200,7 @@ LDU_STATE = state(k_run=int, gains=int, play=int, u_fb=float)
 
 @tick
 def switch_on(p, s, x):
-    """The tick in which outputs come on: every law starts from where the carriage stands."""
+    """Reset all laws to the carriage's position `x` in m, in the tick in which outputs come on."""
     reference.hold(0, s.reference, x)
     shaper.reset(p.shaper, s.shaper, x)
     velocity.reset(p.velocity, s.velocity)
@@ -322,7 +322,7 @@ def stages(config: LduConfig, more: compensation.Lines = compensation.NONE) -> t
 
 @tick
 def prepare(p, s, c, k):
-    """Armed leads to running once the law has held the carriage for a moment."""
+    """Change from armed to running after `p.machine.settle` ticks."""
     if s.safety.state == safety.ARMED and s.safety.armed_for > p.machine.settle:
         s.safety.state = safety.RUNNING
         s.machine.k_run = k
@@ -330,7 +330,7 @@ def prepare(p, s, c, k):
 
 @tick
 def play(t, s, c, k):
-    """Start the table when it is asked for, once the machine runs; what was asked for while it was off is forgotten."""
+    """Start the reference table on request while the machine runs; a request while it is off is dropped."""
     if s.safety.state == safety.IDLE or s.safety.state == safety.TRIPPED:
         s.machine.play = c.play
     elif s.safety.state == safety.RUNNING and c.play != s.machine.play:

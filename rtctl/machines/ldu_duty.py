@@ -1,6 +1,6 @@
-"""Ordinary use of the Linear Drive Unit, from the parameters of its config: no recording is needed.
+"""Nominal duty of the Linear Drive Unit, from the parameters of its config, without a recording.
 
-Speeds of nodes follow from radii and gears. Forces accelerate the machine in time and overcome dry friction.
+Speeds of nodes follow from radii and gears. Forces accelerate the machine to nominal speed and overcome dry friction.
 """
 
 from typing import Any
@@ -12,12 +12,12 @@ from rtctl.machines.duty import Duty, Use
 from rtctl.plants import ldu as plant
 
 SPEED, TRAVEL = 0.04, 0.2  # m/s and m, of the carriage
-QUICK = 3.0  # 1/s, to reach that speed
-RECORDING = 10.0  # s
+QUICK = 3.0  # 1/s, acceleration divided by that speed
+RECORDING = 10.0  # s, length of a recording
 
 
 def use(node: str, config: Any) -> Use:
-    """How a node moves."""
+    """Nominal duty of a node."""
     p = plant.parameters(config.plant)
     N = p.R_t / p.R_s
     mass = p.M + (p.J_m * N**2 + p.J_t) / p.R_c**2
@@ -32,7 +32,7 @@ def use(node: str, config: Any) -> Use:
 
 
 def volts(config: Any) -> float:
-    """Command that ordinary use takes, rms."""
+    """Command of the nominal duty, V rms."""
     return float(use("motor", config).force / (plant.parameters(config.plant).K_m1 * AMPERE_PER_VOLT))
 
 

@@ -8,11 +8,11 @@ from rtctl.machines.exchange import DAMPING, DIRECT, Changes, Exchange, Numbers,
 from rtctl.plants import ldu as plant
 
 TERMS = ("F_c", "B_c", "B_m", "K_m2")
-MOST_VOLT = 10.0  # that the amplifier takes
+MOST_VOLT = 10.0  # V, largest input of the amplifier
 
 
 def believed(given: Mapping[str, float], drive: Any) -> Numbers:
-    """Every symbol, with the gear ratio N from R_t / R_s where it is not given."""
+    """Nominal value of every symbol, SI, with the gear ratio N from R_t / R_s where it is not given."""
     absent = {name: 0.0 for name in TERMS if name not in given}
     own = {name: value for name, value in given.items() if name != "N"}
     return {**with_ratio(plant.LduParameters(**{**absent, **own})), **({"N": given["N"]} if "N" in given else {})}
@@ -30,7 +30,7 @@ def with_ratio(parameters: plant.LduParameters) -> Numbers:
 
 
 def settings(model: Mapping[str, float]) -> Numbers:
-    """Parameters of a config's plant, whose radii make the gear ratio: the ratio is what the equations use."""
+    """Parameters of a config's plant; R_s follows from the gear ratio N, which the equations use."""
     found = dict(model)
     if "N" in found and abs(found["R_t"] / found["R_s"] / found["N"] - 1.0) > 1e-9:
         found["R_s"] = found["R_t"] / found["N"]
@@ -38,7 +38,7 @@ def settings(model: Mapping[str, float]) -> Numbers:
 
 
 def carried(model: Mapping[str, float], own: Numbers, case: Any) -> Changes:
-    """Sensors and amplifier; friction compensation off, since the case's law has its own."""
+    """Changes of a config: sensors and amplifier; friction compensation off, since the case's law has its own."""
     left: list[str] = []
     drive = case.drive
     changes: dict[str, Any] = {

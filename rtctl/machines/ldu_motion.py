@@ -13,7 +13,7 @@ from rtctl.plants import ldu as plant
 
 
 def model(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
-    """Volts to the sensor that feeds back."""
+    """Model from the command to the sensor of the feedback."""
     A, B = plant.state_space(p)
     c = config.sensors.R_c * unit_row(len(A), plant.ENCODER)
     if config.sensors.feedback == "scale":
@@ -22,7 +22,7 @@ def model(config: Any, p: Any, blocks: dict[str, Any], motor: int) -> Model:
 
 
 def mechanics(config: Any, dt: float) -> Mechanics:
-    """Linear model by its parts."""
+    """Mechanics for a feedforward."""
     p = plant.build(config.plant, dt, (2 * np.pi * config.plant.bandwidth, config.plant.damping))
     found = model(config, p, {}, 1)
     return listed(config, p, found, found, [ldu_amplifier.AMPERE_PER_VOLT])

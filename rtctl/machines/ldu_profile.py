@@ -35,7 +35,7 @@ def drive(config: Any, f: np.ndarray) -> np.ndarray:
 
 
 def params(settings: Any, R1: float, R2: float) -> Any:
-    """Params of the plant; there are no reels whose radii matter."""
+    """Params of the plant; R1 and R2 are not used, since there are no reels."""
     return plant.build(settings, 1e-3, (2 * np.pi * settings.bandwidth, settings.damping))
 
 
@@ -46,7 +46,7 @@ def counts(config: Any) -> float:
 
 
 def case(config: Any) -> dict[str, Any]:
-    """Keys of case.json: the model that the config believes in."""
+    """Keys of case.json: the nominal model of the config."""
     parameters = plant.parameters(config.plant)
     return {
         "parameters": {**given(parameters), "N": parameters.R_t / parameters.R_s},
@@ -67,7 +67,7 @@ def case(config: Any) -> dict[str, Any]:
 
 
 def own(config: Any, h: float, seed: int) -> OwnBlocks:
-    """Amplifier, converter, encoder and scale around an own plant."""
+    """Amplifier, converter, encoder and scale around a user's plant."""
     output = at_mio_16de.build_output(config.board.output, h)
     return OwnBlocks(
         (
@@ -97,7 +97,7 @@ def own(config: Any, h: float, seed: int) -> OwnBlocks:
     )
 
 
-SOFT = 100.0  # V/m, of the law under which friction breaks away
+SOFT = 100.0  # V/m, gain of the law in the break-away test
 PROFILE = Profile(
     kind=plant.NAME,
     title="Linear drive unit",

@@ -1,4 +1,4 @@
-"""Mechanics of a machine that comes with the program for a feedforward along its reference."""
+"""Mechanics of a shipped machine, for a feedforward along its reference."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,8 +12,8 @@ from rtctl.plants.physics.place import place
 
 
 def mechanics(config: Any, p: Any, plus: Model, minus: Model, inputs: Sequence[float] = ()) -> Mechanics:
-    """Linear model by its parts, from the params `p` of the plant and its models from positive and negative commands;
-    `inputs` are those of its drives for one unit of command, where one command gives them all."""
+    """Mechanics from the params `p` of the plant and its models for positive and negative commands; `inputs` are the
+    inputs of the drives for one unit of command, where one command sets them all."""
 
     def place_of(entry: Any) -> Spot:
         spot = place(config.kind, entry.node)

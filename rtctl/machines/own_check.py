@@ -1,4 +1,4 @@
-"""The check of all that a machine has of the user's own, before its tick is compiled around it."""
+"""Check of a machine's user files, before its tick is compiled."""
 
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,11 @@ from rtctl.own.files import OwnError, load, split
 from rtctl.own.files import Source as File
 from rtctl.own.parts import Parts
 
-SIZE = {"rad": 1.0, "m": 2e-3}  # of the motion that the check plays, in the unit of the machine's position
+SIZE = {"rad": 1.0, "m": 2e-3}  # amplitude of the check's motion, in the unit of the machine's position
 
 
 def verdicts(machine: Any) -> list[Verdict]:
-    """One for each own law and plant of a machine. Raises UserError where a file may not go into the tick."""
+    """Verdicts on the user's law and plant of a machine. Raises UserError where a file must not go into the tick."""
     found = []
     parts = law.own_laws.get(type(machine.config.law.position))
     if parts is not None:
@@ -43,7 +43,7 @@ def verdicts(machine: Any) -> list[Verdict]:
 
 
 def require(machine: Any, path: Path) -> None:
-    """Check what is the user's own before the module at `path` is compiled, once for each module. Raises UserError."""
+    """Check the user's files before the module at `path` is compiled, once for each module. Raises UserError."""
     mark = path.with_suffix(".checked")
     if machine.config.own and not mark.exists():
         verdicts(machine)
@@ -55,7 +55,7 @@ def _params(diagram: Any, name: str) -> Any:
 
 
 def _check_term(machine: Any, settings: Any, file: File) -> None:
-    """Compile the lines of a term on the record of its machine; they may not allocate."""
+    """Compile the lines of a term on the record of its machine. Raises UserError where they allocate."""
     from rtctl.plants.physics import TERMS
     from rtctl.plants.physics.term import SITES
 

@@ -1,4 +1,4 @@
-"""Emulated machines whose mechanics are in a file of the user's own: the board, its counters and sensors around it."""
+"""Emulated machines with mechanics in a user's file, and the board, counters and sensors around the mechanics."""
 
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ class StepParams(NamedTuple):
 
 
 def is_own(config: Any) -> bool:
-    """Whether the plant of a config is a file of the user's own."""
+    """Whether the plant of a config is a user's file."""
     return type(config.plant) in own_plants
 
 
@@ -40,7 +40,7 @@ def plant_diagram(config: Any, period: float, seed: int, substeps: int) -> Plant
 
 
 def parts_of(config: Any) -> Parts | None:
-    """The parts of an own plant, None for one that comes with rtctl."""
+    """Parts of a user's plant; None for a plant of rtctl."""
     return own_plants.get(type(config.plant))
 
 

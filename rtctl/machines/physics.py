@@ -16,7 +16,7 @@ else:
 
 
 def check_nodes(terms: list[Any], kind: str) -> None:
-    """Raise ValueError where a term stands at a node that this plant does not have or the term does not fit."""
+    """Raise ValueError where a term stands at a node that the plant lacks or that does not suit the term."""
     for i, settings in enumerate(terms):
         allowed = nodes(TERMS[settings.term], kind)
         if settings.node not in allowed:

@@ -1,4 +1,4 @@
-"""What a kind of machine is to experiments, designs, tests and reports: its traits, columns, usual sizes and models.
+"""Profile of a kind of machine for experiments, designs, tests and reports: traits, columns, usual sizes and models.
 
 Each machine declares one `Profile` (ivu_profile.py, ldu_profile.py, axis_profile.py). Other modules ask the profile;
 none compares with the name of a machine (tests/test_names.py).
@@ -16,7 +16,7 @@ from rtctl.machines.duty import Duty
 from rtctl.machines.exchange import Exchange
 
 REELS = "reels"  # a motor at either end winds tape on a reel; the tape turns a capstan with an encoder
-SCALE = "scale"  # a carriage has a linear scale beside the encoder of what drives it
+SCALE = "scale"  # a carriage has a linear scale beside the encoder of its drive
 AMPLIFIER = "amplifier"  # a current amplifier takes a voltage and a direction bit, up to `amplifier.limit`
 FREE_UNITS = "free units"  # of a recording: position, speed and command may have other units than m, m/s and V
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -24,9 +24,9 @@ Lines = tuple[str, ...]
 
 
 class Terminal(NamedTuple):
-    """A quantity at the board's connector: what a plant gets or gives there."""
+    """Quantity at the board's connector: input or output of a plant."""
 
-    name: str  # as the nodes of the plant's physics are called
+    name: str  # name of the node in the plant's physics
     unit: str
     help: str
 
@@ -37,7 +37,7 @@ class Terminals(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """Columns that mean the same on all machines."""
+    """Columns with one meaning on all machines."""
 
     position: str
     command: str  # V, after excitation and friction compensation, before limits
@@ -54,23 +54,23 @@ class Model(NamedTuple):
 
 
 class Usual(NamedTuple):
-    """Excitation of a frequency response where nobody asks for another."""
+    """Default excitation of a frequency response."""
 
     speed: float  # rad/s or m/s
     rms: float  # V, multisine
     noise_rms: float  # V
     band: tuple[float, float]  # Hz, multisine
     noise_top: float  # Hz
-    settle: float  # s from a turn of the reference to constant speed
+    settle: float  # s, from a turn of the reference to constant speed
     law: dict[str, Any]  # keys of the config
     most: float | None = None  # V, linear range of the drive; that of the amplifier if absent
 
 
 class Response(NamedTuple):
-    """How a frequency response of the machine is played and fitted."""
+    """Experiment and fit of the machine's frequency response."""
 
     usual: Usual
-    free: tuple[str, ...]  # parameters that are fitted where nobody names others
+    free: tuple[str, ...]  # parameters that are fitted by default
     band: tuple[float, float]  # Hz, of the fit
     drive: Callable[[Any, np.ndarray], np.ndarray]  # config, f (n,) Hz -> (n,) A/V
     params: Callable[[Any, float, float], Any]  # plant settings, radii R1 and R2 in m -> params of the plant
@@ -78,43 +78,43 @@ class Response(NamedTuple):
 
 
 class Friction(NamedTuple):
-    """How dry friction of the machine is measured."""
+    """Experiment for the machine's dry friction."""
 
     speeds: tuple[float, ...]  # rad/s of the capstan
     unit: str  # of the force
-    per_rad: Callable[[Any], float]  # config -> what the reference moves for a radian of the capstan
-    gain: float  # V for one unit of position, of the law that breaks away
+    per_rad: Callable[[Any], float]  # config -> motion of the reference for a radian of the capstan
+    gain: float  # V for one unit of position, of the law in the break-away test
     most: float  # V
     rate: float  # V/s
     running: dict[str, Any]  # keys of the config at constant velocity
-    soft: dict[str, Any]  # keys of the config that breaks away
+    soft: dict[str, Any]  # keys of the config in the break-away test
 
 
 class Range(NamedTuple):
-    """Range of a random day. Lengths in the unit of the machine's reference (rad or m), times in s."""
+    """Limits of a soak's random day. Lengths in the unit of the machine's reference (rad or m), times in s."""
 
     position: str  # column
     error: str
     outputs: tuple[str, ...]
     counts: str
-    truth: str  # where the counted thing really is; only an emulator knows
+    truth: str  # true position of the counted body, in an emulator only
     tensions: tuple[str, ...]  # estimates
     truth_tensions: tuple[str, ...]
-    travel: float  # to either side of where the day began
+    travel: float  # to either side of the initial position
     jump: float  # largest setpoint without a ramp
     rate: tuple[float, float]  # of a ramp, per s
-    settle: float  # from the end of a move until it has to be there
-    tolerance: float  # how far from its target it may then be
-    stretch: float  # counts that encoder and truth may be apart: an edge that is just passed, springs between the two
+    settle: float  # from the end of a move to the check of its target
+    tolerance: float  # largest distance from the target at the check
+    stretch: float  # counts, largest difference of encoder and truth: an edge just passed, springs between the two
     counters: int  # channels that are wired
     inputs: int
     gains: dict[str, tuple[float, float]]  # setting -> share of the config's own value, lowest and highest
-    measure: tuple[str, str] | None = None  # setting with which arming measures what is followed by counts
-    knots: tuple[tuple[float, float], ...] = ()  # (s, rad or m) from where it starts, for a config without reference
+    measure: tuple[str, str] | None = None  # setting with which arming measures a quantity that counts then track
+    knots: tuple[tuple[float, float], ...] = ()  # (s, rad or m) from the start, for a config without reference
 
 
 class OwnBlocks(NamedTuple):
-    """Board and sensors around a plant in a file of the user's own."""
+    """Board and sensors around a plant in a user's file."""
 
     blocks: tuple[Block, ...]
     read: Lines  # lines by which commands come in
@@ -123,7 +123,7 @@ class OwnBlocks(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """What a kind of machine is. A machine without one (a described machine) has the defaults."""
+    """Profile of a kind of machine; a described machine has the defaults."""
 
     kind: str = ""
     title: str = ""
@@ -133,7 +133,7 @@ class Profile(NamedTuple):
     truth: tuple[Column, ...] = ()
     columns: Columns = Columns("", "", (), "")
     error: str = "position_error"
-    still: float = 0.0  # rad or m: a step need not settle closer
+    still: float = 0.0  # rad or m, least settling band of a step
     pairs: Mapping[str, tuple[str, str]] = NOTHING  # name -> parameters of both sides, where they are alike
     encoder: Callable[[Any], Any] | None = None  # config -> settings of the rotary encoder on the capstan
     model: Callable[[Any, Any, dict[str, Any], int], Model] | None = None  # config, plant's params, blocks, motor
@@ -141,8 +141,8 @@ class Profile(NamedTuple):
     friction: Friction | None = None
     bandwidth: float = 0.0  # Hz, usual of a tuned loop: w_n of a PD, or -3 dB of the closed loop
     least: tuple[float, float] = (6.0, 45.0)  # dB and deg, usual margins
-    frictionless: Mapping[str, float] = NOTHING  # keys of the config that take dry friction away
-    alone: Mapping[str, Any] = NOTHING  # keys of the config that leave one motor for the position
+    frictionless: Mapping[str, float] = NOTHING  # keys of the config that remove dry friction
+    alone: Mapping[str, Any] = NOTHING  # keys of the config with which one motor controls the position
     feedforward: tuple[str, ...] = ()  # keys of the config that feed forward; 0 switches each off
     range: Range | None = None
     output: Callable[[Any], Any] | None = None  # config -> settings of the first converter of outputs
@@ -152,7 +152,7 @@ class Profile(NamedTuple):
     own: Callable[[Any, float, int], OwnBlocks] | None = None  # config, substep in s, seed
     case: Callable[[Any], dict[str, Any]] | None = None  # config -> keys of case.json
     exchange: Exchange | None = None  # of recordings of exchange format 1
-    duty: Duty | None = None  # in ordinary use
+    duty: Duty | None = None  # nominal duty
 
     def has(self, trait: str) -> bool:
         """Whether the machine has a trait."""

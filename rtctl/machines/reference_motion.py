@@ -1,6 +1,6 @@
-"""Motion of a machine along its reference: what each coordinate does for one unit of it, and the forces that it takes.
+"""Motion of a machine along its reference: displacement of each coordinate per unit of it, and the forces required.
 
-    min phi' K phi,  c phi = 1            shape of the motion: rigid where the machine is free, else the softest way
+    min phi' K phi,  c phi = 1            shape of the motion: rigid body if the machine is free, else least stiffness
     K d = F,  l d = 0                     deflection under the forces of the motion, the followed body held
 
 Source: Craig & Bampton, Coupling of substructures, AIAA J. 6 (1968), constraint modes.
@@ -17,12 +17,12 @@ from rtctl.plants.linear import MOST_BODIES, MOST_DRIVES
 
 
 class Mechanics(NamedTuple):
-    """A machine's linear model by its parts, for a feedforward."""
+    """Linear model of a machine and its parts, for a feedforward."""
 
     graph: GraphParams
     A: np.ndarray  # (nx, nx) without weight
-    plus: np.ndarray  # (nx,) of a positive command
-    minus: np.ndarray  # (nx,) of a negative command
+    plus: np.ndarray  # (nx,) input of a positive command
+    minus: np.ndarray  # (nx,) input of a negative command
     c: np.ndarray  # (nx,) feedback by state
     inputs: np.ndarray  # (nu,) of each drive for one unit of command
     rows: dict[str, np.ndarray]  # (nq,) position of each body by coordinate
@@ -43,7 +43,7 @@ class Motion(NamedTuple):
 
 
 def motion(mechanics: Mechanics) -> Motion:
-    """Shape of the motion and static matrices: states of the drives are taken at rest.
+    """Shape of the motion and static matrices, with the drives in steady state.
 
     Raises ValueError where the command does not move the feedback.
     """

@@ -11,7 +11,7 @@ def given(settings: Any) -> dict[str, float]:
 
 
 def position(law: Any) -> dict[str, Any]:
-    """Key `controller`: the law of the position, `unknown` for one in a file of the user's own."""
+    """Key `controller`: the law of the position; `unknown` for a law in a user's file."""
     p = law.position
     kind = getattr(p, "kind", "pd")
     if is_own(kind):

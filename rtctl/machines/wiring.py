@@ -1,6 +1,6 @@
-"""Which channels of a board each machine uses, and what its drives and sensors are called there.
+"""Board channels of each machine, and the names of its drives and sensors there.
 
-The order is that of the codes in the link's frame, and the same for an emulated board, a real one and an FMU.
+The order is that of the codes in the link's frame, for an emulated board, a real board and an FMU alike.
 """
 
 import math
@@ -23,7 +23,7 @@ def wiring(config: Any) -> Wiring:
     if config.kind == DESCRIBED:
         return described(config)
     profile = profile_of(config.kind)
-    assert profile.wiring is not None  # of every machine that is not described
+    assert profile.wiring is not None  # only described machines lack it
     wires: Wiring = profile.wiring(config)
     names = TERMINALS[config.kind]
     seen = [sensor.name for sensor in names.sensors]
@@ -59,7 +59,7 @@ def _number(sensor: Sensor) -> AnalogInputParams:
 
 
 def _turn(machine: Description, sensor: Sensor) -> float | None:
-    """Counts, or rad, of a sensor for one turn of its body; None where the body slides or it shows something else."""
+    """Counts, or rad, of a sensor for one turn of its body; None for a sliding body or a sensor without a body."""
     if sensor.body is None or not machine.turns(sensor.body):
         return None
     return 2.0 * math.pi * (sensor.counts_per_unit or 1.0) if is_counter(sensor) else 2.0 * math.pi

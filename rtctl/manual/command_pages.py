@@ -13,7 +13,7 @@ Every command of `rtctl`, as `--help` and `man rtctl` show it.
 | 0 | done |
 | 1 | the machine tripped, a check said no, or a fault of rtctl itself |
 | 2 | a mistake in what was asked; one line says where, and what would be right |
-| 3 | the data carry no answer |
+| 3 | the data support no answer |
 | 130 | Ctrl-C |
 
 `rtctl --install-completion` teaches bash, zsh or fish to complete commands, options, configs, keys and running
@@ -31,7 +31,7 @@ def command_pages() -> dict[str, str]:
 
 
 def anchor(command: Command) -> str:
-    """Where a command stands on the page."""
+    """Anchor of a command on the page."""
     return "-".join(command.words)
 
 
@@ -60,10 +60,10 @@ def _table(parameters: Iterable[Parameter]) -> Iterable[str]:
 
 
 def prose(text: str) -> str:
-    """Text in which nothing is taken for HTML. Code between backticks stays as it is."""
+    """Text with < escaped for HTML, except in code between backticks."""
     return "`".join(part if i % 2 else part.replace("<", "&lt;") for i, part in enumerate(text.split("`")))
 
 
 def cell(text: str) -> str:
-    """Text that fits into a table."""
+    """Text for a cell of a Markdown table."""
     return prose(" ".join(text.split())).replace("|", "\\|")

@@ -1,4 +1,4 @@
-"""What the command line says of itself: each command with its text, examples, arguments and options."""
+"""Description of the command line: each command with its text, examples, arguments and options."""
 
 import shlex
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ EXAMPLES = "Examples:"
 
 class Parameter(NamedTuple):
     names: tuple[str, ...]  # ("--out", "-o"), or ("CONFIG",) of an argument
-    value: str  # what follows it, e.g. "FILE"; "" of a flag
+    value: str  # placeholder of the value, e.g. "FILE"; "" for a flag
     help: str
     required: bool
     repeated: bool
@@ -40,7 +40,7 @@ class Command(NamedTuple):
 
     @property
     def usage(self) -> str:
-        """The command and what goes with it, in one line."""
+        """Usage line: the command with its options and arguments."""
         told = [p.names[0] if p.required else f"[{p.names[0].strip('[]')}]" for p in self.parameters if p.argument]
         options = ["[OPTIONS]"] if any(not p.argument for p in self.parameters) else []
         return " ".join([self.name, *(["COMMAND"] if self.group else []), *options, *told])
@@ -83,14 +83,14 @@ def _parameter(found: Any) -> Parameter:
 
 @lru_cache(maxsize=1)
 def root() -> Any:
-    """The command line's tree."""
+    """Root command of the command line."""
     return typer.main.get_command(app)
 
 
 def parse(line: str) -> tuple[str, ...]:
-    """The command that a line of a shell calls, without calling it. Raises UserError where the line is wrong.
+    """Words of the command that a shell line calls, without calling it. Raises UserError where the line is wrong.
 
-    What stands behind |, >, & or ; is another program's, and # begins a comment.
+    Words after |, >, & or ; belong to another program, and # begins a comment.
     """
     words: Sequence[str] = shlex.split(line, comments=True)
     ends = [i for i, word in enumerate(words) if word in ("|", "&", "&&", ";") or word.startswith((">", "2>"))]
@@ -111,6 +111,6 @@ def parse(line: str) -> tuple[str, ...]:
         command.make_context(path[-1], left, parent=parent)
     except UserError:
         raise
-    except Exception as error:  # of typer's own kinds, which it does not export
+    except Exception as error:  # typer's error classes, which typer does not export
         raise UserError(f"{line}: {getattr(error, 'message', '') or error!r}") from error
     return path

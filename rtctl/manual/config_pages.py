@@ -11,7 +11,7 @@ from rtctl.machines.profiles import profile_of
 from rtctl.manual.command_pages import cell
 from rtctl.plants.physics import TERMS, by_kind
 
-SHOWN = {"described": "belt"}  # config that stands for a kind, where it has another name
+SHOWN = {"described": "belt"}  # kind of machine -> config shown on its page, where the names differ
 PHYSICS = "plant.physics[]"
 HEAD = """# Config
 
@@ -59,7 +59,7 @@ A force or a speed without a unit below is in N or Nm, m/s or rad/s, as its node
 
 
 class Part(NamedTuple):
-    """Keys that stand together: where, for what, and a row each."""
+    """Group of keys: its paths, its purpose, and a row for each key."""
 
     paths: tuple[str, ...]
     about: str
@@ -105,13 +105,13 @@ def _physics() -> str:
 
 
 def sentences(*texts: str) -> str:
-    """Texts one after the other, each with a full stop; a capital where it does not begin with the name of a key."""
+    """Texts joined, each with a full stop, and the first letter as a capital."""
     whole = " ".join(cell(text).rstrip(".") + "." for text in texts)
     return whole[:1].upper() + whole[1:]
 
 
 def page(head: str, found: Iterable[Part]) -> str:
-    """A page of its head and a section a part."""
+    """Page of a head and a section for each part."""
     text = [head.rstrip("\n")]
     for part in found:
         if part.rows:
@@ -121,7 +121,7 @@ def page(head: str, found: Iterable[Part]) -> str:
 
 
 def table(rows: Iterable[Row]) -> Iterator[str]:
-    """A Markdown table of settings, each by the last of its names."""
+    """Lines of a Markdown table of settings, each by the last word of its path."""
     yield "| key | type | unit | default | bounds | meaning |"
     yield "|---|---|---|---|---|---|"
     for row in rows:
@@ -131,7 +131,7 @@ def table(rows: Iterable[Row]) -> Iterator[str]:
 
 
 def parts(model: Any) -> list[Part]:
-    """The parts of a config in the order of the file; equal ones, such as two sensors of a kind, are one."""
+    """Parts of a config in the order of the file; equal parts, such as two sensors of a kind, become one."""
     rows: dict[str, list[Row]] = {}
     for row in settings_table(model):
         if row.type != "keys" and not row.path.startswith(f"{PHYSICS}["):
@@ -146,7 +146,7 @@ def parts(model: Any) -> list[Part]:
 
 
 def _models(place: Shape, path: str) -> Iterator[tuple[str, Any]]:
-    """Every settings class of a config and where it stands, but for the terms of physics."""
+    """Paths and settings classes of a config, without the terms of physics."""
     if place.model is not None:
         yield path, place.model
         for name, field in place.model.model_fields.items():

@@ -9,7 +9,7 @@ EXIT = (
     ("0", "done"),
     ("1", "the machine tripped, a check said no, or a fault of rtctl itself"),
     ("2", "a mistake in what was asked; one line says where, and what would be right"),
-    ("3", "the data carry no answer"),
+    ("3", "the data support no answer"),
     ("130", "Ctrl-C"),
 )
 ENVIRONMENT = (
@@ -21,12 +21,12 @@ ENVIRONMENT = (
 FILES = (
     ("/etc/rtctl/NAME.yaml", "config of the service rtctl@NAME"),
     ("/run/rtctl/", "sockets and locks of services"),
-    ("runs/NAME-DATE-TIME/", "recordings, where nobody says where"),
+    ("runs/NAME-DATE-TIME/", "recordings, if no other folder is given"),
 )
 
 
 def man_page() -> str:
-    """The text of rtctl.1."""
+    """Text of rtctl.1."""
     found = list(commands())
     return "\n".join(_lines(found)) + "\n"
 
@@ -62,6 +62,6 @@ def _parameters(command: Command) -> Iterator[str]:
 
 
 def escape(text: str) -> str:
-    """Text as roff takes it: no command at a line's start, a minus that can be copied."""
+    """Text escaped for roff: no command at the start of a line, and a minus that can be copied."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     return f"\\&{text}" if text.startswith((".", "'")) else text

@@ -1,7 +1,7 @@
-"""A script with cells, executed into a page: `python -m rtctl.manual.notebook docs/notebook.py docs/notebook.md`.
+"""Script with cells, executed into a page: `python -m rtctl.manual.notebook docs/notebook.py docs/notebook.md`.
 
-Cells begin with `# %%`, text cells with `# %% [markdown]`. The last expression of a cell is shown as a notebook shows
-it: a figure as a picture beside the page, else its words or its table. It runs in a folder of its own.
+Cells begin with `# %%`, text cells with `# %% [markdown]`. The last expression of a cell is shown as in a notebook:
+a figure as a picture beside the page, any other value as text. The script runs in a temporary folder.
 """
 
 import ast
@@ -20,14 +20,14 @@ PICTURE = 100  # dots per inch
 
 
 class Cell(NamedTuple):
-    """One cell: its text, and whether it is words."""
+    """One cell: its text, and whether it is a text cell."""
 
     text: str
     words: bool
 
 
 def cells(script: str) -> list[Cell]:
-    """The cells of a script."""
+    """Cells of a script."""
     parts = MARK.split(script)
     found = []
     for mark, body in zip(parts[1::2], parts[2::2], strict=True):
@@ -38,7 +38,7 @@ def cells(script: str) -> list[Cell]:
 
 
 def run(text: str, names: dict[str, Any]) -> tuple[str, Any]:
-    """What a cell prints, and the value of its last expression; None where it ends in something else."""
+    """Printed text of a cell, and the value of its last expression; None where it ends in a statement."""
     tree = ast.parse(text)
     end = tree.body[-1] if tree.body else None
     last = end if isinstance(end, ast.Expr) else None
@@ -52,7 +52,7 @@ def run(text: str, names: dict[str, Any]) -> tuple[str, Any]:
 
 
 def page(script: Path, out: Path, pictures: Path) -> str:
-    """The page of a script, whose pictures are saved into the folder `pictures`; links to them are from `out`."""
+    """Text of a script's page; pictures are saved into the folder `pictures`, links are relative to `out`."""
     names: dict[str, Any] = {"__name__": "__main__"}
     parts = []
     number = 0
@@ -76,7 +76,7 @@ def page(script: Path, out: Path, pictures: Path) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as words."""
+    """Text of a value."""
     return str(value) if hasattr(value, "to_string") else repr(value)
 
 

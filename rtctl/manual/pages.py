@@ -1,4 +1,4 @@
-"""All pages of the manual that are made and not written."""
+"""All generated pages of the manual."""
 
 from rtctl.manual.command_pages import command_pages
 from rtctl.manual.config_pages import config_pages

@@ -1,6 +1,6 @@
-"""Whether an own file may go into the tick: it compiles, allocates nothing, gives numbers, and is fast enough.
+"""Check of a user's file before it goes into the tick: it compiles, allocates nothing, gives numbers, is fast enough.
 
-Only its own step is compiled for this, a second's work, and not the tick around it, which takes half a minute.
+Only the functions of the file are compiled here, in about a second; the whole tick takes half a minute.
 """
 
 import ast
@@ -19,17 +19,17 @@ from rtctl.own.files import OwnError, Source
 from rtctl.own.parts import Parts, arguments
 from rtctl.tick import clock
 
-TICKS = 20_000  # measured
-FIRST = 20  # of them, to see whether the rest is worth while
-WARM = 100  # of them, at the start, that do not count
+TICKS = 20_000  # ticks measured
+FIRST = 20  # ticks of a first run, which rejects a very slow step
+WARM = 100  # ticks at the start that are not counted
 REPEATS = 3
-TOO_SLOW = 0.5  # share of the period that a step may take at its 99th percentile: the tick has more to do
-SLOW = 0.1  # share beyond which a person is told
+TOO_SLOW = 0.5  # largest share of the period for a step at its 99th percentile; the tick needs the other part
+SLOW = 0.1  # share of the period beyond which a warning is given
 HEAP = re.compile(r"call [^\n]*@NRT_(?:MemInfo_(?:alloc|new|varsize)|Allocate|Reallocate)")
 PYTHON = re.compile(r"call [^\n]*@(?:numba_gil_ensure|PyGILState_Ensure)")
 DEFINED = re.compile(
     r"^define (?![^\n]*@(?:_ZN7cpython|cfunc\.)).*?^}", re.MULTILINE | re.DOTALL
-)  # not what Python calls it by
+)  # without the wrappers that Python calls
 MAKES = ("call", "arrayexpr", "binop", "inplace_binop", "unary", "build_list", "build_set", "build_map", "build_string")
 HEAP_NAMES = ("Buffer", "List", "Set", "ListType", "DictType", "UnicodeType", "SetType")
 HEAP_TYPES = tuple(getattr(types, name) for name in HEAP_NAMES if hasattr(types, name))  # numba 0.60 lacks some
@@ -43,18 +43,18 @@ def drive(p, s, inputs, out, ns):
 
 
 class Verdict(NamedTuple):
-    """What a check has found; times of a step in s, measured here and now."""
+    """Result of a check; times of a step in s, measured on this computer."""
 
     spec: str
     compiled: float  # s
     median: float
     p99: float
     worst: float
-    period: float  # s, that it has at most
+    period: float  # s, of the tick or substep
 
     @property
     def warning(self) -> str:
-        """What a person should know before a run, "" for nothing."""
+        """Warning before a run; "" for none."""
         if self.p99 > SLOW * self.period:
             return f"its step takes {self.p99 / self.period:.0%} of the period in one tick of a hundred"
         if self.worst > TOO_SLOW * self.period:
@@ -63,7 +63,7 @@ class Verdict(NamedTuple):
 
 
 def check(parts: Parts, params: Any, inputs: dict[str, np.ndarray], period: float) -> Verdict:
-    """Check the compiled functions of an own file with `params`; `inputs` (n,) are healthy signals by their names.
+    """Verdict on the compiled functions of a user's file with `params`; `inputs` (n,) are healthy signals by name.
 
     Raises UserError: does not compile, allocates, calls Python, returns no number, NaN for a healthy input, too slow.
     """
@@ -87,7 +87,7 @@ def _check(parts: Parts, params: Any, inputs: dict[str, np.ndarray], period: flo
     names = arguments(parts.module.step)[2:]
     table = np.column_stack([inputs[name] for name in names]) if names else np.zeros((TICKS, 1))
     drive = _driver(parts, len(names))
-    for count in (FIRST, TICKS):  # a step that takes a second would take hours
+    for count in (FIRST, TICKS):  # a step of one second would take hours
         ns = _run(parts, drive, names, table[:count], p, s)
         median, p99, worst = (float(np.percentile(ns, share)) * 1e-9 for share in (50, 99, 100))
         found = Verdict(spec, compiled, median, p99, worst, period)
@@ -96,7 +96,7 @@ def _check(parts: Parts, params: Any, inputs: dict[str, np.ndarray], period: flo
 
 
 def _fast_enough(parts: Parts, found: Verdict) -> None:
-    """Raises OwnError for a step that leaves the tick no time."""
+    """Raise OwnError for a step that leaves the tick too little time."""
     if found.p99 > TOO_SLOW * found.period or found.worst > found.period:
         raise parts.fault(
             "step",
@@ -107,7 +107,7 @@ def _fast_enough(parts: Parts, found: Verdict) -> None:
 
 
 def check_lines(parts: Parts, lines: list[str], records: dict[str, np.dtype]) -> None:
-    """Compile lines of a plant that call an own file, with these `records`. Raises OwnError as `check` does."""
+    """Compile lines of a plant that call a user's file, with these `records`. Raises OwnError where this fails."""
     from rtctl.plants import linear
 
     space: dict[str, Any] = {parts.module.__name__: parts.module, "linear": linear, "np": np}
@@ -125,9 +125,9 @@ def check_lines(parts: Parts, lines: list[str], records: dict[str, np.dtype]) ->
 
 
 def _run(parts: Parts, drive: Any, names: list[str], table: np.ndarray, p: Any, s: Any) -> np.ndarray:
-    """Time of each step over the inputs (n, arguments), ns; the best of a few, so that nothing else that runs is in it.
+    """Time of each step over the inputs (n, arguments), ns: the least of REPEATS runs, free of other programs' load.
 
-    Raises OwnError where a step raises or gives what is not a number.
+    Raises OwnError where a step raises an exception or gives NaN or infinity.
     """
     out, ns, best = np.zeros(len(table)), np.zeros(len(table), np.int64), np.full(len(table), 1 << 60)
     for _ in range(REPEATS):
@@ -153,7 +153,7 @@ def _compile(parts: Parts, name: str, p: Any, s: Any) -> None:
         function.compile((numba.typeof(p), numba.typeof(s), *numbers))
     except KeyError as error:  # numba's way to say that a record has no such field
         raise _no_field(parts, str(error.args[0]), p, s) from error
-    except Exception as error:  # numba's own, and whatever its passes stumble over
+    except Exception as error:  # numba's errors, and any error of its passes
         raise _complaint(parts, name, error) from error
     found = next(iter(function.overloads.values())).signature.return_type
     if name == "step" and parts.result and not isinstance(found, (types.Float, types.Integer, types.Boolean)):
@@ -161,7 +161,7 @@ def _compile(parts: Parts, name: str, p: Any, s: Any) -> None:
 
 
 def _no_field(parts: Parts, field: str, p: Any, s: Any) -> OwnError:
-    """A field of p or s that is not there, at the first place where it is used."""
+    """Error for a missing field of p or s, at its first use."""
     assert parts.source is not None
     lacking = [name for name, record in (("p", p), ("s", s)) if field not in record.dtype.names]
     nodes = [n for n in ast.walk(ast.parse(parts.source.text)) if isinstance(n, ast.Attribute) and n.attr == field]
@@ -183,13 +183,13 @@ def _type(found: Any) -> str:
 
 
 def _complaint(parts: Parts, name: str, error: Exception) -> OwnError:
-    """numba's message in one line, at the line of the file that it is about."""
+    """Error with numba's message in one line, at the line of the file that it concerns."""
     assert parts.source is not None
     return complaint(parts.source, name, error)
 
 
 def complaint(source: Source, name: str, error: Exception) -> OwnError:
-    """As `_complaint`, about the function `name` of a file."""
+    """Error with numba's message in one line, about the function `name` of a file."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
     file = re.escape(source.file.rpartition("/")[2])
     found = [int(a or b) for a, b in re.findall(rf'(?:File "[^"]*{file}", line (\d+)|{file} \((\d+)\))', text)]
@@ -210,7 +210,7 @@ def complaint(source: Source, name: str, error: Exception) -> OwnError:
 
 
 def _allocates_nothing(parts: Parts) -> None:
-    """No call into the heap or into Python is left in the machine code. Raises OwnError with the line, where known."""
+    """Raise OwnError where the machine code calls the heap or Python, with the line where it is known."""
     for name in ("start", "reset", "step", "track"):
         if not parts.has(name):
             continue
@@ -228,7 +228,7 @@ def _no_heap(parts: Parts, name: str, function: Any) -> None:
 
 
 def _where_allocated(parts: Parts) -> tuple[int | None, str]:
-    """First line that makes an array, a list or a text, and what it makes."""
+    """First line that makes an array, a list or a text, and its type; None for an unknown line."""
     found = []
     for value in vars(parts.module).values():
         code = getattr(getattr(value, "py_func", None), "__code__", None)
@@ -252,7 +252,7 @@ def _driver(parts: Parts, count: int) -> Any:
 
 
 def _healthy(parts: Parts, names: list[str], table: np.ndarray, out: np.ndarray, s: Any) -> None:
-    """Raises OwnError where a healthy input has given what is not a number."""
+    """Raise OwnError where a healthy input has given NaN or infinity."""
     state = [n for n in parts.state.names or () if s[n].dtype.kind == "f" and not np.isfinite(s[n]).all()]
     bad = np.flatnonzero(~np.isfinite(out))
     if len(bad):
@@ -266,7 +266,7 @@ def _healthy(parts: Parts, names: list[str], table: np.ndarray, out: np.ndarray,
 
 
 def healthy(names: Any, dt: float, size: float) -> dict[str, np.ndarray]:
-    """Signals (n,) as a machine in order has them: a reference that moves by `size`, and what follows it closely."""
+    """Signals (n,) of a healthy machine by name: a reference of amplitude `size`, and others that follow closely."""
     t = np.arange(TICKS) * dt
     w = 2 * np.pi / (TICKS * dt) * 4
     ref, v_ref, a_ref = size * np.sin(w * t), size * w * np.cos(w * t), -size * w**2 * np.sin(w * t)

@@ -1,8 +1,8 @@
-"""A Python file that a config names, as ./my_law.py:MyLaw: its text, and the module that comes of it.
+"""A Python file that a config names, as ./my_law.py:MyLaw: its text, and the module made of the text.
 
-What runs is the text, not the file: the text is read once, with the config, and goes with the config into every process
-and every bundle. A module is known by a hash of its text, which stands in the generated tick that imports it, so that
-the cache of compiled ticks never takes one text for another, and a replay needs no file.
+The text is run, not the file: the text is read once, with the config, and goes with the config into every process and
+every bundle. The module's name has a hash of the text, and the generated tick imports the module by this name. So the
+cache of compiled ticks never confuses two texts, and a replay needs no file.
 """
 
 import ast
@@ -24,15 +24,15 @@ _trusted: set[str] = set()  # sha256 of the texts that this process may run
 
 
 class OwnError(ValueError):
-    """What is wrong with a file of the user's own: a sentence that names file and line and says what would be right."""
+    """Error in a user's file: a sentence that names file and line and says what would be right."""
 
 
 class ForeignError(OwnError):
-    """Code that came with data and that the user has not given by path."""
+    """Error for code that came with data and that the user has not given by path."""
 
 
 def trust(texts: Iterable[str]) -> None:
-    """Let this process run these texts: read from files that the user named, or sent by a process of the same user."""
+    """Allow this process to run these texts, from files that the user named or from a process of the same user."""
     _trusted.update(_sha256(text) for text in texts)
 
 
@@ -42,7 +42,7 @@ def is_trusted(text: str) -> bool:
 
 
 def give(paths: Iterable[Path]) -> None:
-    """Read own files that the user names on the command line, and trust them. Raises UserError."""
+    """Read files that the user names on the command line, and trust them. Raises UserError."""
     from rtctl.config.errors import UserError
 
     for path in paths:
@@ -65,17 +65,17 @@ class Source(NamedTuple):
 
     @property
     def spec(self) -> str:
-        """As the config writes it, ./my_law.py:MyLaw."""
+        """File and name as in the config, ./my_law.py:MyLaw."""
         return f"{self.file}:{self.name}"
 
     @property
     def module(self) -> str:
-        """Name of the module that comes of this text, own_my_law_ and a hash."""
+        """Name of the module of this text, own_my_law_ and a hash."""
         stem = re.sub(r"\W", "_", Path(self.file).stem)
         return f"own_{stem}_{hashlib.sha256(self.text.encode()).hexdigest()[:12]}"
 
     def error(self, line: int | None, what: str) -> OwnError:
-        """A sentence about a line of the file."""
+        """Error about a line of the file."""
         return OwnError(f"{self.file}:{line}: {what}" if line else f"{self.file}: {what}")
 
     def line_of(self, name: str) -> int | None:
@@ -120,8 +120,8 @@ def read(file: str, folder: Path) -> str:
 
 
 def refuse_plant(config: Any, where: str = "") -> None:
-    """Raise UserError where a config, as settings or as plain data, has a plant of its user's own: each analysis works
-    with the equations of ours. `where` says in which file the config stands."""
+    """Raise UserError where a config, as settings or as plain data, has a user's plant: analyses need the equations of
+    rtctl's plants. `where` is the file of the config, for the message."""
     from rtctl.config.errors import UserError
 
     plant = config.get("plant") if isinstance(config, dict) else getattr(config, "plant", None)
@@ -136,7 +136,7 @@ def refuse_plant(config: Any, where: str = "") -> None:
 
 
 def keep(texts: dict[str, str], folder: Path) -> None:
-    """Write the texts of own files into a bundle's `own`, for people; a replay takes them from its case.json."""
+    """Write the texts of user files into a bundle's folder `own`, for people; a replay takes them from case.json."""
     for file, text in texts.items():
         write_text(made_in(folder, "own") / Path(file).name, text)
 
@@ -151,7 +151,7 @@ def _missing(file: str, path: Path) -> str:
 
 
 def load(source: Source) -> ModuleType:
-    """The module of a text, run once in each process. Raises OwnError with the line where it cannot be run."""
+    """Module of a text, run once in each process. Raises OwnError with the line that fails."""
     name = source.module
     if not is_trusted(source.text):
         raise ForeignError(
@@ -188,5 +188,5 @@ def _words(error: Exception) -> str:
         return f"there is no module '{error.name}'; an own file may import what is installed, and no file beside it"
     if isinstance(error, ImportError):
         return str(error).partition(" (")[0]
-    said = str(error).strip().split("\n")[0]  # pydantic goes on with an address on the web
+    said = str(error).strip().split("\n")[0]  # pydantic adds a web address
     return f"{type(error).__name__} while the file was read: {said}"

@@ -1,19 +1,19 @@
 """The position law of a machine: its block, and the lines that call it in the tick.
 
-A law takes what it asks for by the names of its arguments:
+The names of a function's arguments select its signals:
 
     step(p, s, e)             position error; gives the command in V
-    step(p, s, e, v, v_ref)   the same, the measured speed, and the speed of the reference
+    step(p, s, e, v, v_ref)   position error, measured speed, and speed of the reference
 
-The law is inside the limits: what it returns passes gains, limits and the safety machine like that of any other. One
-that raises, or returns what is not a number, trips the machine with its outputs at zero.
+The command of a user's law passes gains, limits and the safety checks, as that of any law does. A law that raises an
+exception, or returns NaN, trips the machine with its outputs at zero.
 """
 
 from typing import Any, NamedTuple
 
 from rtctl.own.parts import Parts, builtin, camel
 
-SIGNALS = {  # name -> what it is, in the unit of the machine's position, rad or m
+SIGNALS = {  # name -> meaning; lengths in the unit of the machine's position, rad or m
     "e": "position error, ref - x",
     "x": "measured position",
     "v": "measured speed, filtered as law.velocity says",
@@ -27,7 +27,7 @@ SIGNALS = {  # name -> what it is, in the unit of the machine's position, rad or
 FUNCTIONS = {"step": "step(p, s, e)", "reset": "reset(p, s)"}
 RESULT = "the command in V"
 TRIP = "safety.trip(s.safety, safety.NOT_A_NUMBER, k)"
-own_laws: dict[type, Parts] = {}  # settings class -> parts, of the laws in files of the user's own
+own_laws: dict[type, Parts] = {}  # settings class -> parts, of the laws in user files
 
 
 class LawLines(NamedTuple):
@@ -41,16 +41,16 @@ class LawLines(NamedTuple):
 
 
 def law_of(settings: Any) -> Parts:
-    """The parts of a law by its settings: of a file of the user's own, or one of rtctl.laws."""
+    """Parts of a law by its settings, from a user's file or from rtctl.laws."""
     found = own_laws.get(type(settings))
     kind = getattr(settings, "kind", "pd")
     return found or builtin(f"rtctl.laws.{kind}", camel(kind))
 
 
 def lines(settings: Any, result: str, signals: dict[str, str], tracked: dict[str, str] | None = None) -> LawLines:
-    """The lines of a law; `result` names what it returns, `signals` and `tracked` are what it may ask for.
+    """Lines of a law; `result` is the name of its result, `signals` and `tracked` map argument names to expressions.
 
-    Raises OwnError where it asks for what this machine does not have.
+    Raises OwnError where the law has an argument that this machine does not offer.
     """
     parts = law_of(settings)
     step = parts.call("step", "position", signals)
@@ -72,5 +72,5 @@ def lines(settings: Any, result: str, signals: dict[str, str], tracked: dict[str
 
 
 def guarded(line: str, otherwise: str) -> tuple[str, ...]:
-    """A line of a law that nobody here has read: what it raises ends in a trip and not in the loop's process."""
+    """Lines that run a line of a user's law; an exception leads to a trip and does not end the loop's process."""
     return ("try:", f"    {line}", "except Exception:", f"    {otherwise}")

@@ -1,11 +1,11 @@
-"""Mechanics in a file of the user's own: M(q) and h(q, v) of a machine whose bodies move each other.
+"""Mechanics in a user's file: M(q) and h(q, v) of a machine with coupled bodies.
 
-    FurutaSettings(Settings)   numbers of the law, each with its unit
-    FurutaParams(NamedTuple)   what M and h need of them
-    COORDINATES = (...)        names of the bodies whose positions q holds
-    build(settings, h)         the only road from the first to the second
-    @tick M(p, J, q, out)      mass matrix in full, into `out`, which comes as zeros
-    @tick h(p, J, q, v, out)   what stands beside M q'' on its side of the equation, into `out`, which comes as zeros
+    FurutaSettings(Settings)   parameters of the mechanics, each with its unit
+    FurutaParams(NamedTuple)   params for M and h
+    COORDINATES = (...)        names of the bodies with the positions q
+    build(settings, h)         params from settings
+    @tick M(p, J, q, out)      full mass matrix, into `out`, which is zero at the call
+    @tick h(p, J, q, v, out)   terms beside M q'' on the left of the equation, into `out`, which is zero at the call
 
 J are the inertias (kg m^2) or masses (kg) of the bodies in the description, in the order of COORDINATES.
 The file is named in the user's config or on the command line. No text of a bundle is run.
@@ -29,7 +29,7 @@ from rtctl.plants.graph import mechanics as graph
 from rtctl.plants.graph.mechanics import Mechanics
 
 EXAMPLES = {"M": "M(p, J, q, out)", "h": "h(p, J, q, v, out)"}
-TRIED = 0.3  # rad or m, and per s: where the functions are called once before they are believed
+TRIED = 0.3  # rad or m, and per s: size of q and v in the test call of the functions
 
 
 def long_kind(kind: str) -> str:
@@ -68,7 +68,7 @@ def register(source: Source, path: Path | None = None) -> Mechanics:
 
 
 def register_file(kind: str, folder: Path) -> Mechanics:
-    """As `register`, of a file that the user names by path. Raises OwnError."""
+    """Load a file that the user names by path, and let descriptions use it. Raises OwnError."""
     kind = long_kind(kind)
     match = OWN.fullmatch(kind)
     if match is None:
@@ -86,7 +86,7 @@ def give(kind: str) -> None:
 
 
 def give_machine(path: Path) -> None:
-    """Register the mechanics that a user's config names, where it names any. Raises UserError."""
+    """Register the mechanics that a user's config names, if any. Raises UserError."""
     from rtctl.config.yaml_file import find, load_yaml
 
     file = find(path)
@@ -104,9 +104,9 @@ def give_machine(path: Path) -> None:
 
 
 def checked(machine: Any, source: Source) -> None:
-    """Compile M and h of a description's mechanics and look at what they give.
+    """Compile M and h of a description's mechanics and check their results.
 
-    Raises OwnError with file and line: does not compile, no number, M not symmetric.
+    Raises OwnError with file and line: does not compile, NaN or infinity, M not symmetric.
     """
     code = graph.code_of(machine)
     assert code is not None
@@ -116,7 +116,7 @@ def checked(machine: Any, source: Source) -> None:
     for name, types in (("M", (vector, vector, matrix)), ("h", (vector,) * 4)):
         try:
             getattr(code.module, name).compile((numba.typeof(p), *types))
-        except Exception as error:  # numba's own, and whatever its passes stumble over
+        except Exception as error:  # numba's errors, and any error of its passes
             raise complaint(source, name, error) from error
     bodies = [machine.bodies[name] for name in graph.bodies_of(machine)]
     J = np.array([body.inertia if body.turns else body.mass for body in bodies])

@@ -1,11 +1,11 @@
-"""Settings of a machine whose config names own files: its own class, with their keys, units and bounds like any other.
+"""Settings class of a machine whose config names user files, with the keys, units and bounds of those files.
 
     law: {position: {kind: ./my_law.py:MyLaw, gain: 31 V/rad}}     or short: law: ./my_law.py:MyLaw
     plant: {kind: ./my_plant.py:MyPlant, M: 2 kg}                  or short: plant: ./my_plant.py:MyPlant
     plant: {physics: [{term: ./windage.py:Windage, node: reel1, c: 1e-6}]}
 
-The texts of the files go into the key `own` of the config, so that plain data of a config is complete: a child process,
-a bundle and another machine build the same class from it, and need no file.
+The texts of the files go into the key `own` of the config, so that plain data of a config are complete: a child
+process, a bundle and another computer build an equal class from them without the files.
 """
 
 from functools import lru_cache, reduce
@@ -26,7 +26,7 @@ MECHANICS = ("machine", "mechanics", "kind")
 
 
 class MisplacedError(OwnError):
-    """An OwnError and the key of the config that it is about."""
+    """OwnError with the key of the config that it concerns."""
 
     def __init__(self, key: Key, error: Exception):
         super().__init__(str(error))
@@ -34,12 +34,12 @@ class MisplacedError(OwnError):
 
 
 def widened(base: Any, data: Any, folder: Path | None = None, law: bool = True) -> tuple[Any, Any]:
-    """Settings class for plain `data` of a machine, and the data with the texts of its own files.
+    """Settings class for plain `data` of a machine, and the data with the texts of its user files.
 
-    `base` is the machine's class, and what comes back where no own file is named. A text that is not in the data is
-    read, from `folder`. Without `law` an own law is not run, and its settings stay plain data.
+    `base` is the machine's class, which is returned where no user file is named. A text that is not in the data is read
+    from `folder`. Without `law` a user's law is not run, and its settings stay plain data.
 
-    Raises MisplacedError, an OwnError that knows the key.
+    Raises MisplacedError, an OwnError with the key.
     """
     if not isinstance(data, dict):
         return base, data
@@ -69,7 +69,7 @@ def widened(base: Any, data: Any, folder: Path | None = None, law: bool = True) 
 
 
 def long_form(data: Any) -> Any:
-    """`law: ./my_law.py:MyLaw`, `position: ./my_law.py:MyLaw` and `plant: ./my_plant.py:MyPlant` written out."""
+    """Data in long form: `law`, `position` and `plant` as ./my_law.py:MyLaw become keys with `kind`."""
     if not isinstance(data, dict):
         return data
     found = data.get("law")
@@ -91,7 +91,7 @@ def long_form(data: Any) -> Any:
 
 
 def _with_mechanics(data: dict[str, Any], source: Source, folder: Path | None) -> dict[str, Any]:
-    """The data with the hash of the mechanics' text, whose code is registered. Raises MisplacedError."""
+    """Data with the hash of the mechanics' text; registers the code of the mechanics. Raises MisplacedError."""
     try:
         path = (folder / source.file).resolve() if folder is not None else None
         found = mechanics.register(source, path)
@@ -102,10 +102,10 @@ def _with_mechanics(data: dict[str, Any], source: Source, folder: Path | None) -
 
 
 def without_code(base: Any, data: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """Settings class and plain data of a recorded machine for analysis, which runs no own file.
+    """Settings class and plain data of a recorded machine for analysis, which runs no user file.
 
-    The settings of an own law stay as plain data, own terms are left out. Raises MisplacedError for an own plant: its
-    equations are its code.
+    The settings of a user's law stay plain data, user terms are left out. Raises MisplacedError for a user's plant,
+    since its equations are code.
     """
     data = long_form(data)
     found = _named(data)
@@ -122,7 +122,7 @@ def without_code(base: Any, data: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
 
 
 def _named(data: dict[str, Any]) -> dict[Key, str]:
-    """Key -> ./file.py:Name of all own files that the data names."""
+    """Key -> ./file.py:Name of all user files that the data name."""
     found: dict[Key, str] = {}
     for key in (LAW, PLANT, MECHANICS):
         node: Any = data
@@ -151,7 +151,7 @@ def _source(kind: str, texts: dict[str, str], folder: Path | None) -> Source:
 
 @lru_cache(maxsize=64)
 def _model(base: Any, sources: tuple[tuple[Key, Source], ...]) -> Any:
-    """The machine's class with these own files in it. The same class for the same texts."""
+    """Machine's class with the settings of these user files; equal texts give one class."""
     model = base
     for key, source in sources:
         if key == LAW:
@@ -166,7 +166,7 @@ def _model(base: Any, sources: tuple[tuple[Key, Source], ...]) -> Any:
 
 
 def _with_any_law(base: Any) -> Any:
-    """The machine's class whose law of position may be any plain data."""
+    """Machine's class whose position law may be any plain data."""
     return _replaced(base, "law", _replaced(base.model_fields["law"].annotation, "position", Any))
 
 
@@ -184,7 +184,7 @@ def _law(source: Source) -> Any:
 
 @lru_cache(maxsize=64)
 def _plant(source: Source, base: Any, machine: str) -> Any:
-    """The file's settings with what the config of every plant has: rate, substep, an empty list of terms, no FMU."""
+    """The file's settings with the keys of every plant's config: rate, substep, an empty list of terms, no FMU."""
     parts = own(source, plant.FUNCTIONS)
     plant.check_sensors(parts, machine)
     parts.call("step", "own", PLANTS[machine].OWN.inputs)
@@ -200,14 +200,14 @@ def _plant(source: Source, base: Any, machine: str) -> Any:
 
 
 def _kinded(parts: Parts) -> Any:
-    """The file's settings with the key `kind`, which says which file it is."""
+    """The file's settings with the key `kind`, which names the file."""
     assert parts.source is not None
     word = Literal[parts.source.spec]  # type: ignore[name-defined]
     return create_model(parts.settings.__name__, __base__=parts.settings, kind=(word, ...))
 
 
 def _with_terms(base: Any, sources: tuple[Source, ...]) -> Any:
-    """The machine's class where the list `physics` may hold these terms besides those of the library."""
+    """Machine's class whose list `physics` accepts these terms beside those of the library."""
     plants = base.model_fields["plant"].annotation
     field = plants.model_fields["physics"]
     items = get_args(get_args(field.annotation)[0])[0]  # list[Annotated[A | B | ..., ...]]
@@ -218,6 +218,6 @@ def _with_terms(base: Any, sources: tuple[Source, ...]) -> Any:
 
 
 def _replaced(model: Any, field: str, annotation: Any, default: Any = ...) -> Any:
-    """The settings class with another type for one of its keys."""
+    """Settings class with another type for one of its keys."""
     fields: dict[str, Any] = {field: (annotation, default)}
     return create_model(model.__name__, __base__=model, **fields)

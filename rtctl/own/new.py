@@ -1,6 +1,6 @@
-"""Writes the beginning of an own file: a template that works, its test, and a config that uses it.
+"""New user files from a template: a file that works, its test, and a config that uses it.
 
-The templates are files that run as they are, in `templates`; only their names are changed, and their units.
+The files in `templates` run unchanged; only names and units are replaced.
 """
 
 import importlib.util
@@ -23,7 +23,7 @@ PHYSICS = re.compile(r"^  physics:.*\n?", re.MULTILINE)
 
 
 class Written(NamedTuple):
-    """The files of a new law, plant or term."""
+    """Files of a new law, plant or term."""
 
     source: Path
     test: Path
@@ -31,8 +31,8 @@ class Written(NamedTuple):
 
 
 def write(kind: str, name: str, machine: str, folder: Path) -> Written:
-    """Write the files of a new `kind` called `name` for a machine. Raises UserError, and writes nothing, where one is
-    there already or a name does not do."""
+    """Write the files of a new `kind` called `name` for a machine. Raises UserError, and writes nothing, where a file
+    exists or a name is invalid."""
     for word, known, what in ((kind, (*KINDS, *SHIPPED), "kind"), (machine, MACHINES, "machine")):
         if word not in known:
             near = nearest(word, known)
@@ -63,7 +63,7 @@ def write(kind: str, name: str, machine: str, folder: Path) -> Written:
 
 
 def _stem(name: str) -> str:
-    """File name of MyLaw or my_law, without its end."""
+    """File name of MyLaw or my_law, without suffix."""
     if not NAME.fullmatch(name) or name.endswith("_"):
         raise UserError(f"'{name:.60}' is no name for a Python file; write e.g. feedforward or my_law")
     stem = upper(name).lower()
@@ -77,7 +77,7 @@ def _template(file: str) -> str:
 
 
 def _renamed(text: str, kind: str, stem: str, machine: str) -> str:
-    """The template under its new name, and in the unit of the machine's position."""
+    """Text of the template with the new name and the unit of the machine's position."""
     for old, new in (
         (f"my_{kind}", stem),
         (camel(f"my_{kind}"), camel(stem)),
@@ -94,7 +94,7 @@ def _renamed(text: str, kind: str, stem: str, machine: str) -> str:
 
 
 def _config(kind: str, stem: str, machine: str) -> str:
-    """The machine's config with the new file in it."""
+    """Text of the machine's config with the new file in it."""
     text = (resources.files("rtctl.configs") / f"{machine}.yaml").read_text(encoding="utf-8")
     head, _, rest = text.partition("\n")
     text = f"{head}, with the {kind} of {stem}.py\n{rest}".replace(f"name: {machine}\n", f"name: {stem}\n", 1)
@@ -102,7 +102,7 @@ def _config(kind: str, stem: str, machine: str) -> str:
     if kind == "law":
         gains = "".join(f"    {gain}\n" for gain in PLANTS[machine].OWN.gains)
         return POSITION.sub(f"  position:\n    kind: {spec}\n{gains}", text)
-    before, plant, _ = text.partition("\nplant:\n")  # it comes last
+    before, plant, _ = text.partition("\nplant:\n")  # the last section
     if kind == "plant":
         return f"{before}{plant}  kind: {spec}\n"
     entry = f"  physics:\n    - {{term: {spec}, node: {PLANTS[machine].OWN.node}, c: {PLANTS[machine].OWN.drag}}}\n"

@@ -1,5 +1,5 @@
-"""Writes the beginning of a config of the user's own, commented, which runs as it is: like one that comes with rtctl,
-of a described machine or of a unit with a plant of its own."""
+"""New config of the user, with comments, that runs unchanged: a copy of a shipped config, of a described machine or of
+a unit with a plant of its own."""
 
 import re
 from importlib import resources
@@ -12,7 +12,7 @@ BESIDE = re.compile(r"^[^#\n]*\bkind: \./(\w+\.py):", re.MULTILINE)  # a file th
 NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
-SHIPPED = {"machine": "machines", "config": ""}  # kind -> folder of what comes with rtctl
+SHIPPED = {"machine": "machines", "config": ""}  # kind -> folder of the shipped configs
 
 
 def examples(kind: str) -> list[str]:
@@ -22,12 +22,11 @@ def examples(kind: str) -> list[str]:
 
 
 def write_like(kind: str, name: str, like: str, folder: Path) -> Path:
-    """Write NAME.yaml, like a described machine or a config that comes with rtctl, into a folder; returns its path.
+    """Path of a new NAME.yaml in `folder`, a copy of a shipped config or described machine.
 
-    The file of its mechanics or of its law, where it has one, is written beside it; one that is there with the same
-    text stays.
+    A file of mechanics or of a law that the copy names is written beside it; an existing file with equal text stays.
 
-    Raises UserError, and writes nothing, where it is there already or a name does not do.
+    Raises UserError, and writes nothing, where NAME.yaml exists or a name is invalid.
     """
     known = examples(kind)
     if like not in known:

@@ -1,6 +1,6 @@
-"""The four things of the idiom in a module: XSettings, X_STATE, build, and compiled functions such as step and reset.
+"""The four parts of a module by the idiom: XSettings, X_STATE, build, and compiled functions such as step and reset.
 
-The one door through which laws come into a tick, those that come with rtctl and those in files of the user's own.
+All laws enter a tick by this module, those of rtctl and those in user files.
 """
 
 import importlib
@@ -19,14 +19,14 @@ STATE_EXAMPLE = "state(e=float, n=int)"
 
 
 class Parts(NamedTuple):
-    """What a module holds under one name of the idiom."""
+    """Settings, state and functions of a module under one name of the idiom."""
 
     module: ModuleType
     name: str  # Pd, for PdSettings and PD_STATE
     settings: type[Settings]
     state: np.dtype
-    source: Source | None = None  # of a file of the user's own
-    result: str = ""  # what step gives, in words; "" where it leaves all in its state
+    source: Source | None = None  # of a user's file
+    result: str = ""  # noun of the result of step; "" where step writes only its state
 
     @property
     def state_name(self) -> str:
@@ -34,7 +34,7 @@ class Parts(NamedTuple):
         return f"{upper(self.name)}_STATE"
 
     def build(self, settings: Any, dt: float) -> Any:
-        """Params for a tick of `dt` s. Raises ValueError with what the module says of settings that do not fit."""
+        """Params for a tick of `dt` s. Raises ValueError with the module's message on invalid settings."""
         try:
             params = self.module.build(settings, dt)
         except (ValueError, ArithmeticError):
@@ -65,9 +65,9 @@ class Parts(NamedTuple):
         return hasattr(self.module, function)
 
     def call(self, function: str, block: str, signals: dict[str, str]) -> str:
-        """Text that calls a compiled function for a block; what its arguments are called says which signals it gets.
+        """Text of a call of a compiled function for a block; the names of its arguments select the signals.
 
-        Raises OwnError where it asks for a signal that is not there.
+        Raises OwnError where an argument names no signal.
         """
         names = arguments(getattr(self.module, function))[2:]
         for name in names:
@@ -81,14 +81,14 @@ class Parts(NamedTuple):
         return f"{self.module.__name__.rpartition('.')[2]}.{function}({given})"
 
     def fault(self, name: str, what: str) -> OwnError:
-        """A sentence about the place where `name` is defined."""
+        """Error at the place where `name` is defined."""
         if self.source is None:
             return OwnError(f"{self.module.__name__}: {what}")
         return self.source.error(self.source.line_of(name), what)
 
 
 def own(source: Source, functions: dict[str, str], result: str = "") -> Parts:
-    """Parts of an own file; `functions` are those it needs, with an example. Raises OwnError for what is missing."""
+    """Parts of a user's file; `functions` maps required functions to examples. Raises OwnError for a missing part."""
     module = load(source)
     settings = getattr(module, f"{source.name}Settings", None)
     if not (isinstance(settings, type) and issubclass(settings, Settings)):

@@ -1,10 +1,10 @@
-"""An emulated machine of the user's own, between the voltages of the board and what its sensors see.
+"""Emulated machine in a user's file, from the voltages of the board to the inputs of its sensors.
 
     start(p, s)       at rest
-    step(p, s, u)     one substep of p.h or whatever `build(settings, h)` makes of its h, s
+    step(p, s, u)     one substep of the h in s that `build(settings, h)` was given
 
-What it has to leave in its state, by name, the emulated board counts and converts: see `OWN` of the plant
-(plants/shown.py). Its names of the truth are recorded as truth_ columns where the state has them.
+The emulated board counts and converts values that it reads from the state by name: see `OWN` of the plant
+(plants/shown.py). Truth names of `OWN` are recorded as truth_ columns where the state has them.
 """
 
 from rtctl.own.parts import Parts
@@ -21,7 +21,7 @@ own_plants: dict[type, Parts] = {}  # settings class -> parts
 
 
 def check_sensors(parts: Parts, machine: str) -> None:
-    """Raise OwnError where the state lacks what this machine's sensors look at."""
+    """Raise OwnError where the state lacks a value that this machine's sensors read."""
     sensors = PLANTS[machine].OWN.sensors
     lacking = [name for name in sensors if name not in (parts.state.names or ())]
     if lacking:

@@ -1,8 +1,8 @@
-"""A term of physics in a file of the user's own: an effect of the emulated machine, and one that `diagnose` can name.
+"""Term of physics in a user's file: an effect that the emulated machine can have and `diagnose` can name.
 
-The file holds what a file in plants/physics holds: XSettings with the key `node`, XParams, build, compiled functions,
-and the value X = Term(...) that tells what the effect is, where it acts, and what looks like it. In its lines `act`
-the file is called by its own name: windage.torque({p}, ...) in windage.py.
+The file has the parts of a file in plants/physics: XSettings with the key `node`, XParams, build, compiled functions,
+and X = Term(...) with the effect's text, sites and look-alikes. The lines `act` name the file by its own name:
+windage.torque({p}, ...) in windage.py.
 """
 
 import re
@@ -26,31 +26,31 @@ registered: dict[str, Source] = {}  # ./windage.py:Windage -> its source
 
 
 def register(sources: list[Source]) -> None:
-    """Put terms into the library under the words by which a config names them, ./windage.py:Windage."""
+    """Add terms to the library under their names in a config, ./windage.py:Windage."""
     for source in dict.fromkeys(sources):
         TERMS[source.spec] = own_term(source)
         registered[source.spec] = source
 
 
 def register_file(spec: str, folder: Path) -> None:
-    """As `register`, of a file named on the command line. Raises OwnError."""
+    """Add the term of a file named on the command line to the library. Raises OwnError."""
     file, name = split(spec)
     register([Source(file, name, read(file, folder))])
 
 
 def texts(names: Iterable[str]) -> dict[str, str]:
-    """Texts of the own files among these terms, as a config's `own` has them."""
+    """Texts of the user files among these terms, as in a config's `own`: file -> text."""
     return {registered[name].file: registered[name].text for name in names if name in registered}
 
 
 def sizes(name: str) -> dict[str, tuple[float, float]]:
-    """Parameters of an own term that a fit may choose, with their typical range; the first is the effect's size."""
+    """Parameters of a user's term that a fit may change, with their typical range; the first is the effect's size."""
     return TERMS[name].typical if name in registered else {}
 
 
 @lru_cache(maxsize=64)
 def own_term(source: Source) -> Term:
-    """The term of a file, as one of the library. Raises OwnError for what is missing or does not fit."""
+    """Term of a file, as in the library. Raises OwnError for a missing or unsuitable part."""
     module = load(source)
     name = upper(source.name)
     found = getattr(module, name, None)
@@ -83,6 +83,6 @@ def own_term(source: Source) -> Term:
 
 
 def _named(settings: type[Settings], spec: str) -> type[Settings]:
-    """The file's settings under the word by which a config names them."""
+    """The file's settings with the key `term` set to the name in a config."""
     word: Any = Literal[spec]
     return create_model(settings.__name__, __base__=settings, term=(word, spec))

@@ -1,4 +1,4 @@
-"""Lines that fit: what matters least goes first, and nothing ever runs into the next line."""
+"""Lines that fit into a width: the least important part is left out first, and no line wraps."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ GAP = 2  # cells between two parts of a line
 
 
 class Part(NamedTuple):
-    """A piece of a line. Rank 0 stays the longest."""
+    """Part of a line; rank 0 is left out last."""
 
     rank: int
     text: str
@@ -17,7 +17,7 @@ class Part(NamedTuple):
 
 
 def fit(parts: list[Part], width: int, ellipsis: str = "…") -> Text:
-    """The parts side by side; those of the highest rank are left out until the rest takes at most `width` cells."""
+    """Line of the parts; those of the highest rank are left out until it takes at most `width` cells."""
     kept = [part for part in parts if part.text]
     while len(kept) > 1 and sum(cell_len(part.text) + GAP for part in kept) - GAP > width:
         worst = max(part.rank for part in kept)
@@ -32,7 +32,7 @@ def fit(parts: list[Part], width: int, ellipsis: str = "…") -> Text:
 
 
 def columns(widths: dict[str, int], order: tuple[str, ...], width: int) -> set[str]:
-    """The columns that fit side by side, `order` from the most important to the least."""
+    """Names of the columns that fit side by side, `order` from the most important to the least."""
     kept: set[str] = set()
     used = 0
     for name in order:

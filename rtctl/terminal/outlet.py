@@ -1,4 +1,4 @@
-"""A stream whose reader may go: a terminal that is closed (EIO), or a pipe (EPIPE). Writing to it never raises."""
+"""Stream whose reader may disappear: a closed terminal (EIO) or pipe (EPIPE). Writing to it never raises."""
 
 import contextlib
 import os
@@ -6,17 +6,17 @@ from typing import Any
 
 
 class Outlet:
-    """Passes on to `stream` for as long as it takes anything; `gone` says that it does not any more."""
+    """Writer to `stream`; after the first failed write `gone` is true and text is dropped."""
 
     def __init__(self, stream: Any):
         self._stream = stream
         self.gone = False
 
     def write(self, text: str) -> int:
-        """Write, or drop where nobody is there."""
+        """Write the text, or drop it where the reader is gone; returns the number of characters."""
         try:
             return len(text) if self.gone else int(self._stream.write(text))
-        except (OSError, ValueError):  # ValueError: it was closed here
+        except (OSError, ValueError):  # ValueError: the stream is closed
             self._lose()
             return len(text)
 
@@ -24,12 +24,12 @@ class Outlet:
         try:
             if not self.gone:
                 self._stream.flush()
-        except (OSError, ValueError):  # ValueError: it was closed here
+        except (OSError, ValueError):  # ValueError: the stream is closed
             self._lose()
 
     def _lose(self) -> None:
         self.gone = True
-        with contextlib.suppress(OSError, ValueError):  # what waits in the buffer would fail again at exit
+        with contextlib.suppress(OSError, ValueError):  # else the buffer would fail again at exit
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, self._stream.fileno())
             os.close(nowhere)

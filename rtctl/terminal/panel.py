@@ -1,7 +1,7 @@
-"""The panel of a running machine, for whatever width and height the terminal has.
+"""Panel of a running machine, for any width and height of the terminal.
 
 From top to bottom: state lamp and clock, trip, signals against their references and limits, timing, sparklines, rows.
-Where there is little room the less important goes: columns and parts of a line first, then lines.
+In little room the less important is left out: columns and parts of a line first, then lines.
 """
 
 import textwrap
@@ -16,22 +16,22 @@ from rtctl.terminal.spark import WINDOW, Peaks, sparkline
 from rtctl.terminal.traces import Traces
 from rtctl.terminal.view import STYLE, Quantity, number, quantities, shown
 
-WIDEST = 110  # cells; beyond, the eye loses the line
-LABEL = 10
+WIDEST = 110  # cells; longer lines are hard to read
+LABEL = 10  # cells
 BAR = 21  # cells between the limits of an output
 CELLS = {"label": LABEL, "measured": 10, "unit": 3, "error": 10, "reference": 11, "bar": BAR + 2}
-ORDER = ("label", "measured", "unit", "error", "reference", "bar")  # from the one that stays the longest
+ORDER = ("label", "measured", "unit", "error", "reference", "bar")  # from the most important to the least
 
 
 class Line(NamedTuple):
-    rank: int  # 0 stays the longest
+    rank: int  # 0 is left out last
     text: Text
 
 
 class Panel:
-    """One picture of a machine. `status` is the reply of that command, `law` the settings of the law, `left` s to go.
+    """One frame of a machine. `status` is the reply of that command, `law` the law's settings, `left` the time left, s.
 
-    `gone` is told instead of the time where the daemon no longer answers: what is shown is then old.
+    Where the daemon no longer answers, the text `gone` replaces the time, and the values shown are old.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Panel:
             yield line.text
 
     def lines(self, width: int, ascii_only: bool) -> Iterator[Line]:
-        """All lines for a terminal of `width` cells; whoever draws them leaves out those of the highest rank."""
+        """All lines for a terminal of `width` cells; the drawing leaves out those of the highest rank."""
         self._dots = "..." if ascii_only else "…"
         self._ascii = ascii_only
         self._width = width
@@ -95,7 +95,7 @@ class Panel:
         return Line(0, fit(parts, self._width, self._dots))
 
     def _trip(self) -> Iterator[Line]:
-        """The cause is never cut: it takes as many lines as it needs, broken between words."""
+        """Lines of the trip, wrapped between words; its cause is never cut."""
         trip = self.status["trip"]
         if not trip:
             return
@@ -108,7 +108,7 @@ class Panel:
         found = quantities(self.status["signals"], self.traces.units, self.law)
         kept = columns(CELLS, ORDER, self._width)
         if "measured" not in kept:
-            return  # half a number is worse than none
+            return  # a cut number misleads
         if found:
             yield Line(6, self._row({"measured": "measured", "reference": "reference", "error": "error"}, kept, "dim"))
         for q in found:
@@ -140,7 +140,7 @@ class Panel:
         return row
 
     def _bar(self, value: float, low: float, high: float) -> Text:
-        """Where an output stands between its limits, from zero on; red at a limit."""
+        """Bar of an output between its limits, starting at zero; red at a limit."""
         at = [min(max(round((x - low) / (high - low) * (BAR - 1)), 0), BAR - 1) for x in (0.0, value)]
         full, zero = ("#", "|") if self._ascii else ("█", "┃")
         cells = [full if min(at) <= n <= max(at) else " " for n in range(BAR)]
@@ -201,7 +201,7 @@ def _within(limits: tuple[float, float], ascii_only: bool) -> str:
 
 
 def _times(us: dict[str, float], period: float | None) -> list[Part]:
-    """Percentiles; the largest stays the longest, since it is what costs a tick."""
+    """Parts with percentiles in us; the maximum is left out last, because it costs ticks."""
     of = "" if period is None else f"of {period:g} us"
     return [
         Part(3, f"p50 {_us(us['p50'])}"),

@@ -1,7 +1,7 @@
-"""A picture that is kept at the bottom of the terminal, with messages and log lines scrolling by above it.
+"""Picture at the bottom of the terminal, with messages and log lines scrolling above it.
 
-A thread of its own draws, the newest picture only: a terminal that is stopped with Ctrl-S, or hangs on a slow line,
-costs pictures and never holds up whoever shows them.
+A separate thread draws only the newest picture: a terminal that is stopped with Ctrl-S or slow loses pictures and never
+delays the caller.
 """
 
 import contextlib
@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-PATIENCE = 2.0  # s that the end waits for a terminal that takes nothing
-LINES = 1000  # that wait for such a terminal; then the oldest are lost
+PATIENCE = 2.0  # s, longest wait at the end for a blocked terminal
+LINES = 1000  # lines kept for a blocked terminal; the oldest are dropped
 
 
 def takes_pictures(console: Console) -> bool:
@@ -24,11 +24,11 @@ def takes_pictures(console: Console) -> bool:
 
 
 class Screen:
-    """`show` and `say` return at once. As a file it takes the lines of a log. Leaving it takes the picture away."""
+    """Context of a picture, removed at the end; `show` and `say` return at once. As a file it takes log lines."""
 
     def __init__(self, console: Console, first: Any = ""):
         self._console = console
-        self._changed = threading.Condition()  # guards what follows; never held while drawing
+        self._changed = threading.Condition()  # guards the attributes below; never held while drawing
         self._picture = first
         self._fresh = False
         self._lines: deque[Text] = deque(maxlen=LINES)
@@ -46,13 +46,13 @@ class Screen:
         self._thread.join(PATIENCE)
 
     def show(self, picture: Any) -> None:
-        """Draw this instead of the last one."""
+        """Replace the picture."""
         with self._changed:
             self._picture, self._fresh = picture, True
             self._changed.notify()
 
     def say(self, text: Text) -> None:
-        """A line above the picture, there to stay."""
+        """Print a line above the picture."""
         with self._changed:
             self._lines.append(text)
             self._changed.notify()
@@ -63,7 +63,7 @@ class Screen:
         return len(text)
 
     def flush(self) -> None:
-        """Nothing waits here that the thread would not take."""
+        """Nothing to do: the thread prints all lines."""
 
     def _run(self) -> None:
         with contextlib.suppress(OSError, SystemExit):  # the terminal is gone; rich exits on a broken pipe

@@ -1,6 +1,6 @@
-"""Peaks of a signal over the last seconds, and the row of small bars that shows them.
+"""Peaks of a signal over the last seconds, and their sparkline.
 
-A bar is as high as the largest value of its stretch of time, so that one bad tick of ten thousand is seen.
+A bar shows the largest value of its interval, so that one bad tick of ten thousand is visible.
 """
 
 import itertools
@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 
 WINDOW = 30.0  # s of the machine's clock
-STRETCH = 0.1  # s, the finest bar
+STRETCH = 0.1  # s, interval of the finest bar
 BARS = " ▁▂▃▄▅▆▇█"
 ASCII_BARS = " .:-=+*#@"
 
@@ -18,17 +18,17 @@ class Peaks:
 
     def __init__(self) -> None:
         self._peaks = np.full(round(WINDOW / STRETCH), np.nan)
-        self._newest = -1  # number of the newest stretch, counted from t = 0
+        self._newest = -1  # number of the newest interval, counted from t = 0
 
     def feed(self, t: np.ndarray, values: np.ndarray) -> None:
-        """Take in `values` at the times `t`, s, oldest first; what is not finite is passed over."""
+        """Add `values` at the times `t`, s, oldest first; non-finite values are skipped."""
         size = np.abs(np.asarray(values, float))
         known = np.isfinite(size) & np.isfinite(t)
         if not known.any():
             return
         stretch = np.floor(np.asarray(t, float)[known] / STRETCH + 1e-6).astype(np.int64)
         last = int(stretch[-1])
-        if last < self._newest:  # the clock of a machine that was started again
+        if last < self._newest:  # the clock of a restarted machine
             self.clear()
         kept = stretch > last - len(self._peaks)
         fresh = np.arange(max(self._newest + 1, last - len(self._peaks) + 1), last + 1)
@@ -45,11 +45,11 @@ class Peaks:
 
     @property
     def peak(self) -> float:
-        """The largest of the window; NaN where nothing is known."""
+        """Largest peak of the window; NaN where none is known."""
         return float(np.fmax.reduce(self._peaks))
 
     def bars(self, count: int) -> np.ndarray:
-        """The window as `count` peaks, oldest first; NaN where nothing is known."""
+        """The window as `count` peaks, oldest first, (count,) or fewer; NaN where none is known."""
         if self._newest < 0:
             return np.full(count, np.nan)
         ordered = np.roll(self._peaks, -(self._newest + 1) % len(self._peaks))
@@ -60,7 +60,7 @@ class Peaks:
 
 
 def sparkline(values: np.ndarray, top: float, ascii_only: bool = False) -> str:
-    """One character a value; `top` is a full bar, unknown is a blank, and what is known has at least the lowest bar."""
+    """Text with one character a value: `top` is a full bar, NaN a blank, any other value at least the lowest bar."""
     bars = ASCII_BARS if ascii_only else BARS
     scale = (len(bars) - 2) / top if top > 0 else 0.0
     return "".join(bars[0] if v != v else bars[1 + min(int(v * scale + 0.5), len(bars) - 2)] for v in values)

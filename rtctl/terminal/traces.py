@@ -1,4 +1,4 @@
-"""The last half minute of a running machine, for the sparklines: every row where we can read its ring."""
+"""Signals of the last half minute of a running machine, for the sparklines; every row where its ring can be read."""
 
 import contextlib
 from typing import Any
@@ -13,8 +13,8 @@ from rtctl.terminal.view import error_name
 class Traces:
     """Tracking error and lateness over time. `signals` is the reply of the command of that name.
 
-    Without a ring of this machine and this user, the daemon is elsewhere: then one row for each status is all there is,
-    and `sampled` is true.
+    The ring of a daemon on another computer or of another user cannot be read. Then each status gives one row, and
+    `sampled` is true.
     """
 
     def __init__(self, signals: dict[str, Any]):
@@ -31,11 +31,11 @@ class Traces:
 
     @property
     def filled(self) -> float | None:
-        """Share of the ring that waits for the supervisor; None where it is out of sight."""
+        """Share of the ring that waits for the supervisor, 0 to 1; None where the ring cannot be read."""
         return None if self._tap is None else self._tap.filled
 
     def update(self, row: dict[str, float]) -> None:
-        """Take in what has come since; `row` is the newest, as the status has it."""
+        """Add the rows since the last call; `row` is the newest row in the status."""
         names = [name for name in ("t", "lateness", self.error_name) if name in self.units]
         if self._tap is not None:
             rows: Any = self._tap.take(names)

@@ -1,4 +1,4 @@
-"""What is shown of a machine, whichever it is: by names and units of its signals, and the settings of its law."""
+"""Quantities to show of any machine, chosen by names and units of its signals and by the settings of its law."""
 
 import re
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ STYLE = {"idle": "reverse", "armed": "black on yellow", "running": "black on gre
 
 
 class Quantity(NamedTuple):
-    """One line of the table: in `unit`; None where there is nothing of the kind."""
+    """One line of the table, in `unit`; None for a value that does not exist."""
 
     label: str
     unit: str
@@ -22,17 +22,17 @@ class Quantity(NamedTuple):
 
 
 def error_name(units: Mapping[str, str]) -> str | None:
-    """The signal that is the tracking error, such as capstan_error."""
+    """Name of the signal with the tracking error, such as capstan_error; None without one."""
     return next((name for name in units if name.endswith("_error") and not name.startswith("truth_")), None)
 
 
 def shown(value: float, unit: str) -> tuple[float, str]:
-    """A value in the unit that people read it in: metres as millimetres."""
+    """Value and unit for display: metres become millimetres."""
     return (1000.0 * value, "mm") if unit == "m" else (value, unit)
 
 
 def number(value: float | None, unit: str) -> str:
-    """With a sign and as many decimals as the unit deserves, so that a column does not jump."""
+    """Text of a value with its sign and a fixed number of decimals for the unit."""
     if value is None:
         return ""
     text = f"{value:+.{DECIMALS.get(unit, 4)}f}"
@@ -40,7 +40,7 @@ def number(value: float | None, unit: str) -> str:
 
 
 def quantities(signals: Mapping[str, float], units: Mapping[str, str], law: Mapping[str, Any]) -> list[Quantity]:
-    """Motion against its reference, tensions against theirs, outputs against their limits."""
+    """Quantities of motion and tensions with their references, and of outputs with their limits."""
     found = []
     error = error_name(units)
     if error is not None and error in signals:
@@ -69,7 +69,7 @@ def _limits(law: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def plain(status: Mapping[str, Any], units: Mapping[str, str], left: float | None = None) -> str:
-    """One line without control characters: for a pipe, a file, a dumb terminal."""
+    """Line of a status without control characters, for a pipe, a file or a dumb terminal."""
     t = status["signals"].get("t", 0.0)
     words = [f"{status['name']}  {t:7.1f} s  {status['state']}  {status['rate_hz']:g} Hz  missed {status['missed']}"]
     if status["mode"] == "real":

@@ -1,4 +1,4 @@
-"""`rtctl status --watch`: the panel of a running machine, until Ctrl-C, and through an end and a new start of it."""
+"""`rtctl status --watch`: the panel of a running machine until Ctrl-C, also across a restart of the daemon."""
 
 import time
 from typing import Any
@@ -13,11 +13,11 @@ from rtctl.terminal.screen import takes_pictures
 from rtctl.terminal.traces import Traces
 from rtctl.terminal.view import plain
 
-LOOK = 0.25  # s between two looks for a daemon that has gone
+LOOK = 0.25  # s between two attempts to find a daemon that has ended
 
 
 class Watch:
-    """Asks the daemon of `client` for one picture after the other. `found` is its first status."""
+    """Repeated display of a daemon's status; `found` is its first status."""
 
     def __init__(self, client: Any, found: dict[str, Any], console: Console):
         self.client, self.console = client, console
@@ -27,7 +27,7 @@ class Watch:
         self.gone = ""
 
     def run(self, every: float) -> None:
-        """Show until Ctrl-C, a picture each `every` s, or plain lines where the cursor cannot be moved."""
+        """Show a frame each `every` s until Ctrl-C, or plain lines where the cursor cannot be moved."""
         try:
             if takes_pictures(self.console):
                 self._pictures(every)
@@ -61,7 +61,7 @@ class Watch:
         return Panel(self.found, self.law, self.traces, gone=self.gone)
 
     def _look(self) -> None:
-        """A new status, or what is wrong with getting one."""
+        """Fetch a new status, or set `gone` to the reason why there is none."""
         name = self.found["name"]
         if not listens(self.client.endpoint):
             self.gone = f"{name} has ended; waiting for it to come back, Ctrl-C ends"

@@ -7,7 +7,7 @@ from rtctl.config.errors import UserError
 
 def test_a_tolerance_of_no_value_is_told_with_the_nearest_path():
     read = read_case(case_of(BELT, tolerance={"default": 0.1, "bodies.moter.dry": 0.1}), "bench")
-    assert any("speaks of no value of the machine" in w and "bodies.motor.dry" in w for w in read.warnings)
+    assert any("names no value of the machine" in w and "bodies.motor.dry" in w for w in read.warnings)
 
 
 @pytest.mark.parametrize(

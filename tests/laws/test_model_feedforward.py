@@ -64,7 +64,7 @@ def test_a_body_that_there_is_not_is_told(belt):
 
 def test_an_effect_that_neither_pushes_nor_changes_a_command_is_refused(belt):
     scale = {"term": "sensor.scale", "node": "encoder", "relative": 0.01}
-    with pytest.raises(Exception, match="neither pushes nor changes a command"):
+    with pytest.raises(Exception, match="neither adds a force nor changes a command"):
         set_paths(belt, {"law.compensation.feedforward": {"effects": [{"effect": scale}]}})
 
 

@@ -147,7 +147,7 @@ def test_the_command(recorded, copy, tmp_path, capsys):
     assert not said["identical"] and said["differences"][0]["tick"] == 1700
     picture = tmp_path / "gain.png"
     assert main(["replay", str(recorded), "--set", f"{GAIN}=11", "--plot", str(picture)]) == 0
-    assert "what the machine answered is as it was recorded" in capsys.readouterr().out
+    assert "the measurements are as recorded" in capsys.readouterr().out
     assert picture.stat().st_size > 10_000
     assert main(["replay", str(recorded), "--set", "gain"]) == 2
     assert main(["replay", str(recorded), "--set", "law.position.gian=3"]) == 2

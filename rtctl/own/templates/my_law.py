@@ -5,8 +5,8 @@
 
 e is the position error in rad, u the command in V; d is the derivative of e in rad/s. A tick takes dt s.
 
-The arguments of `step` behind p and s name the signals that it gets: e, and any of x, v, ref, v_ref, a_ref, u
-(`rtctl check` tells what each machine has). Limits and trips lie behind this law: it cannot get around them.
+The arguments of `step` after p and s select its signals by name: e, and any of x, v, ref, v_ref, a_ref, u.
+`rtctl check` reports a name that the machine does not have. Limits and trips act after this law; it cannot bypass them.
 """
 
 from math import exp, pi
@@ -16,7 +16,7 @@ from rtctl.idiom import Settings, quantity, state, tick
 
 
 class MyLawSettings(Settings):
-    """What a person writes in the config."""
+    """Settings in the config."""
 
     gain: float = quantity(unit="V/rad", ge=0, help="proportional gain")
     tau_d: float = quantity(0.0, unit="s", ge=0, help="derivative time")
@@ -24,7 +24,7 @@ class MyLawSettings(Settings):
 
 
 class MyLawParams(NamedTuple):
-    """What a tick needs of it."""
+    """Params of a tick."""
 
     gain: float  # V/rad
     tau_d: float  # s
@@ -36,7 +36,7 @@ MY_LAW_STATE = state(e=float, d=float, primed=int)  # error, its filtered deriva
 
 
 def build(settings: MyLawSettings, dt: float) -> MyLawParams:
-    """Params for a tick of `dt` s; the only road from settings to params. A ValueError refuses settings."""
+    """Params for a tick of `dt` s, made of the settings here only. A ValueError refuses settings."""
     a = 1.0 - exp(-2 * pi * settings.derivative_filter * dt)
     return MyLawParams(settings.gain, settings.tau_d, a, dt)
 
@@ -54,6 +54,6 @@ def step(p, s, e):
 
 @tick
 def reset(p, s):
-    """The outputs come on: forget the past, so that the first step has no derivative."""
+    """Reset the state when outputs come on, so that the first step has no derivative."""
     s.d = 0.0
     s.primed = 0

@@ -6,8 +6,8 @@ u in V, x in m, v in m/s. Exact for a voltage that is held over a substep of h s
 
     v+ = a v + (1 - a) K u / F_v        a = exp(-F_v h / M)
 
-Between the voltages of the board and what its sensors see: the board, its converters and its counters are emulated
-around it. `step` gets u and leaves x in its state, for the encoder to count.
+The board, its converters, counters and sensors are emulated around this file. `step` gets the voltage u of the board
+and leaves x in its state, for the encoder to count.
 """
 
 from math import exp
@@ -17,7 +17,7 @@ from rtctl.idiom import Settings, quantity, state, tick
 
 
 class MyPlantSettings(Settings):
-    """What a person writes in the config."""
+    """Settings in the config."""
 
     M: float = quantity(95.0, unit="kg", gt=0, help="moving mass")
     K: float = quantity(35.0, unit="N/V", gt=0, help="force per volt")
@@ -25,11 +25,11 @@ class MyPlantSettings(Settings):
 
 
 class MyPlantParams(NamedTuple):
-    """What a substep needs of it."""
+    """Params of a substep."""
 
     h: float  # s
-    a: float  # share of the speed that is left after a substep
-    gain: float  # m/s per V, in the long run
+    a: float  # share of the speed that remains after a substep
+    gain: float  # m/s per V, in steady state
     tau: float  # s
 
 
@@ -37,14 +37,14 @@ MY_PLANT_STATE = state(x=float, v=float)  # m, m/s; `x` is what the encoder coun
 
 
 def build(settings: MyPlantSettings, h: float) -> MyPlantParams:
-    """Params for substeps of `h` s; the only road from settings to params."""
+    """Params for substeps of `h` s, made of the settings here only."""
     tau = settings.M / settings.F_v
     return MyPlantParams(h, exp(-h / tau), settings.K / settings.F_v, tau)
 
 
 @tick
 def start(p, s):
-    """At rest."""
+    """Set the state to rest."""
     s.x = 0.0
     s.v = 0.0
 

@@ -6,8 +6,8 @@ u1 and u2 in V, phi in rad, w in rad/s. Exact for voltages that are held over a 
 
     w+ = a w + (1 - a) K (u1 - u2) / B        a = exp(-B h / J)
 
-Between the voltages of the board and what its sensors see: the board, its converters and its counters are emulated
-around it. `step` gets u1 and u2 and leaves in its state the angles `capstan`, `reel1` and `reel2` in rad.
+The board, its converters, counters and sensors are emulated around this file. `step` gets the voltages u1 and u2 of the
+board and leaves in its state the angles `capstan`, `reel1` and `reel2` in rad.
 """
 
 from math import exp
@@ -17,9 +17,9 @@ from rtctl.idiom import Settings, quantity, state, tick
 
 
 class MyPlantSettings(Settings):
-    """What a person writes in the config."""
+    """Settings in the config."""
 
-    J: float = quantity(1.8e-3, unit="kg*m^2", gt=0, help="inertia of all that turns, as the capstan feels it")
+    J: float = quantity(1.8e-3, unit="kg*m^2", gt=0, help="total inertia, referred to the capstan")
     K: float = quantity(5e-3, unit="Nm/V", gt=0, help="torque at the capstan per volt of one motor")
     B: float = quantity(2e-3, unit="Nm*s/rad", gt=0, help="viscous friction at the capstan")
     R_c: float = quantity(12.5e-3, unit="m", gt=0, help="radius of the capstan")
@@ -28,11 +28,11 @@ class MyPlantSettings(Settings):
 
 
 class MyPlantParams(NamedTuple):
-    """What a substep needs of it."""
+    """Params of a substep."""
 
     h: float  # s
-    a: float  # share of the speed that is left after a substep
-    gain: float  # rad/s per V, in the long run
+    a: float  # share of the speed that remains after a substep
+    gain: float  # rad/s per V, in steady state
     tau: float  # s
     ratio1: float  # turns of a reel per turn of the capstan
     ratio2: float
@@ -42,7 +42,7 @@ MY_PLANT_STATE = state(capstan=float, reel1=float, reel2=float, w=float)  # rad,
 
 
 def build(settings: MyPlantSettings, h: float) -> MyPlantParams:
-    """Params for substeps of `h` s; the only road from settings to params."""
+    """Params for substeps of `h` s, made of the settings here only."""
     tau = settings.J / settings.B
     ratios = settings.R_c / settings.R1, -settings.R_c / settings.R2
     return MyPlantParams(h, exp(-h / tau), settings.K / settings.B, tau, *ratios)
@@ -50,7 +50,7 @@ def build(settings: MyPlantSettings, h: float) -> MyPlantParams:
 
 @tick
 def start(p, s):
-    """At rest."""
+    """Set the state to rest."""
     s.capstan = 0.0
     s.reel1 = 0.0
     s.reel2 = 0.0

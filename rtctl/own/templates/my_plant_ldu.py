@@ -7,8 +7,8 @@ Exact for a voltage that is held over a substep of h s:
 
     v+ = a v + (1 - a) K u / F_v        a = exp(-F_v h / M)
 
-Between the voltages of the board and what its sensors see: the board, its converters and its counters are emulated
-around it. `step` gets u and leaves in its state `encoder` in rad and `scale` in m, for the sensors to count.
+The board, its converters, counters and sensors are emulated around this file. `step` gets the voltage u of the board
+and leaves in its state `encoder` in rad and `scale` in m, for the sensors to count.
 """
 
 from math import exp
@@ -18,20 +18,20 @@ from rtctl.idiom import Settings, quantity, state, tick
 
 
 class MyPlantSettings(Settings):
-    """What a person writes in the config."""
+    """Settings in the config."""
 
-    M: float = quantity(47.0, unit="kg", gt=0, help="moving mass, as the carriage feels it")
+    M: float = quantity(47.0, unit="kg", gt=0, help="moving mass, referred to the carriage")
     K: float = quantity(14.0, unit="N/V", gt=0, help="force per volt")
     F_v: float = quantity(5.0, unit="N*s/m", gt=0, help="viscous friction")
     R_c: float = quantity(3e-3, unit="m", gt=0, help="radius of the capstan")
 
 
 class MyPlantParams(NamedTuple):
-    """What a substep needs of it."""
+    """Params of a substep."""
 
     h: float  # s
-    a: float  # share of the speed that is left after a substep
-    gain: float  # m/s per V, in the long run
+    a: float  # share of the speed that remains after a substep
+    gain: float  # m/s per V, in steady state
     tau: float  # s
     R_c: float  # m
 
@@ -40,14 +40,14 @@ MY_PLANT_STATE = state(encoder=float, scale=float, v=float)  # rad, m, m/s; `v` 
 
 
 def build(settings: MyPlantSettings, h: float) -> MyPlantParams:
-    """Params for substeps of `h` s; the only road from settings to params."""
+    """Params for substeps of `h` s, made of the settings here only."""
     tau = settings.M / settings.F_v
     return MyPlantParams(h, exp(-h / tau), settings.K / settings.F_v, tau, settings.R_c)
 
 
 @tick
 def start(p, s):
-    """At rest."""
+    """Set the state to rest."""
     s.encoder = 0.0
     s.scale = 0.0
     s.v = 0.0

@@ -14,9 +14,9 @@ from rtctl.plants.physics import Term, stand
 
 
 class MyTermSettings(Settings):
-    """What a person writes in the list `physics` of a plant."""
+    """Settings in the list `physics` of a plant."""
 
-    term: Literal["my_term"] = "my_term"  # in a config it is the file: ./my_term.py:MyTerm
+    term: Literal["my_term"] = "my_term"  # in a config the file: ./my_term.py:MyTerm
     node: str
     c: float = quantity(unit="", ge=0, le=1e4, help="drag at a speed of one, by the node's own unit")
 
@@ -26,7 +26,7 @@ class MyTermParams(NamedTuple):
 
 
 def build(settings: MyTermSettings, h: float) -> MyTermParams:
-    """Params for substeps of `h` s: there is nothing to discretise."""
+    """Params for substeps of `h` s; nothing is discretised."""
     return MyTermParams(settings.c)
 
 

@@ -1,4 +1,4 @@
-"""`pytest` in this folder. Compiled code takes a named tuple and a record of numpy as well as those of the tick."""
+"""Run `pytest` in this folder. Compiled code takes a named tuple and a numpy record here, as in the tick."""
 
 import my_law
 import numpy as np
@@ -8,7 +8,7 @@ DT = 0.002  # s
 
 
 def commands(errors, **settings):
-    """What the law gives for a series of errors in rad, V."""
+    """Commands of the law in V for a series of errors in rad."""
     p = my_law.build(my_law.MyLawSettings(**{"gain": 30.0, **settings}), DT)
     s = np.zeros(1, my_law.MY_LAW_STATE)[0]
     my_law.reset(p, s)

@@ -1,4 +1,4 @@
-"""`pytest` in this folder."""
+"""Run `pytest` in this folder."""
 
 import my_term
 import pytest
