@@ -57,9 +57,9 @@ def number(value: float, span: float) -> str:
 
 
 def ends(values: np.ndarray) -> tuple[float, float]:
-    """Lowest and highest value; 1 apart where all values are equal."""
+    """Lowest and highest value; 1 apart where all values are equal, to the least number with all its digits."""
     low, high = float(values.min()), float(values.max())
-    return (low, high) if high > low else (low - 0.5, high + 0.5)
+    return (low, high) if high - low >= np.finfo(float).tiny else (low - 0.5, high + 0.5)
 
 
 def sizes(curve: Any) -> str:
