@@ -52,7 +52,7 @@ class Frf(NamedTuple):
         return self._replace(f=self.f[keep], H=self.H[keep], sd=self.sd[keep])
 
     def without_drive(self, config: Any) -> "Frf":
-        """H per ampere: the drive of the config divided out (thesis 8.1). Raises UserError where this was done before."""
+        """H per ampere: the drive of the config divided out (thesis 8.1). Raises UserError the second time."""
         if self.per_ampere:
             raise UserError("the drive is divided out already")
         D = drive(config, self.f)
