@@ -1,1 +1,1 @@
-"""The experiments and designs of the thesis done again on the emulated machines, its numbers beside ours."""
+"""Reproduction of the experiments and designs of the thesis on the emulated machines, with a comparison of numbers."""

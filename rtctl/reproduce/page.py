@@ -1,4 +1,4 @@
-"""The page: one table a chapter, thesis beside measured, what is to be said of the rows, and the figures."""
+"""Reproduction page: one table for each chapter with thesis and measured values, notes on rows, and figures."""
 
 import textwrap
 from collections import Counter
@@ -60,7 +60,7 @@ is there; it does not show again what the real machines had.
 COLUMNS = ("name", "quantity", "thesis", "measured", "tolerance", "", "source")
 WITH = ("name", "law", "parameter set", "filter", "text of the thesis")
 
-ERRATA = (  # errata of the thesis without a number: section, its words, what is right
+ERRATA = (  # errata of the thesis without a number: section, printed words, correction
     ("12.1", r"-\frac{b_c + N^2b_m}{J_t}", "b_m is b_s, in appendix F too"),
     ("Appendix F", "0 & 1 & 0 & 0 & 0 & 0 & 0 & 0 & 0", "A, B and C have a ninth column for eight states"),
     ("Appendix A", "$c_{m1} = c_{m2}$	8.0e1	1.2e1	torsion spring constant motor shaft	[Nm]",
@@ -70,14 +70,14 @@ ERRATA = (  # errata of the thesis without a number: section, its words, what is
 
 
 def write(results: Sequence[Result], out: Path) -> Path:
-    """Write the page into the folder `out` and return its path. Raises OSError where that cannot be."""
+    """Write the page into the folder `out`; returns its path. Raises OSError where the write fails."""
     path = out / PAGE
     write_text(path, text(results))
     return path
 
 
 def text(results: Sequence[Result]) -> str:
-    """The page of these results."""
+    """Markdown text of the page."""
     parts = [HEAD.format(words=_wrapped(summary([row for result in results for row in result.rows])))]
     for chapter, group in groupby(results, key=lambda result: result.chapter):
         parts.append(_chapter(chapter, list(group)))
@@ -85,7 +85,7 @@ def text(results: Sequence[Result]) -> str:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """How many rows have which verdict, in two sentences."""
+    """Numbers of rows by verdict, in two sentences."""
     count = Counter(row.verdict for row in rows)
     bare, some = sum(row.thesis is None for row in rows), "row" if len(rows) == 1 else "rows"
     text = (
@@ -146,13 +146,13 @@ def _note(row: Row) -> str:
 
 
 def value(x: float, unit: str) -> str:
-    """A number with its unit, to four digits."""
+    """Text of a number with unit, to four digits."""
     number = f"{x:.4g}" if x == 0 or 1e-3 <= abs(x) < 1e5 else f"{x:.3g}"
     return f"{number} {unit}".rstrip()
 
 
 def tolerance(row: Row) -> str:
-    """The tolerance in words: 3 %, 0.5 Hz, at least, at most."""
+    """Text of the tolerance: 3 %, 0.5 Hz, at least, at most."""
     size = ""
     if row.tolerance:
         size = f"{100 * row.tolerance:g} %" if row.relative else value(row.tolerance, row.unit)
