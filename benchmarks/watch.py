@@ -197,7 +197,7 @@ def main() -> None:
         "noticed_share": sum(t["noticed"] for t in tried) / len(tried) if tried else None,
         "median_delay_s": statistics.median(delays) if delays else None,
         "core_share_500hz": share(slow, usual(slow), 120.0),
-        "core_share_10khz": share(fast, usual(fast)._replace(jumps=0.0), 30.0),  # without jumps: a jump of 20 mm trips the machine
+        "core_share_10khz": share(fast, usual(fast)._replace(jumps=0.0), 30.0),  # a 20 mm jump trips the machine
         "lateness_ratio": lateness(given.rounds, 20.0) if given.rounds else None,
         "machine": given.machine, "days": len(per_day), "trials": len(tried),
     }  # fmt: skip
