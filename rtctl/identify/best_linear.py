@@ -67,7 +67,7 @@ def identify(sources: Sequence[Any] | Any, band: tuple[float, float] | None = No
     parts = [_realisation(record, n, motor) for record in records]
     if len(parts) < 2:
         raise NoAnswer(
-            f"{records[0].source}: one realisation does not tell distortion from the response; record at least two, "
+            f"{records[0].source}: one realisation does not separate distortion from the response; record at least two "
             "with another excitation.seed each"
         )
     f, on = parts[0].f, parts[0].excited
@@ -196,7 +196,7 @@ def _carried(record: Record, frf: Frf, band: tuple[float, float] | None) -> np.n
     bad = np.flatnonzero(inside & ~good)
     if (band is not None and len(bad) > 0.05 * inside.sum()) or (good & inside).sum() < 5:
         raise NoAnswer(
-            f"{record.source}: the response is not known to within a half from {frf.f[bad[0]]:.3g} to "
+            f"{record.source}: the deviation of the response is above 50 % from {frf.f[bad[0]]:.3g} to "
             f"{frf.f[bad[-1]]:.3g} Hz; take more excitation, more periods or more realisations"
         )
     return inside & good

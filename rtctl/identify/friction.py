@@ -143,7 +143,7 @@ def _turns(record: Record, turns: float, refused: list[str]) -> list[tuple[np.nd
         moved = direction * np.diff(angle[pieces])
         if moved.std() > UNEVEN * moved.mean():
             v = direction * to_go[edges[0] - begin] / (t[edges[-1] - 1] - t[edges[0]])
-            refused.append(f"{v:+.3g} rad/s at {t[edges[0]]:.2f} s: it sticks and slips, which is no constant velocity")
+            refused.append(f"{v:+.3g} rad/s at {t[edges[0]]:.2f} s: stick-slip instead of constant velocity")
             continue
         found.append((edges, direction))
     return found
@@ -249,7 +249,7 @@ def split(records: Sequence[Record], turns: float = 12.0) -> Split:
     M: np.ndarray = np.array(rows).reshape(-1, 3)
     F = np.array(forces)
     if len(M) < 4 or np.linalg.cond(M / np.abs(M).max(axis=0)) > ALIKE:
-        raise NoAnswer(f"{len(records)} records have reels too alike to tell the friction of the two motors apart")
+        raise NoAnswer(f"{len(records)} records have reels too alike to separate the friction of the two motors")
     tau = np.linalg.lstsq(M, F, rcond=None)[0]
     variance = float(np.sum((F - M @ tau) ** 2)) / (len(F) - 3)
     half = 2.0 * np.sqrt(np.diag(np.linalg.inv(M.T @ M)) * variance)

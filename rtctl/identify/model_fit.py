@@ -93,8 +93,8 @@ def fit(
     lines = sum(len(frf.f) for frf in kept)
     if 2 * lines < 3 * (len(names) + 1):
         raise NoAnswer(
-            f"{lines} lines of the response are carried from {bottom:g} to {top:g} Hz; {len(names) + 1} parameters "
-            f"need {int(np.ceil(1.5 * (len(names) + 1)))} at least"
+            f"{lines} lines of the response are accurate enough from {bottom:g} to {top:g} Hz; {len(names) + 1} "
+            f"parameters need {int(np.ceil(1.5 * (len(names) + 1)))} at least"
         )
     model = Model(config, names)
     dt = kept[0].dt
@@ -201,7 +201,7 @@ def _covariance(J: np.ndarray, names: Sequence[str], late: bool) -> np.ndarray:
     if s[-1] < 1e-9 * s[0]:
         every = (*names, "tau") if late else tuple(names)
         mixed = [name for name, part in zip(every, V[-1], strict=True) if abs(part) > 0.3]
-        raise NoAnswer(f"the response does not carry {' and '.join(mixed)} apart; fix one of them")
+        raise NoAnswer(f"the response does not separate {' and '.join(mixed)}; fix one of them")
     return (V.T / s**2) @ V
 
 
@@ -224,13 +224,13 @@ def _check_known(
     for i, name in enumerate((*names, "tau")[: len(x)]):
         if abs(x[i] - start[i]) > 0.99 * span:
             raise NoAnswer(
-                f"{name} runs to {np.exp(x[i]):.3g}, {SPAN:g} times from where the model has it; the response from "
-                f"{band[0]:g} to {band[1]:g} Hz does not carry it, or is not that of this model"
+                f"{name} runs to {np.exp(x[i]):.3g}, a factor of {SPAN:g} off the model; the response from "
+                f"{band[0]:g} to {band[1]:g} Hz does not determine it, or the model is wrong"
             )
         if wide[i] > VAGUE:
             raise NoAnswer(
-                f"the response from {band[0]:g} to {band[1]:g} Hz does not carry {name}: {np.exp(x[i]):.3g} within a "
-                f"factor of {np.exp(wide[i]):.2g}; widen the band, measure longer, or leave it out"
+                f"the response from {band[0]:g} to {band[1]:g} Hz does not determine {name}: {np.exp(x[i]):.3g} within "
+                f"a factor of {np.exp(wide[i]):.2g}; widen the band, measure longer, or leave it out"
             )
 
 

@@ -169,7 +169,7 @@ def _check_drive(record: Record, stretches: list[slice]) -> None:
             share = len(at) / sum(s.stop - s.start for s in stretches)
             advice = "take a smaller excitation"
             if share > SWINGING:
-                advice = "a loop that is not stable swings like that: lower its gain, or else the excitation"
+                advice = "an unstable loop oscillates like this: lower its gain, then the excitation"
             raise NoAnswer(
                 f"{record.source}: the drive saturates, {name} is {u[at[0]]:.3g} V at {record.t[at[0]]:.3f} s, "
                 f"{len(at)} samples in all; {advice}"
@@ -200,7 +200,7 @@ def _check_sliding(record: Record, stretches: list[slice]) -> None:
         against = np.flatnonzero(speed[s] * (ref[s.stop - 1] - ref[s.start]) < 0)
         if len(against) > TURNING * (s.stop - s.start):
             raise NoAnswer(
-                f"{record.source}: the machine turns back {len(against)} samples long from "
+                f"{record.source}: the machine reverses for {len(against)} samples from "
                 f"{record.t[s.start + against[0]]:.3f} s on, and dry friction with it; take less excitation, more "
                 "speed, or a law that does not raise a resonance"
             )

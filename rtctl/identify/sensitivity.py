@@ -146,8 +146,8 @@ def _carried(
     if band is None:
         if good.sum() < 5:
             raise NoAnswer(
-                f"{record.source}: the coherence is too low from {frf.f[0]:.3g} to {frf.f[-1]:.3g} Hz, H_p is not "
-                "known to within a half anywhere; take more excitation, a longer record or a tighter loop"
+                f"{record.source}: the coherence is too low from {frf.f[0]:.3g} to {frf.f[-1]:.3g} Hz, the "
+                "deviation of H_p is above 50 % everywhere; take more excitation, a longer record or a tighter loop"
             )
         return frf.select(good)
     inside = (frf.f >= band[0]) & (frf.f <= band[1])
@@ -156,8 +156,8 @@ def _carried(
     bad = np.flatnonzero(inside & ~good)
     if len(bad) > 0.05 * inside.sum():
         raise NoAnswer(
-            f"{record.source}: H_p is not carried from {frf.f[bad[0]]:.3g} to {frf.f[bad[-1]]:.3g} Hz: coherence down "
-            f"to {coherence[bad].min():.3f}, |S - 1| as small as {_closeness(frf, bad):.2g} of its own deviation there"
+            f"{record.source}: H_p is too inaccurate from {frf.f[bad[0]]:.3g} to {frf.f[bad[-1]]:.3g} Hz: coherence "
+            f"down to {coherence[bad].min():.3f}, |S - 1| as small as {_closeness(frf, bad):.2g} of its deviation there"
         )
     return frf.select(inside & good)
 

@@ -149,7 +149,7 @@ def recordings(folder: Path) -> list[Path]:
     there = [part.name for part in parts if (part / PARQUET).is_file()]
     if not isinstance(told, list) or [e.get("folder") for e in told if isinstance(e, dict)] != there:
         raise UserError(
-            f"{folder / CASE} lists other parts than are there ({', '.join(there[:20]) or 'none'}); "
+            f"{folder / CASE} lists other parts than the folder holds ({', '.join(there[:20]) or 'none'}); "
             f"run: rtctl trace repair {folder}"
         )
     return [files.inside(folder / name / PARQUET, folder) for name in there]

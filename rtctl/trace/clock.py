@@ -53,8 +53,8 @@ def even_rows(
         k = int(off[0]) + 1
         more = f", as at {len(off) - 1} more places" if len(off) > 1 else ""
         raise UserError(
-            f"{row(k)}: {d[k - 1]:.6g} s after the row before where {usual:.6g} s is usual{more}; --uneven keeps such "
-            "a clock, else lay the rows on an even one first"
+            f"{row(k)}: {d[k - 1]:.6g} s after the row before where {usual:.6g} s is usual{more}; keep an uneven "
+            "clock with --uneven, or resample the rows to an even clock first"
         )
     found = 1.0 / usual
     _agree(found, rate, row, told)
@@ -68,7 +68,7 @@ def increasing(t: np.ndarray, row: Callable[[int], str], hint: bool = False) -> 
         return
     k = int(back[0]) + 1
     more = f" (also at {len(back) - 1} more rows)" if len(back) > 1 else ""
-    ways = "; if its digits are too few for its rows, --rate says how many rows a second there are" if hint else ""
+    ways = "; where its digits are too few, give the rows a second with --rate" if hint else ""
     raise UserError(f"{row(k)}: {t[k]:.9g} s after {t[k - 1]:.9g} s{more}; time should increase{ways}")
 
 
@@ -124,7 +124,7 @@ def _refuse_break(t: np.ndarray, rate: float, row: Callable[[int], str]) -> None
         k = int(off[0])
         raise UserError(
             f"{row(k)}: {t[k]:.9g} s is more than the last digit ({digit:.3g} s) off an even clock of {rate:g} Hz, "
-            "which holds up to there: rows are missing or doubled; lay the rows on an even clock first"
+            "which holds up to there: rows are missing or doubled; repair the rows first"
         )
 
 

@@ -119,8 +119,8 @@ def _foreign(bundle: Bundle, given: dict[str, Any]) -> str:
     words = " ".join(f"--own {shlex.quote(name)}" for name in texts)
     sums = ", ".join(f"{name} {hashlib.sha256(text.encode()).hexdigest()}" for name, text in texts.items())
     return (
-        f"{bundle.folder} was recorded with code of its owner, and rtctl runs no code that comes with data. Read it "
-        f"and give the files by path: rtctl replay {shlex.quote(str(bundle.folder))} {words}; their sha256 has to be "
+        f"{bundle.folder} was recorded with user code, and rtctl never runs code from a bundle. Read the code "
+        f"and give the files by path: rtctl replay {shlex.quote(str(bundle.folder))} {words}; their sha256 must be "
         f"that of the texts in case.json: {sums}"
     )
 

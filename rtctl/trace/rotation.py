@@ -111,7 +111,9 @@ class Parts:
             self._look_on_top()
             wanted = self.folder / self._part.folder.name
             if self._part.follow(wanted) and not self._news:
-                self._news.append(f"{wanted} was taken away while it was recorded: its rows are rescued into it anew")
+                self._news.append(
+                    f"{wanted} was moved or deleted while it was recorded: its rows are rescued into a new one"
+                )
             told, self._news = "; ".join(self._news) or None, []
             return told
 

@@ -63,7 +63,7 @@ def read(path: Path | str, text: TextPlan | None = None) -> Table:
     if path.is_dir():
         raise UserError(f"{path} is a folder; give the file in it, one of {', '.join(READERS)}")
     if not path.is_file():
-        raise UserError(f"{path}: no such file" if not path.exists() else f"{path} is no plain file")
+        raise UserError(f"{path}: no such file" if not path.exists() else f"{path} is no regular file")
     try:
         return _read(path, text or TextPlan(), 0)
     except ModuleNotFoundError as error:
@@ -91,7 +91,7 @@ def _read(path: Path, text: TextPlan, depth: int) -> Table:
     if by_content is None and by_name is None:
         near = nearest(suffix, READERS)
         hint = f"is it a {near}?" if near else "if it is one of these, name it so"
-        raise UserError(f"{path}: cannot import '{suffix}'; what can be is {', '.join(READERS)}; {hint}")
+        raise UserError(f"{path}: cannot import '{suffix}'; importable are {', '.join(READERS)}; {hint}")
     kind = by_content or by_name
     if by_name == "mat_file" and kind == "hdf5_file":
         kind = by_name
@@ -100,7 +100,9 @@ def _read(path: Path, text: TextPlan, depth: int) -> Table:
         table = module.read(path, text)
     elif text.model_fields_set:
         option = sorted(text.model_fields_set)[0].replace("_", "-")
-        raise UserError(f"{path} is read as {str(kind).removesuffix('_file')}, and --{option} is of files of text")
+        raise UserError(
+            f"{path} is read as {str(kind).removesuffix('_file')}, and --{option} applies only to text files"
+        )
     else:
         table = module.read(path)
     if by_name is not None and kind != by_name and not (by_name in TEXT and kind in TEXT):

@@ -147,7 +147,7 @@ def _need(table: Table, named: Mapping[str, ColumnPlan], wanted: Mapping[str, Wa
         taken = {given.column for given in named.values()}
         there = [name for name in table.columns if name not in taken][:20]
         raise UserError(
-            f"{table.path}: no column is '{what.column}' of {what.what}; --map {what.column}=NAME says which, of "
+            f"{table.path}: no column is '{what.column}' of {what.what}; name it with --map {what.column}=NAME, one of "
             f"{', '.join(there) or 'none that is left'}"
         )
 

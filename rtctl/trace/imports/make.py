@@ -202,7 +202,7 @@ def unit_factor(table: Table, name: str, column: str, theirs: str, choices: Sequ
         except ValueError as error:
             first = first or error
     wanted = choices[0] or "a number without unit"
-    given = f"in '{theirs}'" if theirs else "a mere number by the file"
+    given = f"in '{theirs}'" if theirs else "a number without unit"
     raise UserError(
         f"{table.path}: column '{column}' ({name}) is {given}, which is not {wanted}; --unit {name}=... says what it is"
     ) from first
@@ -223,7 +223,7 @@ def clock_of(table: Table, plan: Plan, columns: dict[str, np.ndarray]) -> tuple[
     if "t" not in columns:
         if plan.rate is None:
             raise UserError(
-                f"{table.path}: which column is the time? --map t=NAME says it, or --rate 1000 where none is"
+                f"{table.path}: no time column; name it with --map t=NAME, or give the rate, e.g. --rate 1000"
             )
         return np.arange(n) / plan.rate, plan.rate, []
     t = columns["t"]

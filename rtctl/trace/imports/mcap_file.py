@@ -122,7 +122,9 @@ def _table(path: Path, topics: dict[str, _Topic], notes: list[str], left: dict[s
         units[before + TIME] = "s"
         stamps = [before + key for key, values in found.items() if values.dtype.kind == "m"]
         if stamps:
-            notes.append(f"{', '.join(stamps)} is a time too, of the sender: --map t={stamps[0]} takes it as the clock")
+            notes.append(
+                f"{', '.join(stamps)} is also a time, of the sender; take it as the clock with --map t={stamps[0]}"
+            )
     return Table(
         path, columns, units, clock=TIME if len(topics) == 1 else "", where=lambda row: f"message {row + 1}",
         notes=(*notes, *notes_of(left)), left={**words, **left},

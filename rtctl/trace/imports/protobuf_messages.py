@@ -29,7 +29,7 @@ class ProtobufRows:
         try:
             self._file, self._type = _type(name, descriptor)
         except Exception:  # protobuf raises any type for a damaged descriptor
-            raise UserError(f"{path}: the descriptor of {topic} gives no message {name}; it is damaged") from None
+            raise UserError(f"{path}: the descriptor of {topic} has no message {name}; the file is damaged") from None
         self._told = [_told(self._file, n, field.name) for n, field in enumerate(self._type.DESCRIPTOR.fields)]
 
     def add(self, data: bytes) -> None:
